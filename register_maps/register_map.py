@@ -1,0 +1,154 @@
+"""What a register map is: registers, two blocks, and the error that says what it may not be.
+
+Records only. How a map is read from TOML and what it may not hold is in `parse.py` and `rules.py`;
+how words become values is in `codec.py`. The meaning of each key of a map file is told in `parse.py`.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from register_maps.units import UNITS, Unit
+
+Table = Literal["holding", "input"]
+WordOrder = Literal["ABCD", "CDAB", "BADC", "DCBA"]
+TypeName = Literal["int16", "uint16", "int32", "uint32", "float32", "bits", "enum"]
+Access = Literal["read", "write"]
+
+FIRST_REFERENCE = {"holding": 40001, "input": 30001}
+MOST_READ, MOST_WRITTEN = 125, 123
+LARGEST_FLOAT = 3.4028234663852886e38
+
+
+@dataclass(frozen=True, kw_only=True)
+class RawType:
+    """How a raw value lies in words: `code` is the letter of `struct`, most significant first."""
+
+    words: int
+    code: str
+    low: float
+    high: float
+
+
+TYPES: dict[TypeName, RawType] = {
+    "int16": RawType(words=1, code="h", low=-(2**15), high=2**15 - 1),
+    "uint16": RawType(words=1, code="H", low=0, high=2**16 - 1),
+    "int32": RawType(words=2, code="i", low=-(2**31), high=2**31 - 1),
+    "uint32": RawType(words=2, code="I", low=0, high=2**32 - 1),
+    "float32": RawType(words=2, code="f", low=-LARGEST_FLOAT, high=LARGEST_FLOAT),
+    "bits": RawType(words=1, code="H", low=0, high=2**16 - 1),
+    "enum": RawType(words=1, code="H", low=0, high=2**16 - 1),
+}
+
+
+class MapError(Exception):
+    """A register map that may not be used: where it says what, and what would be right."""
+
+    exit_code = 2
+
+    def __init__(self, *, file: str, line: int, place: str, value: object, expected: str) -> None:
+        self.file, self.line, self.place = file, line, place
+        self.value, self.expected = value, expected
+        shown = " ".join(repr(value).split())
+        super().__init__(f"{file}:{line}: {place} = {shown}: expected {expected}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Register:
+    """One value in the PLC's memory. `scaled` = raw scale + offset, in `unit`; the value is SI.
+
+    address : zero-based address of its first word, as it stands in the request
+    range : lowest and highest scaled value
+    not_available : raw value with which the PLC says that it has no value
+    constant : the only scaled value that it may hold
+    wraps : a counter that runs over the end of its type
+    crc : checksum over the words of the block before it
+    """
+
+    name: str
+    signal: str
+    table: Table
+    address: int
+    type: TypeName
+    word_order: WordOrder
+    scale: float
+    offset: float
+    unit: str
+    range: tuple[float, float]
+    access: Access
+    description: str
+    source: str
+    not_available: int | None = None
+    constant: float | None = None
+    wraps: bool = False
+    crc: Literal["crc32"] | None = None
+
+    @property
+    def raw(self) -> RawType:
+        """Number of words, and what they can hold."""
+        return TYPES[self.type]
+
+    @property
+    def si_unit(self) -> Unit:
+        """How its scaled value becomes SI."""
+        return UNITS[self.unit]
+
+    @property
+    def reference(self) -> int:
+        """Number in the 4xxxx (3xxxx) notation of data sheets."""
+        return FIRST_REFERENCE[self.table] + self.address
+
+    @property
+    def end(self) -> int:
+        """First address after it."""
+        return self.address + self.raw.words
+
+
+@dataclass(frozen=True, kw_only=True)
+class Block:
+    """Adjoining registers that one request carries."""
+
+    table: Table
+    start: int
+    count: int
+
+    @property
+    def end(self) -> int:
+        """First address after it."""
+        return self.start + self.count
+
+    def holds(self, register: Register) -> bool:
+        """Whether the whole of the register lies inside."""
+        return (
+            register.table == self.table
+            and self.start <= register.address
+            and register.end <= self.end
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RegisterMap:
+    """One PLC: registers by address, a block to read and a block to write.
+
+    Compared by identity, so that the codec finds its prepared plan at once; two maps hold the same
+    when their `source_hash` (SHA-256 of the file) is the same.
+    """
+
+    name: str
+    version: int
+    description: str
+    registers: tuple[Register, ...]
+    measurement: Block
+    command: Block
+    source_hash: str
+
+    def register(self, signal: str) -> Register | None:
+        """Register that carries the signal, None: the map has it not."""
+        return next((found for found in self.registers if found.signal == signal), None)
+
+    def modulus(self, signal: str) -> float | None:
+        """Span after which a wrapping counter starts again [SI unit of the signal], None: never."""
+        register = self.register(signal)
+        if register is None or not register.wraps:
+            return None
+        span = (register.raw.high - register.raw.low + 1) * abs(register.scale)
+        return span * register.si_unit.factor
