@@ -1,0 +1,107 @@
+"""The running bench: the model advanced in fixed steps, a few at a time, for the emulator."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+
+from plant_emulator.integrate import CHANNELS
+from plant_emulator.kernel import Kernel, vector
+from plant_emulator.kernel import kernel as default_kernel
+from plant_emulator.log import Array
+from plant_emulator.parameters import ParameterSet
+from plant_emulator.simulate import values_of
+
+STEP = 1e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchSamples:
+    """What the sensors showed at the end of every step, shape (steps,) each, and where it stands.
+
+    wheel_torque : torque of the truck at its wheel incl. the brake's reaction, mean [N m]
+    shell_temperature [K]; motor_angle, drum_angle: since the start [rad]
+    """
+
+    motor_speed: Array
+    drum_speed: Array
+    armature_current: Array
+    armature_voltage: Array
+    shaft_torque: Array
+    wheel_torque: float
+    shell_temperature: float
+    motor_angle: float
+    drum_angle: float
+
+
+class Bench:
+    """Drive, motor, gear and drum at rest, waiting for references.
+
+    effects : effect -> parameter -> value [SI]; gap_position: see `simulate`; step [s]
+    """
+
+    def __init__(
+        self,
+        parameters: ParameterSet,
+        effects: Mapping[str, Mapping[str, float]] | None = None,
+        *,
+        gap_position: float = 0.0,
+        step: float = STEP,
+        kernel: Kernel | None = None,
+    ) -> None:
+        self._kernel = kernel or default_kernel()
+        self._p = self._kernel.parameter_record(values_of(parameters, effects))
+        self._stage = self._kernel.stage_record()
+        self._x = self._kernel.state(self._p, gap_position * self._p.backlash_half_gap)
+        self._work = self._kernel.work()
+        self._history = vector([0.0] * (ceil(self._p.dead_time / step) + 4))
+        self._newest = 0
+        self._step = step
+        self._motor_angle = 0.0
+        self._drum_angle = 0.0
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        return float(self._stage.time)
+
+    def advance(
+        self, references: Sequence[float], *, wheel_torque: float = 0.0, brake_torque: float = 0.0
+    ) -> BenchSamples:
+        """Advance by one step for each reference and return what the sensors showed.
+
+        references : what the PLC asks of the drive at the end of each step, before its dead time,
+            linear between them [rad/s]
+        wheel_torque : the truck's drive at its own wheel [N m]
+        brake_torque : its brake, >= 0, holds a standing drum up to that torque [N m at the wheel]
+        """
+        self._stage.wheel_torque, self._stage.brake_torque = wheel_torque, brake_torque
+        out = np.zeros((len(references), len(CHANNELS)))
+        self._newest = self._kernel.advance(
+            vector([float(r) for r in references]),
+            self._history,
+            self._newest,
+            self._step,
+            self._x,
+            self._work,
+            self._stage,
+            self._p,
+            out,
+        )
+        column = {name: out[:, k] for k, name in enumerate(CHANNELS)}
+        self._motor_angle += float(column["motor_speed"].sum()) * self._step
+        self._drum_angle += float(column["drum_speed"].sum()) * self._step
+        return BenchSamples(
+            motor_speed=column["motor_speed"],
+            drum_speed=column["drum_speed"],
+            armature_current=column["armature_current"],
+            armature_voltage=column["armature_voltage"],
+            shaft_torque=column["shaft_torque"],
+            wheel_torque=float(column["wheel_torque"].mean()),
+            shell_temperature=float(column["shell_temperature"][-1]),
+            motor_angle=self._motor_angle,
+            drum_angle=self._drum_angle,
+        )

@@ -1,0 +1,48 @@
+"""numba, or nothing: compiles the kernel's functions and keeps the result in a cache on disk.
+
+numba's cache knows the file of the function it compiled, not those of its callees, and would run an old
+drive under a new integrator. Hence a cache folder of its own for each state of all the sources.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+ENABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
+
+
+def cache_root() -> Path:
+    """Folder of the compiled kernels: ROADLOAD_CACHE, or the user's cache folder."""
+    given = os.environ.get("ROADLOAD_CACHE")
+    if given:
+        return Path(given)
+    user = os.environ.get("XDG_CACHE_HOME")
+    return (Path(user) if user else Path.home() / ".cache") / "road-load-bench"
+
+
+def use_cache(sources: Sequence[str], names: Sequence[str]) -> None:
+    """Let numba keep what it compiles from now on in the folder of these sources."""
+    if not ENABLED:
+        return
+    import numba
+
+    state = hashlib.sha256(f"{sys.version} {numba.__version__} {list(names)}".encode())
+    for source in sources:
+        state.update(Path(source).read_bytes())
+    numba.config.CACHE_DIR = str(cache_root() / state.hexdigest()[:16])
+
+
+def compiled(function: Callable[..., Any], *, on_disk: bool = False) -> Callable[..., Any]:
+    """The function, compiled at its first call; without compiler the function itself."""
+    if not ENABLED:
+        return function
+    import numba
+
+    # error_model: a division by zero gives infinity instead of a check at every division; the
+    # divisors of the model are sums of positive terms. nogil: simulations run side by side.
+    return numba.njit(cache=on_disk, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]

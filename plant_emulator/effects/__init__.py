@@ -1,0 +1,84 @@
+"""Effects that the nominal model lacks: one file each, found by its name.
+
+An effect is a module with
+
+    SUBSYSTEM    where it sits (contracts: drive, motor, motor_shaft, gear, ...)
+    PARAMETERS   name -> EffectParameter; all at their neutral values = the effect is not there
+    MEMORIES     name -> Memory, if it remembers anything (a lag, a temperature)
+    and one function for each law of `plant_emulator.laws` that it changes, of the law's name:
+    law(value, s, p) -> value, value being what the nominal law and the effects before it gave.
+
+Inside, a parameter is `p.<effect>_<parameter>`, a memory `s.<effect>_<memory>`. At the neutral value a
+function must return `value` itself, so that the run stays bit for bit as it was; the conformance
+tests in tests/plant_emulator/test_every_effect.py see to that for every file in this folder.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import pkgutil
+from collections.abc import Mapping
+from pathlib import Path
+from types import ModuleType
+
+from plant_emulator.effects.declaration import Effect, EffectParameter, Memory, effect_of
+from plant_emulator.errors import ParameterError
+
+__all__ = ["Effect", "EffectParameter", "Memory", "from_file", "load", "names", "parse"]
+
+
+def names() -> list[str]:
+    """Names of the shipped effects."""
+    found = (module.name for module in pkgutil.iter_modules(__path__))
+    return sorted(name for name in found if name != "declaration")
+
+
+def load(name: str) -> Effect:
+    """The shipped effect of that name; ParameterError where there is none."""
+    if name not in names():
+        raise ParameterError(f"effect {name}: unknown; known: {', '.join(names())}")
+    return effect_of(name, importlib.import_module(f"{__name__}.{name}"))
+
+
+def from_file(path: Path) -> Effect:
+    """A user's own effect; its name is the file's."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    if spec is None or spec.loader is None or not path.is_file():
+        raise ParameterError(f"{path}: no Python file with an effect")
+    module: ModuleType = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return effect_of(path.stem, module)
+
+
+def parse(texts: tuple[str, ...] | list[str]) -> dict[str, dict[str, float]]:
+    """`NAME[:PARAM=VALUE,...]` as given on the command line -> values by effect and parameter.
+
+    Without PARAM the effect's plausible size. Raises ParameterError for what is not understood.
+    """
+    return dict(_parse_one(text) for text in texts)
+
+
+def _parse_one(text: str) -> tuple[str, dict[str, float]]:
+    name, _, rest = text.partition(":")
+    effect = load(name)
+    values = effect.plausible()
+    for item in filter(None, rest.split(",")):
+        key, _, number = item.partition("=")
+        if key not in effect.parameters:
+            known = ", ".join(effect.parameters)
+            raise ParameterError(f"--effect {text}: {key} is no parameter of {name}; known: {known}")
+        try:
+            values[key] = float(number)
+        except ValueError:
+            raise ParameterError(f"--effect {text}: {key}={number!r}; a number is needed") from None
+    return name, effect.checked(values)
+
+
+def neutral(effects: Mapping[str, Effect]) -> dict[str, float]:
+    """The values at which none of the effects is there, by their names in the parameter record."""
+    return {
+        f"{name}_{key}": parameter.neutral
+        for name, effect in effects.items()
+        for key, parameter in effect.parameters.items()
+    }

@@ -1,0 +1,90 @@
+"""How an effect declares itself; the same declaration serves simulation, fit and report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import isfinite
+from types import ModuleType
+
+from plant_emulator import laws
+from plant_emulator.errors import ParameterError
+from plant_emulator.kernel_types import Record
+
+
+@dataclass(frozen=True, kw_only=True)
+class EffectParameter:
+    """One constant of an effect, SI; `neutral`: there the effect is absent.
+
+    `plausible` is a size met on real benches, used when none is given and by planning tools.
+    A parameter that only shapes the effect (absent anyway while another is neutral) has neutral =
+    plausible.
+    """
+
+    neutral: float
+    lower: float
+    upper: float
+    plausible: float
+    unit: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Memory:
+    """A state that an effect adds.
+
+    start   : p -> value at the start of a run
+    advance : (base, a, s, p) -> the solution x of x = base + a * rate(x), the memory's own
+              implicit stage; it must be finite for a time constant of 0
+    """
+
+    start: Callable[[Record], float]
+    advance: Callable[[float, float, Record, Record], float]
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect as the kernel and the commands see it."""
+
+    name: str
+    subsystem: str
+    description: str
+    parameters: Mapping[str, EffectParameter]
+    memories: Mapping[str, Memory]
+    laws: Mapping[str, Callable[[float, Record, Record], float]]
+    file: str
+
+    def plausible(self) -> dict[str, float]:
+        """A plausible size of the effect, by parameter."""
+        return {key: parameter.plausible for key, parameter in self.parameters.items()}
+
+    def checked(self, values: Mapping[str, float]) -> dict[str, float]:
+        """The values, if each lies within its bounds; ParameterError otherwise."""
+        for key, value in values.items():
+            bounds = self.parameters[key]
+            if not isfinite(value) or not bounds.lower <= value <= bounds.upper:
+                raise ParameterError(
+                    f"effect {self.name}: {key}={value!r}; "
+                    f"{bounds.lower:g} to {bounds.upper:g} {bounds.unit} is allowed"
+                )
+        return dict(values)
+
+
+def effect_of(name: str, module: ModuleType) -> Effect:
+    """The effect that a module declares; ParameterError names what is missing."""
+    for needed in ("SUBSYSTEM", "PARAMETERS"):
+        if not hasattr(module, needed):
+            raise ParameterError(f"effect {name}: {module.__file__} declares no {needed}")
+    own = {law.__name__: getattr(module, law.__name__, None) for law in laws.LAWS}
+    changed = {key: function for key, function in own.items() if function is not None}
+    if not changed:
+        raise ParameterError(f"effect {name}: {module.__file__} changes no law of the bench")
+    return Effect(
+        name=name,
+        subsystem=module.SUBSYSTEM,
+        description=(module.__doc__ or "").strip(),
+        parameters=dict(module.PARAMETERS),
+        memories=dict(getattr(module, "MEMORIES", {})),
+        laws=changed,
+        file=str(module.__file__),
+    )

@@ -1,0 +1,44 @@
+"""The torque sensor follows the shaft's torque as a first-order lag.
+
+    tau dT_s/dt = T_meas - T_s
+
+Source: first-order response of a measuring chain, e.g. K. Ogata, Modern Control Engineering,
+chapter on first-order systems. At tau = 0 the sensor shows the torque itself.
+"""
+
+from __future__ import annotations
+
+from plant_emulator.effects.declaration import EffectParameter, Memory
+from plant_emulator.kernel_types import Record
+
+SUBSYSTEM = "torque_sensor"
+PARAMETERS = {
+    "time_constant": EffectParameter(
+        neutral=0.0, lower=0.0, upper=1.0, plausible=0.05, unit="s", meaning="tau"
+    ),
+}
+
+
+def start(p: Record) -> float:
+    """The bench starts at rest, without torque [N m]."""
+    return 0.0
+
+
+def advance(base: float, a: float, s: Record, p: Record) -> float:
+    """Shown torque at the end of an implicit stage of size a [N m].
+
+    Written around the torque itself: exactly that at tau = 0.
+    """
+    tau = p.torque_sensor_lag_time_constant
+    torque = -s.motor_shaft_torque
+    return torque + (base - torque) * (tau / (tau + a))
+
+
+MEMORIES = {"shown": Memory(start, advance)}
+
+
+def measured_shaft_torque(value: float, s: Record, p: Record) -> float:
+    """What the sensor shows [N m]."""
+    if p.torque_sensor_lag_time_constant == 0.0:
+        return value
+    return value + (s.torque_sensor_lag_shown + s.motor_shaft_torque)

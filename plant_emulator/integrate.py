@@ -1,0 +1,230 @@
+"""The stepper: SDIRK2, with fixed or adapted steps. It knows steps and stages, not motors.
+
+Two-stage, singly diagonally implicit Runge-Kutta method of order 2, L-stable and stiffly accurate
+(Alexander, SIAM J. Numer. Anal. 14 (1977) 1006):
+
+    X1 = x + gamma h f(X1)
+    X2 = x + (1 - gamma) h f(X1) + gamma h f(X2),   x(t + h) = X2,   gamma = 1 - 1/sqrt(2)
+
+Each stage is X = base + a f(X) with a = gamma h; f(X1) = (X1 - x) / a, so the second base is
+x + (1 - gamma)/gamma (X1 - x) and f itself is never evaluated.
+
+Error estimate: the slopes at t, t + gamma h and t + h give a quadrature of order 3; its difference
+from the method's is the local error. Where a contact closes or a limit is reached the slopes jump,
+and the step shrinks. A step ends on every sample and on every corner of the delayed reference.
+"""
+
+from __future__ import annotations
+
+from math import ceil, sqrt
+
+from plant_emulator.kernel_types import Record, State
+from plant_emulator.laws import (
+    dead_time,
+    measured_armature_current,
+    measured_drum_speed,
+    measured_shaft_torque,
+    shell_temperature,
+    tachometer_gain,
+)
+from plant_emulator.plant import (
+    GEAR_SPEED,
+    MOTOR_SPEED,
+    acting_wheel_torque,
+    evaluate_laws,
+    load,
+    solve_stage,
+    store,
+)
+
+GAMMA = 1.0 - 1.0 / sqrt(2.0)
+# Weights of the error estimate: order-3 quadrature at 0, gamma, 1 minus the method's.
+_W1 = 1.0 / (6.0 * GAMMA * (1.0 - GAMMA))
+_W2 = 0.5 - _W1 * GAMMA
+ERROR_0, ERROR_1, ERROR_2 = 1.0 - _W1 - _W2, _W1 - (1.0 - GAMMA), _W2 - GAMMA
+
+# States whose error is controlled, and the size that counts as 1: the range of a full-speed run.
+CONTROLLED = (2, 3, 4, 7)
+SCALE = (70.0, 400.0, 1.2e-3, 6.5)
+
+SHRINK, GROW, SAFETY = 0.2, 5.0, 0.9
+SMALLEST_STEP = 1e-6
+
+# Channels of a log in the order of `observe`.
+CHANNELS = (
+    "motor_speed",
+    "drum_speed",
+    "armature_current",
+    "shaft_torque",
+    "armature_voltage",
+    "shell_temperature",
+    "wheel_torque",
+)
+
+
+# Rows of the work space.
+FIRST, BASE, LAST, SLOPE = 0, 1, 2, 3
+
+
+def step(h: float, t: float, r: tuple[float, float], x: State, w: State, s: Record, p: Record) -> None:
+    """One step from x at t; its result goes to w[LAST], x stays as it is.
+
+    r : delayed reference at t + gamma h and at t + h [rad/s]
+    """
+    first, base, last, slope = w[FIRST], w[BASE], w[LAST], w[SLOPE]
+    load(x, s)
+    s.motor_speed += GAMMA * h * slope[MOTOR_SPEED]
+    s.gear_speed += GAMMA * h * slope[GEAR_SPEED]
+    s.time, s.delayed_reference = t + GAMMA * h, r[0]
+    solve_stage(x, GAMMA * h, s, p)
+    store(s, first)
+    for k in range(len(x)):
+        base[k] = x[k] + (1.0 - GAMMA) / GAMMA * (first[k] - x[k])
+    s.motor_speed = x[MOTOR_SPEED] + (first[MOTOR_SPEED] - x[MOTOR_SPEED]) / GAMMA
+    s.gear_speed = x[GEAR_SPEED] + (first[GEAR_SPEED] - x[GEAR_SPEED]) / GAMMA
+    s.time, s.delayed_reference = t + h, r[1]
+    solve_stage(base, GAMMA * h, s, p)
+    store(s, last)
+
+
+def local_error(h: float, x: State, w: State) -> float:
+    """Largest local error of the controlled states, each over its scale [1]."""
+    first, base, last, slope = w[FIRST], w[BASE], w[LAST], w[SLOPE]
+    error = 0.0
+    for j in range(len(CONTROLLED)):
+        k = CONTROLLED[j]
+        slope_1 = (first[k] - x[k]) / (GAMMA * h)
+        slope_2 = (last[k] - base[k]) / (GAMMA * h)
+        size = abs(h * (ERROR_0 * slope[k] + ERROR_1 * slope_1 + ERROR_2 * slope_2)) / SCALE[j]
+        error = max(error, size)
+    return error
+
+
+def accept(h: float, x: State, w: State) -> None:
+    """Make the step's result the state, and keep its last slope."""
+    base, last, slope = w[BASE], w[LAST], w[SLOPE]
+    for k in range(len(x)):
+        slope[k] = (last[k] - base[k]) / (GAMMA * h)
+        x[k] = last[k]
+
+
+def observe(row: int, out: State, s: Record, p: Record) -> None:
+    """Write what the sensors show into one row of the log (CHANNELS)."""
+    out[row, 0] = s.tachometer_gain * s.motor_speed
+    out[row, 1] = measured_drum_speed(s, p)
+    out[row, 2] = measured_armature_current(s, p)
+    out[row, 3] = measured_shaft_torque(s, p)
+    out[row, 4] = s.armature_voltage
+    out[row, 5] = shell_temperature(s, p)
+    out[row, 6] = acting_wheel_torque(s, p)
+
+
+def delayed(tau: float, k: int, time: State, value: State, slope: State) -> float:
+    """Reference of segment k at the time tau, before the first sample its value [rad/s]."""
+    if k < 0:
+        return value[0]
+    return value[k] + slope[k] * (tau - time[k])
+
+
+def run(
+    time: State,
+    value: State,
+    slope: State,
+    edges: State,
+    wheel_torque: State,
+    parked: State,
+    settings: tuple[float, float],
+    x: State,
+    w: State,
+    s: Record,
+    p: Record,
+    out: State,
+) -> int:
+    """Simulate a whole log; returns the number of steps.
+
+    time, value, slope : samples of the reference and its slope behind each [s, rad/s, rad/s^2]
+    edges : corners of the reference before the dead time, ascending [s]
+    wheel_torque, parked : in force during the interval that ends at the sample [N m, 0 or 1]
+    settings : tolerance [1] (infinite: fixed steps) and largest step [s]
+    x, w, s, p : state at time[0], work space, stage and parameter records
+    out : (samples, channels), filled
+    """
+    tolerance, largest = settings
+    load(x, s)
+    evaluate_laws(s, p)
+    observe(0, out, s, p)
+    t, h, segment, edge, steps = time[0], largest, -1, 0, 0
+    for row in range(1, len(time)):
+        s.wheel_torque, s.parked = wheel_torque[row], parked[row]
+        while t < time[row]:
+            b = dead_time(s, p)
+            while edge < len(edges) and edges[edge] + b <= t + SMALLEST_STEP:
+                edge += 1
+            end = time[row]
+            if edge < len(edges):
+                end = min(end, edges[edge] + b)
+            if end > time[row] - SMALLEST_STEP:
+                end = time[row]
+            pieces = ceil((end - t) / min(h, largest) - 1e-9)
+            length = (end - t) / pieces
+            middle = t + 0.5 * length - b
+            while segment + 1 < len(time) and time[segment + 1] <= middle:
+                segment += 1
+            r = (
+                delayed(t + GAMMA * length - b, segment, time, value, slope),
+                delayed(t + length - b, segment, time, value, slope),
+            )
+            step(length, t, r, x, w, s, p)
+            steps += 1
+            if tolerance < 1e9:
+                error = local_error(length, x, w) / tolerance
+                factor = SAFETY * max(error, 1e-6) ** (-1.0 / 3.0)
+                h = length * min(GROW, max(SHRINK, factor))
+                if error > 1.0 and length > SMALLEST_STEP:
+                    continue
+            accept(length, x, w)
+            t = end if pieces == 1 else t + length
+        observe(row, out, s, p)
+    return steps
+
+
+def advance(
+    references: State,
+    history: State,
+    newest: int,
+    h: float,
+    x: State,
+    w: State,
+    s: Record,
+    p: Record,
+    out: State,
+) -> int:
+    """Advance the running bench by one fixed step for each reference; returns the new `newest`.
+
+    references : what the PLC asks at the end of each step [rad/s]
+    history : ring of past references one step apart, at least dead time / h + 3 long
+    out : (steps, channels), filled
+    """
+    length = len(history)
+    for row in range(len(references)):
+        newest = (newest + 1) % length
+        history[newest] = references[row]
+        lag = dead_time(s, p) / h
+        r = (
+            past(lag + 1.0 - GAMMA, newest, history),
+            past(lag, newest, history),
+        )
+        step(h, s.time, r, x, w, s, p)
+        accept(h, x, w)
+        observe(row, out, s, p)
+    return newest
+
+
+def past(lag: float, newest: int, history: State) -> float:
+    """Reference that many steps ago, linear between the steps [rad/s]."""
+    length = len(history)
+    lag = min(lag, length - 2.0)
+    whole = int(lag)
+    part = lag - whole
+    young, old = history[(newest - whole) % length], history[(newest - whole - 1) % length]
+    return (1.0 - part) * young + part * old

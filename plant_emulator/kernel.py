@@ -1,0 +1,171 @@
+"""Builds the simulation kernel: the model's plain functions, the effects chained in, compiled.
+
+The functions of laws, drive, plant and integrate are ordinary Python. Building means, for one list of
+effects:
+ 1. write a few lines of glue that only the list determines: each law followed by the effects that
+    change it, the copying of states and memories (`glue`);
+ 2. rebind every function to the glue and to its compiled callees;
+ 3. compile run and advance with numba, kept on disk.
+Values of parameters are data: a changed value, or an effect switched on, compiles nothing. With
+NUMBA_DISABLE_JIT=1 step 3 is left out and the same functions run as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from types import FunctionType, ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from plant_emulator import compiler, drive, effects, integrate, laws, plant
+from plant_emulator.effects import Effect
+from plant_emulator.kernel_types import Record, State
+from plant_emulator.parameters import UNITS
+
+Function = Callable[..., Any]
+MODULES: tuple[ModuleType, ...] = (laws, drive, plant, integrate)
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """The compiled model and the layout of its records."""
+
+    effects: Mapping[str, Effect]
+    parameters: tuple[str, ...]
+    stage: tuple[str, ...]
+    run: Function
+    advance: Function
+    starts: tuple[Function, ...]
+
+    def parameter_record(self, values: Mapping[str, float]) -> Record:
+        """The flat record p; values not given keep their neutral value."""
+        return record(self.parameters, {**effects.neutral(self.effects), **values})
+
+    def stage_record(self) -> Record:
+        """A stage record, all zero."""
+        return record(self.stage, {})
+
+    def state(self, p: Record, backlash_angle: float) -> State:
+        """State at rest with the gap at that angle [rad], memories at their starts."""
+        x = [0.0] * plant.FIRST_MEMORY + [start(p) for start in self.starts]
+        x[plant.BACKLASH] = backlash_angle
+        return vector(x)
+
+    def work(self) -> State:
+        """Work space of the stepper."""
+        size = plant.FIRST_MEMORY + len(self.starts)
+        rows = [[0.0] * size for _ in range(4)]
+        return np.array(rows) if compiler.ENABLED else rows
+
+
+def record(names: tuple[str, ...], values: Mapping[str, float]) -> Record:
+    """A record of floats by attribute: a structured scalar, or a namespace without compiler."""
+    if not compiler.ENABLED:
+        return SimpleNamespace(**dict.fromkeys(names, 0.0) | {n: float(v) for n, v in values.items()})
+    data = np.zeros(1, dtype=[(name, np.float64) for name in names]).view(np.recarray)
+    for name, value in values.items():
+        data[name] = value
+    return data[0]
+
+
+def vector(values: list[float]) -> State:
+    """A state vector: an array, or a list without compiler."""
+    return np.array(values) if compiler.ENABLED else values
+
+
+def shipped() -> dict[str, Effect]:
+    """All shipped effects by name."""
+    return {name: effects.load(name) for name in effects.names()}
+
+
+@cache
+def kernel(own: tuple[Effect, ...] = ()) -> Kernel:
+    """The kernel with the shipped effects and a user's own ones; built once a process."""
+    return build({**shipped(), **{effect.name: effect for effect in own}})
+
+
+def memory_names(known: Mapping[str, Effect]) -> list[str]:
+    """Names of all memories in the stage record, in the order of the state vector."""
+    return [f"{effect.name}_{memory}" for effect in known.values() for memory in effect.memories]
+
+
+def glue(known: Mapping[str, Effect]) -> str:
+    """Source of the functions that only the list of effects determines."""
+    lines: list[str] = []
+    for law in laws.LAWS:
+        value = f"nominal_{law.__name__}(s, p)"
+        for effect in known.values():
+            if law.__name__ in effect.laws:
+                value = f"{effect.name}__{law.__name__}({value}, s, p)"
+        lines += [f"def {law.__name__}(s, p):", f"    return {value}"]
+    states = [*plant.STATES, *memory_names(known)]
+    lines += ["def load(x, s):", *(f"    s.{name} = x[{k}]" for k, name in enumerate(states))]
+    lines += ["def store(s, x):", *(f"    x[{k}] = s.{name}" for k, name in enumerate(states))]
+    lines += ["def memories(base, a, s, p):", "    pass"]
+    lines += [
+        f"    s.{name} = {name}__advance(base[{plant.FIRST_MEMORY + k}], a, s, p)"
+        for k, name in enumerate(memory_names(known))
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def build(known: Mapping[str, Effect]) -> Kernel:
+    """Chain, bind and compile; see the module's text."""
+    compiler.use_cache(
+        [*(str(m.__file__) for m in MODULES), *(effect.file for effect in known.values())],
+        list(known),
+    )
+    compiled: dict[Function, Function] = {}
+    names: dict[str, Function] = {}
+    for law in laws.LAWS:
+        names[f"nominal_{law.__name__}"] = compiler.compiled(law)
+    for effect in known.values():
+        helpers: dict[Function, Function] = {}
+        for key, function in effect.laws.items():
+            names[f"{effect.name}__{key}"] = bind(function, helpers)
+        for key, memory in effect.memories.items():
+            names[f"{effect.name}_{key}__advance"] = bind(memory.advance, helpers)
+    exec(compile(glue(known), "<glue>", "exec"), names)  # noqa: S102  our own text, from names only
+    for function in (*laws.LAWS, plant.load, plant.store, plant.memories):
+        compiled[function] = compiler.compiled(names[function.__name__])
+    for module in MODULES[1:]:
+        for function in own_functions(module):
+            bind(function, compiled)
+    return Kernel(
+        effects=known,
+        parameters=(*UNITS, *effects.neutral(known)),
+        stage=(*plant.STAGE, *memory_names(known)),
+        run=compiled[integrate.run],
+        advance=compiled[integrate.advance],
+        starts=tuple(m.start for e in known.values() for m in e.memories.values()),
+    )
+
+
+def own_functions(module: ModuleType) -> list[Function]:
+    """Functions that a module defines, in the order of its text: callees stand before callers."""
+    return [
+        f
+        for f in vars(module).values()
+        if isinstance(f, FunctionType) and f.__module__ == module.__name__
+    ]
+
+
+def bind(function: Function, compiled: dict[Function, Function]) -> Function:
+    """Compile a function whose callees are those already compiled; compiled once."""
+    if function not in compiled:
+        assert isinstance(function, FunctionType)
+        names = dict(function.__globals__)
+        for name in function.__code__.co_names:
+            callee = names.get(name)
+            if isinstance(callee, FunctionType):
+                names[name] = compiled.get(callee) or bind(callee, compiled)
+        bound = FunctionType(function.__code__, names, function.__name__)
+        bound.__module__ = function.__module__
+        cached = function in (integrate.run, integrate.advance)
+        compiled[function] = compiler.compiled(bound, on_disk=cached)
+    return compiled[function]
+
+

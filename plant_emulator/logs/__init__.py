@@ -1,0 +1,49 @@
+"""Log formats: one module each with recognises(head), read(path) and write(log, path).
+
+`read` finds the format by the file's first bytes, `write` by the file's name; a new format is a new
+file here.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from pathlib import Path
+from types import ModuleType
+
+from plant_emulator.errors import LogError
+from plant_emulator.log import Log
+
+HEAD = 4096
+
+
+def formats() -> list[ModuleType]:
+    """The format modules, by name."""
+    found = sorted(module.name for module in pkgutil.iter_modules(__path__))
+    return [importlib.import_module(f"{__name__}.{name}") for name in found]
+
+
+def read(path: str | Path) -> Log:
+    """The log in that file; LogError says file, line, column and what was expected."""
+    path = Path(path)
+    if not path.is_file():
+        raise LogError(f"{path}: no such file; a log file is needed")
+    with path.open("rb") as file:
+        head = file.read(HEAD)
+    for module in formats():
+        if module.recognises(head):
+            log: Log = module.read(path)
+            return log
+    names = ", ".join(module.NAME for module in formats())
+    raise LogError(f"{path}: not a log in a known format; known: {names}")
+
+
+def write(log: Log, path: str | Path) -> None:
+    """Write the log in the format that the file's name asks for."""
+    path = Path(path)
+    for module in formats():
+        if path.name.endswith(module.SUFFIXES):
+            module.write(log, path)
+            return
+    known = ", ".join(suffix for module in formats() for suffix in module.SUFFIXES)
+    raise LogError(f"{path}: no log format of that name; known: {known}")

@@ -1,0 +1,116 @@
+"""CSV logs (contracts, section 1): UTF-8, comma, one header line, plain or gzip-compressed."""
+
+from __future__ import annotations
+
+import gzip
+import io
+from pathlib import Path
+
+import numpy as np
+
+from plant_emulator.errors import LogError
+from plant_emulator.log import COLUMNS, Array, Log, checked
+
+NAME = "CSV"
+SUFFIXES = (".csv", ".csv.gz")
+GZIP = b"\x1f\x8b"
+BY_NAME = {column.name: column for column in COLUMNS}
+
+
+def recognises(head: bytes) -> bool:
+    """Whether a file that begins with these bytes is a CSV log: gzip, or text with a comma."""
+    if head.startswith(GZIP):
+        return True
+    line = head.split(b"\n", 1)[0]
+    return b"," in line and b"\0" not in line
+
+
+def read(path: Path) -> Log:
+    """The log of a CSV file; LogError names file, line and column."""
+    text = _text(path)
+    header, _, body = text.partition("\n")
+    names = [name.strip() for name in header.strip().lstrip("\ufeff").split(",")]
+    _check_header(path, names)
+    try:
+        table = np.loadtxt(io.StringIO(body), delimiter=",", ndmin=2)
+    except ValueError:
+        table = None
+    if table is None or table.shape[1] != len(names) or not _sound(table, names):
+        raise _first_fault(path, names, body)
+    known = {name: table[:, k] for k, name in enumerate(names) if name in BY_NAME}
+    signals = {BY_NAME[name].signal: v + BY_NAME[name].offset for name, v in known.items()}
+    time = signals.pop("time")
+    other = tuple(name for name in names if name not in BY_NAME)
+    return checked(Log(time, signals, str(path), other))
+
+
+def write(log: Log, path: Path) -> None:
+    """Write the signals of a log with their units in the column names."""
+    all_signals = {"time": log.time, **log.signals}
+    columns = [column for column in COLUMNS if column.signal in all_signals]
+    values = [all_signals[column.signal] - column.offset for column in columns]
+    lines = [",".join(column.name for column in columns)]
+    formats = [f"{{:.{column.decimals}f}}".format for column in columns]
+    lines += [
+        ",".join(form(value + 0.0) for form, value in zip(formats, row, strict=True))
+        for row in zip(*values, strict=True)
+    ]
+    data = ("\n".join(lines) + "\n").encode()
+    path.write_bytes(gzip.compress(data, mtime=0) if path.name.endswith(".gz") else data)
+
+
+def _text(path: Path) -> str:
+    data = path.read_bytes()
+    try:
+        if data.startswith(GZIP):
+            data = gzip.decompress(data)
+        return data.decode("utf-8")
+    except (OSError, EOFError) as error:
+        raise LogError(f"{path}: damaged gzip file ({error})") from error
+    except UnicodeDecodeError as error:
+        raise LogError(f"{path}: byte {error.start}: not UTF-8 text") from error
+
+
+def _check_header(path: Path, names: list[str]) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            raise LogError(f"{path}: line 1: column {name} stands twice")
+        for column in COLUMNS:
+            if name not in BY_NAME and name.startswith(column.signal + "_"):
+                raise LogError(f"{path}: line 1: column {name}; expected {column.name}")
+    for column in COLUMNS:
+        if column.needed and column.name not in names:
+            raise LogError(f"{path}: line 1: column {column.name} is missing; it is needed")
+
+
+def _sound(table: Array, names: list[str]) -> bool:
+    known = [k for k, name in enumerate(names) if name in BY_NAME]
+    time = table[:, names.index("time_s")]
+    return bool(np.isfinite(table[:, known]).all() and (np.diff(time) > 0).all())
+
+
+def _first_fault(path: Path, names: list[str], body: str) -> LogError:
+    """The first fault of the text, with line and column; found cell by cell."""
+    last = -np.inf
+    for number, line in enumerate(body.splitlines(), start=2):
+        cells = line.split(",")
+        if len(cells) != len(names):
+            return LogError(
+                f"{path}: line {number}: {len(cells)} values; {len(names)} columns are expected"
+            )
+        for name, cell in zip(names, cells, strict=True):
+            try:
+                value = float(cell)
+            except ValueError:
+                return LogError(f"{path}: line {number}, column {name}: {cell!r}; expected a number")
+            if name in BY_NAME and not np.isfinite(value):
+                return LogError(
+                    f"{path}: line {number}, column {name}: {cell!r}; expected a finite number"
+                )
+            if name == "time_s" and value <= last:
+                return LogError(
+                    f"{path}: line {number}, column time_s: {cell} after {last:g}; "
+                    "time must increase strictly"
+                )
+            last = value if name == "time_s" else last
+    return LogError(f"{path}: not a table of numbers")

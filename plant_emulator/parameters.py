@@ -1,0 +1,207 @@
+"""Parameters of the bench: value, unit, symbol, source and kind, and the sets they come in.
+
+A parameter set is data (TOML, one table a parameter); this file knows what such data must hold and
+computes the `calculated` parameters from the `given` ones. Reading files is left to
+`parameter_sets`. Source of the nominal set: the thesis, Table 3.1 (LiTH-ISY-EX--17/5092--SE).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from math import isfinite, pi
+from typing import Any, Literal
+
+from plant_emulator.errors import ParameterError
+
+Kind = Literal["given", "estimated", "calculated"]
+KINDS: tuple[Kind, ...] = ("given", "estimated", "calculated")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """One constant of the model, SI, with where it comes from.
+
+    `std` is the prior standard deviation [unit of the value]; None where the value is not estimated.
+    """
+
+    name: str
+    symbol: str
+    value: float
+    unit: str
+    kind: Kind
+    source: str
+    std: float | None = None
+
+
+def torsional_stiffness(shear_modulus: float, radius: float, length: float) -> float:
+    """Stiffness of a round steel shaft [N m/rad].
+
+    k = G J_p / l,  J_p = pi r^4 / 2                       (thesis, eq. 3.24, 3.25, 3.32, 3.33)
+
+    shear_modulus [Pa], radius [m], length [m]
+    """
+    return shear_modulus * pi / 2 * radius**4 / length
+
+
+# name -> (formula, the parameters it takes): the thesis's "calculated" rows
+CALCULATED: dict[str, tuple[Callable[..., float], tuple[str, ...]]] = {
+    "motor_shaft_stiffness": (
+        torsional_stiffness,
+        ("shear_modulus", "motor_shaft_radius", "motor_shaft_length"),
+    ),
+    "drum_shaft_stiffness": (
+        torsional_stiffness,
+        ("shear_modulus", "drum_shaft_radius", "drum_shaft_length"),
+    ),
+}
+
+# name -> SI unit: every parameter that the model needs, none that it does not
+UNITS: dict[str, str] = {
+    "armature_resistance": "ohm",
+    "armature_inductance": "H",
+    "motor_inertia": "kg m^2",
+    "flux_constant": "N m/A",
+    "flux_constant_1": "(N m/A)(rad/s)",
+    "flux_constant_2": "rad/s",
+    "gear_inertia": "kg m^2",
+    "gear_ratio": "1",
+    "shear_modulus": "Pa",
+    "motor_shaft_length": "m",
+    "motor_shaft_radius": "m",
+    "motor_shaft_stiffness": "N m/rad",
+    "drum_shaft_length": "m",
+    "drum_shaft_radius": "m",
+    "drum_shaft_stiffness": "N m/rad",
+    "drum_shaft_damping": "N m s/rad",
+    "gear_coulomb_friction": "N m",
+    "gear_viscous_friction": "N m (s/rad)^delta_g",
+    "gear_friction_exponent": "1",
+    "backlash_half_gap": "rad",
+    "drum_inertia": "kg m^2",
+    "drum_radius": "m",
+    "speed_gain": "A/(rad/s)",
+    "speed_integral_time": "s",
+    "current_gain": "V/A",
+    "current_integral_time": "s",
+    "dead_time": "s",
+    "voltage_limit": "V",
+    "armature_current_limit": "A",
+    "speed_limit": "rad/s",
+    "wheel_radius": "m",
+}
+
+# Zero is a meaningful value only where a term may be absent from the model.
+MAY_BE_ZERO = frozenset(
+    {
+        "gear_inertia",
+        "gear_coulomb_friction",
+        "gear_viscous_friction",
+        "backlash_half_gap",
+        "dead_time",
+        "flux_constant_2",
+    }
+)
+
+
+@dataclass(frozen=True)
+class ParameterSet:
+    """The constants of one bench; `parameters[name]` for every name of `UNITS`."""
+
+    name: str
+    parameters: Mapping[str, Parameter]
+
+    def __getitem__(self, name: str) -> Parameter:
+        return self.parameters[name]
+
+    def __iter__(self) -> Iterator[Parameter]:
+        return iter(self.parameters.values())
+
+    def value(self, name: str) -> float:
+        """Value of one parameter [its unit]."""
+        return self.parameters[name].value
+
+    def values(self) -> dict[str, float]:
+        """All values by name [SI]."""
+        return {p.name: p.value for p in self}
+
+    def with_values(self, changes: Mapping[str, float]) -> ParameterSet:
+        """A copy with other values; what is calculated follows unless it is itself changed."""
+        for name in changes:
+            if name not in self.parameters:
+                raise ParameterError(
+                    f"{self.name}: {name} is no parameter; known: {', '.join(UNITS)}"
+                )
+        new = {n: replace(p, value=changes.get(n, p.value)) for n, p in self.parameters.items()}
+        for name, (formula, inputs) in CALCULATED.items():
+            if name not in changes and new[name].kind == "calculated":
+                value = formula(*(new[i].value for i in inputs))
+                new[name] = replace(new[name], value=value)
+        for parameter in new.values():
+            check_value(self.name, parameter)
+        return ParameterSet(self.name, new)
+
+
+def check_value(place: str, parameter: Parameter) -> None:
+    """Refuse what the model cannot run with: not finite, negative, or zero where it divides."""
+    value, name = parameter.value, parameter.name
+    if not isfinite(value) or value < 0 or (value == 0 and name not in MAY_BE_ZERO):
+        floor = "at least 0" if name in MAY_BE_ZERO else "above 0"
+        raise ParameterError(f"{place}: {name}: {value!r}; a finite number {floor} is needed")
+
+
+def parameter_set(name: str, table: Mapping[str, Any]) -> ParameterSet:
+    """A parameter set from the tables of its file; raises ParameterError naming file and key."""
+    unknown = sorted(set(table) - set(UNITS))
+    if unknown:
+        raise ParameterError(f"{name}: {unknown[0]} is no parameter; known: {', '.join(UNITS)}")
+    missing = sorted(set(UNITS) - set(table))
+    if missing:
+        raise ParameterError(f"{name}: parameter {missing[0]} is missing")
+    given = {key: _parameter(name, key, table[key]) for key in UNITS}
+    return ParameterSet(name, given).with_values({})
+
+
+KEYS = {"symbol", "value", "unit", "kind", "source", "std"}
+
+
+def _parameter(place: str, name: str, entry: object) -> Parameter:
+    """One table of the file as a Parameter."""
+    if not isinstance(entry, Mapping):
+        raise ParameterError(f"{place}: {name}: a table with value, unit, symbol, source, kind")
+    unknown = sorted(set(entry) - KEYS)
+    if unknown:
+        raise ParameterError(
+            f"{place}: {name}.{unknown[0]}: unknown key; known: {', '.join(sorted(KEYS))}"
+        )
+    kind = entry.get("kind")
+    if kind not in KINDS:
+        raise ParameterError(f"{place}: {name}.kind: {kind!r}; one of {', '.join(KINDS)}")
+    if entry.get("unit") != UNITS[name]:
+        raise ParameterError(f"{place}: {name}.unit: {entry.get('unit')!r}; must be {UNITS[name]!r}")
+    return Parameter(
+        name=name,
+        symbol=str(entry.get("symbol", "")),
+        value=_value(place, name, entry, kind),
+        unit=UNITS[name],
+        kind=kind,
+        source=str(entry.get("source", "")),
+        std=None if "std" not in entry else _number(place, f"{name}.std", entry["std"]),
+    )
+
+
+def _value(place: str, name: str, entry: Mapping[str, Any], kind: Kind) -> float:
+    """The value as given; 1.0 stands in for a calculated one until `with_values` computes it."""
+    if kind != "calculated":
+        return _number(place, f"{name}.value", entry.get("value"))
+    if name not in CALCULATED:
+        raise ParameterError(f"{place}: {name}.kind: there is no formula for it; give a value")
+    if "value" in entry:
+        raise ParameterError(f"{place}: {name}.value: it is calculated; leave the value out")
+    return 1.0
+
+
+def _number(place: str, key: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ParameterError(f"{place}: {key}: {value!r}; a number is needed")
+    return float(value)

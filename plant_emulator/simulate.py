@@ -1,0 +1,154 @@
+"""From a log of inputs to a log of simulated signals.
+
+A `Run` holds what of a log the kernel needs (reference, its corners, truck torque), prepared once and
+simulated many times with other values. What holds between samples: contracts, section 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import inf
+from typing import Literal
+
+import numpy as np
+
+from plant_emulator.integrate import CHANNELS
+from plant_emulator.kernel import Kernel
+from plant_emulator.kernel import kernel as default_kernel
+from plant_emulator.log import Array, Log
+from plant_emulator.parameters import ParameterSet
+
+Hold = Literal["linear", "staircase"]
+
+# Error per step over the range of a full-speed run; the figures are in the README's table.
+TOLERANCE = 1e-6
+LARGEST_STEP = 0.01
+# A kink of the reference that is stepped onto [rad/s^2]; smaller ones are left to the error control.
+CORNER = 1.0
+# The truck starts when its torque leaves the noise of a parked one [N m at the wheel].
+WHEEL_TORQUE_STARTS = 10.0
+# Noise of the bench's sensors, the weights when a start state is fitted [rad/s, rad/s, A, N m].
+SENSOR_NOISE = {
+    "motor_speed": 0.15,
+    "drum_speed": 0.01,
+    "armature_current": 0.25,
+    "shaft_torque": 0.25,
+}
+
+
+@dataclass(frozen=True)
+class Run:
+    """The inputs of one run as the kernel takes them, shape (n,) each but `corners`."""
+
+    time: Array
+    reference: Array
+    slope: Array
+    corners: Array
+    wheel_torque: Array
+    parked: Array
+    source: str
+
+
+def run_of(log: Log, hold: Hold | None = None) -> Run:
+    """The inputs in a log.
+
+    hold : what holds between samples of the reference; None: staircase with a truck, else linear
+    """
+    time, reference = log.time, log["speed_reference"]
+    truck = "wheel_torque" in log
+    staircase = (hold or ("staircase" if truck else "linear")) == "staircase"
+    slope = np.zeros_like(reference)
+    if staircase:
+        corners = time[1:][np.diff(reference) != 0.0]
+    else:
+        slope[:-1] = np.diff(reference) / np.diff(time)
+        corners = time[1:-1][np.abs(np.diff(slope[:-1])) > CORNER]
+    wheel_torque = log["wheel_torque"] if truck else np.zeros_like(reference)
+    return Run(
+        *(np.ascontiguousarray(a) for a in (time, reference, slope, corners, wheel_torque)),
+        parked=_parked(wheel_torque) if truck else np.zeros_like(reference),
+        source=log.source,
+    )
+
+
+def _parked(wheel_torque: Array) -> Array:
+    """1 for the intervals before the truck's first start, in which the drum is held."""
+    started = np.abs(wheel_torque) > WHEEL_TORQUE_STARTS
+    first = int(np.argmax(started)) if started.any() else len(started)
+    return (np.arange(len(wheel_torque)) < first).astype(float)
+
+
+def simulate(
+    run: Run,
+    values: Mapping[str, float],
+    *,
+    gap_position: float = 0.0,
+    tolerance: float = TOLERANCE,
+    step: float | None = None,
+    kernel: Kernel | None = None,
+) -> Log:
+    """Simulate a run; the log has the inputs and every channel of the bench.
+
+    values : parameters, and those of effects as <effect>_<parameter> [SI]
+    gap_position : (theta_g - theta_d) / alpha at the start, -1 to 1; +1: driving flank in contact
+    step : a fixed step [s] instead of adapted ones
+    """
+    model = kernel or default_kernel()
+    out = np.zeros((len(run.time), len(CHANNELS)))
+    p = model.parameter_record(values)
+    x = model.state(p, gap_position * values["backlash_half_gap"])
+    settings = (tolerance, LARGEST_STEP) if step is None else (inf, step)
+    model.run(
+        run.time,
+        run.reference,
+        run.slope,
+        run.corners,
+        run.wheel_torque,
+        run.parked,
+        settings,
+        x,
+        model.work(),
+        model.stage_record(),
+        p,
+        out,
+    )
+    signals = {name: out[:, k] for k, name in enumerate(CHANNELS)}
+    return Log(run.time, {"speed_reference": run.reference, **signals}, run.source)
+
+
+def values_of(
+    parameters: ParameterSet, effects: Mapping[str, Mapping[str, float]] | None = None
+) -> dict[str, float]:
+    """One flat mapping of all values, as `simulate` takes it."""
+    flat = {f"{e}_{key}": v for e, own in (effects or {}).items() for key, v in own.items()}
+    return {**parameters.values(), **flat}
+
+
+def whitened(measured: Log, simulated: Log) -> float:
+    """Mean square of the residual in units of the sensors' noise, over the compared channels."""
+    squares = [
+        np.mean(((measured[name] - simulated[name]) / noise) ** 2)
+        for name, noise in SENSOR_NOISE.items()
+        if name in measured
+    ]
+    return float(np.mean(squares))
+
+
+def fit_start(log: Log, run: Run, values: Mapping[str, float], points: int = 41) -> float:
+    """Gap position at the start that fits the log best, -1 to 1.
+
+    A scan, because the timing of the first contact makes the cost many-valleyed, then a bounded search
+    in the best valley.
+    """
+    from scipy.optimize import minimize_scalar
+
+    def cost(position: float) -> float:
+        return whitened(log, simulate(run, values, gap_position=position, tolerance=1e-4))
+
+    grid = np.linspace(-1.0, 1.0, points)
+    best = float(grid[np.argmin([cost(float(position)) for position in grid])])
+    width = float(grid[1] - grid[0])
+    bounds = (max(-1.0, best - width), min(1.0, best + width))
+    found = minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": 1e-4})
+    return float(found.x) if found.fun < cost(best) else best

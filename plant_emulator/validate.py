@@ -1,0 +1,50 @@
+"""How well a simulation follows a measurement: Val1, Val2, NRMSD.
+
+    NRMSD = sqrt(mean e^2) / (max y - min y)      Val1 = 100 (1 - NRMSD)       (thesis, eq. 3.37-3.39)
+    Val2  = 100 (1 - sum |e| / sum |y|)                                        (thesis, eq. 3.40-3.41)
+
+e = y measured minus y simulated. Eq. 3.40 as printed divides by y sample by sample, which is undefined
+at standstill; the ratio of sums is the reading that fits the thesis's tables (trap E1 of the guide).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from plant_emulator.errors import LogError
+from plant_emulator.log import COMPARED, Array, Log
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Measures of one channel; val1 and val2 in percent, nrmsd as a fraction, rms in its unit."""
+
+    val1: float
+    val2: float
+    nrmsd: float
+    rms: float
+
+
+def fit(measured: Array, simulated: Array, place: str = "channel") -> Fit:
+    """Measures of a simulated channel against the measured one, shape (n,) each.
+
+    Raises LogError where the measured channel is constant or all zero: nothing to normalise by.
+    """
+    residual = measured - simulated
+    span, total = float(np.ptp(measured)), float(np.abs(measured).sum())
+    if span == 0.0 or total == 0.0:
+        raise LogError(f"{place}: it does not move; a run that excites it is needed")
+    rms = float(np.sqrt(np.mean(residual**2)))
+    val2 = 100.0 * (1.0 - float(np.abs(residual).sum()) / total)
+    return Fit(100.0 * (1.0 - rms / span), val2, rms / span, rms)
+
+
+def validate(measured: Log, simulated: Log) -> dict[str, Fit]:
+    """Measures of every compared channel that the measured log has."""
+    return {
+        name: fit(measured[name], simulated[name], f"{measured.source}: {name}")
+        for name in COMPARED
+        if name in measured
+    }
