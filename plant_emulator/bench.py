@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from plant_emulator.integrate import CHANNELS
 from plant_emulator.kernel import Kernel, vector
 from plant_emulator.kernel import kernel as default_kernel
-from plant_emulator.log import Array
-from plant_emulator.parameters import ParameterSet
 from plant_emulator.simulate import values_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.log import Array
+    from plant_emulator.parameters import ParameterSet
 
 STEP = 1e-3
 

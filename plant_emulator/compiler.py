@@ -1,7 +1,8 @@
 """numba, or nothing: compiles the kernel's functions and keeps the result in a cache on disk.
 
-numba's cache knows the file of the function it compiled, not those of its callees, and would run an old
-drive under a new integrator. Hence a cache folder of its own for each state of all the sources.
+numba's cache knows the file of the function it compiled, not those of its callees, and would run
+an old drive under a new integrator. Hence a cache folder of its own for each state of all the
+sources.
 """
 
 from __future__ import annotations
@@ -9,9 +10,11 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
-from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
 
 ENABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 
@@ -34,7 +37,8 @@ def use_cache(sources: Sequence[str], names: Sequence[str]) -> None:
     state = hashlib.sha256(f"{sys.version} {numba.__version__} {list(names)}".encode())
     for source in sources:
         state.update(Path(source).read_bytes())
-    numba.config.CACHE_DIR = str(cache_root() / state.hexdigest()[:16])
+    folder = cache_root() / state.hexdigest()[:16]
+    numba.config.__dict__["CACHE_DIR"] = str(folder)
 
 
 def compiled(function: Callable[..., Any], *, on_disk: bool = False) -> Callable[..., Any]:
@@ -45,4 +49,7 @@ def compiled(function: Callable[..., Any], *, on_disk: bool = False) -> Callable
 
     # error_model: a division by zero gives infinity instead of a check at every division; the
     # divisors of the model are sums of positive terms. nogil: simulations run side by side.
-    return numba.njit(cache=on_disk, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+    dispatcher: Callable[..., Any] = numba.njit(cache=on_disk, nogil=True, error_model="numpy")(
+        function
+    )
+    return dispatcher

@@ -1,14 +1,17 @@
 """The drive: cascade of two PI controllers with limits, and the armature they feed.
 
-Everything the drive does within one implicit stage of size a is a function of the motor speed at the
-end of that stage, piecewise linear but for the back-EMF, which is linearised. `armature` finds
-current, voltage and integrators there and the slope of the current; the stage in `plant` needs
-no more. Thesis, eq. 3.1-3.6, 3.8, 3.12.
+Everything the drive does within one implicit stage of size a is a function of the motor speed at
+the end of that stage, piecewise linear but for the back-EMF, which is linearised. `armature` finds
+current, voltage and integrators there and the slope of the current; the stage in `plant` needs no
+more. Thesis, eq. 3.1-3.6, 3.8, 3.12.
 """
 
 from __future__ import annotations
 
-from plant_emulator.kernel_types import Record, State
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from plant_emulator.kernel_types import Record, State
 
 SPEED_INTEGRAL, CURRENT_INTEGRAL, ARMATURE_CURRENT = 0, 1, 2
 

@@ -17,15 +17,14 @@ and the step shrinks. A step ends on every sample and on every corner of the del
 from __future__ import annotations
 
 from math import ceil, sqrt
+from typing import TYPE_CHECKING
 
-from plant_emulator.kernel_types import Record, State
 from plant_emulator.laws import (
     dead_time,
     measured_armature_current,
     measured_drum_speed,
     measured_shaft_torque,
     shell_temperature,
-    tachometer_gain,
 )
 from plant_emulator.plant import (
     GEAR_SPEED,
@@ -36,6 +35,9 @@ from plant_emulator.plant import (
     solve_stage,
     store,
 )
+
+if TYPE_CHECKING:
+    from plant_emulator.kernel_types import Record, State
 
 GAMMA = 1.0 - 1.0 / sqrt(2.0)
 # Weights of the error estimate: order-3 quadrature at 0, gamma, 1 minus the method's.
@@ -66,7 +68,9 @@ CHANNELS = (
 FIRST, BASE, LAST, SLOPE = 0, 1, 2, 3
 
 
-def step(h: float, t: float, r: tuple[float, float], x: State, w: State, s: Record, p: Record) -> None:
+def step(
+    h: float, t: float, r: tuple[float, float], x: State, w: State, s: Record, p: Record
+) -> None:
     """One step from x at t; its result goes to w[LAST], x stays as it is.
 
     r : delayed reference at t + gamma h and at t + h [rad/s]
@@ -121,9 +125,10 @@ def observe(row: int, out: State, s: Record, p: Record) -> None:
 
 def delayed(tau: float, k: int, time: State, value: State, slope: State) -> float:
     """Reference of segment k at the time tau, before the first sample its value [rad/s]."""
-    if k < 0:
-        return value[0]
-    return value[k] + slope[k] * (tau - time[k])
+    reference: float = value[0]
+    if k >= 0:
+        reference = value[k] + slope[k] * (tau - time[k])
+    return reference
 
 
 def run(
@@ -226,5 +231,6 @@ def past(lag: float, newest: int, history: State) -> float:
     lag = min(lag, length - 2.0)
     whole = int(lag)
     part = lag - whole
-    young, old = history[(newest - whole) % length], history[(newest - whole - 1) % length]
+    young: float = history[(newest - whole) % length]
+    old: float = history[(newest - whole - 1) % length]
     return (1.0 - part) * young + part * old

@@ -1,7 +1,7 @@
 """Builds the simulation kernel: the model's plain functions, the effects chained in, compiled.
 
-The functions of laws, drive, plant and integrate are ordinary Python. Building means, for one list of
-effects:
+The functions of laws, drive, plant and integrate are ordinary Python. Building means, for one list
+of effects:
  1. write a few lines of glue that only the list determines: each law followed by the effects that
     change it, the copying of states and memories (`glue`);
  2. rebind every function to the glue and to its compiled callees;
@@ -16,14 +16,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from types import FunctionType, ModuleType, SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from plant_emulator import compiler, drive, effects, integrate, laws, plant
-from plant_emulator.effects import Effect
-from plant_emulator.kernel_types import Record, State
 from plant_emulator.parameters import UNITS
+
+if TYPE_CHECKING:
+    from plant_emulator.effects import Effect
+    from plant_emulator.kernel_types import Record, State
 
 Function = Callable[..., Any]
 MODULES: tuple[ModuleType, ...] = (laws, drive, plant, integrate)
@@ -64,11 +66,12 @@ class Kernel:
 def record(names: tuple[str, ...], values: Mapping[str, float]) -> Record:
     """A record of floats by attribute: a structured scalar, or a namespace without compiler."""
     if not compiler.ENABLED:
-        return SimpleNamespace(**dict.fromkeys(names, 0.0) | {n: float(v) for n, v in values.items()})
+        zeros = dict.fromkeys(names, 0.0)
+        return cast("Record", SimpleNamespace(**zeros | {n: float(v) for n, v in values.items()}))
     data = np.zeros(1, dtype=[(name, np.float64) for name in names]).view(np.recarray)
     for name, value in values.items():
         data[name] = value
-    return data[0]
+    return cast("Record", data[0])
 
 
 def vector(values: list[float]) -> State:
@@ -128,8 +131,9 @@ def build(known: Mapping[str, Effect]) -> Kernel:
             names[f"{effect.name}__{key}"] = bind(function, helpers)
         for key, memory in effect.memories.items():
             names[f"{effect.name}_{key}__advance"] = bind(memory.advance, helpers)
-    exec(compile(glue(known), "<glue>", "exec"), names)  # noqa: S102  our own text, from names only
-    for function in (*laws.LAWS, plant.load, plant.store, plant.memories):
+    exec(compile(glue(known), "<glue>", "exec"), names)  # our own text, made from names
+    replaced: tuple[Function, ...] = (*laws.LAWS, plant.load, plant.store, plant.memories)
+    for function in replaced:
         compiled[function] = compiler.compiled(names[function.__name__])
     for module in MODULES[1:]:
         for function in own_functions(module):
@@ -167,5 +171,3 @@ def bind(function: Function, compiled: dict[Function, Function]) -> Function:
         cached = function in (integrate.run, integrate.advance)
         compiled[function] = compiler.compiled(bound, on_disk=cached)
     return compiled[function]
-
-

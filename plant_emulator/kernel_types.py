@@ -1,14 +1,24 @@
-"""Types of the records that the kernel's functions share.
+"""Types of what the kernel's functions share.
 
-A Record is read and written by attribute; which attributes it has is data (`plant.STAGE` and the
-parameter names), laid out when the kernel is built: a NumPy structured scalar for the compiled
-kernel, a plain namespace for the uncompiled one. A State is the vector of the states in the order of
-`plant`, a NumPy array or a list.
+A Record is read and written by attribute, all floats; which attributes it has is data
+(`plant.STAGE`, the parameter names), laid out when the kernel is built: a NumPy structured scalar
+for the compiled kernel, a plain namespace for the uncompiled one. A State is a vector or table of
+floats: a NumPy array, or (nested) lists.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
-Record = Any
+
+class Record(Protocol):
+    """A set of named floats."""
+
+    def __getattr__(self, name: str) -> float:
+        """Value of one name."""
+
+    def __setattr__(self, name: str, value: float) -> None:
+        """Set the value of one name."""
+
+
 State = Any

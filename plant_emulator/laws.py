@@ -12,7 +12,13 @@ Angles and speeds: index m motor side, g gear output, d drum. All values SI.
 
 from __future__ import annotations
 
-from plant_emulator.kernel_types import Record
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from plant_emulator.kernel_types import Record
+
+# Shell temperature that the nominal friction belongs to, 32 degC [K] (thesis, section 3.5).
+WARM_SHELL = 305.15
 
 # --- drive ------------------------------------------------------------------------------------
 
@@ -45,7 +51,7 @@ def voltage_limit(s: Record, p: Record) -> float:
 def integration_at_limit(s: Record, p: Record) -> float:
     """Share of its error that an integrator takes in while its output is limited, outwards [1].
 
-    0: conditional integration. The thesis does not state an anti-windup; see R1 in the guide.
+    0: conditional integration. The thesis does not state its anti-windup; this is the usual one.
     """
     return 0.0
 
@@ -155,8 +161,8 @@ def measured_shaft_torque(s: Record, p: Record) -> float:
 
 
 def shell_temperature(s: Record, p: Record) -> float:
-    """What the thermocouples on the gearbox's shell show [K]; the nominal bench is warm: 32 degC."""
-    return 305.15
+    """What the thermocouples on the gearbox's shell show [K]; the nominal bench is warm."""
+    return WARM_SHELL
 
 
 LAWS = (

@@ -1,18 +1,21 @@
 """A log of the bench: time and one column a signal, SI.
 
-The columns of a file carry their unit in their name (contracts, section 1); inside the unit is SI and the
-name is the signal's. Nothing here reads a file: `logs` has one module a format.
+The columns of a file carry their unit in their name (contracts, section 1); inside the unit is SI
+and the name is the signal's. Nothing here reads a file: `logs` has one module a format.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from plant_emulator.errors import LogError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 Array = NDArray[np.float64]
 ZERO_CELSIUS = 273.15

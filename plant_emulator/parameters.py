@@ -22,7 +22,8 @@ KINDS: tuple[Kind, ...] = ("given", "estimated", "calculated")
 class Parameter:
     """One constant of the model, SI, with where it comes from.
 
-    `std` is the prior standard deviation [unit of the value]; None where the value is not estimated.
+    `std` is the prior standard deviation [unit of the value]; None where the value is not
+    estimated.
     """
 
     name: str
@@ -178,7 +179,9 @@ def _parameter(place: str, name: str, entry: object) -> Parameter:
     if kind not in KINDS:
         raise ParameterError(f"{place}: {name}.kind: {kind!r}; one of {', '.join(KINDS)}")
     if entry.get("unit") != UNITS[name]:
-        raise ParameterError(f"{place}: {name}.unit: {entry.get('unit')!r}; must be {UNITS[name]!r}")
+        raise ParameterError(
+            f"{place}: {name}.unit: {entry.get('unit')!r}; must be {UNITS[name]!r}"
+        )
     return Parameter(
         name=name,
         symbol=str(entry.get("symbol", "")),

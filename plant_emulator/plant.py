@@ -1,11 +1,11 @@
 """The equations of motion and the solution of one implicit stage, X = base + a f(X).
 
 States (index in the vector; side in brackets):
-    0 int e_s     integral of the speed error [rad]          4 q = theta_m - xi theta_g [rad] (motor)
-    1 int e_c     integral of the current error [A s]        5 omega_g  gear output [rad/s]
+    0 int e_s     integral of the speed error [rad]          4 q = theta_m - xi theta_g [rad]
+    (motor) 1 int e_c     integral of the current error [A s]        5 omega_g  gear output [rad/s]
     2 i           armature current [A]                       6 d = theta_g - theta_d [rad] (output)
-    3 omega_m     motor [rad/s]                              7 omega_d  drum [rad/s]
-    8...          memories of the effects
+    3 omega_m     motor [rad/s]                              7 omega_d  drum [rad/s] 8...
+    memories of the effects
 Equations (thesis, eq. 3.10, 3.20-3.31, 3.34; T_mw, T_gw, T_dw: neglected there, see laws):
     J_m omega_m' = k Phi i - T_mg - T_mw         T_mg = k_mg q
     J_g omega_g' = xi T_mg - T_gd - T_f          T_f  = (f_gc + f_g |omega_g|^delta_g) sgn omega_g
@@ -22,8 +22,9 @@ repeated until the linearisation and the laws agree with what was found. Nothing
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from plant_emulator.drive import armature, flux_slope, move_drive, same_limits
-from plant_emulator.kernel_types import Record, State
 from plant_emulator.laws import (
     backlash_half_gap,
     converter_voltage_drop,
@@ -45,6 +46,9 @@ from plant_emulator.laws import (
     tachometer_gain,
     voltage_limit,
 )
+
+if TYPE_CHECKING:
+    from plant_emulator.kernel_types import Record, State
 
 STATES = (
     "speed_integral",
@@ -128,8 +132,8 @@ UNDAMPED_PASSES = 10
 LINEAR_WITHIN = 0.05
 # Relative change of a law between estimate and solution that asks for another pass.
 LAW_WITHIN = 1e-7
-# Newton in omega_g: from here on the test for stick comes first [rad/s]; a step of this share of the
-# speed leaves a curvature error below 1e-7 of it; torques left unbalanced [N m] of some 1000.
+# Newton in omega_g: from here on the test for stick comes first [rad/s]; a step of this share of
+# the speed leaves a curvature error below 1e-7 of it; torques left unbalanced [N m] of some 1000.
 NEAR_REST = 1e-4
 STRAIGHT_WITHIN = 1e-3
 BALANCED_WITHIN = 1e-5
@@ -302,9 +306,9 @@ def gear_speed_of(s: Record, p: Record) -> float:
 def slide(speed: float, direction: float, s: Record, p: Record) -> float:
     """Newton for |omega_g| on one side of rest, from `speed` [rad/s]; friction and slope to s.
 
-    Only the friction is curved. Once a step is small its curvature is negligible, and all that is left
-    to check is whether contact or stick changed on the way: one look at the new point, without a
-    power. A step across rest gives -|speed|: the caller then tests for stick.
+    Only the friction is curved. Once a step is small its curvature is negligible, and all that is
+    left to check is whether contact or stick changed on the way: one look at the new point,
+    without a power. A step across rest gives -|speed|: the caller then tests for stick.
     """
     level, f_g, delta_g = s.gear_coulomb_friction, s.gear_viscous_friction, p.gear_friction_exponent
     total, slope = frictionless(direction * speed, s, p)

@@ -1,9 +1,10 @@
 """The drive programs of the bench as data.
 
-Programs 1-4: corner points of the motor's speed reference, linear between them; program 4 adds three
-sweeps of rising frequency. Corner times read off the logged references of the independent bench;
-programs 1-3 are shaped after the thesis, Fig. 3.8. Programs 6 and 6L are a forklift's travel cycle
-(thesis, Figs 4.7-4.10): 14 km/h, start at 2 s, brake at 22 s, without load and with 1600 kg.
+Programs 1-4: corner points of the motor's speed reference, linear between them; program 4 adds
+three sweeps of rising frequency. Corner times read off the logged references of the independent
+bench; programs 1-3 are shaped after the thesis, Fig. 3.8. Programs 6 and 6L are a forklift's
+travel cycle (thesis, Figs 4.7-4.10): 14 km/h, start at 2 s, brake at 22 s, without load and with
+1600 kg.
 """
 
 from __future__ import annotations
@@ -18,6 +19,11 @@ from plant_emulator.errors import ParameterError
 
 Array = NDArray[np.float64]
 SAMPLE_PERIOD = 0.01
+
+
+def sample_times(duration: float, period: float = SAMPLE_PERIOD) -> Array:
+    """Times of the samples of a run, both ends included [s]."""
+    return np.arange(round(duration / period) + 1, dtype=np.float64) * period
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,10 +58,12 @@ class SpeedProgram:
 
     def reference(self, period: float = SAMPLE_PERIOD) -> tuple[Array, Array]:
         """Sample times [s] and references [rad/s], shape (n,) each."""
-        time = np.arange(round(self.duration / period) + 1) * period
+        time = sample_times(self.duration, period)
         points, speeds = zip(*self.corners, strict=True)
-        value = np.interp(time, points, speeds)
-        return time, value + sum(sweep.values(time) for sweep in self.sweeps)
+        value: Array = np.interp(time, points, speeds)
+        for sweep in self.sweeps:
+            value = value + sweep.values(time)
+        return time, value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,8 +148,12 @@ PROGRAMS: dict[str, Program] = {
             ),
             sweeps=(
                 Sweep(start=4.0, end=16.5, amplitude=25.0, first_frequency=0.1, last_frequency=0.9),
-                Sweep(start=19.5, end=31.5, amplitude=30.0, first_frequency=0.1, last_frequency=0.8),
-                Sweep(start=35.0, end=45.5, amplitude=25.0, first_frequency=0.12, last_frequency=0.8),
+                Sweep(
+                    start=19.5, end=31.5, amplitude=30.0, first_frequency=0.1, last_frequency=0.8
+                ),
+                Sweep(
+                    start=35.0, end=45.5, amplitude=25.0, first_frequency=0.12, last_frequency=0.8
+                ),
             ),
         ),
         TravelProgram(name="program6", duration=30.0, mass=3640.0),

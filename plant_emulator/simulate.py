@@ -1,40 +1,38 @@
 """From a log of inputs to a log of simulated signals.
 
-A `Run` holds what of a log the kernel needs (reference, its corners, truck torque), prepared once and
-simulated many times with other values. What holds between samples: contracts, section 1.
+A `Run` holds what of a log the kernel needs (reference, its corners, truck torque), prepared once
+and simulated many times with other values. What holds between samples: contracts, section 1.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from plant_emulator.integrate import CHANNELS
 from plant_emulator.kernel import Kernel
 from plant_emulator.kernel import kernel as default_kernel
-from plant_emulator.log import Array, Log
-from plant_emulator.parameters import ParameterSet
+from plant_emulator.log import COMPARED, Array, Log
+from plant_emulator.sensors import SENSORS
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from plant_emulator.parameters import ParameterSet
 
 Hold = Literal["linear", "staircase"]
 
 # Error per step over the range of a full-speed run; the figures are in the README's table.
 TOLERANCE = 1e-6
 LARGEST_STEP = 0.01
-# A kink of the reference that is stepped onto [rad/s^2]; smaller ones are left to the error control.
+# A kink of the reference that is stepped onto [rad/s^2]; smaller ones are left to the error
+# control.
 CORNER = 1.0
 # The truck starts when its torque leaves the noise of a parked one [N m at the wheel].
 WHEEL_TORQUE_STARTS = 10.0
-# Noise of the bench's sensors, the weights when a start state is fitted [rad/s, rad/s, A, N m].
-SENSOR_NOISE = {
-    "motor_speed": 0.15,
-    "drum_speed": 0.01,
-    "armature_current": 0.25,
-    "shaft_torque": 0.25,
-}
 
 
 @dataclass(frozen=True)
@@ -66,7 +64,11 @@ def run_of(log: Log, hold: Hold | None = None) -> Run:
         corners = time[1:-1][np.abs(np.diff(slope[:-1])) > CORNER]
     wheel_torque = log["wheel_torque"] if truck else np.zeros_like(reference)
     return Run(
-        *(np.ascontiguousarray(a) for a in (time, reference, slope, corners, wheel_torque)),
+        time=np.ascontiguousarray(time),
+        reference=np.ascontiguousarray(reference),
+        slope=slope,
+        corners=corners,
+        wheel_torque=np.ascontiguousarray(wheel_torque),
         parked=_parked(wheel_torque) if truck else np.zeros_like(reference),
         source=log.source,
     )
@@ -128,8 +130,8 @@ def values_of(
 def whitened(measured: Log, simulated: Log) -> float:
     """Mean square of the residual in units of the sensors' noise, over the compared channels."""
     squares = [
-        np.mean(((measured[name] - simulated[name]) / noise) ** 2)
-        for name, noise in SENSOR_NOISE.items()
+        np.mean(((measured[name] - simulated[name]) / SENSORS[name][0]) ** 2)
+        for name in COMPARED
         if name in measured
     ]
     return float(np.mean(squares))
@@ -138,8 +140,8 @@ def whitened(measured: Log, simulated: Log) -> float:
 def fit_start(log: Log, run: Run, values: Mapping[str, float], points: int = 41) -> float:
     """Gap position at the start that fits the log best, -1 to 1.
 
-    A scan, because the timing of the first contact makes the cost many-valleyed, then a bounded search
-    in the best valley.
+    A scan, because the timing of the first contact makes the cost many-valleyed, then a bounded
+    search in the best valley.
     """
     from scipy.optimize import minimize_scalar
 

@@ -1,10 +1,10 @@
 """How well a simulation follows a measurement: Val1, Val2, NRMSD.
 
-    NRMSD = sqrt(mean e^2) / (max y - min y)      Val1 = 100 (1 - NRMSD)       (thesis, eq. 3.37-3.39)
-    Val2  = 100 (1 - sum |e| / sum |y|)                                        (thesis, eq. 3.40-3.41)
+    NRMSD = sqrt(mean e^2) / (max y - min y)    Val1 = 100 (1 - NRMSD)     (thesis, eq. 3.37-3.39)
+    Val2  = 100 (1 - sum |e| / sum |y|)                                    (thesis, eq. 3.40-3.41)
 
-e = y measured minus y simulated. Eq. 3.40 as printed divides by y sample by sample, which is undefined
-at standstill; the ratio of sums is the reading that fits the thesis's tables (trap E1 of the guide).
+e = y measured minus y simulated. Eq. 3.40 as printed divides by y sample by sample, which is
+undefined at standstill; the ratio of sums is the reading that fits the thesis's tables.
 """
 
 from __future__ import annotations

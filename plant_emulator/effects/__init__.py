@@ -8,9 +8,10 @@ An effect is a module with
     and one function for each law of `plant_emulator.laws` that it changes, of the law's name:
     law(value, s, p) -> value, value being what the nominal law and the effects before it gave.
 
-Inside, a parameter is `p.<effect>_<parameter>`, a memory `s.<effect>_<memory>`. At the neutral value a
-function must return `value` itself, so that the run stays bit for bit as it was; the conformance
-tests in tests/plant_emulator/test_every_effect.py see to that for every file in this folder.
+Inside, a parameter is `p.<effect>_<parameter>`, a memory `s.<effect>_<memory>`. At the neutral
+value a function must return `value` itself, so that the run stays bit for bit as it was; the
+conformance tests in tests/plant_emulator/test_every_effect.py see to that for every file in this
+folder.
 """
 
 from __future__ import annotations
@@ -18,12 +19,15 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import pkgutil
-from collections.abc import Mapping
-from pathlib import Path
-from types import ModuleType
+from typing import TYPE_CHECKING
 
 from plant_emulator.effects.declaration import Effect, EffectParameter, Memory, effect_of
 from plant_emulator.errors import ParameterError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+    from types import ModuleType
 
 __all__ = ["Effect", "EffectParameter", "Memory", "from_file", "load", "names", "parse"]
 
@@ -67,7 +71,9 @@ def _parse_one(text: str) -> tuple[str, dict[str, float]]:
         key, _, number = item.partition("=")
         if key not in effect.parameters:
             known = ", ".join(effect.parameters)
-            raise ParameterError(f"--effect {text}: {key} is no parameter of {name}; known: {known}")
+            raise ParameterError(
+                f"--effect {text}: {key} is no parameter of {name}; known: {known}"
+            )
         try:
             values[key] = float(number)
         except ValueError:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import isfinite
-from types import ModuleType
+from typing import TYPE_CHECKING
 
 from plant_emulator import laws
 from plant_emulator.errors import ParameterError
-from plant_emulator.kernel_types import Record
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from types import ModuleType
+
+    from plant_emulator.kernel_types import Record
 
 
 @dataclass(frozen=True, kw_only=True)

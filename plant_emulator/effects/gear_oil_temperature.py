@@ -4,17 +4,20 @@
     C dT/dt = T_f omega_g - G (T - T_shell)       heat of the friction, loss through the shell
 
 Sources: O. Reynolds, Phil. Trans. R. Soc. 177 (1886) 157 for the exponential viscosity; the heat
-balance is the lumped one of a gearbox (ISO/TR 14179-1). T is the oil's temperature, T_n the one that
-the nominal friction belongs to; the shell holds T_shell during a run (it lags by minutes). beta = 0
-is a friction that does not know the temperature.
+balance is the lumped one of a gearbox (ISO/TR 14179-1). T is the oil's temperature, T_n the one
+that the nominal friction belongs to; the shell holds T_shell during a run (it lags by minutes).
+beta = 0 is a friction that does not know the temperature.
 """
 
 from __future__ import annotations
 
 from math import exp
+from typing import TYPE_CHECKING
 
 from plant_emulator.effects.declaration import EffectParameter, Memory
-from plant_emulator.kernel_types import Record
+
+if TYPE_CHECKING:
+    from plant_emulator.kernel_types import Record
 
 SUBSYSTEM = "gear"
 PARAMETERS = {

@@ -8,8 +8,12 @@ chapter on first-order systems. At tau = 0 the sensor shows the torque itself.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from plant_emulator.effects.declaration import EffectParameter, Memory
-from plant_emulator.kernel_types import Record
+
+if TYPE_CHECKING:
+    from plant_emulator.kernel_types import Record
 
 SUBSYSTEM = "torque_sensor"
 PARAMETERS = {

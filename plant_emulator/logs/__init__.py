@@ -9,10 +9,14 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from pathlib import Path
-from types import ModuleType
+from typing import TYPE_CHECKING
 
 from plant_emulator.errors import LogError
-from plant_emulator.log import Log
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from plant_emulator.log import Log
 
 HEAD = 4096
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import gzip
 import io
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from plant_emulator.errors import LogError
 from plant_emulator.log import COLUMNS, Array, Log, checked
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 NAME = "CSV"
 SUFFIXES = (".csv", ".csv.gz")
@@ -44,18 +47,24 @@ def read(path: Path) -> Log:
     return checked(Log(time, signals, str(path), other))
 
 
-def write(log: Log, path: Path) -> None:
-    """Write the signals of a log with their units in the column names."""
+def text(log: Log) -> str:
+    """The signals of a log with their units in the column names, as the text of a CSV file."""
     all_signals = {"time": log.time, **log.signals}
     columns = [column for column in COLUMNS if column.signal in all_signals]
     values = [all_signals[column.signal] - column.offset for column in columns]
     lines = [",".join(column.name for column in columns)]
     formats = [f"{{:.{column.decimals}f}}".format for column in columns]
     lines += [
+        # + 0.0 turns a negative zero into a zero
         ",".join(form(value + 0.0) for form, value in zip(formats, row, strict=True))
         for row in zip(*values, strict=True)
     ]
-    data = ("\n".join(lines) + "\n").encode()
+    return "\n".join(lines) + "\n"
+
+
+def write(log: Log, path: Path) -> None:
+    """Write a log; a name that ends in .gz is compressed."""
+    data = text(log).encode()
     path.write_bytes(gzip.compress(data, mtime=0) if path.name.endswith(".gz") else data)
 
 
@@ -102,7 +111,9 @@ def _first_fault(path: Path, names: list[str], body: str) -> LogError:
             try:
                 value = float(cell)
             except ValueError:
-                return LogError(f"{path}: line {number}, column {name}: {cell!r}; expected a number")
+                return LogError(
+                    f"{path}: line {number}, column {name}: {cell!r}; expected a number"
+                )
             if name in BY_NAME and not np.isfinite(value):
                 return LogError(
                     f"{path}: line {number}, column {name}: {cell!r}; expected a finite number"

@@ -22,7 +22,9 @@ def load(name: str = DEFAULT) -> ParameterSet:
     shipped = FOLDER / f"{name}.toml"
     path = shipped if name in names() else Path(name)
     if not path.is_file():
-        raise ParameterError(f"{name}: no such parameter set; a file, or one of {', '.join(names())}")
+        raise ParameterError(
+            f"{name}: no such parameter set; a file, or one of {', '.join(names())}"
+        )
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -1,0 +1,51 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+parameters = click.option(
+    "--parameters",
+    default="thesis_table_3_1",
+    show_default=True,
+    metavar="SET",
+    help="Shipped parameter set, or the path of a TOML file.",
+)
+effect = click.option(
+    "--effect",
+    "effect_texts",
+    multiple=True,
+    metavar="NAME[:PARAM=VALUE,...]",
+    help="An effect that the nominal bench lacks; without PARAM in its plausible size.",
+)
+reference = click.option(
+    "--reference",
+    type=click.Choice(["linear", "staircase"]),
+    help="What holds between samples of the reference; default staircase with a truck.",
+)
+start = click.option(
+    "--start",
+    type=click.Choice(["fit", "middle"]),
+    default="fit",
+    show_default=True,
+    help="Start position in the backlash gap.",
+)
+json_file = click.option(
+    "--json",
+    "json_file",
+    metavar="FILE",
+    help="Write the machine-readable answer; - is standard output.",
+)
+
+
+def write_json(answer: Any, target: str) -> None:
+    """Write an answer to a file, or to standard output for `-`."""
+    text = json.dumps(answer, indent=2)
+    if target == "-":
+        click.echo(text)
+    else:
+        Path(target).write_text(text + "\n", encoding="utf-8")

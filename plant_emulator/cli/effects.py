@@ -1,0 +1,70 @@
+"""List the effects that can be added to the nominal bench, or show one of them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from plant_emulator.cli import _options
+
+if TYPE_CHECKING:
+    from plant_emulator.effects import Effect
+
+EXAMPLE = """
+\b
+Example:
+  plant-emulator effects gear_oil_temperature
+"""
+
+
+@click.command(epilog=EXAMPLE)
+@click.argument("name", required=False)
+@_options.json_file
+def command(name: str | None, json_file: str | None) -> None:
+    """Show equation, parameters, units and source of the effect NAME; without it list all."""
+    from plant_emulator import effects
+
+    found = [effects.load(key) for key in ([name] if name else effects.names())]
+    if json_file:
+        _options.write_json(
+            {"schema": "effects/1", "effects": [_entry(e) for e in found]}, json_file
+        )
+    if json_file == "-":
+        return
+    for effect in found:
+        if name:
+            click.echo(_page(effect))
+        else:
+            click.echo(f"{effect.name:26}{effect.subsystem:16}{effect.description.splitlines()[0]}")
+
+
+def _entry(effect: Effect) -> dict[str, Any]:
+    return {
+        "effect": effect.name,
+        "subsystem": effect.subsystem,
+        "description": effect.description,
+        "laws": sorted(effect.laws),
+        "parameters": [
+            {
+                "name": key,
+                "unit": p.unit,
+                "neutral": p.neutral,
+                "lower": p.lower,
+                "upper": p.upper,
+                "plausible": p.plausible,
+                "meaning": p.meaning,
+            }
+            for key, p in effect.parameters.items()
+        ],
+    }
+
+
+def _page(effect: Effect) -> str:
+    head = f"{effect.name} ({effect.subsystem})\n\n{effect.description}\n"
+    columns = f"\n{'parameter':24}{'unit':8}{'neutral':>10}{'plausible':>11}{'from':>10}{'to':>10}"
+    rows = [
+        f"{key:24}{p.unit:8}{p.neutral:10g}{p.plausible:11g}{p.lower:10g}{p.upper:10g}  {p.meaning}"
+        for key, p in effect.parameters.items()
+    ]
+    return "\n".join([head + columns, *rows])

@@ -1,0 +1,59 @@
+"""Simulate a program or a logged run, and write the log that the bench would have given."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from plant_emulator.cli import _options
+
+EXAMPLE = """
+\b
+Examples:
+  plant-emulator simulate --program program1 --out program1.csv
+  plant-emulator simulate --program run.csv.gz --effect torque_sensor_lag:time_constant=0.1 \\
+      --seed 1 --out lagging.csv
+"""
+
+
+@click.command(epilog=EXAMPLE)
+@click.option("--program", required=True, metavar="NAME|LOG", help="A program, or a log to follow.")
+@_options.parameters
+@_options.effect
+@click.option("--seed", type=int, help="Add the sensors' noise and quantisation, from this seed.")
+@_options.reference
+@_options.start
+@click.option("--out", metavar="CSV", help="The log to write; default: standard output.")
+def command(
+    program: str,
+    parameters: str,
+    effect_texts: tuple[str, ...],
+    seed: int | None,
+    reference: str | None,
+    start: str,
+    out: str | None,
+) -> None:
+    """Simulate a program (program1-4, program6, program6L) or the inputs of a log.
+
+    A log's start position in the backlash gap is fitted to it unless --start middle; a program
+    starts in the middle of the gap.
+    """
+    from plant_emulator import effects, logs, parameter_sets
+    from plant_emulator.logs import csv
+    from plant_emulator.sensors import noisy
+    from plant_emulator.session import simulated
+
+    log = simulated(
+        program,
+        parameter_sets.load(parameters),
+        effects.parse(effect_texts),
+        hold=reference,
+        start=start,
+    )
+    log = log if seed is None else noisy(log, seed)
+    if out:
+        logs.write(log, out)
+        click.echo(f"{out}: {len(log.time)} samples, {log.time[-1]:g} s", err=True)
+    else:
+        sys.stdout.write(csv.text(log))

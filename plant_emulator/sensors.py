@@ -1,0 +1,31 @@
+"""Noise and resolution of the bench's sensors, for logs that should look measured.
+
+White noise of the standard deviations and steps of quantisation that the independent bench's noisy
+logs have; the reference is not measured and stays exact.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from plant_emulator.log import Log
+
+# signal -> (standard deviation, quantisation step) [SI]
+SENSORS: dict[str, tuple[float, float]] = {
+    "motor_speed": (0.15, 0.0732),
+    "drum_speed": (0.01, 0.00488),
+    "armature_current": (0.25, 0.0488),
+    "shaft_torque": (0.25, 0.0244),
+    "wheel_torque": (2.0, 0.73),
+}
+
+
+def noisy(log: Log, seed: int) -> Log:
+    """The log as the sensors would show it, noise drawn from `seed`."""
+    random = np.random.default_rng(seed)
+    signals = dict(log.signals)
+    for name, (deviation, step) in SENSORS.items():
+        if name in signals:
+            value = signals[name] + deviation * random.standard_normal(len(log.time))
+            signals[name] = np.round(value / step) * step
+    return Log(log.time, signals, log.source, log.other)
