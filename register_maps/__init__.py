@@ -1,1 +1,59 @@
-"""Register maps: where in a PLC each signal lives. One TOML file a PLC, found by its file name."""
+"""Register maps: where in a PLC each signal lives. One TOML file a PLC, found by its file name.
+
+`load` reads one; `signals` is the language, `codec` turns words into values and back. The keys of
+a map file are told in `parse.py`.
+"""
+
+import hashlib
+import re
+import tomllib
+from pathlib import Path
+
+from register_maps.entry import Lines
+from register_maps.parse import parse
+from register_maps.register_map import MapError, RegisterMap
+
+__all__ = ["MapError", "RegisterMap", "load", "names"]
+
+_HERE = Path(__file__).parent
+
+
+def names() -> tuple[str, ...]:
+    """Names of the shipped maps."""
+    return tuple(sorted(path.stem for path in _HERE.glob("*.toml")))
+
+
+def load(name_or_path: str | Path) -> RegisterMap:
+    """The shipped map of that name, or the map in that file; raises `MapError`."""
+    shipped = _HERE / f"{name_or_path}.toml"
+    path = shipped if str(name_or_path) in names() else Path(name_or_path)
+    content = _content(path)
+    text = _text(path, content)
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        at = re.search(r"line (\d+)", str(error))
+        line = int(at[1]) if at else text.count("\n") + 1
+        raise _unreadable(path, line, str(error), "TOML") from None
+    digest = hashlib.sha256(content).hexdigest()
+    return parse(data, file=str(path), lines=Lines(text), source_hash=digest)
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        expected = f"a readable file, or one of {', '.join(names())}"
+        raise _unreadable(path, 1, error.strerror or str(error), expected) from None
+
+
+def _text(path: Path, content: bytes) -> str:
+    try:
+        return content.decode()
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise _unreadable(path, line, "not UTF-8", "TOML in UTF-8") from None
+
+
+def _unreadable(path: Path, line: int, why: str, expected: str) -> MapError:
+    return MapError(file=str(path), line=line, place="file", value=why, expected=expected)

@@ -1,7 +1,7 @@
 """What a register map is: registers, two blocks, and the error that says what it may not be.
 
-Records only. How a map is read from TOML and what it may not hold is in `parse.py` and `rules.py`;
-how words become values is in `codec.py`. The meaning of each key of a map file is told in `parse.py`.
+Records only. How a map is read from TOML, and what each key means, is in `parse.py`; what it may
+not hold is in `rules.py`; how words become values is in `codec.py`.
 """
 
 from dataclasses import dataclass

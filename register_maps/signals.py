@@ -124,7 +124,7 @@ class Measurement:
 class Setpoint:
     """The command block in SI. `None` = the map has no such register.
 
-    When encoded, a `map_version` of None becomes the map's own, a `command_crc` of None is computed.
+    Encoded, a `map_version` of None becomes the map's own, a `command_crc` of None is computed.
     """
 
     command_sequence: Annotated[int, "1", "number of this command; wraps"]
