@@ -1,0 +1,116 @@
+"""Emulate the bench and its PLC behind a Modbus TCP server."""
+
+import asyncio
+from pathlib import Path
+
+import click
+
+MASS_HELP = "Mass of the truck on the drum [kg], or none. Its driver sets off in road-load."
+
+
+class Mass(click.ParamType[float | None]):
+    """A mass in kg, or `none`."""
+
+    name = "KG|none"
+
+    def convert(
+        self,
+        value: float | str | None,
+        param: click.Parameter | None,
+        ctx: click.Context | None,
+    ) -> float | None:
+        """Mass [kg], None for `none`."""
+        if value is None or value == "none":
+            return None
+        try:
+            mass = float(value)
+        except ValueError:
+            mass = 0.0
+        if not 100.0 <= mass <= 100_000.0:
+            self.fail(f"{value!r} is no mass; 100 to 100000 (kg), or none", param, ctx)
+        return mass
+
+
+@click.command()
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
+@click.option(
+    "--port",
+    default=5020,
+    show_default=True,
+    type=click.IntRange(0, 65535),
+    help="Port; 0 takes any free one.",
+)
+@click.option("--map", "register_map", default="bench_int16", show_default=True, metavar="NAME")
+@click.option(
+    "--speed",
+    default=1.0,
+    show_default=True,
+    type=click.FloatRange(0.01, 1000.0),
+    help="Emulated seconds in one second.",
+)
+@click.option("--parameters", default="thesis_table_3_1", show_default=True, metavar="SET")
+@click.option("--effect", multiple=True, metavar="NAME[:PARAM=VALUE,...]", help="May be repeated.")
+@click.option("--fault", multiple=True, metavar="NAME[@SECONDS]", help="May be repeated.")
+@click.option("--truck", default="3640", show_default=True, type=Mass(), help=MASS_HELP)
+@click.option(
+    "--driver",
+    default="pi",
+    show_default=True,
+    type=click.Choice(["none", "pi"]),
+    help="pi holds the speed of the cycle, none replays the torque of the cycle.",
+)
+@click.option("--remote/--local", default=False, help="Operator's switch at the start.")
+@click.option(
+    "--remote-after", type=click.FloatRange(0.0), metavar="S", help="Switch to remote then."
+)
+@click.option(
+    "--log", type=click.Path(path_type=Path, dir_okay=False), help="Log written at the end."
+)
+@click.option(
+    "--duration", type=click.FloatRange(0.0), metavar="S", help="Emulated time to stop at."
+)
+@click.option("--control", is_flag=True, hidden=True, help="JSON requests on standard input.")
+@click.option("--stepped", is_flag=True, hidden=True, help="Scan only on request.")
+def command(  # noqa: PLR0917 - click passes options by name
+    host: str,
+    port: int,
+    register_map: str,
+    speed: float,
+    parameters: str,
+    effect: tuple[str, ...],
+    fault: tuple[str, ...],
+    truck: float | None,
+    driver: str,
+    remote: bool,
+    remote_after: float | None,
+    log: Path | None,
+    duration: float | None,
+    control: bool,
+    stepped: bool,
+) -> None:
+    """Emulate the bench and its PLC behind a Modbus TCP server.
+
+    The first line printed says where it listens. It ends on Ctrl-C or SIGTERM and then says how
+    well it kept real time.
+    """
+    from plant_emulator.emulator import Options  # noqa: PLC0415 - numba and pymodbus, not for --help
+    from plant_emulator.serving import serve  # noqa: PLC0415
+
+    options = Options(
+        host=host,
+        port=port,
+        map=register_map,
+        speed=None if stepped else speed,
+        parameters=parameters,
+        effects=effect,
+        faults=fault,
+        truck_mass=truck,
+        driver=driver,
+        remote=remote,
+        remote_after=remote_after,
+        log=log,
+        duration=duration,
+        keeps_log=control,
+    )
+    last_words = asyncio.run(serve(options, click.echo, control=control))
+    click.echo(last_words, err=True)
