@@ -1,0 +1,111 @@
+"""The emulator as a process: its first line, its switches from outside, its end."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from plant_emulator import logs
+from plant_emulator.process import EmulatorProcess, ProcessError
+
+
+def started(*arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "plant_emulator", "serve", "--port", "0", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def wait_for(state: str, emulator: EmulatorProcess, limit: float = 10.0) -> None:
+    """Return when the PLC is in that state."""
+    end = time.monotonic() + limit
+    while emulator.status()["state"] != state:
+        assert time.monotonic() < end, f"never {state}"
+        time.sleep(0.01)
+
+
+def test_stepped_emulator_stands_still_until_it_is_stepped():
+    with EmulatorProcess(speed=None) as emulator:
+        assert emulator.status()["time"] == 0.01
+        emulator.step(99)
+        assert emulator.status()["time"] == 1.0
+        assert emulator.status()["time"] == 1.0
+        assert len(emulator.log().time) == 100
+    assert emulator.report == "100 scans"
+
+
+def test_switches_and_faults_are_turned_from_outside():
+    with EmulatorProcess(speed=None) as emulator:
+        emulator.set_remote(on=True)
+        emulator.step(1)
+        assert emulator.status()["remote"]
+        emulator.open_interlocks("EMERGENCY_STOP")
+        emulator.step(1)
+        assert emulator.status()["state"] == "FAULT"
+        with pytest.raises(ProcessError, match="unknown fault"):
+            emulator.set_faults("gremlins")
+
+
+def test_emulator_that_cannot_start_says_why():
+    with pytest.raises(ProcessError, match="no_such_map"), EmulatorProcess(map="no_such_map"):
+        pass
+
+
+@pytest.mark.slow
+def test_real_time_is_held_and_reported():
+    with EmulatorProcess(speed=10.0, truck_mass=None) as emulator:
+        wait_for("READY", emulator)
+        before, start = emulator.status()["time"], time.monotonic()
+        time.sleep(0.5)
+        emulated = emulator.status()["time"] - before
+        elapsed = time.monotonic() - start
+        assert emulated == pytest.approx(10.0 * elapsed, rel=0.1)
+    assert "real-time factor 1.0" in emulator.report or "0.99" in emulator.report
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signal_ends_it_cleanly_with_its_log_written(number, tmp_path):
+    process = started("--log", str(tmp_path / "run.csv"))
+    assert process.stdout is not None
+    first = process.stdout.readline()
+    assert first.startswith("listening on 127.0.0.1:")
+    assert 0 < int(first.rpartition(":")[2]) < 65536
+    time.sleep(0.2)
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=10)
+    assert process.returncode == 0
+    assert "real-time factor" in errors
+    assert len(logs.read(tmp_path / "run.csv").time) > 5
+
+
+def test_duration_is_in_emulated_seconds():
+    process = started("--duration", "5", "--speed", "50")
+    out, errors = process.communicate(timeout=30)
+    assert process.returncode == 0
+    assert out.count("\n") == 1
+    assert 490 < int(errors.split()[0]) < 520
+
+
+@pytest.mark.parametrize(
+    ("arguments", "what"),
+    [
+        (["--map", "nowhere"], "nowhere"),
+        (["--fault", "gremlins"], "gremlins"),
+        (["--effect", "magic"], "magic"),
+        (["--parameters", "nowhere"], "nowhere"),
+        (["--truck", "light"], "light"),
+        (["--speed", "0"], "--speed"),
+        (["--port", "70000"], "--port"),
+    ],
+)
+def test_wrong_usage_is_one_line_and_code_2(arguments, what):
+    process = started(*arguments)
+    out, errors = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert out == ""
+    assert what in errors
+    assert errors.count("\n") == 1
