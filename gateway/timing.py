@@ -1,0 +1,32 @@
+"""How late and how long: a histogram of durations of fixed size (pure)."""
+
+import math
+from typing import Final
+
+WIDTH: Final = 1e-5
+BINS: Final = 20_000
+"""10 us steps up to 0.2 s; what is longer counts in the last, and `max` is exact."""
+
+
+class Histogram:
+    """Counts of durations [s]."""
+
+    def __init__(self) -> None:
+        self._counts = [0] * BINS
+        self.total = 0
+        self.max = 0.0
+
+    def add(self, duration: float) -> None:
+        """Count one duration [s]."""
+        self._counts[min(max(int(duration / WIDTH), 0), BINS - 1)] += 1
+        self.total += 1
+        self.max = max(self.max, duration)
+
+    def quantile(self, share: float) -> float:
+        """Duration that this share of all does not exceed, upper edge of its step [s]."""
+        wanted, seen = max(1, math.ceil(share * self.total)), 0
+        for index, count in enumerate(self._counts):
+            seen += count
+            if seen >= wanted:
+                return min((index + 1) * WIDTH, self.max)
+        return 0.0

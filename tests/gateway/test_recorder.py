@@ -1,0 +1,186 @@
+"""A recording holds every tick, whatever happens to the gateway or to the end of the file."""
+
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gateway.record import COMMANDED, MEASURED, NOTHING, Layout, Tick
+from gateway.recorder import Job, Recorder
+from gateway.recording import RecordingError, encode_header, is_recording, read
+from register_maps.signals import Control, Measurement, Mode, Setpoint, Status
+
+LAYOUT = Layout(read_count=3, write_count=2)
+HEADER = {
+    "read_count": 3,
+    "write_count": 2,
+    "states": {"1": "RUN"},
+    "reasons": {"12": ["LATE", ""]},
+}
+
+MEASUREMENT = Measurement(
+    sequence_start=65535,
+    plc_heartbeat=7,
+    plc_time=429496.7295,
+    status=Status.READY,
+    motor_speed=0.1,
+    drum_speed=-0.3,
+    shaft_torque=-12.8,
+    test_uint32=0x12345678,
+    sequence_end=65535,
+)
+SETPOINT = Setpoint(
+    command_sequence=9,
+    gateway_heartbeat=10,
+    control=Control.ENABLE,
+    mode=Mode.ROAD_LOAD,
+    speed_setpoint=1.0 / 3.0,
+)
+
+
+def tick(index: int, *, read_back: bool = True) -> Tick:
+    return Tick(
+        tick=index,
+        now=1000.0 + 0.01 * index,
+        period=0.01,
+        lateness=5e-5,
+        latency=4e-4,
+        age=None,
+        demand=0.1 + index,
+        missed=0,
+        dropped=0,
+        fault=NOTHING,
+        reason=12,
+        state=1,
+        shadow=True,
+        stop_requested=False,
+        written=False,
+        words_read=(1, 2, 65535) if read_back else None,
+        words_written=(3, 4),
+        measurement=MEASUREMENT if read_back else None,
+        setpoint=SETPOINT,
+    )
+
+
+def write(path: Path, count: int) -> bytes:
+    content = encode_header(HEADER) + b"".join(LAYOUT.pack(tick(index)) for index in range(count))
+    path.write_bytes(content)
+    return content
+
+
+def test_what_was_recorded_is_read_bit_for_bit(tmp_path: Path) -> None:
+    path = tmp_path / "a.rlrec"
+    recorder = Recorder(Job(path=path, header=HEADER, layout=LAYOUT))
+    for index in range(5):
+        recorder.push(LAYOUT.pack(tick(index)))
+    recorder.close()
+    found = read(path)
+    assert (found.header["states"], len(found), found.note) == ({"1": "RUN"}, 5, "")
+    assert found.records["now"].tolist() == [1000.0 + 0.01 * index for index in range(5)]
+    last = found.records[-1]
+    assert last["demand"] == 0.1 + 4
+    assert math.isnan(last["age"])
+    assert last["words_read"].tolist() == [1, 2, 65535]
+    assert last["words_written"].tolist() == [3, 4]
+    assert last["measured_plc_time"] == 429496.7295
+    assert last["measured_test_uint32"] == 0x12345678
+    assert math.isnan(last["measured_armature_current"])
+    assert last["setpoint_speed_setpoint"] == 1.0 / 3.0
+    assert (found.state(last["state"]), found.reason(last["fault"])) == ("RUN", "")
+    assert found.reason(last["reason"]) == "LATE"
+
+
+def test_record_and_numpy_agree_on_the_layout() -> None:
+    assert np.dtype(LAYOUT.formats).itemsize == LAYOUT.size == len(LAYOUT.pack(tick(0)))
+    assert LAYOUT.size < 4096, "a record goes into the pipe whole only below PIPE_BUF"
+    assert len(MEASURED) + len(COMMANDED) == sum(
+        name.startswith(("measured_", "setpoint_")) for name, _, _ in LAYOUT.formats
+    )
+
+
+def test_a_file_cut_anywhere_in_its_last_record_keeps_all_before_it(tmp_path: Path) -> None:
+    path = tmp_path / "a.rlrec"
+    content = write(path, 3)
+    for left in range(LAYOUT.size):
+        path.write_bytes(content[: len(content) - LAYOUT.size + left])
+        found = read(path)
+        assert len(found) == 2
+        assert (f"{left} bytes" in found.note) == (left > 0)
+
+
+def test_a_last_record_of_zeros_is_left_out(tmp_path: Path) -> None:
+    """What a file system may leave after the power went: the length is there, the bytes are not."""
+    path = tmp_path / "a.rlrec"
+    content = write(path, 3)
+    path.write_bytes(content[: -LAYOUT.size] + bytes(LAYOUT.size))
+    assert len(read(path)) == 2
+
+
+@pytest.mark.parametrize("length", [0, 4, 11, 40])
+def test_a_file_without_a_whole_header_is_refused(tmp_path: Path, length: int) -> None:
+    path = tmp_path / "a.rlrec"
+    path.write_bytes(write(path, 1)[:length])
+    with pytest.raises(RecordingError, match="is no recording") as caught:
+        read(path)
+    assert caught.value.exit_code == 2
+
+
+def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("time_s,motor_speed_rad_s\n0,1\n")
+    assert not is_recording(path)
+    with pytest.raises(RecordingError, match="is no recording"):
+        read(path)
+
+
+def test_a_directory_that_cannot_be_written_is_refused_at_the_start(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_text("")
+    with pytest.raises(RecordingError, match="recording"):
+        Recorder(Job(path=file / "a.rlrec", header=HEADER, layout=LAYOUT))
+
+
+def test_a_full_pipe_drops_the_record_and_counts_it(tmp_path: Path) -> None:
+    recorder = Recorder(Job(path=tmp_path / "a.rlrec", header=HEADER, layout=LAYOUT))
+    record = LAYOUT.pack(tick(0))
+    pushed = 0
+    while not recorder.dropped:
+        recorder.push(record)
+        pushed += 1
+    recorder.close()
+    assert len(read(tmp_path / "a.rlrec")) == pushed - recorder.dropped
+
+
+GATEWAY_THAT_IS_KILLED = """
+import os, signal, sys
+from pathlib import Path
+from gateway.recorder import Job, Recorder
+from tests.gateway.test_recorder import HEADER, LAYOUT, tick
+if __name__ == "__main__":
+    recorder = Recorder(Job(path=Path(sys.argv[1]), header=HEADER, layout=LAYOUT))
+    for index in range(100):
+        recorder.push(LAYOUT.pack(tick(index)))
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_gateway_that_is_killed_loses_no_tick(tmp_path: Path) -> None:
+    script, path = tmp_path / "killed.py", tmp_path / "a.rlrec"
+    script.write_text(GATEWAY_THAT_IS_KILLED)
+    ended = subprocess.run(
+        [sys.executable, script, path],
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        timeout=60,
+        check=False,
+    )
+    assert ended.returncode == -signal.SIGKILL
+    deadline = time.monotonic() + 30.0
+    while len(read(path)) < 100:
+        assert time.monotonic() < deadline
+    assert read(path).records["tick"].tolist() == list(range(100))
