@@ -1,0 +1,65 @@
+"""Configuration files: read TOML, and name file and line of whatever is wrong in it."""
+
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from gateway.config import Config, changed, from_document
+from gateway.errors import ConfigError
+
+
+def load(path: str | Path) -> Config:
+    """The configuration in a file; a friction file is looked for beside it."""
+    file = Path(path)
+    text = _text(file)
+    document = _with_friction(_toml(file, text), file.parent)
+    return from_document(document, place=lambda section, key: _place(file, text, section, key))
+
+
+def with_values(config: Config, values: Mapping[str, str]) -> Config:
+    """`Config.with_values` where `regulator.friction` may also be the path of a friction file."""
+    return from_document(_with_friction(changed(config.document, values), Path()))
+
+
+def load_friction(path: str | Path) -> dict[str, Any]:
+    """The table in a friction file."""
+    return _toml(Path(path), _text(Path(path)))
+
+
+def _with_friction(document: dict[str, Any], directory: Path) -> dict[str, Any]:
+    regulator = document.get("regulator")
+    if not isinstance(regulator, Mapping) or not isinstance(regulator.get("friction"), str):
+        return document
+    table = load_friction(directory / regulator["friction"])
+    return document | {"regulator": {**regulator, "friction": table}}
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        raise ConfigError(why, file=path, expected="a TOML file that can be read") from error
+
+
+def _toml(path: Path, text: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(str(error), file=path, expected="TOML") from error
+
+
+def _place(path: Path, text: str, section: str, key: str) -> str:
+    """`file:line: [section] key`; without the line where the key is not written in the file."""
+    inside = ""
+    for number, line in enumerate(text.splitlines(), 1):
+        heading = re.match(r"\s*\[\s*([\w.-]+)\s*\]", line)
+        inside = heading[1] if heading else inside
+        wanted = inside == section and (
+            bool(heading) if not key else re.match(rf"\s*\"?{re.escape(key)}\"?\s*[=.]", line)
+        )
+        if wanted:
+            return f"{path}:{number}: [{section}] {key}".rstrip()
+    return f"{path}: [{section}] {key}".rstrip()

@@ -1,0 +1,79 @@
+"""Friction of the gear, as the regulator knows it: law, values, and their reading from a document.
+
+Values not given are those of the thesis (Table 3.1), identified with the gear's shell at 32 degC.
+The temperature coefficient is not in the thesis: friction falls with the oil's viscosity.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from gateway.errors import ConfigError
+
+CELSIUS = 273.15
+
+
+@dataclass(frozen=True, kw_only=True)
+class Friction:
+    """coulomb [N m], viscous [N m (s/rad)^exponent], exponent [1], at the gear output.
+
+    temperature_coefficient : relative fall of the friction per kelvin of the shell [1/K]
+    reference_temperature_celsius : shell at which coulomb and viscous hold [degC]
+    """
+
+    coulomb: float = 35.989
+    viscous: float = 345.38
+    exponent: float = 0.4418
+    temperature_coefficient: float = 0.0
+    reference_temperature_celsius: float = 32.0
+
+    @property
+    def document(self) -> dict[str, float]:
+        """The same as a table of TOML."""
+        return asdict(self)
+
+
+THESIS = Friction()
+RANGES = {
+    "coulomb": (0.0, 1e4),
+    "viscous": (0.0, 1e5),
+    "exponent": (0.05, 2.0),
+    "temperature_coefficient": (-0.1, 0.1),
+    "reference_temperature_celsius": (-40.0, 150.0),
+}
+
+
+def friction_torque(omega: float, friction: Friction, temperature: float | None = None) -> float:
+    """Friction torque at the gear output [N m].
+
+    T_f = (f_gc + f_g |omega|^delta_g) sgn(omega) exp(-a (T - T_0))         (thesis, eq 3.27; a = 0)
+
+    omega : speed of the gear output [rad/s]; at rest the sign is 0
+    temperature : of the shell [K], None: not known, the law holds as at its reference temperature
+    """
+    if omega == 0.0:
+        return 0.0
+    f_gc, f_g, delta_g = friction.coulomb, friction.viscous, friction.exponent
+    torque = math.copysign(f_gc + f_g * abs(omega) ** delta_g, omega)
+    if temperature is None or friction.temperature_coefficient == 0.0:
+        return torque
+    above = temperature - CELSIUS - friction.reference_temperature_celsius
+    return torque * math.exp(-friction.temperature_coefficient * above)
+
+
+def from_friction(table: object, place: str) -> Friction:
+    """The friction in a table; `place` names it in the error."""
+    if not isinstance(table, Mapping):
+        raise ConfigError("no friction table", place=place, value=table, expected=", ".join(RANGES))
+    return Friction(**{key: _checked(key, value, place) for key, value in table.items()})
+
+
+def _checked(key: str, value: Any, place: str) -> float:
+    where = f"{place}.{key}"
+    if key not in RANGES:
+        raise ConfigError("unknown key", place=where, value=key, expected=", ".join(RANGES))
+    low, high = RANGES[key]
+    if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+        raise ConfigError("bad value", place=where, value=value, expected=f"{low:g} .. {high:g}")
+    return float(value)
