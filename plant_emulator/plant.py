@@ -292,7 +292,7 @@ def gear_speed_of(s: Record, p: Record) -> float:
     """
     estimate = s.gear_speed
     if abs(estimate) > NEAR_REST:
-        speed = slide(abs(estimate), 1.0 if estimate > 0.0 else -1.0, s, p)
+        speed = slide(abs(estimate), 1.0 if estimate > 0.0 else -1.0, False, s, p)
         if speed > 0.0:
             return speed if estimate > 0.0 else -speed
     at_rest, _ = frictionless(0.0, s, p)
@@ -300,24 +300,25 @@ def gear_speed_of(s: Record, p: Record) -> float:
         s.gear_friction_torque = -at_rest
         return 0.0
     direction = -1.0 if at_rest > 0.0 else 1.0
-    return direction * abs(slide(max(direction * estimate, NEAR_REST), direction, s, p))
+    return direction * slide(NEAR_REST, direction, True, s, p)
 
 
-def slide(speed: float, direction: float, s: Record, p: Record) -> float:
+def slide(speed: float, direction: float, certain: bool, s: Record, p: Record) -> float:
     """Newton for |omega_g| on one side of rest, from `speed` [rad/s]; friction and slope to s.
 
     Only the friction is curved. Once a step is small its curvature is negligible, and all that is
     left to check is whether contact or stick changed on the way: one look at the new point,
-    without a power. A step across rest gives -|speed|: the caller then tests for stick.
+    without a power. A step across rest gives -|speed|, and the caller tests for stick; where the
+    root is known to lie on this side (`certain`) it goes half the way to rest instead.
     """
     level, f_g, delta_g = s.gear_coulomb_friction, s.gear_viscous_friction, p.gear_friction_exponent
     total, slope = frictionless(direction * speed, s, p)
-    for attempt in range(MAX_NEWTON):
+    for _ in range(MAX_NEWTON):
         viscous = f_g * speed**delta_g
         rise = delta_g * viscous / speed
         step = -(direction * total + level + viscous) / (slope + rise)
         if step <= -speed:
-            if attempt == 0 and speed > NEAR_REST:
+            if not certain:
                 return -speed
             step = -0.5 * speed
         speed += step
