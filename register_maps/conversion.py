@@ -95,8 +95,6 @@ def raw_limits(register: Register) -> tuple[float, float]:
     low, high = sorted((bound - register.offset) / register.scale for bound in bounds)
     if register.type != "float32":
         return math.ceil(low - 1e-6), math.floor(high + 1e-6)
-    if max(abs(low), abs(high)) > LARGEST_FLOAT:
-        return low, high
     return nearest_float32(low), nearest_float32(high)
 
 

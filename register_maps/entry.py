@@ -34,7 +34,12 @@ class Lines:
 
     def of(self, table: str, index: int, key: str | None) -> int:
         """Line of the key; where it is not written, of its table; else of where it should be."""
-        wanted = ((table, index, key), (table, index, None), ("", 1, table), (table, 1, None))
+        wanted = (
+            (table, index, key),
+            (key or table, 1, None) if table == "" else (table, index, None),
+            ("", 1, table),
+            (table, 1, None),
+        )
         return next((self._found[place] for place in wanted if place in self._found), 1)
 
 
@@ -51,7 +56,8 @@ class Entry:
     def error(self, key: str | None, expected: str) -> MapError:
         """The error for this key, or for the whole table."""
         name = self.values.get("name")
-        shown = name if isinstance(name, str) and name else f"{self.table} {self.index}"
+        unnamed = f"{self.table} {self.index}" if self.table else "file"
+        shown = name if isinstance(name, str) and name else unnamed
         value = self.values.get(key, "missing") if key else shown
         return MapError(
             file=self.file,
