@@ -175,6 +175,8 @@ def run(
             middle = t + 0.5 * length - b
             while segment + 1 < len(time) and time[segment + 1] <= middle:
                 segment += 1
+            while segment >= 0 and time[segment] > middle:  # the step was refused and shortened
+                segment -= 1
             r = (
                 delayed(t + GAMMA * length - b, segment, time, value, slope),
                 delayed(t + length - b, segment, time, value, slope),

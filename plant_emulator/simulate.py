@@ -37,7 +37,10 @@ WHEEL_TORQUE_STARTS = 10.0
 
 @dataclass(frozen=True)
 class Run:
-    """The inputs of one run as the kernel takes them, shape (n,) each but `corners`."""
+    """The inputs of one run as the kernel takes them, shape (n,) each but `corners`.
+
+    truck : whether there is one; without it the drum is free and the log has no wheel torque
+    """
 
     time: Array
     reference: Array
@@ -45,6 +48,7 @@ class Run:
     corners: Array
     wheel_torque: Array
     parked: Array
+    truck: bool
     source: str
 
 
@@ -70,6 +74,7 @@ def run_of(log: Log, hold: Hold | None = None) -> Run:
         corners=corners,
         wheel_torque=np.ascontiguousarray(wheel_torque),
         parked=_parked(wheel_torque) if truck else np.zeros_like(reference),
+        truck=truck,
         source=log.source,
     )
 
@@ -90,7 +95,7 @@ def simulate(
     step: float | None = None,
     kernel: Kernel | None = None,
 ) -> Log:
-    """Simulate a run; the log has the inputs and every channel of the bench.
+    """Simulate a run; the log has the inputs and the channels of the bench.
 
     values : parameters, and those of effects as <effect>_<parameter> [SI]
     gap_position : (theta_g - theta_d) / alpha at the start, -1 to 1; +1: driving flank in contact
@@ -116,6 +121,8 @@ def simulate(
         out,
     )
     signals = {name: out[:, k] for k, name in enumerate(CHANNELS)}
+    if not run.truck:  # a log with this column would be read as a staircase with a parked truck
+        del signals["wheel_torque"]
     return Log(run.time, {"speed_reference": run.reference, **signals}, run.source)
 
 
