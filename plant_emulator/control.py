@@ -16,6 +16,7 @@ import json
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from functools import reduce
+from math import isfinite
 from operator import and_
 from typing import Any
 
@@ -86,6 +87,7 @@ class Control:
             "remote": plc.switches.remote,
             "alarms": [alarm.name for alarm in plc.alarm],
             "refusal": plc.inbox.refusal,
+            "command_age": plc.inbox.age(plc.time) if isfinite(plc.inbox.age(plc.time)) else None,
             "road_load_since": plc.road_load_since,
             "speed_reference": plc.reference,
             "motor_speed": float(plc.samples.motor_speed[-1]),
