@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gzip
-import io
+import zlib
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,17 +34,29 @@ def read(path: Path) -> Log:
     header, _, body = text.partition("\n")
     names = [name.strip() for name in header.strip().lstrip("\ufeff").split(",")]
     _check_header(path, names)
-    try:
-        table = np.loadtxt(io.StringIO(body), delimiter=",", ndmin=2)
-    except ValueError:
-        table = None
-    if table is None or table.shape[1] != len(names) or not _sound(table, names):
+    lines = [line for line in body.splitlines() if line.strip()]
+    if not lines:
+        raise LogError(f"{path}: line 2: no sample; at least 2 are needed")
+    known = [name for name in names if name in BY_NAME]
+    table = _table(lines, names, known)
+    if table is None or not _sound(table, known):
         raise _first_fault(path, names, body)
-    known = {name: table[:, k] for k, name in enumerate(names) if name in BY_NAME}
-    signals = {BY_NAME[name].signal: v + BY_NAME[name].offset for name, v in known.items()}
+    columns = dict(zip(known, table.T, strict=True))
+    signals = {BY_NAME[name].signal: v + BY_NAME[name].offset for name, v in columns.items()}
     time = signals.pop("time")
     other = tuple(name for name in names if name not in BY_NAME)
     return checked(Log(time, signals, str(path), other))
+
+
+def _table(lines: list[str], names: list[str], known: list[str]) -> Array | None:
+    """The known columns, shape (n, columns); None where a row does not fit. Others may be text."""
+    if any(line.count(",") != len(names) - 1 for line in lines):
+        return None
+    columns = [names.index(name) for name in known]
+    try:
+        return np.loadtxt(lines, delimiter=",", ndmin=2, usecols=columns, comments=None)
+    except ValueError:
+        return None
 
 
 def text(log: Log) -> str:
@@ -74,7 +86,7 @@ def _text(path: Path) -> str:
         if data.startswith(GZIP):
             data = gzip.decompress(data)
         return data.decode("utf-8")
-    except (OSError, EOFError) as error:
+    except (OSError, EOFError, zlib.error) as error:
         raise LogError(f"{path}: damaged gzip file ({error})") from error
     except UnicodeDecodeError as error:
         raise LogError(f"{path}: byte {error.start}: not UTF-8 text") from error
@@ -85,43 +97,48 @@ def _check_header(path: Path, names: list[str]) -> None:
         if names.count(name) > 1:
             raise LogError(f"{path}: line 1: column {name} stands twice")
         for column in COLUMNS:
-            if name not in BY_NAME and name.startswith(column.signal + "_"):
+            if column.name not in names and name.startswith(column.signal + "_"):
                 raise LogError(f"{path}: line 1: column {name}; expected {column.name}")
     for column in COLUMNS:
         if column.needed and column.name not in names:
             raise LogError(f"{path}: line 1: column {column.name} is missing; it is needed")
 
 
-def _sound(table: Array, names: list[str]) -> bool:
-    known = [k for k, name in enumerate(names) if name in BY_NAME]
-    time = table[:, names.index("time_s")]
-    return bool(np.isfinite(table[:, known]).all() and (np.diff(time) > 0).all())
+def _sound(table: Array, known: list[str]) -> bool:
+    time = table[:, known.index("time_s")]
+    return bool(np.isfinite(table).all() and (np.diff(time) > 0).all())
 
 
 def _first_fault(path: Path, names: list[str], body: str) -> LogError:
     """The first fault of the text, with line and column; found cell by cell."""
     last = -np.inf
     for number, line in enumerate(body.splitlines(), start=2):
+        if not line.strip():
+            continue
         cells = line.split(",")
         if len(cells) != len(names):
             return LogError(
                 f"{path}: line {number}: {len(cells)} values; {len(names)} columns are expected"
             )
-        for name, cell in zip(names, cells, strict=True):
-            try:
-                value = float(cell)
-            except ValueError:
+        row = {name: cell for name, cell in zip(names, cells, strict=True) if name in BY_NAME}
+        for name, cell in row.items():
+            if expected := _lacking(cell):
                 return LogError(
-                    f"{path}: line {number}, column {name}: {cell!r}; expected a number"
+                    f"{path}: line {number}, column {name}: {cell!r}; expected {expected}"
                 )
-            if name in BY_NAME and not np.isfinite(value):
-                return LogError(
-                    f"{path}: line {number}, column {name}: {cell!r}; expected a finite number"
-                )
-            if name == "time_s" and value <= last:
-                return LogError(
-                    f"{path}: line {number}, column time_s: {cell} after {last:g}; "
-                    "time must increase strictly"
-                )
-            last = value if name == "time_s" else last
+        time = float(row["time_s"])
+        if time <= last:
+            return LogError(
+                f"{path}: line {number}, column time_s: {row['time_s']} after {last:g}; "
+                "time must increase strictly"
+            )
+        last = time
     return LogError(f"{path}: not a table of numbers")
+
+
+def _lacking(cell: str) -> str:
+    """What a cell should have been; nothing where it is a finite number."""
+    try:
+        return "" if np.isfinite(float(cell)) else "a finite number"
+    except ValueError:
+        return "a number"
