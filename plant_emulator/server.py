@@ -8,6 +8,7 @@ pymodbus answers one request a segment and gives wrong error frames for a bad qu
 function; tests/plant_emulator/test_server.py pins these deviations.
 """
 
+import asyncio
 from typing import Any
 
 from pymodbus.constants import ExcCodes
@@ -45,6 +46,7 @@ class PlcServer:
         self.command: tuple[int, ...] | None = None
         self.faults: frozenset[str] = frozenset()
         self._listener: _Listener | None = None
+        self._changing = asyncio.Lock()
 
     def blocks(self) -> tuple[tuple[Block, tuple[int, ...]], ...]:
         """What can be read: each block and its words."""
@@ -75,10 +77,11 @@ class PlcServer:
     async def misbehave(self, names: frozenset[str]) -> None:
         """Switch to exactly these faults."""
         self.faults = names
-        if faults.refuses(names):
-            await self.stop()
-        elif self._listener is None:
-            await self.start()
+        async with self._changing:
+            if faults.refuses(names):
+                await self.stop()
+            elif self._listener is None:
+                await self.start()
 
     def request(
         self, function: int, address: int, count: int, values: list[int] | None
@@ -146,7 +149,7 @@ class _Listener(ModbusTcpServer):
 def _devices(plc: PlcServer) -> list[SimDevice]:
     """The same registers for our unit and for any other."""
 
-    async def action(  # noqa: PLR0917 - the signature is pymodbus'
+    async def action(
         function: int,
         start: int,
         address: int,

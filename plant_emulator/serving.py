@@ -54,7 +54,13 @@ class _Run:
         """Switch the server's faults."""
         task = self.loop.create_task(self.emulator.server.misbehave(names))
         self.tasks.add(task)
-        task.add_done_callback(self.tasks.discard)
+        task.add_done_callback(self.task_done)
+
+    def task_done(self, task: asyncio.Task[None]) -> None:
+        """Forget it, unless the port could not be had again."""
+        self.tasks.discard(task)
+        if not task.cancelled() and isinstance(error := task.exception(), Exception):
+            self.failed(error)
 
 
 async def serve(options: Options, announce: Callable[[str], None], *, control: bool) -> str:

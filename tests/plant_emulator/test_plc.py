@@ -5,6 +5,8 @@ from dataclasses import dataclass, field, replace
 from math import pi
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from plant_emulator.plc import Plc
 from plant_emulator.plc_state import TRANSITIONS, Event
@@ -457,3 +459,26 @@ def test_scan_time_is_shown_up_to_what_its_register_holds():
     made = desk()
     assert made.plc.scan(None, Switches(), 0.0021).scan_time_max == 0.0021
     assert made.plc.scan(None, Switches(), 60.0).scan_time_max == pytest.approx(6.5535)
+
+
+WORDS = st.one_of(st.just(0), st.integers(0, 10), st.integers(0, 65535))
+
+
+@given(
+    blocks=st.lists(st.lists(WORDS, min_size=16, max_size=16), max_size=20),
+    start=st.integers(0, 4830 * 5),
+)
+def test_no_command_gets_the_reference_out_of_range_or_over_its_slew_limit(blocks, start):
+    made = desk()
+    made.scan(2)
+    made.beat(1, control=Control.ENABLE, speed_setpoint=start * 0.2 * RPM)
+    for number, block in enumerate(blocks, start=2):
+        # sound in what would be refused at once, anything in the rest
+        block[0], block[VERSION], block[10:12] = number, 1, [0, 0]
+        made.words = tuple(block)
+        before = made.plc.path[-1]
+        encode_measurement(INT16, made.scan())
+        path = [before, *made.plc.path]
+        slew = made.plc.inbox.command.slew
+        assert all(0.0 <= speed <= 4830 * RPM + 1e-9 for speed in path)
+        assert all(abs(b - a) <= slew * 1e-3 + 1e-9 for a, b in itertools.pairwise(path))

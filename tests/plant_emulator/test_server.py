@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import random
 import socket
 import threading
 
@@ -216,6 +217,26 @@ def test_wrong_transaction_is_on_the_wire(served):
     with served.connect() as wire:
         wire.sendall(adu("03 0000 0001"))
         assert received(wire, 11)[:2] == b"\x12\x35"
+
+
+def test_faults_may_change_faster_than_the_port_can(served):
+    async def flicker() -> None:
+        changes = [frozenset({"refuse_connection"}), frozenset()] * 10
+        await asyncio.gather(*(served.plc.misbehave(names) for names in changes))
+
+    served.do(flicker())
+    assert served.ask("03 0000 0001") == "03 02 03 E8"
+
+
+def test_server_outlives_any_bytes(served):
+    chance = random.Random(2)
+    for length in (1, 7, 8, 12, 260, 600):
+        with served.connect() as wire:
+            wire.sendall(chance.randbytes(length))
+            with contextlib.suppress(ConnectionError):
+                rest(wire)
+    assert served.ask("03 0000 0001") == "03 02 03 E8"
+    assert served.plc.command is None
 
 
 # What pymodbus does otherwise than the specification says: an upgrade that changes it shows here.
