@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from statistics import quantiles
 
 GIVE_UP = 0.25
-REMEMBERED = 100_000
+# Scans that the percentiles are taken over: the last 100 s in real time.
+REMEMBERED = 10_000
 
 
 @dataclass(frozen=True, kw_only=True)
