@@ -9,8 +9,8 @@ import re
 import tomllib
 from pathlib import Path
 
+from register_maps import parse
 from register_maps.entry import Lines
-from register_maps.parse import parse_map
 from register_maps.register_map import MapError, RegisterMap
 
 __all__ = ["MapError", "RegisterMap", "load", "names"]
@@ -36,7 +36,7 @@ def load(name_or_path: str | Path) -> RegisterMap:
         line = int(at[1]) if at else text.count("\n") + 1
         raise _unreadable(path, line, str(error), "TOML") from None
     digest = hashlib.sha256(content).hexdigest()
-    return parse_map(data, file=str(path), lines=Lines(text), source_hash=digest)
+    return parse.parse(data, file=str(path), lines=Lines(text), source_hash=digest)
 
 
 def _content(path: Path) -> bytes:

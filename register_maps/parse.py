@@ -51,7 +51,7 @@ _REGISTER_KEYS = frozenset(field.name for field in fields(Register)) | {"count"}
 _ORDERS, _TABLES = get_args(WordOrder), get_args(Table)
 
 
-def parse_map(data: Mapping[str, Any], *, file: str, lines: Lines, source_hash: str) -> RegisterMap:
+def parse(data: Mapping[str, Any], *, file: str, lines: Lines, source_hash: str) -> RegisterMap:
     """The map that the file's data describe; raises `MapError`."""
     root = Entry(values=data, table="", index=1, file=file, lines=lines)
     root.known(frozenset({"map", "register"}))

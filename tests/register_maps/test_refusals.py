@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import register_maps
 from register_maps.entry import Lines
-from register_maps.parse import parse_map
+from register_maps.parse import parse
 from register_maps.register_map import MapError
 
 SHIPPED = (Path(register_maps.__file__).parent / "bench_int16.toml").read_text()
@@ -305,7 +305,7 @@ def test_a_map_with_one_line_spoilt_loads_or_is_refused_and_nothing_else(data):
     lines[place] = f"{key} = {data.draw(value)}"
     path = Path("spoilt.toml")
     try:
-        parse_map(
+        parse(
             tomllib.loads("\n".join(lines)),
             file=str(path),
             lines=Lines("\n".join(lines)),
