@@ -1,0 +1,111 @@
+"""Connecting without waiting: one attempt at a time, spaced by a bounded back-off.
+
+`poll` is called once a tick and returns at once. A host name is resolved when the connector is
+made, because a name server may take seconds. Delays: 0.1 s after the first failure, doubling to 2
+s; `succeeded` starts over.
+"""
+
+import contextlib
+import errno
+import os
+import select
+import socket
+import time
+from collections.abc import Callable
+from typing import Final
+
+from gateway.errors import ConfigError
+
+FIRST_DELAY: Final = 0.1
+LAST_DELAY: Final = 2.0
+ATTEMPT_TIMEOUT: Final = 1.0
+"""[s] For one attempt; it passes between ticks, never inside one."""
+USER_TIMEOUT_MS: Final = 300
+"""Bytes that stay unacknowledged for this long end the connection: a pulled cable is noticed."""
+KEEPALIVE: Final = ((socket.TCP_KEEPIDLE, 1), (socket.TCP_KEEPINTVL, 1), (socket.TCP_KEEPCNT, 3))
+
+
+class Connector:
+    """Opens TCP connections to one peer, never blocking."""
+
+    def __init__(self, host: str, port: int, clock: Callable[[], float] = time.monotonic) -> None:
+        self._family, self._address = resolve(host, port)
+        self._clock = clock
+        self._pending: socket.socket | None = None
+        self._started = 0.0
+        self._next_attempt = clock()
+        self._delay = FIRST_DELAY
+        self.problem = ""
+
+    def poll(self) -> socket.socket | None:
+        """A connected socket, or None; `problem` says why the last attempt failed."""
+        if self._pending is None and self._clock() >= self._next_attempt:
+            self._start()
+        return self._finish() if self._pending is not None else None
+
+    def failed(self, delay: float | None = None) -> None:
+        """Note that one ended; the next attempt waits for `delay` or the back-off [s]."""
+        self._next_attempt = self._clock() + (self._delay if delay is None else delay)
+        self._delay = min(2.0 * self._delay, LAST_DELAY)
+
+    def succeeded(self) -> None:
+        """Note a good reply: the back-off starts over."""
+        self._delay = FIRST_DELAY
+
+    def close(self) -> None:
+        """Give up a pending attempt."""
+        if self._pending is not None:
+            self._pending.close()
+            self._pending = None
+
+    def _start(self) -> None:
+        attempt = socket.socket(self._family, socket.SOCK_STREAM)
+        attempt.setblocking(False)
+        self._pending, self._started = attempt, self._clock()
+        error = attempt.connect_ex(self._address)
+        if error not in (0, errno.EINPROGRESS):
+            self._give_up(error)
+
+    def _finish(self) -> socket.socket | None:
+        attempt = self._pending
+        assert attempt is not None
+        if not select.select([], [attempt], [], 0.0)[1]:
+            if self._clock() - self._started > ATTEMPT_TIMEOUT:
+                self._give_up(errno.ETIMEDOUT)
+            return None
+        if error := attempt.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR):
+            self._give_up(error)
+            return None
+        self._pending, self.problem = None, ""
+        set_options(attempt)
+        return attempt
+
+    def _give_up(self, error: int) -> None:
+        self.close()
+        self.problem = os.strerror(error)
+        self.failed()
+
+
+def resolve(host: str, port: int) -> tuple[socket.AddressFamily, tuple[str, int]]:
+    """Address family and numeric address of a peer."""
+    try:
+        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+    except OSError as error:
+        raise ConfigError(
+            error.strerror or str(error),
+            place="[plc] host",
+            value=host,
+            expected="an address, or a name that is known here",
+        ) from error
+    return family, (str(address[0]), int(address[1]))
+
+
+def set_options(connection: socket.socket) -> None:
+    """Send at once, and notice a dead peer by ourselves."""
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for option, value in KEEPALIVE:
+        with contextlib.suppress(OSError):
+            connection.setsockopt(socket.IPPROTO_TCP, option, value)
+    with contextlib.suppress(OSError):
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, USER_TIMEOUT_MS)
