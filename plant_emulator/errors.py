@@ -14,7 +14,7 @@ class InputError(EmulatorError):
 
 
 class ParameterError(InputError):
-    """A parameter, parameter set, program or effect that does not exist or cannot hold the value."""
+    """A parameter, parameter set, program or effect that does not exist or holds no such value."""
 
 
 class LogError(InputError):
