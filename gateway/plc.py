@@ -23,8 +23,8 @@ from pymodbus.pdu import ModbusPDU
 
 from gateway.connector import LAST_DELAY, Connector
 from gateway.errors import PlcError
-from gateway.reply import Asked, Objection, objection
 from gateway.reasons import Reason
+from gateway.reply import Asked, Objection, objection
 
 READ_HOLDING: Final = 3
 READ_INPUT: Final = 4
