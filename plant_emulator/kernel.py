@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from plant_emulator import compiler, drive, effects, integrate, laws, plant
+from plant_emulator.errors import ParameterError
 from plant_emulator.parameters import UNITS
 
 if TYPE_CHECKING:
@@ -44,6 +45,9 @@ class Kernel:
 
     def parameter_record(self, values: Mapping[str, float]) -> Record:
         """The flat record p; values not given keep their neutral value."""
+        for name in values:
+            if name not in self.parameters:
+                raise ParameterError(f"{name}: neither a parameter of the bench nor of an effect")
         return record(self.parameters, {**effects.neutral(self.effects), **values})
 
     def stage_record(self) -> Record:
@@ -117,10 +121,8 @@ def glue(known: Mapping[str, Effect]) -> str:
 
 def build(known: Mapping[str, Effect]) -> Kernel:
     """Chain, bind and compile; see the module's text."""
-    compiler.use_cache(
-        [*(str(m.__file__) for m in MODULES), *(effect.file for effect in known.values())],
-        list(known),
-    )
+    own = (*(str(module.__file__) for module in MODULES), __file__, compiler.__file__)
+    compiler.use_cache([*own, *(effect.file for effect in known.values())], list(known))
     compiled: dict[Function, Function] = {}
     names: dict[str, Function] = {}
     for law in laws.LAWS:
