@@ -8,13 +8,38 @@ from typing import Final
 
 from gateway.errors import ConfigError
 from gateway.inspection import Reading, Words, mbpoll
-from gateway.plc import READ_HOLDING, READ_INPUT, LinkError, TcpLink, opened
+from gateway.plc import READ_HOLDING, READ_INPUT, LinkError, TcpLink
 from register_maps.codec import CodecError, encode_value
 from register_maps.register_map import Block, Register, RegisterMap
+from register_maps.signals import RESERVED
 from register_maps.units import UNITS
 
+POLL: Final = 0.002
 VERIFY_PAUSE: Final = 0.15
 """[s] Between the readings of `verify`: many scans of a PLC."""
+
+
+@contextmanager
+def opened(host: str, port: int, unit: int, timeout: float) -> Iterator[TcpLink]:
+    """A link that is connected, for a command that may wait."""
+    link = TcpLink(host, port, unit, timeout)
+    deadline = time.monotonic() + timeout
+    try:
+        while not _connects(link, deadline):
+            time.sleep(POLL)
+        yield link
+    finally:
+        link.close()
+
+
+def _connects(link: TcpLink, deadline: float) -> bool:
+    try:
+        link.connect()
+    except LinkError:
+        if time.monotonic() > deadline:
+            raise
+        return False
+    return True
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +117,11 @@ def write_value(link: TcpLink, register: Register, words: Words) -> Words:
 
 def writable(register_map: RegisterMap, name: str) -> Register:
     """The register of that name, if the map lets one write it."""
-    allowed = {found.name: found for found in register_map.registers if found.access == "write"}
+    allowed = {
+        found.name: found
+        for found in register_map.registers
+        if found.access == "write" and found.signal != RESERVED
+    }
     if name not in allowed:
         raise ConfigError(
             "no register that may be written",

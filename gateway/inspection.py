@@ -48,7 +48,7 @@ def shown(register: Register, words: Words) -> str:
         return str(value) if not hasattr(value, "name") else (value.name or "none")
     if register.type == "enum":
         return str(getattr(value, "name", value))
-    return f"{scaled(register, value):.6g}"
+    return f"{scaled(register, value):.10g}"
 
 
 def in_other_order(register: Register, words: Words) -> str:

@@ -13,8 +13,7 @@ import logging
 import select
 import socket
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import Final, Protocol
 
 from pymodbus.client import ModbusTcpClient
@@ -32,7 +31,6 @@ WRITE_ONE: Final = 6
 WRITE_MANY: Final = 16
 FAILURES_TO_CLOSE: Final = 2
 PERMANENT: Final = frozenset({1, 2, 3})
-POLL: Final = 0.002
 
 logging.getLogger("pymodbus").setLevel(
     logging.CRITICAL + 1
@@ -190,29 +188,6 @@ class TcpLink:
 
     def _error(self, against: Objection) -> LinkError:
         return LinkError(against.reason, f"{self._peer} unit {self._unit}: {against.text}")
-
-
-@contextmanager
-def opened(host: str, port: int, unit: int, timeout: float) -> Iterator[TcpLink]:
-    """A link that is connected, for a command that may wait."""
-    link = TcpLink(host, port, unit, timeout)
-    deadline = time.monotonic() + timeout
-    try:
-        while not _connects(link, deadline):
-            time.sleep(POLL)
-        yield link
-    finally:
-        link.close()
-
-
-def _connects(link: TcpLink, deadline: float) -> bool:
-    try:
-        link.connect()
-    except LinkError:
-        if time.monotonic() > deadline:
-            raise
-        return False
-    return True
 
 
 class _Client(ModbusTcpClient):

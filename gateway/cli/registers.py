@@ -52,7 +52,7 @@ def list_registers(name: str) -> None:
 
 def _paper(register: Register) -> tuple[str, ...]:
     low, high = register.range
-    constant = "" if register.constant is None else f" = {register.constant:g} {_both(register)}"
+    constant = "" if register.constant is None else f" = {register.constant:.10g} {_both(register)}"
     return (
         register.name,
         register.signal,
@@ -62,7 +62,7 @@ def _paper(register: Register) -> tuple[str, ...]:
         register.word_order if register.raw.words > 1 else register.word_order[:2],
         f"{register.scale:g} {register.unit}"
         + (f" {register.offset:+g}" if register.offset else ""),
-        f"{low:g} .. {high:g}{constant}",
+        f"{low:.10g} .. {high:.10g}{constant}",
         register.access,
     )
 
