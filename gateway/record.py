@@ -14,6 +14,7 @@ from dataclasses import dataclass, fields
 from functools import lru_cache
 from typing import Final
 
+from register_maps.register_map import RegisterMap
 from register_maps.signals import Measurement, Setpoint
 
 MAGIC: Final = b"RLREC\x01\r\n"
@@ -26,6 +27,7 @@ HEAD: Final = (
     ("age", "d", "<f8"),
     ("demand", "d", "<f8"),
     ("missed", "I", "<u4"),
+    ("overruns", "I", "<u4"),
     ("dropped", "I", "<u4"),
     ("fault", "H", "<u2"),
     ("reason", "H", "<u2"),
@@ -52,6 +54,7 @@ class Tick:
     now : monotonic time of the reading [s]; period : since the tick before [s]
     lateness : wake-up after the deadline [s]; latency : from wake-up to end of write [s]
     age : of the newest sample [s]; demand : of the regulator [rad/s]
+    missed : deadlines so far; overruns : in a row, up to this tick
     words_written : what the limits passed; `written` says whether the PLC confirmed it
     """
 
@@ -63,6 +66,7 @@ class Tick:
     age: float | None
     demand: float | None
     missed: int
+    overruns: int
     dropped: int
     fault: int
     reason: int
@@ -94,6 +98,13 @@ class Layout:
     read_count: int
     write_count: int
 
+    @classmethod
+    def of(cls, register_map: RegisterMap) -> "Layout":
+        """The layout for a register map."""
+        return cls(
+            read_count=register_map.measurement.count, write_count=register_map.command.count
+        )
+
     @property
     def body(self) -> struct.Struct:
         """All but the checksum."""
@@ -124,9 +135,10 @@ class Layout:
             tick.period,
             tick.lateness,
             tick.latency,
-            _number(tick.age),
-            _number(tick.demand),
+            number(tick.age),
+            number(tick.demand),
             tick.missed,
+            tick.overruns,
             tick.dropped,
             tick.fault,
             tick.reason,
@@ -134,8 +146,8 @@ class Layout:
             tick.flags,
             *(tick.words_read or (0,) * self.read_count),
             *(tick.words_written or (0,) * self.write_count),
-            *_values(tick.measurement, MEASURED),
-            *_values(tick.setpoint, COMMANDED),
+            *values(tick.measurement, MEASURED),
+            *values(tick.setpoint, COMMANDED),
         )
         return body + zlib.crc32(body).to_bytes(4, "little")
 
@@ -147,14 +159,16 @@ def _body(read_count: int, write_count: int) -> struct.Struct:
     return struct.Struct(f"<{letters}{words}{len(MEASURED)}d{len(COMMANDED)}d")
 
 
-def _number(value: float | None) -> float:
+def number(value: float | None) -> float:
+    """A value as a record holds it: NaN where there is none."""
     return math.nan if value is None else float(value)
 
 
-def _values(record: Measurement | Setpoint | None, names: Sequence[str]) -> list[float]:
+def values(record: Measurement | Setpoint | None, names: Sequence[str]) -> list[float]:
+    """The named fields as a record holds them."""
     if record is None:
         return [math.nan] * len(names)
-    return [_number(getattr(record, name)) for name in names]
+    return [number(getattr(record, name)) for name in names]
 
 
 def intact(record: bytes) -> bool:

@@ -55,7 +55,7 @@ class Recorder:
         self._process = context.Process(target=record, args=(receiver, job), name="recorder")
         self._process.start()
         receiver.close()
-        self._path = job.path
+        self.path = job.path
         self.dropped = 0
         self.failed = False
 
@@ -73,7 +73,7 @@ class Recorder:
         self._sender.close()
         self._process.join()
         if self._process.exitcode:
-            raise GatewayError(f"{self._path}: the recorder ended early; expected room on the disk")
+            raise GatewayError(f"{self.path}: the recorder ended early; expected room on the disk")
 
 
 def record(receiver: Connection, job: Job) -> None:

@@ -7,6 +7,7 @@ crash leaves is a file whose last record may be cut, and such a record is left o
 """
 
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -18,6 +19,7 @@ from gateway.record import MAGIC, NOTHING, Layout, intact
 
 SUFFIX: Final = ".rlrec"
 SCHEMA: Final = "recording/1"
+CHUNK: Final = 1000
 
 
 class RecordingError(ConfigError):
@@ -40,6 +42,13 @@ class Recording:
 
     def __len__(self) -> int:
         return len(self.records)
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """The ticks one by one, as plain numbers and lists."""
+        names = self.records.dtype.names or ()
+        for first in range(0, len(self.records), CHUNK):
+            for row in self.records[first : first + CHUNK].tolist():
+                yield dict(zip(names, row, strict=True))
 
     def state(self, code: int) -> str:
         """Name of a state."""

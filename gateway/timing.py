@@ -22,6 +22,10 @@ class Histogram:
         self.total += 1
         self.max = max(self.max, duration)
 
+    def summary(self) -> dict[str, float]:
+        """Median, 99 % and the longest [s]."""
+        return {"p50": self.quantile(0.5), "p99": self.quantile(0.99), "max": self.max}
+
     def quantile(self, share: float) -> float:
         """Duration that this share of all does not exceed, upper edge of its step [s]."""
         wanted, seen = max(1, math.ceil(share * self.total)), 0

@@ -54,6 +54,7 @@ def tick(index: int, *, read_back: bool = True) -> Tick:
         age=None,
         demand=0.1 + index,
         missed=0,
+        overruns=0,
         dropped=0,
         fault=NOTHING,
         reason=12,

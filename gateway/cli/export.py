@@ -1,0 +1,27 @@
+"""Turn a recording into a CSV, Parquet or MDF4 log."""
+
+from pathlib import Path
+
+import click
+
+from gateway import export, recording
+from gateway.header import map_of
+
+
+@click.command()
+@click.argument("file", metavar="RECORDING", type=click.Path(path_type=Path))
+@click.option(
+    "--to",
+    "target",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="FILE.csv, .csv.gz, .parquet or .mf4",
+)
+def command(file: Path, target: Path) -> None:
+    """Write the samples of a RECORDING as a log that every command here reads."""
+    found = recording.read(file)
+    columns = export.columns(found, map_of(found.header))
+    export.write(target, columns)
+    if found.note:
+        click.echo(f"note: {found.note}", err=True)
+    click.echo(f"{target}: {len(columns['time_s'])} samples of {len(found)} ticks")

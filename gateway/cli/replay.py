@@ -1,0 +1,158 @@
+"""Put a recording or a log through the regulator again, bit for bit or with other parameters."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+import register_maps
+from gateway import config_file, log, recording, replay, replay_log
+from gateway.cli._settings import assignments
+from gateway.config import Config
+from gateway.cycle import Output
+from gateway.header import config_of, map_of
+from gateway.record import number
+from gateway.replay_report import Compared, draw, write_csv
+
+
+@click.command()
+@click.argument("file", metavar="LOG|RECORDING", type=click.Path(path_type=Path))
+@click.option("-c", "--config", type=click.Path(path_type=Path), help="TOML file")
+@click.option("--set", "values", multiple=True, metavar="KEY=VALUE", help="another parameter")
+@click.option("--out", type=click.Path(path_type=Path), help="write both setpoints to a CSV file")
+@click.option("--plot", type=click.Path(path_type=Path), help="draw both setpoints (PNG)")
+@click.option("--json", "json_file", type=click.File("w"), help="run/1; - = stdout")
+def command(
+    file: Path,
+    config: Path | None,
+    *,
+    values: tuple[str, ...],
+    out: Path | None,
+    plot: Path | None,
+    json_file: Any,
+) -> int:
+    """Feed what was measured to the same regulator, supervisor and limits.
+
+    A RECORDING without -c and --set must come out bit for bit (exit code 1 otherwise). With them,
+    and for a CSV LOG, the setpoint is compared with the recorded one or with the logged reference.
+    """
+    changed = assignments(values)
+    if recording.is_recording(file):
+        found = recording.read(file)
+        settings = config_file.load(config) if config else config_of(found.header)
+        exact = config is None and not changed
+        result = _recording(found, config_file.with_values(settings, changed), exact=exact)
+    else:
+        settings = config_file.load(config) if config else Config()
+        result = _log(log.read(file), config_file.with_values(settings, changed))
+    if out is not None:
+        write_csv(out, result.compared)
+    if plot is not None:
+        draw(plot, result.compared)
+    if json_file is not None:
+        click.echo(json.dumps(result.entry), file=json_file)
+    if json_file is None or json_file.name != "<stdout>":
+        click.echo("\n".join(result.lines))
+    return 0 if result.holds else 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Result:
+    """What one replay gave: for files, for a machine, for the operator, for the exit code."""
+
+    compared: Compared
+    entry: dict[str, Any]
+    lines: list[str]
+    holds: bool
+
+
+def _recording(found: recording.Recording, config: Config, *, exact: bool) -> Result:
+    register_map = map_of(found.header)
+    outputs = list(replay.outputs(config, register_map, replay.observations(found, register_map)))
+    left = list(replay.differences(found, outputs, register_map))
+    compared = _compared(
+        f"{found.path.name}: recorded setpoint and replay",
+        found.records["now"] - found.header["started"],
+        found.records["setpoint_speed_setpoint"],
+        outputs,
+    )
+    lines = [found.note] if found.note else []
+    if not left:
+        lines.append(f"{found.path}: {len(outputs)} ticks, equal bit for bit")
+    else:
+        lines += [_told(found.path, left, len(outputs)), compared.summary()]
+    entry = _entry(config, compared, "recorded") | {
+        "missed_deadlines": int(found.records["missed"][-1]) if len(found) else 0,
+        "latency_ms": _latency(found.records["latency"]),
+    }
+    return Result(compared=compared, entry=entry, lines=lines, holds=not (exact and left))
+
+
+def _told(path: Path, left: list[replay.Difference], ticks: int) -> str:
+    first = left[0]
+    return (
+        f"{path}: {len(left)} of {ticks} ticks differ, the first is tick {first.tick} at "
+        f"{first.time:.3f} s: {first.what} recorded {first.recorded}, replayed {first.replayed}"
+    )
+
+
+def _log(found: log.Log, config: Config) -> Result:
+    outputs = replay_log.replay(config, register_maps.load(config.plc.map), found)
+    compared = _compared(
+        f"{found.path.name}: logged reference and setpoint of the gateway",
+        found.time - found.time[0],
+        found.columns["speed_reference"],
+        outputs,
+    )
+    missing = ", ".join(found.missing())
+    lines = [f"not in the log: {missing}"] if missing else []
+    return Result(
+        compared=compared,
+        entry=_entry(config, compared, "logged"),
+        lines=[*lines, compared.summary()],
+        holds=True,
+    )
+
+
+def _compared(title: str, time: Any, wanted: Any, outputs: list[Output]) -> Compared:
+    return Compared(
+        title=title,
+        time=np.asarray(time, dtype=float),
+        wanted=np.asarray(wanted, dtype=float),
+        found=np.array([_asked(one) for one in outputs]),
+        demand=np.array([number(one.demand) for one in outputs]),
+        states=[one.state.name for one in outputs],
+        reasons=["" if one.reason is None else one.reason.name for one in outputs],
+    )
+
+
+def _asked(output: Output) -> float:
+    return number(None if output.setpoint is None else output.setpoint.speed_setpoint)
+
+
+def _entry(config: Config, compared: Compared, driver: str) -> dict[str, Any]:
+    """The answer for a machine; what a replay cannot tell is null."""
+    close = compared.agreement()
+    return {
+        "schema": "run/1",
+        "truck_kg": config.truck.total_mass,
+        "driver": driver,
+        "regulator": config.regulator.name,
+        "velocity": {"val1": close and close.val1, "val2": close and close.val2},
+        "force": {"target_newton": None, "mean_error_newton": None},
+        "energy": {"road_joule": None, "bench_joule": None, "error_percent": None},
+        "cycles": len(compared.time),
+        "missed_deadlines": 0,
+        "latency_ms": {"p50": None, "p99": None, "max": None},
+        "stop_reason": next(filter(None, reversed(compared.reasons)), ""),
+    }
+
+
+def _latency(latency: Any) -> dict[str, float | None]:
+    if not len(latency):
+        return {"p50": None, "p99": None, "max": None}
+    p50, p99 = np.quantile(latency, [0.5, 0.99])
+    return {"p50": 1e3 * p50, "p99": 1e3 * p99, "max": 1e3 * float(np.max(latency))}

@@ -1,0 +1,127 @@
+"""The gateway as a whole: link, loop and recorder put together, and signals that ask it to stop.
+
+The loop runs in the calling process, which is asked for real time; the recorder has a process of
+its own. The first SIGINT or SIGTERM asks for a ramp-down; the second ends at once, and the PLC's
+watchdog ramps down.
+"""
+
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+from gateway.config import Config
+from gateway.errors import GatewayError
+from gateway.header import header
+from gateway.loop import Loop, MonotonicClock
+from gateway.plc import TcpLink
+from gateway.realtime import real_time
+from gateway.reasons import Reason
+from gateway.record import Layout
+from gateway.recorder import Job, Recorder
+from gateway.recording import SUFFIX
+from gateway.supervisor import State
+from register_maps.register_map import RegisterMap
+
+BY_OPERATOR: Final = frozenset({Reason.STOP_REQUESTED, Reason.REMOTE_OFF})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ended:
+    """How a run went. Times in seconds; `reason`: why it ended, None: because it was asked to."""
+
+    recording: Path
+    reason: Reason | None
+    cycles: int
+    missed: int
+    dropped: int
+    latency: dict[str, float]
+    lateness: dict[str, float]
+    real_time: str
+
+
+class _Stop:
+    """Whether to stop: by a signal, or because the time is over."""
+
+    def __init__(self, until: float | None) -> None:
+        self._until = until
+        self.asked = False
+
+    def signalled(self, number: int, _frame: object) -> None:
+        """First: ask; second: end at once."""
+        if self.asked:
+            raise GatewayError(f"stopped at once by a second {signal.Signals(number).name}")
+        self.asked = True
+
+    def __call__(self) -> bool:
+        return self.asked or (self._until is not None and time.monotonic() >= self._until)
+
+
+def run(
+    config: Config,
+    register_map: RegisterMap,
+    *,
+    shadow: bool = False,
+    duration: float | None = None,
+    view: bool = True,
+) -> Ended:
+    """Run the gateway until it is asked to stop, or for so long [s]."""
+    link = TcpLink(config.plc.host, config.plc.port, config.plc.unit, config.plc.timeout)
+    granted = real_time() if config.loop.realtime else nullcontext("not asked for")
+    with granted as real:
+        started = time.monotonic()
+        stop = _Stop(None if duration is None else started + duration)
+        recorder = Recorder(
+            Job(
+                path=Path(config.recording.dir) / f"{datetime.now(UTC):%Y%m%dT%H%M%S.%fZ}{SUFFIX}",
+                header=header(config, register_map, started=started, shadow=shadow, real_time=real),
+                layout=Layout.of(register_map),
+                view=view,
+            )
+        )
+        loop = Loop(
+            config=config,
+            register_map=register_map,
+            link=link,
+            sink=recorder,
+            clock=MonotonicClock(),
+            shadow=shadow,
+        )
+        with _signals(stop):
+            try:
+                loop.run(stop)
+            finally:
+                recorder.close()
+    return _ended(loop, recorder, real)
+
+
+@contextmanager
+def _signals(stop: _Stop) -> Iterator[None]:
+    before = {
+        number: signal.signal(number, stop.signalled) for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _ended(loop: Loop, recorder: Recorder, real: str) -> Ended:
+    before = loop.before_stop
+    peer = before is not None and before.state in (State.CONNECT, State.RAMPDOWN, State.SAFE)
+    reason = before.reason if before is not None and peer else None
+    return Ended(
+        recording=recorder.path,
+        reason=None if reason in BY_OPERATOR else reason,
+        cycles=loop.cycles,
+        missed=loop.missed,
+        dropped=recorder.dropped,
+        latency=loop.latency.summary(),
+        lateness=loop.lateness.summary(),
+        real_time=real,
+    )
