@@ -1,0 +1,146 @@
+"""Composition, compilation and cache of the kernel."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+from plant_emulator import compiler, effects, laws, plant
+from plant_emulator.kernel import build, glue, kernel
+from plant_emulator.log import COMPARED
+from plant_emulator.parameters import ParameterSet
+from plant_emulator.simulate import values_of
+from tests.plant_emulator.runs import linear, simulate
+
+ROOT = Path(__file__).parents[2]
+INPUTS = linear((0.1, 0.0), (1.0, 220.0), (1.4, 220.0), (2.2, 0.0), duration=3.0)
+
+UNCOMPILED = """
+import json
+from plant_emulator import compiler, parameter_sets
+from plant_emulator.bench import Bench
+from plant_emulator.log import COMPARED
+from tests.plant_emulator.test_kernel import INPUTS, simulate
+
+values = parameter_sets.load().values()
+lag = {**values, "torque_sensor_lag_time_constant": 0.1}
+bench = Bench(parameter_sets.load())
+samples = bench.advance([0.1 * k for k in range(300)], wheel_torque=50.0, brake_torque=20.0)
+runs = [simulate(INPUTS, values), simulate(INPUTS, values, step=1e-3), simulate(INPUTS, lag)]
+print(json.dumps({
+    "compiler": compiler.ENABLED,
+    "runs": [{name: run[name].tolist() for name in COMPARED} for run in runs],
+    "bench": [samples.motor_speed.tolist(), samples.drum_speed.tolist()],
+}))
+"""
+
+
+def test_compiled_and_uncompiled_agree(nominal: ParameterSet) -> None:
+    answer = subprocess.run(
+        [sys.executable, "-c", UNCOMPILED],
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(ROOT)},
+        cwd=ROOT, capture_output=True, text=True, check=True, timeout=120,
+    )  # fmt: skip
+    found = json.loads(answer.stdout)
+    assert not found["compiler"]
+    lag = values_of(nominal, {"torque_sensor_lag": {"time_constant": 0.1}})
+    runs = [
+        simulate(INPUTS, nominal.values()),
+        simulate(INPUTS, nominal.values(), step=1e-3),
+        simulate(INPUTS, lag),
+    ]
+    for plain, compiled in zip(found["runs"], runs, strict=True):
+        for name in COMPARED:
+            scale = np.ptp(compiled[name])
+            np.testing.assert_allclose(plain[name], compiled[name], rtol=0.0, atol=1e-9 * scale)
+
+
+def test_all_effects_at_their_neutral_values_leave_the_run_bit_for_bit(
+    nominal: ParameterSet,
+) -> None:
+    bare = simulate(INPUTS, nominal.values(), kernel=build({}))
+    composed = simulate(INPUTS, nominal.values())
+    assert len(kernel().effects) == len(effects.names()) >= 2
+    for name in bare.signals:
+        np.testing.assert_array_equal(bare[name], composed[name])
+
+
+def test_switching_an_effect_on_compiles_nothing(nominal: ParameterSet) -> None:
+    simulate(INPUTS, nominal.values())
+    before = len(kernel().run.signatures)  # type: ignore[attr-defined]
+    for name in effects.names():
+        plausible = {name: effects.load(name).plausible()}
+        simulate(INPUTS, values_of(nominal, plausible))
+    assert len(kernel().run.signatures) == before == 1  # type: ignore[attr-defined]
+
+
+def test_kernel_is_built_once_a_process() -> None:
+    assert kernel() is kernel()
+
+
+def test_effects_are_chained_in_the_order_of_the_list() -> None:
+    lag, oil = effects.load("torque_sensor_lag"), effects.load("gear_oil_temperature")
+    text = glue({"torque_sensor_lag": lag, "gear_oil_temperature": oil})
+    assert "torque_sensor_lag__measured_shaft_torque(nominal_measured_shaft_torque(s, p)" in text
+    assert "x[8] = s.torque_sensor_lag_shown" in text
+    assert "x[9] = s.gear_oil_temperature_oil" in text
+
+
+def test_glue_without_effects_is_the_nominal_model() -> None:
+    text = glue({})
+    assert text.count("return nominal_") == len(laws.LAWS)
+    assert text.count("s.drum_speed = x[7]") == 1
+    assert "__advance" not in text
+
+
+def test_state_at_rest_holds_gap_and_start_temperature(nominal: ParameterSet) -> None:
+    model = kernel()
+    oil = {"gear_oil_temperature": {"start_temperature": 300.0}}
+    p = model.parameter_record(values_of(nominal, oil))
+    x = model.state(p, 0.1)
+    assert x[plant.BACKLASH] == 0.1
+    assert 300.0 in x[plant.FIRST_MEMORY :]
+    assert sum(abs(x[: plant.BACKLASH])) + abs(x[plant.DRUM_SPEED]) == 0.0
+
+
+@pytest.fixture
+def untouched_cache_folder() -> object:
+    """The folder that numba keeps its results in is global: put it back afterwards."""
+    folder = numba.config.CACHE_DIR
+    yield
+    numba.config.CACHE_DIR = folder
+
+
+def test_cache_folder_follows_the_sources(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, untouched_cache_folder: object
+) -> None:
+    monkeypatch.setenv("ROADLOAD_CACHE", str(tmp_path / "cache"))
+    source = tmp_path / "law.py"
+
+    def folder(text: str, names: list[str]) -> str:
+        source.write_text(text)
+        compiler.use_cache([str(source)], names)
+        return str(numba.config.CACHE_DIR)
+
+    first = folder("a = 1", ["lag"])
+    assert Path(first).parent == tmp_path / "cache"
+    assert folder("a = 2", ["lag"]) != first
+    assert folder("a = 1", ["lag", "oil"]) != first
+    assert folder("a = 1", ["lag"]) == first
+
+
+def test_cache_root_is_the_users_unless_told_otherwise(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("ROADLOAD_CACHE", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert compiler.cache_root() == tmp_path / "road-load-bench"
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    assert compiler.cache_root() == Path.home() / ".cache" / "road-load-bench"
+    monkeypatch.setenv("ROADLOAD_CACHE", str(tmp_path / "mine"))
+    assert compiler.cache_root() == tmp_path / "mine"
