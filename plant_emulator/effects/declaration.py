@@ -46,7 +46,7 @@ class Memory:
     advance: Callable[[float, float, Record, Record], float]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # compared and hashed as the one object that was loaded
 class Effect:
     """An effect as the kernel and the commands see it."""
 
