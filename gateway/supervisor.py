@@ -6,10 +6,14 @@ Whoever wants to know why a run ended reads `reason`: it is set where a state is
 wish of the operator, and kept until the bench is armed again.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
-from gateway.reasons import Reason as Reason  # State and Reason belong together
+from gateway.reasons import Reason
+
+
+__all__ = ["TRANSITIONS", "Event", "Facts", "Reason", "State", "Supervisor", "advance"]
 
 
 class State(IntEnum):
@@ -92,3 +96,94 @@ class Supervisor:
     released: bool = False
     started: float = 0.0
     confirmed: bool = False
+
+
+CONFIRM_WITHIN = 1.0
+"""[s] that the PLC has to confirm enable and road load."""
+
+Decision = tuple[Event | None, Reason | None]
+
+
+def advance(before: Supervisor, facts: Facts) -> Supervisor:
+    """State after this tick."""
+    event, reason = DECISIONS[before.state](before, facts)
+    state = TRANSITIONS[before.state][event] if event else before.state
+    entered = state is not before.state
+    return Supervisor(
+        state=state,
+        reason=reason,
+        released=_is_released(facts) or (before.released and not entered),
+        started=facts.now if entered else before.started,
+        confirmed=state is State.RUN and facts.confirmed,
+    )
+
+
+def _is_released(facts: Facts) -> bool:
+    return facts.link is None and not facts.remote
+
+
+def _off(before: Supervisor, facts: Facts) -> Decision:
+    return (None, before.reason) if facts.stop_requested else (Event.START, None)
+
+
+def _connect(_before: Supervisor, facts: Facts) -> Decision:
+    if facts.stop_requested:
+        return Event.STOP, Reason.STOP_REQUESTED
+    return (Event.LINK_UP, None) if facts.link is None else (None, facts.link)
+
+
+def _shadow(_before: Supervisor, facts: Facts) -> Decision:
+    if facts.stop_requested:
+        return Event.STOP, Reason.STOP_REQUESTED
+    if facts.link is not None:
+        return Event.LINK_DOWN, facts.link
+    armed = facts.check is None and not facts.shadow
+    return (Event.CHECKS_HOLD, None) if armed else (None, facts.check)
+
+
+def _armed(before: Supervisor, facts: Facts) -> Decision:
+    if facts.stop_requested:
+        return Event.STOP, Reason.STOP_REQUESTED
+    if facts.link is not None:
+        return Event.LINK_DOWN, facts.link
+    if facts.check is not None:
+        return Event.CHECK_FAILS, facts.check
+    return (Event.REMOTE_SET, None) if facts.remote and before.released else (None, None)
+
+
+def _run(before: Supervisor, facts: Facts) -> Decision:
+    late = facts.now - before.started > CONFIRM_WITHIN
+    trips = (
+        (facts.link is not None, facts.link),
+        (facts.check is not None, facts.check),
+        (facts.stop_requested, Reason.STOP_REQUESTED),
+        (not facts.remote, Reason.REMOTE_OFF),
+        (before.confirmed and not facts.confirmed, Reason.PLC_LEFT),
+        (late and not facts.confirmed, Reason.NOT_CONFIRMED),
+    )
+    reason = next((reason for tripped, reason in trips if tripped), None)
+    return (None, None) if reason is None else (Event.TRIP, reason)
+
+
+def _rampdown(before: Supervisor, facts: Facts) -> Decision:
+    return (Event.AT_REST if facts.at_rest else None), before.reason
+
+
+def _safe(before: Supervisor, facts: Facts) -> Decision:
+    if facts.stop_requested:
+        return Event.STOP, before.reason
+    if facts.link is None and facts.remote and before.released:
+        return Event.ACKNOWLEDGED, None
+    return None, before.reason
+
+
+DECISIONS: dict[State, Callable[[Supervisor, Facts], Decision]] = {
+    State.OFF: _off,
+    State.CONNECT: _connect,
+    State.SHADOW: _shadow,
+    State.ARMED: _armed,
+    State.RUN: _run,
+    State.RAMPDOWN: _rampdown,
+    State.SAFE: _safe,
+}
+"""In each state: the event that the facts amount to, and the reason to show."""

@@ -1,0 +1,106 @@
+"""The last word on every setpoint. Knows no regulator and no state: whoever asks gets the same.
+
+A setpoint is finite, inside the bench's range, no faster than its slopes allow, and rises neither
+more than `deviation` over the measured speed nor on stale data. Downward is the safe direction:
+measurements never keep a setpoint from falling. What is not a number counts as standstill.
+"""
+
+from dataclasses import dataclass
+from enum import Flag, auto
+from math import isfinite
+
+
+class Limit(Flag):
+    """What kept the setpoint from what was wanted."""
+
+    NONE = 0
+    NOT_FINITE = auto()
+    DEVIATION = auto()
+    STALE = auto()
+    RATE = auto()
+    RANGE = auto()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """speed_max [rad/s], rate_up, rate_down [rad/s^2], deviation [rad/s], stale [s]"""
+
+    speed_max: float
+    rate_up: float
+    rate_down: float
+    deviation: float
+    stale: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limited:
+    """Setpoint [rad/s], its slope until the next one [rad/s^2], and what has limited it."""
+
+    speed: float
+    rate: float
+    by: Limit
+
+
+def limit(
+    wanted: float,
+    rate: float,
+    *,
+    last: float,
+    measured: float,
+    age: float,
+    dt: float,
+    limits: Limits,
+) -> Limited:
+    """What is allowed of a wanted motor speed and its slope.
+
+    last : setpoint before [rad/s], dt ago [s]; measured : motor [rad/s]; age : of that sample [s]
+    """
+    stale = not age <= limits.stale
+    speed, by = _finite(wanted)
+    speed, by = _at_most(speed, _ceiling(last, measured, limits), Limit.DEVIATION, by)
+    if stale:
+        speed, by = _at_most(speed, last, Limit.STALE, by)
+    speed, by = _sloped(speed, by, last, _interval(dt, limits), limits)
+    speed, by = _ranged(speed, by, limits)
+    return Limited(speed=speed, rate=_slope(rate, by, limits, stale=stale), by=by)
+
+
+def _finite(wanted: float) -> tuple[float, Limit]:
+    return (wanted, Limit.NONE) if isfinite(wanted) else (0.0, Limit.NOT_FINITE)
+
+
+def _ceiling(last: float, measured: float, limits: Limits) -> float:
+    """Highest setpoint that the measured speed allows; a motor not measured may not speed up."""
+    return measured + limits.deviation if isfinite(measured) else last
+
+
+def _at_most(speed: float, ceiling: float, name: Limit, by: Limit) -> tuple[float, Limit]:
+    return _noted(speed, min(speed, ceiling), name, by)
+
+
+def _interval(dt: float, limits: Limits) -> float:
+    """Time that counts for the slope [s]: a gap earns no jump, a time that is no time nothing."""
+    return min(max(0.0, dt), limits.stale)
+
+
+def _sloped(
+    speed: float, by: Limit, last: float, interval: float, limits: Limits
+) -> tuple[float, Limit]:
+    lowest = last - limits.rate_down * interval
+    highest = last + limits.rate_up * interval
+    return _noted(speed, min(max(speed, lowest), highest), Limit.RATE, by)
+
+
+def _ranged(speed: float, by: Limit, limits: Limits) -> tuple[float, Limit]:
+    return _noted(speed, min(max(speed, 0.0), limits.speed_max), Limit.RANGE, by)
+
+
+def _noted(speed: float, allowed: float, name: Limit, by: Limit) -> tuple[float, Limit]:
+    return allowed, by if allowed == speed else by | name
+
+
+def _slope(rate: float, by: Limit, limits: Limits, *, stale: bool) -> float:
+    """Slope that goes with the setpoint: none where a limit holds it, no rise on stale data."""
+    if by or not isfinite(rate):
+        return 0.0
+    return min(max(rate, -limits.rate_down), 0.0 if stale else limits.rate_up)

@@ -1,0 +1,53 @@
+"""Regulators: from what happened since the last sample to the motor speed that is wanted.
+
+A regulator is one module here, found by its name. It gives `Params` (frozen, with a classmethod
+`of(config)`), `State` (frozen) and three functions:
+
+    seed(params, motor_speed, drum_speed) -> State      its demand is the measured motor speed
+    update(params, state, window) -> (State, Demand)    one new sample
+    follow(params, state, demand, setpoint) -> State    the limits did not pass the demand
+
+All are pure. `test_every_regulator.py` holds whatever module it finds here to that.
+"""
+
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any, Protocol, cast
+
+from gateway.config import Config
+from gateway.errors import ConfigError
+from gateway.regulators.window import Demand, Window
+
+
+class _Params(Protocol):
+    def of(self, config: Config) -> Any:
+        """Parameters out of the configuration."""
+
+
+class Regulator(Protocol):
+    """A module of this package."""
+
+    Params: _Params
+
+    def seed(self, params: Any, motor_speed: float, drum_speed: float) -> Any:
+        """State whose demand is the measured motor speed."""
+
+    def update(self, params: Any, state: Any, window: Window) -> tuple[Any, Demand]:
+        """State and demand after one new sample."""
+
+    def follow(self, params: Any, state: Any, demand: float, setpoint: float) -> Any:
+        """State after the limits passed `setpoint` instead of `demand` [rad/s]."""
+
+
+def names() -> tuple[str, ...]:
+    """The regulators there are."""
+    return tuple(sorted(found.name for found in iter_modules(__path__) if found.name != "window"))
+
+
+def load(name: str) -> Regulator:
+    """The regulator of that name."""
+    if name not in names():
+        raise ConfigError(
+            "unknown regulator", place="regulator.name", value=name, expected=" or ".join(names())
+        )
+    return cast("Regulator", import_module(f"{__name__}.{name}"))

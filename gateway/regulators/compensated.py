@@ -1,0 +1,150 @@
+"""A virtual truck, driven by the torque that the real one puts on the drum, which the drum follows.
+
+Beyond the thesis's regulator:
+- Friction from the motor's speed, which is the gear's also inside the backlash; a little less than
+  the whole of it, because what is compensated too much runs away (slowly, above 1 rad/s).
+- Torque as it acted over exactly the window of the speed difference, so that the inertia term
+  cancels what the bench's own acceleration puts into it.
+- Lead: the virtual truck's acceleration over the delay of drive and link is added, so that the
+  drum does not lag. Trim: so is a share of what the drum, held up by the backlash, is behind.
+- Standstill: sensor and friction cannot be told apart while the gear sticks. The virtual truck
+  stands until the impulse above the road load and a margin has earned it START_SPEED, which it then
+  has; so noise and a creeping offset do not start it and a real start loses nothing. Inside the
+  backlash the sensor sees no truck; the torque there is that which accelerates the drum.
+"""
+
+from dataclasses import dataclass, replace
+
+from gateway.config import Config
+from gateway.friction import Friction, friction_torque
+from gateway.regulators.window import Demand, Window
+from gateway.road_load import RoadLoad, road_load
+
+SLOW = 0.5
+"""[rad/s] of the drum, up to which the friction may be compensated less (domain research, 2.1)."""
+START_SPEED = 0.01
+"""[rad/s] of the drum, with which a standing truck is taken to have started."""
+STICK_SPEED = 0.005
+"""[rad/s] of the gear output, below which its friction takes any value up to f_gc."""
+TRIM_MOST = 0.8
+"""[rad/s] of the drum: more than the backlash costs at a torque reversal is another fault."""
+LEAD_MOST = 0.5
+"""rho above which the lead is cut back, as it feeds back rho times the drum's acceleration."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Params:
+    """As the thesis has them; drum_inertia : of gear and drum [kg m^2]; the rest as configured."""
+
+    inertia: float
+    drum_inertia: float
+    drum_radius: float
+    gear_ratio: float
+    friction: Friction
+    road: RoadLoad
+    speed_max: float
+    lead: float
+    trim: float
+    under_compensation: float
+    under_compensation_slow: float
+    breakaway: float
+
+    @classmethod
+    def of(cls, config: Config) -> "Params":
+        """Parameters out of the configuration."""
+        bench, truck, own = config.bench, config.truck, config.regulator
+        inertia = truck.total_mass * bench.drum_radius**2
+        drum_inertia = bench.gear_inertia + bench.drum_inertia
+        return cls(
+            inertia=inertia,
+            drum_inertia=drum_inertia,
+            drum_radius=bench.drum_radius,
+            gear_ratio=bench.gear_ratio,
+            friction=own.friction,
+            road=road_load(truck, bench),
+            speed_max=config.limits.speed_max,
+            lead=own.lead * min(1.0, LEAD_MOST * inertia / drum_inertia),
+            trim=own.trim,
+            under_compensation=own.under_compensation,
+            under_compensation_slow=own.under_compensation_slow,
+            breakaway=own.breakaway,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class State:
+    """virtual_speed : of the truck [rad/s of the drum]; moving : it has started"""
+
+    virtual_speed: float
+    moving: bool
+
+
+def seed(params: Params, motor_speed: float, drum_speed: float) -> State:
+    """Virtual truck with which the demand is the measured motor speed."""
+    gear_speed = motor_speed / params.gear_ratio
+    behind = _bounded(
+        (gear_speed - drum_speed) / (1.0 + params.trim), TRIM_MOST / (1 + params.trim)
+    )
+    virtual = gear_speed - params.trim * behind
+    return State(virtual_speed=max(virtual, 0.0), moving=gear_speed > START_SPEED)
+
+
+def update(params: Params, state: State, window: Window) -> tuple[State, Demand]:
+    """Virtual truck and demand after one new sample."""
+    torque = truck_torque(params, window)
+    moving, speed = _moved(params, state, torque, window.duration)
+    after = State(virtual_speed=speed, moving=moving)
+    if not moving:
+        return after, Demand(speed=0.0)
+    acceleration = (speed - state.virtual_speed) / window.duration if state.moving else 0.0
+    trim = _bounded(params.trim * (speed - window.drum_speed), TRIM_MOST)
+    wanted = params.gear_ratio * (speed + params.lead * acceleration + trim)
+    within = 0.0 <= wanted <= params.speed_max
+    rate = params.gear_ratio * acceleration if within else 0.0
+    return after, Demand(speed=min(max(wanted, 0.0), params.speed_max), rate=rate)
+
+
+def follow(params: Params, state: State, demand: float, setpoint: float) -> State:
+    """Virtual truck with which the demand would have been what the limits passed."""
+    change = (setpoint - demand) / params.gear_ratio / (1.0 + params.trim)
+    return replace(state, virtual_speed=max(state.virtual_speed + change, 0.0))
+
+
+def truck_torque(params: Params, window: Window) -> float:
+    """Torque of the truck on the drum, mean over the window [N m].
+
+    T_w' = (J_g + J_d) theta_d'' + T_f(theta_m' / xi) + xi T_meas           (thesis, eq 4.9)
+    """
+    measured = params.gear_ratio * window.shaft_torque
+    accelerating = params.drum_inertia * window.drum_speed_change / window.duration
+    return accelerating + measured + _friction(params, window, measured)
+
+
+def _friction(params: Params, window: Window, measured: float) -> float:
+    gear_speed = window.motor_speed / params.gear_ratio
+    if abs(gear_speed) < STICK_SPEED:
+        return _bounded(-measured, params.friction.coulomb)
+    least, most = params.under_compensation, params.under_compensation_slow
+    slow = max(0.0, 1.0 - abs(gear_speed) / SLOW)
+    share = 1.0 - least - max(0.0, most - least) * slow
+    return share * friction_torque(gear_speed, params.friction, window.shell_temperature)
+
+
+def _moved(params: Params, state: State, torque: float, duration: float) -> tuple[bool, float]:
+    """Whether the virtual truck moves, and its speed."""
+    r_d, before = params.drum_radius, state.virtual_speed
+    if state.moving:
+        road = r_d * params.road.force(r_d * max(before, 1e-9))
+        speed = min(before + (torque - road) / params.inertia * duration, _top(params))
+        return speed > 0.0, max(speed, 0.0)
+    threshold = r_d * params.road.breakaway + params.breakaway
+    earned = max(before + (torque - threshold) / params.inertia * duration, 0.0)
+    return earned > START_SPEED, earned
+
+
+def _top(params: Params) -> float:
+    return params.speed_max / params.gear_ratio
+
+
+def _bounded(value: float, most: float) -> float:
+    return min(max(value, -most), most)
