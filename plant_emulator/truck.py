@@ -99,7 +99,7 @@ class ReplayedTorque:
     truck: Forklift
     cycle: Cycle = field(default_factory=Cycle)
 
-    def torques(self, time: float, speed: float) -> tuple[float, float]:
+    def torques(self, time: float, speed: float) -> tuple[float, float]:  # noqa: ARG002 - protocol
         """m a(t) + F_RL(v(t)) at the wheel, then the parking brake."""
         cycle, truck = self.cycle, self.truck
         if time <= cycle.start:
