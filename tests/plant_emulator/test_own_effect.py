@@ -1,0 +1,83 @@
+"""A user's own effect, from a file outside of the package."""
+
+from pathlib import Path
+
+import pytest
+
+from plant_emulator import effects
+from plant_emulator.errors import ParameterError
+from plant_emulator.kernel import kernel
+from plant_emulator.parameters import ParameterSet
+from tests.plant_emulator.runs import linear, simulate
+
+OIL_DRAG = '''"""Drag of the gear that rises with its speed: T = k omega_g. Source: a test."""
+
+from plant_emulator.effects import EffectParameter
+
+SUBSYSTEM = "gear"
+PARAMETERS = {
+    "factor": EffectParameter(
+        neutral=0.0, lower=0.0, upper=100.0, plausible=20.0, unit="N m s/rad", meaning="k"
+    )
+}
+
+
+def drag(factor, speed):
+    return factor * speed
+
+
+def gear_torque(value, s, p):
+    return value + drag(p.oil_drag_factor, s.gear_speed)
+'''
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> effects.Effect:
+    path = tmp_path / "oil_drag.py"
+    path.write_text(OIL_DRAG, encoding="utf-8")
+    return effects.from_file(path)
+
+
+def test_file_is_read_as_an_effect(own: effects.Effect) -> None:
+    assert (own.name, own.subsystem) == ("oil_drag", "gear")
+    assert list(own.laws) == ["gear_torque"]
+    assert own.plausible() == {"factor": 20.0}
+    assert "T = k omega_g" in own.description
+
+
+@pytest.mark.slow
+def test_own_effect_acts_beside_the_shipped_ones(
+    nominal: ParameterSet, own: effects.Effect
+) -> None:
+    """It compiles a kernel of its own."""
+    model = kernel((own,))
+    assert set(model.effects) == {*effects.names(), "oil_drag"}
+    inputs = linear((0.5, 0.0), (3.0, 180.0), duration=30.0)
+    values = {**nominal.values(), "oil_drag_factor": 20.0}
+    omega = 180.0 / 62.6
+    expected = 35.989 + 345.38 * omega**0.4418 + 20.0 * omega
+    torque = simulate(inputs, values, kernel=model)["shaft_torque"][-1]
+    assert -62.6 * torque == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('SUBSYSTEM = "gear"', "", "declares no SUBSYSTEM"),
+        ("PARAMETERS =", "SIZES =", "declares no PARAMETERS"),
+        ("def gear_torque", "def gear_troque", "changes no law of the bench"),
+    ],
+)
+def test_file_that_lacks_something_is_refused(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    path = tmp_path / "oil_drag.py"
+    path.write_text(OIL_DRAG.replace(old, new), encoding="utf-8")
+    with pytest.raises(ParameterError, match=said) as refusal:
+        effects.from_file(path)
+    assert "oil_drag" in str(refusal.value)
+
+
+def test_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="no Python file with an effect"):
+        effects.from_file(tmp_path / "ghost.py")
