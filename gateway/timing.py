@@ -32,5 +32,5 @@ class Histogram:
         for index, count in enumerate(self._counts):
             seen += count
             if seen >= wanted:
-                return min((index + 1) * WIDTH, self.max)
+                return self.max if index == BINS - 1 else min((index + 1) * WIDTH, self.max)
         return 0.0
