@@ -12,7 +12,6 @@ from enum import Enum, IntEnum
 
 from gateway.reasons import Reason
 
-
 __all__ = ["TRANSITIONS", "Event", "Facts", "Reason", "State", "Supervisor", "advance"]
 
 

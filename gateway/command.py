@@ -1,0 +1,73 @@
+"""The command block: its number, its bits, and whether the PLC has taken it over.
+
+Writing begins in ARMED, with enable off, because the PLC starts on its rising edge; it goes on in
+SAFE, so that a last command that got lost does not stay in force.
+"""
+
+from dataclasses import dataclass, replace
+from math import inf
+
+from gateway.config import Config
+from gateway.limits import Limited
+from gateway.supervisor import State
+from register_maps.register_map import RegisterMap
+from register_maps.signals import Control, Measurement, Mode, Setpoint
+
+WRITING = frozenset({State.ARMED, State.RUN, State.RAMPDOWN, State.SAFE})
+ENABLING = frozenset({State.RUN, State.RAMPDOWN})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """What was last written: number of the block, setpoint [rad/s], when [s]; and the PLC's echo.
+
+    number : None: nothing written yet
+    echo_moved : when the echo last changed, or the run began [s]
+    """
+
+    number: int | None = None
+    speed: float = 0.0
+    written: float = 0.0
+    echo: int | None = None
+    echo_moved: float = -inf
+
+
+def echoed(command: Command, newest: Measurement | None, now: float) -> Command:
+    """Note whether the PLC has taken a command over."""
+    echo = None if newest is None else newest.command_sequence_echo
+    if echo is None or echo == command.echo:
+        return command
+    return replace(command, echo=echo, echo_moved=now)
+
+
+def nothing(command: Command, now: float) -> Command:
+    """Nothing is written: the setpoint counts as zero."""
+    return replace(command, speed=0.0, written=now)
+
+
+def following(register_map: RegisterMap, command: Command, limited: Limited, now: float) -> Command:
+    """The next block: one number up, the first one up from the echo, as the PLC ignores repeats."""
+    last = command.echo if command.number is None else command.number
+    number = (last or 0) + 1
+    if span := register_map.modulus("command_sequence"):
+        number %= int(span)
+    return replace(command, number=number, speed=limited.speed, written=now)
+
+
+def block(
+    config: Config, register_map: RegisterMap, command: Command, limited: Limited, *, enable: bool
+) -> Setpoint:
+    """The command block in SI."""
+    number = command.number or 0
+    return Setpoint(
+        command_sequence=number,
+        gateway_heartbeat=number,
+        control=Control.ENABLE if enable else Control(0),
+        mode=Mode.ROAD_LOAD if enable else Mode.READY,
+        speed_setpoint=limited.speed,
+        speed_rate=limited.rate,
+        ramp_limit=max(config.limits.rate_up, config.limits.rate_down),
+        current_limit=config.limits.current,
+        watchdog_timeout=config.limits.watchdog,
+        map_version=register_map.version,
+    )
