@@ -1,0 +1,207 @@
+"""The clock of the gateway. Time is the test's; the PLC is the emulator, scanned as time passes."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import register_maps
+from gateway import export, log, replay
+from gateway.config import Config
+from gateway.errors import BugError
+from gateway.header import config_of, header, map_of
+from gateway.loop import Loop
+from gateway.plc import LinkError, TcpLink
+from gateway.reasons import Reason
+from gateway.recording import Recording, encode_header, read
+from gateway.supervisor import State
+from plant_emulator.process import EmulatorProcess
+
+pytestmark = pytest.mark.slow
+
+MAP = register_maps.load("bench_int16")
+SCAN = 0.01
+
+
+class Bench:
+    """An emulator and a clock that belong together: waiting lets the PLC scan."""
+
+    def __init__(self, emulator: EmulatorProcess) -> None:
+        self.emulator = emulator
+        self.time = 1000.0
+        self.scanned = 1000.0
+        self.late = 0.0
+
+    def now(self) -> float:
+        return self.time
+
+    def sleep_until(self, deadline: float) -> None:
+        self.time = max(self.time, deadline) + self.late
+        if scans := int((self.time - self.scanned) / SCAN + 0.5):
+            self.emulator.step(scans)
+            self.scanned += scans * SCAN
+
+
+class Sink:
+    """Keeps the records of a run as the recorder's file would."""
+
+    dropped = 0
+    failed = False
+
+    def __init__(self, config: Config, path: Path) -> None:
+        self.path = path
+        made_with = header(config, MAP, started=1000.0, shadow=False, real_time="no")
+        path.write_bytes(encode_header(made_with))
+
+    def push(self, record: bytes) -> None:
+        with self.path.open("ab") as file:
+            file.write(record)
+
+
+class Run:
+    """A loop on a bench that is stepped tick by tick."""
+
+    def __init__(self, emulator: EmulatorProcess, path: Path, *, shadow: bool = False) -> None:
+        self.bench = Bench(emulator)
+        self.config = Config().with_values({"plc.port": str(emulator.port)})
+        self.sink = Sink(self.config, path)
+        self.link = TcpLink("127.0.0.1", emulator.port, unit=1, timeout=1.0)
+        self.ticks = 0
+        self.loop = Loop(
+            config=self.config,
+            register_map=MAP,
+            link=self.link,
+            sink=self.sink,
+            clock=self.bench,
+            shadow=shadow,
+        )
+
+    def for_ticks(self, count: int) -> "Run":
+        """Go on, without a stop being asked for."""
+        for _ in range(count):
+            deadline = 1000.0 + self.ticks * 0.01
+            self.bench.sleep_until(deadline)
+            self.output = self.loop.tick(deadline, stop_requested=False)
+            self.ticks += 1
+        return self
+
+    def into(self, state: State, within: int) -> int:
+        """Go on until the state is reached; ticks that it took."""
+        for taken in range(within):
+            if self.for_ticks(1).output.state is state:
+                return taken + 1
+        raise AssertionError(f"{self.output.state.name} {self.output.reason} after {within} ticks")
+
+    @property
+    def recording(self) -> Recording:
+        return read(self.sink.path)
+
+
+@pytest.fixture
+def emulator() -> Iterator[EmulatorProcess]:
+    with EmulatorProcess(speed=None, driver="none", truck_mass=3640.0) as running:
+        yield running
+
+
+@pytest.fixture
+def run(emulator: EmulatorProcess, tmp_path: Path) -> Iterator[Run]:
+    made = Run(emulator, tmp_path / "run.rlrec")
+    yield made
+    made.link.close()
+
+
+def running(run: Run) -> Run:
+    """In RUN, the way an operator gets there, and the truck drives: it starts after 2 s."""
+    run.into(State.ARMED, 100)
+    run.bench.emulator.set_remote(on=True)
+    run.into(State.RUN, 20)
+    run.for_ticks(300)
+    assert run.bench.emulator.status()["motor_speed"] > 10.0
+    return run
+
+
+def test_the_way_to_run_is_connect_shadow_armed_remote(run: Run) -> None:
+    running(run)
+    states = [State(state) for state in run.recording.records["state"]]
+    order = list(dict.fromkeys(states))
+    assert order == [State.CONNECT, State.SHADOW, State.ARMED, State.RUN]
+
+
+def test_a_stop_ramps_down_and_ends_with_the_connection_closed(run: Run) -> None:
+    running(run)
+    run.loop.run(lambda: True)
+    states = [State(state) for state in run.recording.records["state"]]
+    assert list(dict.fromkeys(states))[-3:] == [State.RAMPDOWN, State.SAFE, State.OFF]
+    with pytest.raises(LinkError):
+        run.link.read(0, 1)
+
+
+@pytest.mark.parametrize(
+    ("fault", "reason"),
+    [
+        ("frozen_heartbeat", Reason.HEARTBEAT_FROZEN),
+        ("exception_4", Reason.EXCEPTION_4),
+        ("wrong_function", Reason.WRONG_FUNCTION),
+        ("wrong_count", Reason.WRONG_COUNT),
+    ],
+)
+def test_a_lying_plc_ends_the_run_within_150_ms(run: Run, fault: str, reason: Reason) -> None:
+    running(run)
+    run.bench.emulator.set_faults(fault)
+    assert run.into(State.RAMPDOWN, 15) <= 15
+    assert run.output.reason is reason
+
+
+def test_shadow_writes_nothing(emulator: EmulatorProcess, tmp_path: Path) -> None:
+    run = Run(emulator, tmp_path / "run.rlrec", shadow=True)
+    emulator.set_remote(on=True)
+    run.for_ticks(100)
+    records = run.recording.records
+    assert not records["setpoint_speed_setpoint"][records["flags"] & 8 > 0].size
+    assert records["measured_command_sequence_echo"].max() == 0
+    run.link.close()
+
+
+def test_a_late_tick_skips_deadlines_and_keeps_phase(run: Run) -> None:
+    run.bench.late = 0.0
+    deadline = run.bench.now()
+    run.loop.tick(deadline, stop_requested=False)
+    run.bench.time = deadline + 0.034
+    assert run.loop._next(deadline) == pytest.approx(deadline + 0.04)
+    assert run.loop.missed == 3
+
+
+def test_an_error_of_ours_ends_the_run_and_the_connection(run: Run) -> None:
+    running(run)
+    run.sink.push = lambda _: 1 / 0  # type: ignore[assignment]
+    with pytest.raises(BugError, match="ZeroDivisionError"):
+        run.loop.run(lambda: False)
+    with pytest.raises(LinkError):
+        run.link.read(0, 1)
+
+
+def test_a_replay_is_equal_bit_for_bit(run: Run) -> None:
+    running(run)
+    run.loop.run(lambda: True)
+    recorded = run.recording
+    again = map_of(recorded.header)
+    config = config_of(recorded.header)
+    outputs = list(replay.outputs(config, again, replay.observations(recorded, again)))
+    assert len(outputs) == len(recorded) > 320
+    assert list(replay.differences(recorded, outputs, again)) == []
+    other = config.with_values({"truck.mass_kg": "5240"})
+    outputs = list(replay.outputs(other, again, replay.observations(recorded, again)))
+    assert list(replay.differences(recorded, outputs, again)) != []
+
+
+def test_an_exported_recording_is_a_log(run: Run, tmp_path: Path) -> None:
+    running(run)
+    recorded = run.recording
+    path = tmp_path / "run.csv"
+    export.write(path, export.columns(recorded, map_of(recorded.header)))
+    exported = log.read(path)
+    assert exported.time[0] == 0.0
+    assert np.diff(exported.time) == pytest.approx(0.01)
+    measured = recorded.records["measured_motor_speed"]
+    assert exported.columns["motor_speed"].tolist() == measured[np.isfinite(measured)].tolist()
