@@ -12,6 +12,7 @@ NUMBA_DISABLE_JIT=1 step 3 is left out and the same functions run as they are.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -169,7 +170,8 @@ def bind(function: Function, compiled: dict[Function, Function]) -> Function:
             if isinstance(callee, FunctionType):
                 names[name] = compiled.get(callee) or bind(callee, compiled)
         bound = FunctionType(function.__code__, names, function.__name__)
-        bound.__module__ = function.__module__
+        # numba's cache imports the module by its name; that of a user's effect file has none.
+        bound.__module__ = function.__module__ if function.__module__ in sys.modules else __name__
         cached = function in (integrate.run, integrate.advance)
         compiled[function] = compiler.compiled(bound, on_disk=cached)
     return compiled[function]

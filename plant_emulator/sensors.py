@@ -10,13 +10,13 @@ import numpy as np
 
 from plant_emulator.log import Log
 
-# signal -> (standard deviation, quantisation step) [SI]
+# signal -> (standard deviation, quantisation step: full scale of a 12-bit converter) [SI]
 SENSORS: dict[str, tuple[float, float]] = {
-    "motor_speed": (0.15, 0.0732),
-    "drum_speed": (0.01, 0.00488),
-    "armature_current": (0.25, 0.0488),
-    "shaft_torque": (0.25, 0.0244),
-    "wheel_torque": (2.0, 0.73),
+    "motor_speed": (0.15, 300 / 4096),
+    "drum_speed": (0.01, 20 / 4096),
+    "armature_current": (0.25, 200 / 4096),
+    "shaft_torque": (0.25, 100 / 4096),
+    "wheel_torque": (2.0, 3000 / 4096),
 }
 
 
