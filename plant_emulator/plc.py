@@ -141,12 +141,10 @@ class Plc:
     def _enter(self, state: PlcState) -> None:
         if state is PlcState.RAMP_DOWN and not self.inbox.watchdog_ok(self.time):
             self.alarm |= Alarm.COMMUNICATION
-        if self.truck is not None:
-            self.truck.get_off()
         if state is PlcState.ROAD_LOAD:
             self.road_load_since = self.time
-            if self.truck is not None:
-                self.truck.set_off(self.time)
+        if self.truck is not None:
+            self.truck.follow(state, self.time)
         self.state = state
 
     def _plan(self) -> None:

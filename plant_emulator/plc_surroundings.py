@@ -7,9 +7,11 @@ from operator import or_
 from typing import Protocol
 
 from plant_emulator.bench import BenchSamples
-from register_maps.signals import Interlock
+from register_maps.signals import Interlock, PlcState
 
 CLOSED = reduce(or_, Interlock)
+PARKING_SPEED = 0.05
+PARKING_TORQUE = 300.0
 
 
 class Bench(Protocol):
@@ -29,26 +31,30 @@ class Driver(Protocol):
 
 
 class Truck:
-    """A truck on the drum: a new driver sets off whenever the bench goes into road-load."""
+    """A truck on the drum: a new driver sets off whenever the bench goes into road-load.
+
+    When the bench is neither in road-load nor in speed mode nobody drives, and the truck is parked
+    as soon as the drum stands: without that the frictionless drum would float through its gap.
+    """
 
     def __init__(self, new_driver: Callable[[], Driver], drum_radius: float) -> None:
         self._new_driver, self._drum_radius = new_driver, drum_radius
         self._driver: Driver | None = None
         self._since = 0.0
+        self._parks = True
 
-    def set_off(self, time: float) -> None:
-        """Begin the cycle; time: now [s]."""
-        self._driver, self._since = self._new_driver(), time
-
-    def get_off(self) -> None:
-        """Leave the truck rolling freely."""
-        self._driver = None
+    def follow(self, state: PlcState, time: float) -> None:
+        """Do what goes with the PLC's new state; time: now [s]."""
+        self._driver = self._new_driver() if state is PlcState.ROAD_LOAD else None
+        self._since = time
+        self._parks = state not in (PlcState.ROAD_LOAD, PlcState.SPEED)
 
     def torques(self, time: float, drum_speed: float) -> tuple[float, float]:
-        """Drive and brake torque at its wheel [N m]; 0, 0 with nobody on it."""
-        if self._driver is None:
-            return 0.0, 0.0
-        return self._driver.torques(time - self._since, self._drum_radius * drum_speed)
+        """Drive and brake torque at its wheel [N m]."""
+        if self._driver is not None:
+            return self._driver.torques(time - self._since, self._drum_radius * drum_speed)
+        stands = self._parks and abs(drum_speed) < PARKING_SPEED
+        return 0.0, PARKING_TORQUE if stands else 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -421,14 +421,26 @@ def test_driver_sets_off_with_road_load_and_gets_off_after_it():
 
     made = desk(truck=Truck(board, drum_radius=0.645))
     made.scan(3)
-    assert made.plc.bench.wheel == [(0.0, 0.0)] * 3
+    assert not diaries
     made.beat(3, control=Control.ENABLE)
     assert [time for time, _ in diaries[0].asked] == [0.0, 0.01]
     assert made.plc.bench.wheel[-1] == (100.0, 3.0)
     made.beat(2, control=Control(0))
-    assert made.plc.bench.wheel[-1] == (0.0, 0.0)
+    assert made.plc.bench.wheel[-1][0] == 0.0
     made.beat(2, control=Control.ENABLE)
     assert len(diaries) == 2
+
+
+def test_truck_without_a_driver_is_parked_once_the_drum_stands():
+    made = desk(truck=Truck(Diary, drum_radius=0.645))
+    made.scan(3)
+    assert made.plc.bench.wheel[1:] == [(0.0, 300.0)] * 2
+    made.beat(100, control=Control.ENABLE, mode=Mode.SPEED, speed_setpoint=300 * RPM)
+    assert made.plc.bench.wheel[-1] == (0.0, 0.0)
+    made.beat(5, control=Control(0))
+    assert made.plc.bench.wheel[-1] == (0.0, 0.0)
+    made.beat(100)
+    assert made.plc.bench.wheel[-1] == (0.0, 300.0)
 
 
 def test_driver_is_told_the_speed_of_the_tread():
