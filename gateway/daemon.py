@@ -28,6 +28,8 @@ from gateway.supervisor import State
 from register_maps.register_map import RegisterMap
 
 BY_OPERATOR: Final = frozenset({Reason.STOP_REQUESTED, Reason.REMOTE_OFF})
+APART: Final = 1.0
+"""[s] A second signal sooner than this is the first once more: some send to process and group."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,12 +51,15 @@ class _Stop:
 
     def __init__(self, until: float | None) -> None:
         self._until = until
+        self._first = 0.0
         self.asked = False
 
     def signalled(self, number: int, _frame: object) -> None:
         """First: ask; second: end at once."""
-        if self.asked:
+        now = time.monotonic()
+        if self.asked and now - self._first > APART:
             raise GatewayError(f"stopped at once by a second {signal.Signals(number).name}")
+        self._first = now if not self.asked else self._first
         self.asked = True
 
     def __call__(self) -> bool:
@@ -75,28 +80,29 @@ def run(
     with granted as real:
         started = time.monotonic()
         stop = _Stop(None if duration is None else started + duration)
-        recorder = Recorder(
-            Job(
-                path=Path(config.recording.dir) / f"{datetime.now(UTC):%Y%m%dT%H%M%S.%fZ}{SUFFIX}",
-                header=header(config, register_map, started=started, shadow=shadow, real_time=real),
-                layout=Layout.of(register_map),
-                view=view,
-            )
-        )
-        loop = Loop(
-            config=config,
-            register_map=register_map,
-            link=link,
-            sink=recorder,
-            clock=MonotonicClock(),
-            shadow=shadow,
-        )
+        told = header(config, register_map, started=started, shadow=shadow, real_time=real)
         with _signals(stop):
+            recorder = Recorder(
+                Job(path=_new_file(config), header=told, layout=Layout.of(register_map), view=view)
+            )
             try:
+                loop = Loop(
+                    config=config,
+                    register_map=register_map,
+                    link=link,
+                    sink=recorder,
+                    clock=MonotonicClock(),
+                    shadow=shadow,
+                )
                 loop.run(stop)
             finally:
                 recorder.close()
     return _ended(loop, recorder, real)
+
+
+def _new_file(config: Config) -> Path:
+    """Named after the moment, so that files sort by time."""
+    return Path(config.recording.dir) / f"{datetime.now(UTC):%Y%m%dT%H%M%S.%fZ}{SUFFIX}"
 
 
 @contextmanager

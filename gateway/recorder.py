@@ -13,7 +13,7 @@ import os
 import signal
 import time
 from collections.abc import Iterator
-from contextlib import nullcontext, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -53,7 +53,8 @@ class Recorder:
             fcntl.fcntl(self._sender.fileno(), fcntl.F_SETPIPE_SZ, PIPE_SIZE)
         os.set_blocking(self._sender.fileno(), False)
         self._process = context.Process(target=record, args=(receiver, job), name="recorder")
-        self._process.start()
+        with _signals_held():
+            self._process.start()
         receiver.close()
         self.path = job.path
         self.dropped = 0
@@ -74,6 +75,16 @@ class Recorder:
         self._process.join()
         if self._process.exitcode:
             raise GatewayError(f"{self.path}: the recorder ended early; expected room on the disk")
+
+
+@contextmanager
+def _signals_held() -> Iterator[None]:
+    """The new process inherits the mask: a Ctrl-C while it still starts does not end it."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def record(receiver: Connection, job: Job) -> None:

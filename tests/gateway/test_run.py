@@ -1,0 +1,158 @@
+"""`gateway run` as an operator meets it: a process, its output, its exit code, its recording."""
+
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from gateway.recording import Recording, read
+from plant_emulator.process import EmulatorProcess
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture
+def emulator() -> Iterator[EmulatorProcess]:
+    with EmulatorProcess(driver="none", truck_mass=3640.0) as running:
+        yield running
+
+
+class Gateway:
+    """The daemon as a process, against a port."""
+
+    def __init__(self, directory: Path, port: int, *options: str) -> None:
+        self.recordings = directory / "recordings"
+        config = directory / "gateway.toml"
+        config.write_text(f'[plc]\nport = {port}\n[recording]\ndir = "{self.recordings}"\n')
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "gateway", "run", "-c", config, *options],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            cwd=Path(__file__).parents[2],
+        )
+
+    def ended(self) -> tuple[int, str]:
+        """Exit code and output."""
+        output, _ = self.process.communicate(timeout=60)
+        return self.process.returncode, output
+
+    @property
+    def recording(self) -> Recording:
+        (path,) = self.recordings.glob("*.rlrec")
+        return read(path)
+
+    def states(self) -> list[str]:
+        """The states of the recording, each stretch once."""
+        found = self.recording
+        names = [found.state(state) for state in found.records["state"]]
+        return [name for name, before in zip(names, ["", *names], strict=False) if name != before]
+
+
+def until(holds: Callable[[], bool], seconds: float = 20.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def driving(emulator: EmulatorProcess, gateway: Gateway) -> None:
+    """In RUN, and the truck has set off."""
+    until(lambda: gateway.recordings.exists() and "ARMED" in gateway.states())
+    emulator.set_remote(on=True)
+    until(lambda: emulator.status()["motor_speed"] > 50.0)
+
+
+def test_sigterm_ramps_down_and_keeps_the_recording(
+    emulator: EmulatorProcess, tmp_path: Path
+) -> None:
+    gateway = Gateway(tmp_path, emulator.port)
+    driving(emulator, gateway)
+    gateway.process.send_signal(signal.SIGTERM)
+    code, output = gateway.ended()
+    assert code == 0, output
+    assert gateway.states() == ["CONNECT", "SHADOW", "ARMED", "RUN", "RAMPDOWN", "SAFE", "OFF"]
+    assert "RAMPDOWN   STOP_REQUESTED" in output
+    assert "ended by the operator" in output
+    assert emulator.status()["speed_reference"] == pytest.approx(0.0, abs=1.0)
+
+
+def test_sigkill_leaves_a_whole_recording_and_a_drum_that_is_ramped_down(
+    emulator: EmulatorProcess, tmp_path: Path
+) -> None:
+    gateway = Gateway(tmp_path, emulator.port)
+    driving(emulator, gateway)
+    gateway.process.kill()
+    killed = emulator.status()
+    # watchdog 0.2 s, then 3000 rpm/s = 314 rad/s^2, and a scan or two
+    ramp = 0.2 + killed["speed_reference"] / 314.0 + 0.1
+    until(lambda: emulator.status()["speed_reference"] == 0.0)
+    assert emulator.status()["time"] - killed["time"] < ramp + 0.1  # as often as `until` looks
+    assert gateway.ended()[0] == -signal.SIGKILL  # the output ends when the recorder does
+    found = gateway.recording
+    assert found.state(found.records["state"][-1]) == "RUN"
+    assert found.records["measured_plc_time"][-1] == pytest.approx(killed["time"], abs=0.1)
+
+
+def test_a_plc_that_is_gone_is_the_reason_and_exit_code_1(
+    emulator: EmulatorProcess, tmp_path: Path
+) -> None:
+    gateway = Gateway(tmp_path, emulator.port)
+    driving(emulator, gateway)
+    emulator.stop()
+    until(lambda: "SAFE" in gateway.states())
+    gateway.process.send_signal(signal.SIGINT)
+    code, output = gateway.ended()
+    assert code == 1
+    assert "RAMPDOWN   CONNECTION_LOST" in output or "RAMPDOWN   NOT_CONNECTED" in output
+    assert "Traceback" not in output
+
+
+def test_nobody_there_is_exit_code_1_and_says_so(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port = listener.getsockname()[1]
+    code, output = Gateway(tmp_path, port, "--duration", "0.3").ended()
+    assert code == 1
+    assert "NOT_CONNECTED" in output
+
+
+def test_shadow_sends_no_command(emulator: EmulatorProcess, tmp_path: Path) -> None:
+    emulator.set_remote(on=True)
+    gateway = Gateway(tmp_path, emulator.port, "--shadow", "--duration", "1.0")
+    code, output = gateway.ended()
+    assert code == 0, output
+    assert gateway.states() == ["CONNECT", "SHADOW", "OFF"]
+    last = gateway.recording.records[-2]
+    assert (last["measured_command_sequence_echo"], last["measured_command_age"]) == (0, 65.535)
+    assert last["demand"] == pytest.approx(0.0, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("[plc]\nprt = 5020\n", "prt"),
+        ("[plc]\nport = 70000\n", "70000"),
+        ('[plc]\nmap = "no_such_map"\n', "no_such_map"),
+        ('[plc]\nhost = "no such host"\n', "no such host"),
+    ],
+)
+def test_a_bad_configuration_is_one_line_and_exit_code_2(
+    tmp_path: Path, line: str, says: str
+) -> None:
+    config = tmp_path / "bad.toml"
+    config.write_text(line)
+    ended = subprocess.run(
+        [sys.executable, "-m", "gateway", "run", "-c", config],
+        capture_output=True,
+        text=True,
+        cwd=Path(__file__).parents[2],
+        check=False,
+    )
+    assert ended.returncode == 2
+    assert says in ended.stderr
+    assert ended.stderr.count("\n") == 1
