@@ -1,0 +1,113 @@
+"""Every fault of the emulator in RUN, over the real socket: the gateway's reason and how fast.
+
+One gateway meets all of them one after the other: so it also has to come back into RUN after each,
+and only by the operator's remote switch.
+"""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from gateway import recording
+from plant_emulator import faults
+from plant_emulator.process import EmulatorProcess
+from tests.system.gateway_process import Gateway, gateway, until, until_armed
+
+pytestmark = pytest.mark.slow
+
+WITHIN = 0.15
+# 10 ms of the PLC's scan, 10 ms of the gateway's tick, and a busy machine
+TOLERANCE = 0.04
+REASONS = {
+    "frozen_heartbeat": {"HEARTBEAT_FROZEN"},
+    "frozen_image": {"SEQUENCE_FROZEN", "HEARTBEAT_FROZEN"},
+    "late_reply": {"TIMEOUT"},
+    "nan": {"NOT_AVAILABLE", "OUT_OF_RANGE", "NOT_FINITE"},
+    "torn_image": {"TORN_IMAGE"},
+    "drop_mid_reply": {"CONNECTION_LOST"},
+    "refuse_connection": {"CONNECTION_LOST", "NOT_CONNECTED"},
+    "wrong_function": {"WRONG_FUNCTION"},
+    "wrong_count": {"WRONG_COUNT"},
+    "wrong_transaction": {"WRONG_TRANSACTION"},
+    "word_order": {"TEST_WORD"},
+    **{f"exception_{code}": {f"EXCEPTION_{code}"} for code in range(1, 12)},
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Met:
+    """What the recording says about one fault: delay [s] from the fault to the end of RUN."""
+
+    delay: float
+    reason: str
+    next_state: str
+
+
+def run_again(emulator: EmulatorProcess) -> None:
+    """Turn the remote switch off and on until the PLC is in road-load."""
+    for _ in range(20):
+        emulator.set_remote(on=False)
+        time.sleep(0.2)
+        emulator.set_remote(on=True)
+        end = time.monotonic() + 0.5
+        while time.monotonic() < end:
+            if emulator.status()["state"] == "ROAD_LOAD":
+                return
+            time.sleep(0.02)
+    raise AssertionError("the gateway does not come back into RUN")
+
+
+def suffer(emulator: EmulatorProcess, name: str) -> float:
+    """Let one fault happen for half a second in RUN; PLC time at which it began [s]."""
+    run_again(emulator)
+    time.sleep(0.3)
+    start = round(emulator.status()["time"] + 0.1, 2)
+    emulator.set_faults(f"{name}@{start}")
+    until(lambda: emulator.status()["time"] > start + 0.5)
+    emulator.set_faults()
+    return start
+
+
+def met(daemon: Gateway, starts: dict[str, float]) -> dict[str, Met]:
+    """What came of each fault."""
+    (path,) = (daemon.folder / "recordings").glob("*.rlrec")
+    found = recording.read(path)
+    records = found.records
+    sample, now = records["measured_plc_time"], records["now"]
+    # the clocks of PLC and gateway differ by what the freshest sample shows
+    ahead = np.nanmin(now - sample)
+    states = np.array([found.state(code) for code in records["state"]])
+    result = {}
+    for name, start in starts.items():
+        began = start + ahead
+        after = np.flatnonzero((now >= began) & (states != "RUN"))[0]
+        result[name] = Met(
+            delay=float(now[after] - began),
+            reason=found.reason(records["reason"][after]),
+            next_state=str(states[after]),
+        )
+        assert states[np.flatnonzero(now < began)[-1]] == "RUN", name
+    return result
+
+
+@pytest.fixture(scope="module")
+def all_met(tmp_path_factory) -> dict[str, Met]:
+    folder = tmp_path_factory.mktemp("faults")
+    with EmulatorProcess(truck_mass=None) as emulator, gateway(folder, emulator.port) as daemon:
+        until_armed(emulator)
+        starts = {name: suffer(emulator, name) for name in faults.NAMES}
+        daemon.stop()
+    return met(daemon, starts)
+
+
+def test_every_fault_has_its_reasons_here():
+    assert set(REASONS) == set(faults.NAMES)
+
+
+@pytest.mark.parametrize("name", faults.NAMES)
+def test_fault_ends_the_run_with_its_reason_within_150_ms(all_met, name):
+    assert all_met[name].reason in REASONS[name]
+    assert all_met[name].next_state in ("RAMPDOWN", "SAFE")
+    assert all_met[name].delay <= WITHIN + TOLERANCE
