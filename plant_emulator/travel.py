@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.bench import STEP, Bench, BenchSamples
+from plant_emulator.bench import Bench, BenchSamples
 from plant_emulator.laws import WARM_SHELL
 from plant_emulator.log import Log
 from plant_emulator.programs import SAMPLE_PERIOD, TravelProgram, sample_times
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from plant_emulator.parameters import ParameterSet
+
+# The bench takes the reference as linear within a step, the log as a staircase: a short step [s].
+STEP = 2e-4
 
 
 @dataclass
@@ -69,7 +72,7 @@ def travel(
     """The log of a travel program: truck on the drum, reference in a loop around the bench."""
     truck = Forklift(mass=program.mass)
     who = driver or ReplayedTorque(truck)
-    bench = Bench(parameters, effects, gap_position=gap_position)
+    bench = Bench(parameters, effects, gap_position=gap_position, step=STEP)
     regulator = ThesisReference(parameters, truck)
     time = sample_times(program.duration)
     rows = np.zeros((len(time), 7))
