@@ -40,6 +40,11 @@ def test_what_is_no_number_ramps_towards_standstill(wanted):
     assert passed.by == Limit.NOT_FINITE | Limit.RATE
 
 
+def test_what_is_no_number_ends_at_standstill():
+    passed = of(nan, last=1.5, measured=1.0)
+    assert (passed.speed, passed.rate, passed.by) == (0.0, 0.0, Limit.NOT_FINITE)
+
+
 def test_nothing_goes_below_standstill():
     passed = of(-5.0, last=1.0, measured=1.0)
     assert (passed.speed, passed.by) == (0.0, Limit.RATE | Limit.RANGE)

@@ -47,6 +47,13 @@ def test_no_way_leads_into_run_but_from_armed_and_none_out_but_by_the_rampdown()
     assert TRANSITIONS[State.RAMPDOWN] == {Event.AT_REST: State.SAFE}
 
 
+def test_before_the_first_tick_it_is_off_and_has_seen_nothing():
+    begin = Supervisor()
+    assert (begin.state, begin.reason, begin.started) == (State.OFF, None, 0.0)
+    assert not begin.released
+    assert not begin.confirmed
+
+
 def test_the_loop_starts_by_connecting():
     assert after(Supervisor(), GOOD) == (State.CONNECT, None)
 

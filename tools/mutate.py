@@ -1,0 +1,201 @@
+#!/usr/bin/env python3
+"""Mutation test of the two files that stand between an error and the drum.
+
+Every comparison, number, truth value, boolean operator, sign, sum and min/max of gateway/limits.py
+and gateway/supervisor.py is changed, one at a time, and the file's own tests are run against it. A
+change that no test notices is a survivor: the tests do not say what that place is for. Exit 1 then.
+What decorators, annotations and texts hold is not behaviour and stays as it is.
+
+A mutant lives in a forked process only: the sources on disk are never touched.
+"""
+
+import ast
+import copy
+import importlib
+import os
+import signal
+import sys
+import time
+import types
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+TARGETS = {
+    "gateway.limits": "tests/gateway/test_limits.py",
+    "gateway.supervisor": "tests/gateway/test_supervisor.py",
+}
+WORKERS = 2
+PATIENCE = 60
+"""[s] after which a mutant that hangs counts as noticed."""
+
+COMPARISONS: dict[type[ast.cmpop], tuple[type[ast.cmpop], ...]] = {
+    ast.Lt: (ast.LtE, ast.GtE),
+    ast.LtE: (ast.Lt, ast.Gt),
+    ast.Gt: (ast.GtE, ast.LtE),
+    ast.GtE: (ast.Gt, ast.Lt),
+    ast.Eq: (ast.NotEq,),
+    ast.NotEq: (ast.Eq,),
+    ast.Is: (ast.IsNot,),
+    ast.IsNot: (ast.Is,),
+    ast.In: (ast.NotIn,),
+    ast.NotIn: (ast.In,),
+}
+OPERATIONS: dict[type[ast.operator], type[ast.operator]] = {
+    ast.Add: ast.Sub,
+    ast.Sub: ast.Add,
+    ast.Mult: ast.Div,
+    ast.Div: ast.Mult,
+    ast.BitOr: ast.BitAnd,
+    ast.BitAnd: ast.BitOr,
+}
+NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mutant:
+    """A changed module: where, what was there, what is there now."""
+
+    module: str
+    line: int
+    was: str
+    now: str
+    tree: ast.Module
+
+
+def variants(node: ast.AST) -> Iterator[ast.AST]:
+    """Every node that may stand in the place of this one."""
+    if isinstance(node, ast.Compare):
+        for place, operator in enumerate(node.ops):
+            for other in COMPARISONS[type(operator)]:
+                changed = copy.deepcopy(node)
+                changed.ops[place] = other()
+                yield changed
+    elif isinstance(node, ast.BoolOp):
+        other_operator = ast.Or() if isinstance(node.op, ast.And) else ast.And()
+        yield ast.BoolOp(op=other_operator, values=node.values)
+    elif isinstance(node, ast.UnaryOp):
+        yield node.operand
+    elif isinstance(node, ast.BinOp) and type(node.op) in OPERATIONS:
+        yield ast.BinOp(left=node.left, op=OPERATIONS[type(node.op)](), right=node.right)
+    elif isinstance(node, ast.Name) and node.id in NAMES:
+        yield ast.Name(id=NAMES[node.id], ctx=node.ctx)
+    elif isinstance(node, ast.Constant):
+        yield from (ast.Constant(value=value) for value in constants(node.value))
+
+
+def constants(value: object) -> tuple[object, ...]:
+    """Other values for a constant; texts and None have none."""
+    if isinstance(value, bool):
+        return (not value,)
+    if isinstance(value, int | float):
+        return (value + 1, value - 1)
+    return ()
+
+
+def places(node: ast.AST) -> Iterator[tuple[ast.AST, str, int | None]]:
+    """Every place of a node that holds behaviour: parent, field, index in it."""
+    skipped = {"decorator_list", "annotation", "returns"}
+    for field, value in ast.iter_fields(node):
+        if field in skipped:
+            continue
+        for index, child in enumerate(value if isinstance(value, list) else [value]):
+            if isinstance(child, ast.AST):
+                yield node, field, index if isinstance(value, list) else None
+                yield from places(child)
+
+
+def unchanged(module: str) -> Mutant:
+    """The module as it is."""
+    return Mutant(module=module, line=0, was="", now="", tree=parsed(module))
+
+
+def parsed(module: str) -> ast.Module:
+    """Tree of a module."""
+    return ast.parse((ROOT / (module.replace(".", "/") + ".py")).read_text(encoding="utf-8"))
+
+
+def mutants(module: str) -> Iterator[Mutant]:
+    """Every mutant of a module."""
+    tree = parsed(module)
+    for parent, field, index in list(places(tree)):
+        held = getattr(parent, field)
+        node = held if index is None else held[index]
+        for other in variants(node):
+            ast.copy_location(other, node)
+            _put(parent, field, index, other)
+            changed = ast.fix_missing_locations(copy.deepcopy(tree))
+            _put(parent, field, index, node)
+            yield Mutant(
+                module=module,
+                line=getattr(node, "lineno", 0),
+                was=ast.unparse(node),
+                now=ast.unparse(other),
+                tree=changed,
+            )
+
+
+def _put(parent: ast.AST, field: str, index: int | None, node: ast.AST) -> None:
+    if index is None:
+        setattr(parent, field, node)
+    else:
+        getattr(parent, field)[index] = node
+
+
+def is_noticed(mutant: Mutant) -> bool:
+    """Whether the module's tests fail on a mutant; they run in a process of their own."""
+    child = os.fork()
+    if child:
+        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) != 0
+    code = 1
+    try:
+        signal.alarm(PATIENCE)
+        quiet = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(quiet, 1)
+        os.dup2(quiet, 2)
+        code = run_tests(mutant)
+    finally:
+        os._exit(code)
+
+
+def run_tests(mutant: Mutant) -> int:
+    """Exit code of the tests with the mutant in the place of its module."""
+    import pytest  # loaded by the parent, so that a child does not wait for it
+
+    changed = types.ModuleType(mutant.module)
+    package, _, name = mutant.module.rpartition(".")
+    sys.modules[mutant.module] = changed
+    setattr(importlib.import_module(package), name, changed)
+    exec(compile(mutant.tree, mutant.module, "exec"), changed.__dict__)
+    options = ["-x", "-q", "-p", "no:cacheprovider", "-W", "ignore"]
+    return int(pytest.main([*options, TARGETS[mutant.module]]))
+
+
+def main() -> int:
+    """Try every mutant and print the survivors."""
+    os.chdir(ROOT)
+    sys.path.insert(0, str(ROOT))
+    importlib.import_module("hypothesis")
+    importlib.import_module("pytest")
+    for module in TARGETS:
+        importlib.import_module(module)
+    started = time.monotonic()
+    for module, tests in TARGETS.items():
+        if is_noticed(unchanged(module)):
+            print(f"{module}: its tests fail without any change: expected {tests} to pass")
+            return 1
+    everyone = [mutant for module in TARGETS for mutant in mutants(module)]
+    with ThreadPoolExecutor(WORKERS) as pool:
+        noticed = list(pool.map(is_noticed, everyone))
+    survivors = [one for one, dead in zip(everyone, noticed, strict=True) if not dead]
+    for one in survivors:
+        print(f"{one.module}:{one.line}: {one.was}  ->  {one.now}: no test notices")
+    seconds = time.monotonic() - started
+    print(f"{len(everyone)} mutants, {len(survivors)} survivors, {seconds:.0f} s")
+    return 1 if survivors else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
