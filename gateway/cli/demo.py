@@ -1,0 +1,162 @@
+"""Drive a forklift over the emulated bench, and show how much its drum feels like the road."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rich.console import Console
+
+EXAMPLE = """
+\b
+Examples:
+  gateway demo
+  gateway demo --load 1600 --regulator thesis --period 20 --fast
+"""
+
+
+@click.command(epilog=EXAMPLE)
+@click.option(
+    "--load",
+    "load_mass",
+    type=click.FloatRange(0.0, 10000.0),
+    metavar="KG",
+    help="Load on the 3640 kg truck; default: a run without and a run with 1600 kg.",
+)
+@click.option(
+    "--driver",
+    type=click.Choice(["none", "pi"]),
+    default="none",
+    show_default=True,
+    help="none replays the torque that the cycle takes on the road, pi holds the cycle's speed.",
+)
+@click.option("--regulator", default="compensated", show_default=True, metavar="NAME")
+@click.option(
+    "--torque",
+    type=click.Choice(["integrated", "averaged", "instantaneous"]),
+    default="integrated",
+    show_default=True,
+    help="How the regulator sees the shaft torque.",
+)
+@click.option(
+    "--period",
+    type=click.FloatRange(10.0, 200.0),
+    default=10.0,
+    show_default=True,
+    metavar="MS",
+    help="Of the gateway's loop.",
+)
+@click.option("--map", "map_name", default="bench_int16", show_default=True, metavar="NAME")
+@click.option(
+    "--bench-parameters",
+    default="thesis_table_3_1",
+    show_default=True,
+    metavar="SET",
+    help="The emulated bench; the regulator goes on believing in Table 3.1.",
+)
+@click.option("--friction", metavar="FILE", help="Friction map that the regulator compensates.")
+@click.option(
+    "--duration",
+    type=click.FloatRange(1.0, 600.0),
+    default=30.0,
+    show_default=True,
+    metavar="S",
+    help="Of the truck's cycle.",
+)
+@click.option("--fast", is_flag=True, help="Do not wait for the clock; latency is not measured.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("demo_output"),
+    show_default=True,
+    metavar="DIR",
+    help="Where log, picture and summary go.",
+)
+@click.option("--json", "json_file", metavar="FILE", help="Summary; - is standard output.")
+def command(
+    *,
+    load_mass: float | None,
+    driver: str,
+    regulator: str,
+    torque: str,
+    period: float,
+    map_name: str,
+    bench_parameters: str,
+    friction: str | None,
+    duration: float,
+    fast: bool,
+    out: Path,
+    json_file: str | None,
+) -> None:
+    """Run the emulated bench, a forklift on its drum, and the gateway between them.
+
+    Three processes: the bench with its PLC behind Modbus TCP on 127.0.0.1, the gateway, and this
+    one as the operator. Leaves log, recording, configuration, demo.png and summary.json in DIR.
+    """
+    from rich.console import Console
+
+    from gateway.demo import LOADS, Options, demo
+
+    console = Console(stderr=json_file == "-")
+    summary = demo(
+        Options(
+            loads=LOADS if load_mass is None else (load_mass,),
+            driver=driver,
+            regulator=regulator,
+            torque=torque,
+            period=period / 1e3,
+            map=map_name,
+            bench_parameters=bench_parameters,
+            friction=friction,
+            duration=duration,
+            fast=fast,
+            out=out,
+        ),
+        console,
+    )
+    _show(console, summary, out)
+    if json_file == "-":
+        click.echo(json.dumps(summary, indent=2))
+    elif json_file:
+        Path(json_file).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+
+
+def _show(console: "Console", summary: dict[str, Any], out: Path) -> None:
+    from rich.table import Table
+
+    runs = summary["runs"]
+    table = Table(title="Does the drum feel like the road?", title_justify="left")
+    table.add_column("")
+    for run in runs:
+        table.add_column(f"{run['truck_kg']:.0f} kg", justify="right")
+    rows: tuple[tuple[str, Callable[[dict[str, Any]], str]], ...] = (
+        ("speed, Val1", lambda run: f"{run['velocity']['val1']:.2f} %"),
+        ("speed, Val2", lambda run: f"{run['velocity']['val2']:.2f} %"),
+        ("force in cruise, error", lambda run: _force(run["force"])),
+        ("traction energy, error", lambda run: f"{run['energy']['error_percent']:+.2f} %"),
+        ("latency p50 / p99 / max", lambda run: _latency(run["latency_ms"])),
+        ("missed deadlines", lambda run: f"{run['missed_deadlines']} of {run['cycles']}"),
+        ("stopped by", lambda run: run["stop_reason"]),
+    )
+    for name, show in rows:
+        table.add_row(name, *(show(run) for run in runs))
+    console.print(table)
+    console.print(f"picture, logs, recordings and summary.json: {out}", highlight=False)
+
+
+def _force(force: dict[str, float | None]) -> str:
+    error, target = force["mean_error_newton"], force["target_newton"]
+    if error is None or target is None:
+        return "no cruise"
+    return f"{error:+.1f} N of {target:.0f} N"
+
+
+def _latency(latency: dict[str, float | None]) -> str:
+    values = [latency[name] for name in ("p50", "p99", "max")]
+    if any(value is None for value in values):
+        return "not measured"
+    return " / ".join(f"{value:.2f}" for value in values) + " ms"
