@@ -10,7 +10,8 @@ it is not differentiated here:
 
 Friction takes the drum's speed for the gear's (eq 4.8), which is wrong in the backlash. At rest
 sgn(0) = 0: friction and rolling resistance vanish. The bench has no reverse: where the reference
-would leave its range, the integral is set to what keeps it there.
+would leave its range, the integral is set to what keeps it there. The setpoint is a staircase, as
+in the thesis: no slope is sent that the PLC could follow between two writes.
 """
 
 from dataclasses import dataclass, replace
@@ -74,8 +75,7 @@ def update(params: Params, state: State, window: Window) -> tuple[State, Demand]
     wanted = xi * (rho * theta_d + integral)
     speed = min(max(wanted, 0.0), params.speed_max)
     integral += (speed - wanted) / xi
-    rate = xi * (rho * window.drum_speed_change / dt + growth) if speed == wanted else 0.0
-    return replace(state, integral=integral), Demand(speed=speed, rate=rate)
+    return replace(state, integral=integral), Demand(speed=speed)
 
 
 def follow(params: Params, state: State, demand: float, setpoint: float) -> State:
