@@ -24,18 +24,19 @@ from gateway.record import (
     number,
     values,
 )
-from gateway.recording import Recording
 from gateway.supervisor import State
 from register_maps.codec import CodecError, decode_measurement, encode_setpoint
 from register_maps.register_map import RegisterMap
 from register_maps.signals import Measurement
 
+Row = dict[str, Any]
+"""A tick as recorded: gateway.recording.Recording.rows()."""
 REASONS: Final = {int(reason): reason for reason in Reason}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Difference:
-    """Where a replay first leaves its recording."""
+    """Where a replay leaves its recording; `time` as recorded [s]."""
 
     tick: int
     time: float
@@ -44,9 +45,9 @@ class Difference:
     replayed: object
 
 
-def observations(recording: Recording, register_map: RegisterMap) -> Iterator[Observation]:
+def observations(rows: Iterable[Row], register_map: RegisterMap) -> Iterator[Observation]:
     """What each tick of the recording saw."""
-    for row in recording.rows():
+    for row in rows:
         yield Observation(
             now=row["now"],
             measurement=_measurement(row, register_map) if row["flags"] & READ else None,
@@ -57,7 +58,7 @@ def observations(recording: Recording, register_map: RegisterMap) -> Iterator[Ob
         )
 
 
-def _measurement(row: dict[str, Any], register_map: RegisterMap) -> Measurement | None:
+def _measurement(row: Row, register_map: RegisterMap) -> Measurement | None:
     try:
         return decode_measurement(register_map, row["words_read"])
     except CodecError:
@@ -75,15 +76,15 @@ def outputs(
 
 
 def differences(
-    recording: Recording, replayed: Iterable[Output], register_map: RegisterMap
+    rows: Iterable[Row], replayed: Iterable[Output], register_map: RegisterMap
 ) -> Iterator[Difference]:
     """Where outputs are not the recorded ones, bit by bit; the first of each tick."""
-    for row, output in zip(recording.rows(), replayed, strict=True):
+    for row, output in zip(rows, replayed, strict=True):
         for what, before, after in _pairs(row, output, register_map):
             if _bits(before) != _bits(after):
                 yield Difference(
                     tick=row["tick"],
-                    time=row["now"] - recording.header["started"],
+                    time=row["now"],
                     what=what,
                     recorded=before,
                     replayed=after,
@@ -91,9 +92,7 @@ def differences(
                 break
 
 
-def _pairs(
-    row: dict[str, Any], output: Output, register_map: RegisterMap
-) -> Iterator[tuple[str, Any, Any]]:
+def _pairs(row: Row, output: Output, register_map: RegisterMap) -> Iterator[tuple[str, Any, Any]]:
     """What is compared: name, recorded, replayed."""
     yield "state", State(row["state"]).name, output.state.name
     yield "reason", row["reason"], NOTHING if output.reason is None else int(output.reason)

@@ -7,18 +7,20 @@ the logged bench followed the log's reference, not the setpoint that comes out, 
 speed integrates; what is compared is one setpoint with the other.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gateway.config import Config
 from gateway.cycle import Observation, Output, initial, step
-from gateway.log import Log
 from gateway.supervisor import State
 from register_maps.register_map import RegisterMap
 from register_maps.signals import Alarm, Interlock, Measurement, PlcState, Status
+
+Column = NDArray[np.float64]
 
 REST: Final = 1.0
 """[s] Before the log: half of it with remote off, so that remote on is a wish of now."""
@@ -27,11 +29,13 @@ RUNNING: Final = Status.ENABLED | Status.ROAD_LOAD
 ALL_CLOSED: Final = Interlock(sum(Interlock))
 
 
-def replay(config: Config, register_map: RegisterMap, log: Log) -> list[Output]:
-    """Every sample of the log through the tick."""
+def replay(
+    config: Config, register_map: RegisterMap, time: Column, columns: Mapping[str, Column]
+) -> list[Output]:
+    """Every sample of a log through the tick: times [s] and columns by signal, in SI."""
     state = initial(config, register_map)
     running, outputs = False, []
-    for measurement, remote in _samples(log):
+    for measurement, remote in _samples(time, columns):
         status = STANDING | (Status.REMOTE if remote else 0) | (RUNNING if running else 0)
         plc_state = PlcState.ROAD_LOAD if running else PlcState.READY
         seen = replace(measurement, status=status, plc_state=plc_state)
@@ -39,18 +43,18 @@ def replay(config: Config, register_map: RegisterMap, log: Log) -> list[Output]:
         state, output = step(config, register_map, state, observation)
         running = output.state in (State.RUN, State.RAMPDOWN)
         outputs.append(output)
-    return outputs[-len(log.time) :]
+    return outputs[-len(time) :]
 
 
-def _samples(log: Log) -> Iterator[tuple[Measurement, bool]]:
+def _samples(times: Column, columns: Mapping[str, Column]) -> Iterator[tuple[Measurement, bool]]:
     """What the PLC would have sent, and whether remote was on."""
-    step_size = float(np.median(np.diff(log.time)))
+    step_size = float(np.median(np.diff(times)))
     resting = max(4, round(REST / step_size))
     integral, before, last = 0.0, 0.0, 0.0
-    for index in range(-resting, len(log.time)):
-        row = {name: float(column[max(index, 0)]) for name, column in log.columns.items()}
+    for index in range(-resting, len(times)):
+        row = {name: float(column[max(index, 0)]) for name, column in columns.items()}
         torque = row["shaft_torque"]
-        time = float(log.time[index]) if index >= 0 else float(log.time[0]) + index * step_size
+        time = float(times[index]) if index >= 0 else float(times[0]) + index * step_size
         mean = 0.5 * (torque + before) if index > -resting else torque
         integral += mean * (time - last) if index > -resting else 0.0
         last, before = time, torque

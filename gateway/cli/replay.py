@@ -71,8 +71,10 @@ class Result:
 
 def _recording(found: recording.Recording, config: Config, *, exact: bool) -> Result:
     register_map = map_of(found.header)
-    outputs = list(replay.outputs(config, register_map, replay.observations(found, register_map)))
-    left = list(replay.differences(found, outputs, register_map))
+    outputs = list(
+        replay.outputs(config, register_map, replay.observations(found.rows(), register_map))
+    )
+    left = list(replay.differences(found.rows(), outputs, register_map))
     compared = _compared(
         f"{found.path.name}: recorded setpoint and replay",
         found.records["now"] - found.header["started"],
@@ -83,7 +85,7 @@ def _recording(found: recording.Recording, config: Config, *, exact: bool) -> Re
     if not left:
         lines.append(f"{found.path}: {len(outputs)} ticks, equal bit for bit")
     else:
-        lines += [_told(found.path, left, len(outputs)), compared.summary()]
+        lines += [_told(found, left, len(outputs)), compared.summary()]
     entry = _entry(config, compared, "recorded") | {
         "missed_deadlines": int(found.records["missed"][-1]) if len(found) else 0,
         "latency_ms": _latency(found.records["latency"]),
@@ -91,16 +93,19 @@ def _recording(found: recording.Recording, config: Config, *, exact: bool) -> Re
     return Result(compared=compared, entry=entry, lines=lines, holds=not (exact and left))
 
 
-def _told(path: Path, left: list[replay.Difference], ticks: int) -> str:
+def _told(found: recording.Recording, left: list[replay.Difference], ticks: int) -> str:
     first = left[0]
+    when = first.time - found.header["started"]
     return (
-        f"{path}: {len(left)} of {ticks} ticks differ, the first is tick {first.tick} at "
-        f"{first.time:.3f} s: {first.what} recorded {first.recorded}, replayed {first.replayed}"
+        f"{found.path}: {len(left)} of {ticks} ticks differ, the first is tick {first.tick} at "
+        f"{when:.3f} s: {first.what} recorded {first.recorded}, replayed {first.replayed}"
     )
 
 
 def _log(found: log.Log, config: Config) -> Result:
-    outputs = replay_log.replay(config, register_maps.load(config.plc.map), found)
+    outputs = replay_log.replay(
+        config, register_maps.load(config.plc.map), found.time, found.columns
+    )
     compared = _compared(
         f"{found.path.name}: logged reference and setpoint of the gateway",
         found.time - found.time[0],

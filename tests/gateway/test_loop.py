@@ -187,12 +187,12 @@ def test_a_replay_is_equal_bit_for_bit(run: Run) -> None:
     recorded = run.recording
     again = map_of(recorded.header)
     config = config_of(recorded.header)
-    outputs = list(replay.outputs(config, again, replay.observations(recorded, again)))
+    outputs = list(replay.outputs(config, again, replay.observations(recorded.rows(), again)))
     assert len(outputs) == len(recorded) > 320
-    assert list(replay.differences(recorded, outputs, again)) == []
+    assert list(replay.differences(recorded.rows(), outputs, again)) == []
     other = config.with_values({"truck.mass_kg": "5240"})
-    outputs = list(replay.outputs(other, again, replay.observations(recorded, again)))
-    assert list(replay.differences(recorded, outputs, again)) != []
+    outputs = list(replay.outputs(other, again, replay.observations(recorded.rows(), again)))
+    assert list(replay.differences(recorded.rows(), outputs, again)) != []
 
 
 def test_an_exported_recording_is_a_log(run: Run, tmp_path: Path) -> None:
