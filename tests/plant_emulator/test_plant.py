@@ -202,7 +202,7 @@ def energy(x: np.ndarray) -> float:
     return 0.5 * float(motion + shafts + 0.004 * x[CURRENT] ** 2)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(
     speeds=st.tuples(*[st.floats(-5.0, 5.0)] * 2),
     gap=st.floats(-0.155, 0.155),
@@ -218,9 +218,8 @@ def test_free_bench_only_loses_energy(
     for k in range(1, 101):
         bench.to(0.01 * k, 0.0)
         now = energy(bench.x)
-        assert now <= before + 1e-6 * first
+        assert now <= before + 1e-12 * (first + 1.0)
         before = now
-    assert before < 0.9 * first or first < 1.0
 
 
 @settings(max_examples=25, deadline=None)
