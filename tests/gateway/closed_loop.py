@@ -1,0 +1,100 @@
+"""Gateway's tick and emulated PLC in one virtual time: no clock, no socket, everything in words."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+from gateway import cycle
+from gateway.config import Config
+from gateway.cycle import Observation, Output
+from gateway.reasons import Reason
+from gateway.supervisor import State
+from plant_emulator import parameter_sets
+from plant_emulator.bench import Bench
+from plant_emulator.plc import SCAN, Plc
+from plant_emulator.plc_surroundings import Backlash, Switches, Truck
+from plant_emulator.truck import Forklift, ReplayedTorque
+from register_maps import load
+from register_maps.codec import decode_measurement, encode_measurement, encode_setpoint
+from register_maps.signals import Measurement
+
+PARAMETERS = parameter_sets.load("thesis_table_3_1")
+Reading = Measurement | Reason
+Disturbance = Callable[["ClosedLoop", Reading], Reading]
+
+
+def undisturbed(_: "ClosedLoop", reading: Reading) -> Reading:
+    return reading
+
+
+@dataclass
+class ClosedLoop:
+    config: Config
+    map_name: str = "bench_int16"
+    shadow: bool = False
+    disturb: Disturbance = undisturbed
+    deaf: bool = False
+    stop_requested: bool = False
+    overruns: int = 0
+    observations: list[Observation] = field(default_factory=list)
+    outputs: list[Output] = field(default_factory=list)
+    drum_speed: list[float] = field(default_factory=list)
+    wheel_torque: list[float] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.map = load(self.map_name)
+        truck = Forklift(mass=self.config.truck.total_mass)
+        self.plc = Plc(
+            Bench(PARAMETERS, {}),
+            self.map,
+            backlash=Backlash(ratio=62.6, half_gap=0.15073),
+            truck=Truck(lambda: ReplayedTorque(truck), 0.645),
+        )
+        self.switches = Switches()
+        self.words: Sequence[int] | None = None
+        self.state = cycle.initial(self.config, self.map)
+        self.every = round(self.config.loop.period / SCAN)
+
+    @property
+    def now(self) -> float:
+        return self.plc.scans * SCAN + 0.003
+
+    @property
+    def last(self) -> Output:
+        return self.outputs[-1]
+
+    def operate(self, *, remote: bool) -> None:
+        self.switches = replace(self.switches, remote=remote)
+
+    def run(self, duration: float) -> Output:
+        for _ in range(round(duration / SCAN)):
+            shown = self.plc.scan(self.words, self.switches)
+            self.drum_speed.append(float(self.plc.samples.drum_speed[-1]))
+            self.wheel_torque.append(self.plc.samples.wheel_torque)
+            if self.plc.scans % self.every == 0:
+                self.tick(decode_measurement(self.map, encode_measurement(self.map, shown)))
+        return self.last
+
+    def tick(self, measurement: Measurement) -> None:
+        reading = self.disturb(self, measurement)
+        failed = isinstance(reading, Reason)
+        seen = Observation(
+            now=self.now,
+            measurement=None if failed else reading,
+            fault=reading if failed else None,
+            shadow=self.shadow,
+            stop_requested=self.stop_requested,
+            overruns=self.overruns,
+        )
+        self.state, output = cycle.step(self.config, self.map, self.state, seen)
+        self.observations.append(seen)
+        self.outputs.append(output)
+        if output.setpoint is not None and not self.deaf:
+            self.words = encode_setpoint(self.map, output.setpoint)
+
+    def start(self) -> None:
+        """Arm, and let the operator set remote: the truck sets off as soon as the PLC runs."""
+        self.run(0.2)
+        assert self.last.state is State.ARMED
+        self.operate(remote=True)
+        self.run(0.2)
+        assert self.last.state is State.RUN, self.last
