@@ -1,0 +1,119 @@
+"""The demo as a user calls it: the bench in its own process, the gateway, a real socket.
+
+Figures are the project's acceptance limits. The fast runs use the same loop, server and socket and
+no clock; one run keeps real time.
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from gateway import recording
+from gateway.cli import main
+from gateway.evaluation import agreement, cruise, traction_energy
+from gateway.supervisor import State
+from plant_emulator import logs
+
+pytestmark = pytest.mark.slow
+
+
+def demo(out: Path, *options: str) -> list[dict]:
+    result = CliRunner().invoke(main, ["demo", "--out", str(out), *options])
+    assert result.exit_code == 0, result.output
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["schema"] == "demo/1"
+    return summary["runs"]
+
+
+@pytest.mark.parametrize(
+    ("regulator", "period", "val1", "val2"),
+    [
+        ("thesis", "10", 98.0, 98.0),
+        ("thesis", "20", 97.8, 0.0),
+        ("thesis", "50", 97.8, 0.0),
+        ("compensated", "10", 98.4, 98.3),
+        ("compensated", "20", 97.8, 0.0),
+        ("compensated", "50", 97.8, 0.0),
+    ],
+)
+def test_replayed_torque_gives_the_speed_of_the_road(tmp_path, regulator, period, val1, val2):
+    runs = demo(tmp_path, "--fast", "--regulator", regulator, "--period", period)
+    assert [run["truck_kg"] for run in runs] == [3640.0, 5240.0]
+    for run in runs:
+        assert run["velocity"]["val1"] >= val1
+        assert run["velocity"]["val2"] >= val2
+        assert run["stop_reason"] == "REMOTE_OFF"
+
+
+@pytest.mark.parametrize("regulator", ["thesis", "compensated"])
+def test_driver_who_holds_his_speed_feels_road_load_and_spends_its_energy(tmp_path, regulator):
+    for run in demo(tmp_path, "--fast", "--driver", "pi", "--regulator", regulator):
+        # by hand: m g (0.0117 + 9.3882e-6 v / r_d), v = 14 km/h, r_d = 0.645 m
+        road_load = run["truck_kg"] * 9.81 * (0.0117 + 9.3882e-6 * 14 / 3.6 / 0.645)
+        assert run["force"]["target_newton"] == pytest.approx(road_load, rel=2e-3)
+        assert abs(run["force"]["mean_error_newton"]) < 0.03 * road_load
+        assert abs(run["energy"]["error_percent"]) < 2.0
+
+
+def test_instantaneous_torque_aliases_with_the_staircase_as_the_thesis_did(tmp_path):
+    runs = demo(
+        tmp_path, "--fast", "--regulator", "thesis", "--torque", "instantaneous", "--period", "20"
+    )
+    assert all(run["velocity"]["val1"] < 96.0 for run in runs)
+
+
+def test_friction_that_is_ten_percent_off_is_felt_in_force_and_not_in_speed(tmp_path):
+    table = Path(__file__).parents[2] / "plant_emulator/parameter_sets/thesis_table_3_1.toml"
+    stiffer = table.read_text().replace("value = 345.38", "value = 379.918")
+    (tmp_path / "stiff.toml").write_text(stiffer.replace("value = 35.989", "value = 39.588"))
+    options = ("--fast", "--driver", "pi", "--load", "0")
+    (run,) = demo(tmp_path, *options, "--bench-parameters", str(tmp_path / "stiff.toml"))
+    error = run["force"]["mean_error_newton"] / run["force"]["target_newton"]
+    assert 0.2 < abs(error) < 0.4
+    assert run["velocity"]["val1"] > 98.0
+
+
+def test_real_time_run_leaves_everything_behind(tmp_path):
+    (run,) = demo(tmp_path, "--load", "0", "--duration", "12")
+    assert run["missed_deadlines"] <= 0.01 * run["cycles"]
+    assert 0.0 < run["latency_ms"]["p50"] <= run["latency_ms"]["p99"] <= run["latency_ms"]["max"]
+    assert run["latency_ms"]["p50"] < 10.0
+    (file,) = tmp_path.glob("*.rlrec")
+    states = [State(int(state)) for state in recording.read(file).records["state"]]
+    passed = [state for k, state in enumerate(states) if not k or state is not states[k - 1]]
+    assert passed == [
+        *(State.CONNECT, State.SHADOW, State.ARMED, State.RUN, State.RAMPDOWN, State.SAFE),
+        State.OFF,
+    ]
+    log = logs.read(tmp_path / "truck_3640kg.csv")
+    assert log.time[0] == 0.0
+    assert log.time[-1] == pytest.approx(12.0, abs=0.011)
+    assert log["drum_speed"].max() * 0.645 * 3.6 == pytest.approx(14.0, abs=0.5)
+    assert (tmp_path / "demo.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_agreement_is_that_of_a_hand_calculation():
+    # y = 0 1 2 3 4, e = 1 0 0 0 -1: rms = sqrt(2/5), span 4; sum |e| = 2, sum |y| = 10
+    found = agreement(np.arange(5.0), np.array([-1.0, 1.0, 2.0, 3.0, 5.0]))
+    assert found.val1 == pytest.approx(100 * (1 - 0.4**0.5 / 4))
+    assert found.val2 == pytest.approx(80.0)
+
+
+def test_cruise_is_the_longest_steady_stretch_of_at_least_five_seconds():
+    time = np.arange(0.0, 30.0, 0.01)
+    speed = np.interp(time, [0.0, 2.0, 8.0, 20.0, 24.0], [0.0, 0.0, 4.0, 4.0, 0.0])
+    steady = cruise(time, speed)
+    assert steady is not None
+    assert time[steady][0] == pytest.approx(8.0, abs=0.3)
+    assert time[steady][-1] == pytest.approx(20.0, abs=0.3)
+    assert cruise(time[:1000], speed[:1000]) is None
+
+
+def test_traction_energy_counts_only_what_drives():
+    # 100 N at 2 m/s for 3 s = 600 J; the braking that follows costs nothing
+    time = np.arange(0.0, 6.01, 0.01)
+    force = np.where(time <= 3.0, 100.0, -100.0)
+    assert traction_energy(time, force, np.full_like(time, 2.0)) == pytest.approx(600.0, rel=1e-9)
