@@ -71,7 +71,7 @@ class Mass(click.ParamType[float | None]):
 )
 @click.option("--control", is_flag=True, hidden=True, help="JSON requests on standard input.")
 @click.option("--stepped", is_flag=True, hidden=True, help="Scan only on request.")
-def command(  # noqa: PLR0917 - click passes options by name
+def command(
     host: str,
     port: int,
     register_map: str,
@@ -93,8 +93,8 @@ def command(  # noqa: PLR0917 - click passes options by name
     The first line printed says where it listens. It ends on Ctrl-C or SIGTERM and then says how
     well it kept real time.
     """
-    from plant_emulator.emulator import Options  # noqa: PLC0415 - numba and pymodbus, not for --help
-    from plant_emulator.serving import serve  # noqa: PLC0415
+    from plant_emulator.emulator import Options
+    from plant_emulator.serving import serve
 
     options = Options(
         host=host,
