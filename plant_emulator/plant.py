@@ -22,6 +22,7 @@ repeated until the linearisation and the laws agree with what was found. Nothing
 
 from __future__ import annotations
 
+from math import inf
 from typing import TYPE_CHECKING
 
 from plant_emulator.drive import armature, flux_slope, move_drive, same_limits
@@ -138,6 +139,7 @@ NEAR_REST = 1e-4
 STRAIGHT_WITHIN = 1e-3
 BALANCED_WITHIN = 1e-5
 MAX_NEWTON = 60
+BISECT_FROM = 8
 # A brake that no torque of this bench overcomes [N m]: the parked truck.
 PARKED = 1e9
 
@@ -309,18 +311,24 @@ def slide(speed: float, direction: float, certain: bool, s: Record, p: Record) -
     Only the friction is curved. Once a step is small its curvature is negligible, and all that is
     left to check is whether contact or stick changed on the way: one look at the new point,
     without a power. A step across rest gives -|speed|, and the caller tests for stick; where the
-    root is known to lie on this side (`certain`) it goes half the way to rest instead.
+    root is known to lie on this side (`certain`) it goes half the way to rest instead. Corners of
+    both kinds (contact, a motor that sticks) can make Newton go to and fro: the root stays
+    bracketed, and after some steps every other one halves the bracket.
     """
     level, f_g, delta_g = s.gear_coulomb_friction, s.gear_viscous_friction, p.gear_friction_exponent
+    lower, upper = 0.0, inf
     total, slope = frictionless(direction * speed, s, p)
-    for _ in range(MAX_NEWTON):
+    for attempt in range(MAX_NEWTON):
         viscous = f_g * speed**delta_g
         rise = delta_g * viscous / speed
-        step = -(direction * total + level + viscous) / (slope + rise)
-        if step <= -speed:
-            if not certain:
-                return -speed
-            step = -0.5 * speed
+        left = direction * total + level + viscous
+        lower, upper = (speed, upper) if left < 0.0 else (lower, speed)
+        step = -left / (slope + rise)
+        if step <= -speed and not certain:
+            return -speed
+        newton = lower <= speed + step <= upper and speed + step > 0.0
+        if not newton or (attempt >= BISECT_FROM and attempt % 2 == 0 and upper < inf):
+            step = 0.5 * (lower + upper) - speed
         speed += step
         viscous += rise * step
         total, slope = frictionless(direction * speed, s, p)
