@@ -72,7 +72,7 @@ class LoopConfig:
 
     period: float = _key("period_ms", 10.0, scale=MILLI, lower=1.0, upper=200.0)
     stale: float = _key("stale_ms", 100.0, scale=MILLI, lower=5.0, upper=1000.0)
-    overruns: int = _key("overruns", 20, lower=1, upper=1000)
+    overruns: int = _key("overruns", 15, lower=1, upper=1000)
     realtime: bool = _key("realtime", True)
 
 
