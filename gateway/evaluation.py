@@ -9,6 +9,7 @@ with y the road's speed and e = road minus bench (thesis, eq. 3.37-3.41; eq. 3.4
 sums, since sample by sample it divides by zero at standstill).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,27 +33,6 @@ class Agreement:
 
     val1: float
     val2: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Force:
-    """Mean force of the truck in cruise [N]: what the road asks for, and the bench's error."""
-
-    target: float
-    mean_error: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Energy:
-    """Traction energy, the integral of the positive power at the wheel [J]."""
-
-    road: float
-    bench: float
-
-    @property
-    def error_percent(self) -> float:
-        """Bench over road, less 100 % [%]."""
-        return 100.0 * (self.bench / self.road - 1.0) if self.road else 0.0
 
 
 def agreement(wanted: Array, found: Array) -> Agreement:
@@ -90,3 +70,19 @@ def traction_energy(time: Array, force: Array, speed: Array) -> float:
     """Integral of the positive part of force times speed [J]; force acts up to its sample."""
     power = np.maximum(force[1:] * 0.5 * (speed[1:] + speed[:-1]), 0.0)
     return float(np.sum(power * np.diff(time)))
+
+
+def road_speed(
+    time: Array, force: Array, mass: float, resistance: Callable[[float], float]
+) -> Array:
+    """Speed [m/s] that a truck would have on its road under a logged force, from rest.
+
+    force : at the wheel, acting up to its sample [N]; resistance : of the road at a speed [N]. A
+    negative force on the standing truck is its brake's reaction and does not push it back.
+    """
+    speed = np.zeros_like(time)
+    for k in range(1, len(time)):
+        before, period = float(speed[k - 1]), float(time[k] - time[k - 1])
+        against = resistance(max(before, np.nextafter(0.0, 1.0)))
+        speed[k] = max(0.0, before + period * (float(force[k]) - against) / mass)
+    return speed

@@ -13,9 +13,11 @@ from gateway import config_file, log, recording, replay, replay_log
 from gateway.cli._settings import assignments
 from gateway.config import Config
 from gateway.cycle import Output
+from gateway.evaluation import cruise, road_speed, traction_energy
 from gateway.header import config_of, map_of
 from gateway.record import number
 from gateway.replay_report import Compared, draw, write_csv
+from gateway.road_load import road_load
 
 
 @click.command()
@@ -116,7 +118,7 @@ def _log(found: log.Log, config: Config) -> Result:
     lines = [f"not in the log: {missing}"] if missing else []
     return Result(
         compared=compared,
-        entry=_entry(config, compared, "logged"),
+        entry=_entry(config, compared, "logged") | _felt(found, config),
         lines=[*lines, compared.summary()],
         holds=True,
     )
@@ -154,6 +156,30 @@ def _entry(config: Config, compared: Compared, driver: str) -> dict[str, Any]:
         "latency_ms": {"p50": None, "p99": None, "max": None},
         "stop_reason": next(filter(None, reversed(compared.reasons)), ""),
     }
+
+
+def _felt(found: log.Log, config: Config) -> dict[str, Any]:
+    """What the truck of the log felt: force in cruise and energy, beside those of its road."""
+    if "wheel_torque" not in found.columns:
+        return {}
+    time, road = found.time, road_load(config.truck, config.bench)
+    speed = found.columns["drum_speed"] * config.bench.drum_radius
+    force = found.columns["wheel_torque"] / config.truck.wheel_radius
+    wanted = road_speed(time, force, config.truck.total_mass, road.force)
+    energy = traction_energy(time, force, wanted), traction_energy(time, force, speed)
+    steady = cruise(time, speed)
+    answer: dict[str, Any] = {
+        "energy": {
+            "road_joule": energy[0],
+            "bench_joule": energy[1],
+            "error_percent": 100.0 * (energy[1] / energy[0] - 1.0) if energy[0] else None,
+        }
+    }
+    if steady is not None:
+        target = float(np.mean([road.force(float(v)) for v in speed[steady]]))
+        error = float(force[steady].mean()) - target
+        answer["force"] = {"target_newton": target, "mean_error_newton": error}
+    return answer
 
 
 def _latency(latency: Any) -> dict[str, float | None]:

@@ -7,13 +7,11 @@ no clock; one run keeps real time.
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from gateway import recording
 from gateway.cli import main
-from gateway.evaluation import agreement, cruise, traction_energy
 from gateway.supervisor import State
 from plant_emulator import logs
 
@@ -93,27 +91,3 @@ def test_real_time_run_leaves_everything_behind(tmp_path):
     assert log.time[-1] == pytest.approx(12.0, abs=0.011)
     assert log["drum_speed"].max() * 0.645 * 3.6 == pytest.approx(14.0, abs=0.5)
     assert (tmp_path / "demo.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_agreement_is_that_of_a_hand_calculation():
-    # y = 0 1 2 3 4, e = 1 0 0 0 -1: rms = sqrt(2/5), span 4; sum |e| = 2, sum |y| = 10
-    found = agreement(np.arange(5.0), np.array([-1.0, 1.0, 2.0, 3.0, 5.0]))
-    assert found.val1 == pytest.approx(100 * (1 - 0.4**0.5 / 4))
-    assert found.val2 == pytest.approx(80.0)
-
-
-def test_cruise_is_the_longest_steady_stretch_of_at_least_five_seconds():
-    time = np.arange(0.0, 30.0, 0.01)
-    speed = np.interp(time, [0.0, 2.0, 8.0, 20.0, 24.0], [0.0, 0.0, 4.0, 4.0, 0.0])
-    steady = cruise(time, speed)
-    assert steady is not None
-    assert time[steady][0] == pytest.approx(8.0, abs=0.3)
-    assert time[steady][-1] == pytest.approx(20.0, abs=0.3)
-    assert cruise(time[:1000], speed[:1000]) is None
-
-
-def test_traction_energy_counts_only_what_drives():
-    # 100 N at 2 m/s for 3 s = 600 J; the braking that follows costs nothing
-    time = np.arange(0.0, 6.01, 0.01)
-    force = np.where(time <= 3.0, 100.0, -100.0)
-    assert traction_energy(time, force, np.full_like(time, 2.0)) == pytest.approx(600.0, rel=1e-9)
