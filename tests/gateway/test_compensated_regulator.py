@@ -1,0 +1,137 @@
+"""What the compensated regulator adds: standstill, breakaway, backlash, friction, lead, trim."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gateway.config import Config
+from gateway.friction import friction_torque
+from gateway.regulators import compensated
+from gateway.regulators.window import Window
+
+CONFIG = Config().with_values({"regulator.trim": "0.8"})
+PARAMS = compensated.Params.of(CONFIG)
+INERTIA = 3640.0 * 0.645**2
+ROAD = 0.645 * 0.011721 * 3640.0 * 9.81
+
+
+def window(*, torque=0.0, motor=0.0, drum=0.0, change=0.0, temperature=None):
+    return Window(
+        duration=0.01,
+        shaft_torque=torque,
+        motor_speed=motor,
+        drum_speed=drum,
+        drum_speed_change=change,
+        shell_temperature=temperature,
+    )
+
+
+def demands(windows, state=None, params=PARAMS):
+    state = state or compensated.seed(params, 0.0, 0.0)
+    for seen in windows:
+        state, demand = compensated.update(params, state, seen)
+        yield demand
+
+
+def rolling_drum(torque, count):
+    """Windows of a drum that a truck's torque turns freely inside the backlash, motor at rest."""
+    change = torque / 312.71242 * 0.01
+    return [window(drum=change * (k + 1), change=change) for k in range(count)]
+
+
+def test_a_truck_in_the_backlash_is_seen_by_the_drum_alone():
+    """It pushes with 100 N m over road load and margin: 0.01 rad/s earned after 0.152 s."""
+    untrimmed = replace(PARAMS, trim=0.0)
+    seen = list(demands(rolling_drum(ROAD + 30.0 + 100.0, 40), params=untrimmed))
+    first = next(k for k, demand in enumerate(seen) if demand.speed > 0.0)
+    assert first + 1 == np.ceil(0.01 * INERTIA / 100.0 / 0.01)
+
+
+def test_below_the_road_load_and_its_margin_it_never_starts():
+    assert all(one.speed == 0.0 for one in demands(rolling_drum(ROAD + 29.0, 500)))
+
+
+def test_noise_of_the_sensors_does_not_start_it():
+    """The noise of the practice logs: 0.01 rad/s at the drum, 0.15 at the motor, 0.25 N m."""
+    random = np.random.default_rng(1)
+    drum = 0.01 * random.standard_normal(6001)
+    windows = [
+        window(
+            torque=float(0.25 * random.standard_normal()),
+            motor=float(0.15 * random.standard_normal()),
+            drum=float(drum[k + 1]),
+            change=float(drum[k + 1] - drum[k]),
+        )
+        for k in range(6000)
+    ]
+    assert all(one.speed == 0.0 for one in demands(windows))
+
+
+def test_it_stops_once_and_does_not_creep_on():
+    state = compensated.seed(PARAMS, 20.0, 20.0 / 62.6)
+    braked = [window(torque=-40.0, motor=5.0, drum=5.0 / 62.6)] * 100
+    held = [window(torque=-40.0)] * 100
+    seen = list(demands(braked + held, state))
+    assert seen[0].speed > 0.0
+    assert all(one.speed == 0.0 for one in seen[100:])
+
+
+def test_friction_follows_the_motor_and_not_the_drum():
+    seen = window(motor=200.0, drum=0.0)
+    share = 1.0 - 0.003
+    expected = share * friction_torque(200.0 / 62.6, PARAMS.friction)
+    assert compensated.truck_torque(PARAMS, seen) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("gear_speed", "left_out"), [(0.01, 0.01966), (0.25, 0.0115), (0.5, 0.003), (6.0, 0.003)]
+)
+def test_friction_is_compensated_less_only_below_half_a_radian_per_second(gear_speed, left_out):
+    seen = window(motor=62.6 * gear_speed)
+    whole = friction_torque(gear_speed, PARAMS.friction)
+    assert 1.0 - compensated.truck_torque(PARAMS, seen) / whole == pytest.approx(left_out, rel=1e-9)
+
+
+def test_a_sticking_gear_explains_up_to_its_coulomb_friction():
+    for torque, left in ((0.3, 0.0), (-0.3, 0.0), (1.0, 62.6 - 35.989), (-1.0, -62.6 + 35.989)):
+        assert compensated.truck_torque(PARAMS, window(torque=torque)) == pytest.approx(left)
+
+
+def test_friction_falls_with_the_temperature_of_the_shell():
+    friction = replace(PARAMS.friction, temperature_coefficient=0.01)
+    params = replace(PARAMS, friction=friction)
+    warm = compensated.truck_torque(params, window(motor=200.0, temperature=273.15 + 42.0))
+    nominal = compensated.truck_torque(PARAMS, window(motor=200.0))
+    assert warm == pytest.approx(nominal * np.exp(-0.1))
+
+
+def test_lead_adds_the_acceleration_times_its_time():
+    state = compensated.seed(PARAMS, 200.0, 200.0 / 62.6)
+    seen = window(torque=10.0, motor=200.0, drum=200.0 / 62.6)
+    without = replace(PARAMS, lead=0.0)
+    _, led = compensated.update(PARAMS, state, seen)
+    _, plain = compensated.update(without, state, seen)
+    assert led.speed - plain.speed == pytest.approx(0.085 * led.rate)
+
+
+def test_lead_is_cut_back_for_a_light_truck():
+    light = compensated.Params.of(CONFIG.with_values({"truck.mass_kg": "752"}))
+    assert light.lead == pytest.approx(0.0425, rel=0.001)
+
+
+def test_trim_adds_its_share_of_what_the_drum_is_behind_up_to_a_bound():
+    state = compensated.seed(PARAMS, 200.0, 200.0 / 62.6)
+    free = compensated.update(PARAMS, state, window(motor=200.0, drum=200.0 / 62.6))[1]
+    behind = compensated.update(PARAMS, state, window(motor=200.0, drum=200.0 / 62.6 - 0.5))[1]
+    far = compensated.update(PARAMS, state, window(motor=200.0, drum=200.0 / 62.6 - 2.0))[1]
+    assert behind.speed - free.speed == pytest.approx(62.6 * 0.8 * 0.5)
+    assert far.speed == pytest.approx(62.6 * 0.8, abs=free.speed)
+    assert far.speed - behind.speed < 62.6 * 0.8 * 0.6
+
+
+@pytest.mark.parametrize("drum", [3.0, 3.5])
+def test_seeding_is_bumpless_also_while_the_drum_is_ahead_or_behind(drum):
+    state = compensated.seed(PARAMS, 200.0, drum)
+    trim = 0.8 * (state.virtual_speed - drum)
+    assert 62.6 * (state.virtual_speed + trim) == pytest.approx(200.0)

@@ -1,0 +1,186 @@
+"""What `check` says of a configuration: the rules of the domain research, each at its edge."""
+
+import json
+
+import pytest
+
+from gateway.cli import main
+from gateway.config import Config
+from gateway.config_file import load
+from gateway.review import holds, review, rho_of
+from register_maps import load as load_map
+
+MAP = load_map("bench_int16")
+RHO_ONE = 312.71242 / 0.645**2
+
+
+def found(where, what="", **values):
+    """Severities of the findings at a place, for a configuration with `section__key=value`."""
+    names = {name.replace("__", "."): str(value) for name, value in values.items()}
+    findings = review(Config().with_values(names), MAP)
+    return [one.severity for one in findings if one.where == where and what in one.what]
+
+
+def test_the_default_configuration_holds_without_a_warning():
+    findings = review(Config(), MAP)
+    assert holds(findings)
+    assert {one.severity for one in findings} == {"info"}
+
+
+def test_rho_of_the_forklift_is_the_one_of_the_domain_research():
+    assert rho_of(Config()) == pytest.approx(0.207, abs=0.001)
+
+
+@pytest.mark.parametrize(
+    ("rho", "severity"),
+    [(0.49, "info"), (0.51, "warning"), (0.89, "warning"), (0.91, "error"), (1.5, "error")],
+)
+def test_rho_is_warned_of_from_one_half_and_refused_from_nine_tenths(rho, severity):
+    mass = RHO_ONE / rho
+    assert found("truck.mass_kg", "rho", truck__mass_kg=mass) == [severity]
+
+
+@pytest.mark.parametrize("torque", ["integrated", "averaged"])
+def test_a_pallet_truck_is_let_through_with_one_window_matched_filters_and_no_lead(torque):
+    values = {"truck__mass_kg": 500, "regulator__lead_s": 0, "regulator__torque": torque}
+    assert found("truck.mass_kg", "rho", **values) == ["warning"]
+    matched = values | {"bench__torque_filter_ms": 20, "bench__speed_filter_ms": 20}
+    assert found("truck.mass_kg", "rho", **matched) == ["warning"]
+
+
+@pytest.mark.parametrize(
+    "spoilt",
+    [
+        {"regulator__lead_s": 0.085},
+        {"regulator__torque": "instantaneous"},
+        {"regulator__torque": "averaged", "loop__period_ms": 20},
+        {"bench__torque_filter_ms": 20},
+        {"bench__speed_filter_ms": 20},
+    ],
+)
+def test_a_pallet_truck_is_refused_without_any_of_them(spoilt):
+    values = {"truck__mass_kg": 500, "regulator__lead_s": 0} | spoilt
+    assert found("truck.mass_kg", "rho", **values) == ["error"]
+
+
+def test_the_thesis_regulator_has_no_lead_that_could_matter():
+    values = {"truck__mass_kg": 500, "regulator__name": "thesis", "regulator__lead_s": 0.085}
+    assert found("truck.mass_kg", "rho", **values) == ["warning"]
+
+
+def test_a_mass_below_what_the_sampled_loop_bears_is_refused():
+    values = {"regulator__torque": "instantaneous", "regulator__trim": 0, "loop__period_ms": 50}
+    assert found("truck.mass_kg", "smallest", truck__mass_kg=500, **values) == ["error"]
+    assert found("truck.mass_kg", "smallest", truck__mass_kg=1000, **values) == ["info"]
+
+
+def test_a_trim_that_is_too_high_is_refused():
+    assert found("truck.mass_kg", "smallest", regulator__trim=1.5) == ["error"]
+
+
+def test_lead_with_filters_that_differ_is_warned_of():
+    assert "warning" in found("regulator.lead_s", truck__mass_kg=1500, bench__speed_filter_ms=50)
+
+
+@pytest.mark.parametrize(
+    ("torque", "period", "severities"),
+    [
+        ("integrated", 50, []),
+        ("averaged", 10, []),
+        ("averaged", 20, ["warning"]),
+        ("instantaneous", 10, ["warning"]),
+    ],
+)
+def test_torque_that_does_not_span_the_window_is_warned_of(torque, period, severities):
+    values = {"regulator__torque": torque, "loop__period_ms": period}
+    assert found("regulator.torque", **values) == severities
+
+
+@pytest.mark.parametrize(
+    ("where", "values", "severity"),
+    [
+        ("loop.period_ms", {"loop__period_ms": 50}, []),
+        ("loop.period_ms", {"loop__period_ms": 51}, ["error"]),
+        ("plc.timeout_ms", {"plc__timeout_ms": 50}, []),
+        ("plc.timeout_ms", {"plc__timeout_ms": 51}, ["error"]),
+        ("loop.stale_ms", {"loop__stale_ms": 140}, []),
+        ("loop.stale_ms", {"loop__stale_ms": 141}, ["warning"]),
+        ("limits.watchdog_ms", {"limits__watchdog_ms": 100}, []),
+        ("limits.watchdog_ms", {"limits__watchdog_ms": 99}, ["warning"]),
+        ("limits.watchdog_ms", {"limits__watchdog_ms": 90, "loop__period_ms": 50}, ["error"]),
+    ],
+)
+def test_times_have_to_fit_into_each_other(where, values, severity):
+    assert found(where, **values)[:1] == severity
+
+
+@pytest.mark.parametrize(
+    ("where", "values"),
+    [
+        ("limits.speed_max_rpm", {"limits__speed_max_rpm": 3600}),
+        ("limits.rate_up_rpm_s", {"limits__rate_up_rpm_s": 600}),
+        ("limits.rate_down_rpm_s", {"limits__rate_down_rpm_s": 970}),
+        ("limits.deviation_rpm", {"limits__deviation_rpm": 90}),
+    ],
+)
+def test_a_limit_that_the_cycle_would_meet_is_refused(where, values):
+    """14 km/h are 3604 rpm; 0.65 and 1.05 m/s2 are 602 and 973 rpm/s; 94 ms late is 91 rpm."""
+    assert found(where, **values) == ["error"]
+    assert found(where) == ["info"]
+
+
+def test_torque_limit_at_14_km_h_is_that_of_e24():
+    limits = [one for one in review(Config(), MAP) if one.where == "truck.braking_m_s2"]
+    assert limits[0].allowed == "<= 4289"
+
+
+def test_torque_limit_below_base_speed_is_that_of_e24():
+    slow = Config().with_values({"truck.top_speed_km_h": "5"})
+    limits = [one for one in review(slow, MAP) if one.where == "truck.braking_m_s2"]
+    assert limits[0].allowed == "<= 8341"
+
+
+def test_a_braking_that_the_motor_cannot_hold_is_warned_of():
+    assert found("truck.braking_m_s2", truck__braking_m_s2=2.5) == ["warning"]
+
+
+def answer(capsys, *arguments):
+    with pytest.raises(SystemExit) as ended:
+        main(["check", *arguments])
+    return ended.value.code or 0, capsys.readouterr()
+
+
+@pytest.fixture
+def file(tmp_path):
+    written = tmp_path / "bench.toml"
+    written.write_text("[truck]\nmass_kg = 3640\n", encoding="utf-8")
+    assert load(written).truck.mass == 3640.0
+    return str(written)
+
+
+def test_the_command_answers_as_the_contract_says(capsys, file):
+    code, said = answer(capsys, "-c", file, "--json", "-")
+    told = json.loads(said.out)
+    assert (code, told["schema"], told["holds"]) == (0, "check/1", True)
+    assert set(told["findings"][0]) == {"severity", "where", "what", "value", "allowed"}
+
+
+def test_the_command_exits_with_one_when_it_does_not_hold(capsys, file):
+    code, said = answer(capsys, "-c", file, "--set", "truck.mass_kg=500")
+    assert code == 1
+    assert "does not hold" in said.out
+
+
+def test_the_command_exits_with_two_on_bad_input(capsys, tmp_path):
+    bad = tmp_path / "bad.toml"
+    bad.write_text("[truck]\nmas_kg = 3640\n", encoding="utf-8")
+    code, said = answer(capsys, "-c", str(bad))
+    assert code == 2
+    assert "bad.toml:2: [truck] mas_kg" in said.err
+    assert said.err.count("\n") == 1
+
+
+def test_a_plc_that_does_not_answer_does_not_hold(capsys, file):
+    code, said = answer(capsys, "-c", file, "--live", "--set", "plc.port=1", "--json", "-")
+    assert code == 1
+    assert json.loads(said.out)["findings"][0]["where"] == "plc.host"
