@@ -7,7 +7,9 @@ import pytest
 from gateway.cli import main
 from gateway.config import Config
 from gateway.config_file import load
+from gateway.device import Device
 from gateway.review import holds, review, rho_of
+from plant_emulator.process import EmulatorProcess
 from register_maps import load as load_map
 
 MAP = load_map("bench_int16")
@@ -184,3 +186,34 @@ def test_a_plc_that_does_not_answer_does_not_hold(capsys, file):
     code, said = answer(capsys, "-c", file, "--live", "--set", "plc.port=1", "--json", "-")
     assert code == 1
     assert json.loads(said.out)["findings"][0]["where"] == "plc.host"
+
+
+@pytest.mark.slow
+def test_live_compares_the_map_with_the_device(capsys, file):
+    with EmulatorProcess() as emulator:
+        here = ["-c", file, "--live", "--set", f"plc.port={emulator.port}", "--json", "-"]
+        code, _ = answer(capsys, *here)
+        assert code == 0
+        emulator.set_faults("word_order")
+        code, said = answer(capsys, *here)
+    worst = json.loads(said.out)["findings"]
+    assert code == 1
+    assert any(one["where"] == "TEST_U32" and "word order" in one["what"] for one in worst)
+
+
+@pytest.mark.slow
+def test_live_finds_a_command_block_of_another_map_version(capsys, file):
+    with EmulatorProcess() as emulator:
+        with Device(host="127.0.0.1", port=emulator.port, unit=1, timeout=1.0).link() as link:
+            register = MAP.register("map_version")
+            link.write(MAP.command.start, other_version(register.address - MAP.command.start))
+        here = ["-c", file, "--live", "--set", f"plc.port={emulator.port}", "--json", "-"]
+        code, said = answer(capsys, *here)
+    told = json.loads(said.out)["findings"][0]
+    assert (code, told["where"], told["value"]) == (1, "plc.map", 99.0)
+
+
+def other_version(place):
+    words = [0] * MAP.command.count
+    words[place] = 99
+    return words
