@@ -18,6 +18,11 @@ if TYPE_CHECKING:
 
 ENABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 
+# error_model: a division by zero gives infinity instead of a check at every division; the divisors
+# of the model are sums of positive terms. nogil: simulations run side by side. forceinline: one
+# function in the end, so that a stage lives in registers.
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "forceinline": True}
+
 
 def cache_root() -> Path:
     """Folder of the compiled kernels: ROADLOAD_CACHE, or the user's cache folder."""
@@ -47,9 +52,48 @@ def compiled(function: Callable[..., Any], *, on_disk: bool = False) -> Callable
         return function
     import numba
 
-    # error_model: a division by zero gives infinity instead of a check at every division; the
-    # divisors of the model are sums of positive terms. nogil: simulations run side by side.
-    dispatcher: Callable[..., Any] = numba.njit(cache=on_disk, nogil=True, error_model="numpy")(
-        function
-    )
+    dispatcher: Callable[..., Any] = numba.njit(cache=on_disk, **OPTIONS)(function)
     return dispatcher
+
+
+def private_copy() -> Callable[..., Any]:
+    """A compiled function that copies a record to where no other pointer leads.
+
+    With everything inlined around it such a copy dissolves into registers; what is only written
+    is not computed. Written back by `write_back`.
+    """
+    from numba.core import cgutils
+    from numba.extending import intrinsic
+
+    llvm: Any = cgutils  # has no types
+
+    @intrinsic
+    def private(_typing: Any, record: Any) -> Any:
+        def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+            place = llvm.alloca_once(builder, arguments[0].type.pointee)
+            llvm.raw_memcpy(builder, place, arguments[0], llvm.intp_t(record.size), 1)
+            return place
+
+        return record(record), generate
+
+    found: Callable[..., Any] = private
+    return found
+
+
+def write_back() -> Callable[..., Any]:
+    """A compiled function (copy, record) that brings a private copy back to its record."""
+    from numba.core import cgutils, types
+    from numba.extending import intrinsic
+
+    llvm: Any = cgutils  # has no types
+
+    @intrinsic
+    def publish(_typing: Any, private: Any, record: Any) -> Any:
+        def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+            llvm.raw_memcpy(builder, arguments[1], arguments[0], llvm.intp_t(record.size), 1)
+            return context.get_dummy_value()
+
+        return types.none(private, record), generate
+
+    found: Callable[..., Any] = publish
+    return found

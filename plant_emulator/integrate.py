@@ -45,12 +45,14 @@ _W1 = 1.0 / (6.0 * GAMMA * (1.0 - GAMMA))
 _W2 = 0.5 - _W1 * GAMMA
 ERROR_0, ERROR_1, ERROR_2 = 1.0 - _W1 - _W2, _W1 - (1.0 - GAMMA), _W2 - GAMMA
 
-# States whose error is controlled, and the size that counts as 1: the range of a full-speed run.
+# States whose error is controlled, over the size that counts as 1: the range of a full-speed run.
 CONTROLLED = (2, 3, 4, 7)
-SCALE = (70.0, 400.0, 1.2e-3, 6.5)
+WEIGHT = (1.0 / 70.0, 1.0 / 400.0, 1.0 / 1.2e-3, 1.0 / 6.5)
 
 SHRINK, GROW, SAFETY = 0.2, 5.0, 0.9
 SMALLEST_STEP = 1e-6
+# Below this share of the tolerance a step grows by GROW, above by the root.
+EASY = (SAFETY / GROW) ** 3
 
 # Channels of a log in the order of `observe`.
 CHANNELS = (
@@ -94,21 +96,30 @@ def step(
 def local_error(h: float, x: State, w: State) -> float:
     """Largest local error of the controlled states, each over its scale [1]."""
     first, base, last, slope = w[FIRST], w[BASE], w[LAST], w[SLOPE]
-    error = 0.0
+    per_stage, error = 1.0 / (GAMMA * h), 0.0
     for j in range(len(CONTROLLED)):
         k = CONTROLLED[j]
-        slope_1 = (first[k] - x[k]) / (GAMMA * h)
-        slope_2 = (last[k] - base[k]) / (GAMMA * h)
-        size = abs(h * (ERROR_0 * slope[k] + ERROR_1 * slope_1 + ERROR_2 * slope_2)) / SCALE[j]
+        slope_1 = (first[k] - x[k]) * per_stage
+        slope_2 = (last[k] - base[k]) * per_stage
+        size = abs(h * (ERROR_0 * slope[k] + ERROR_1 * slope_1 + ERROR_2 * slope_2)) * WEIGHT[j]
         error = max(error, size)
     return error
+
+
+def growth(error: float) -> float:
+    """Factor to the next step after one of that error, in units of the tolerance [1]."""
+    if error <= EASY:
+        return GROW
+    factor: float = SAFETY * error ** (-1.0 / 3.0)
+    return max(SHRINK, factor)
 
 
 def accept(h: float, x: State, w: State) -> None:
     """Make the step's result the state, and keep its last slope."""
     base, last, slope = w[BASE], w[LAST], w[SLOPE]
+    per_stage = 1.0 / (GAMMA * h)
     for k in range(len(x)):
-        slope[k] = (last[k] - base[k]) / (GAMMA * h)
+        slope[k] = (last[k] - base[k]) * per_stage
         x[k] = last[k]
 
 
@@ -131,6 +142,15 @@ def delayed(tau: float, k: int, time: State, value: State, slope: State) -> floa
     return reference
 
 
+def private(stage: Record) -> Record:
+    """The record to work on: compiled, a copy that the compiler may keep in registers."""
+    return stage
+
+
+def publish(s: Record, stage: Record) -> None:
+    """Bring the record worked on back to the caller's: nothing to do where it is the same."""
+
+
 def run(
     time: State,
     value: State,
@@ -141,7 +161,7 @@ def run(
     settings: tuple[float, float],
     x: State,
     w: State,
-    s: Record,
+    stage: Record,
     p: Record,
     out: State,
 ) -> int:
@@ -151,10 +171,11 @@ def run(
     edges : corners of the reference before the dead time, ascending [s]
     wheel_torque, parked : in force during the interval that ends at the sample [N m, 0 or 1]
     settings : tolerance [1] (infinite: fixed steps) and largest step [s]
-    x, w, s, p : state at time[0], work space, stage and parameter records
+    x, w, stage, p : state at time[0], work space, stage and parameter records
     out : (samples, channels), filled
     """
     tolerance, largest = settings
+    s, p = private(stage), private(p)
     load(x, s)
     evaluate_laws(s, p)
     observe(0, out, s, p)
@@ -185,13 +206,13 @@ def run(
             steps += 1
             if tolerance < 1e9:
                 error = local_error(length, x, w) / tolerance
-                factor = SAFETY * max(error, 1e-6) ** (-1.0 / 3.0)
-                h = length * min(GROW, max(SHRINK, factor))
+                h = length * growth(error)
                 if error > 1.0 and length > SMALLEST_STEP:
                     continue
             accept(length, x, w)
             t = end if pieces == 1 else t + length
         observe(row, out, s, p)
+    publish(s, stage)
     return steps
 
 
@@ -202,7 +223,7 @@ def advance(
     h: float,
     x: State,
     w: State,
-    s: Record,
+    stage: Record,
     p: Record,
     out: State,
 ) -> int:
@@ -212,6 +233,7 @@ def advance(
     history : ring of past references one step apart, at least dead time / h + 3 long
     out : (steps, channels), filled
     """
+    s, p = private(stage), private(p)
     length = len(history)
     for row in range(len(references)):
         newest = (newest + 1) % length
@@ -224,6 +246,7 @@ def advance(
         step(h, s.time, r, x, w, s, p)
         accept(h, x, w)
         observe(row, out, s, p)
+    publish(s, stage)
     return newest
 
 

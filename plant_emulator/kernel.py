@@ -138,6 +138,11 @@ def build(known: Mapping[str, Effect]) -> Kernel:
     replaced: tuple[Function, ...] = (*laws.LAWS, plant.load, plant.store, plant.memories)
     for function in replaced:
         compiled[function] = compiler.compiled(names[function.__name__])
+    if compiler.ENABLED:
+        compiled |= {
+            integrate.private: compiler.private_copy(),
+            integrate.publish: compiler.write_back(),
+        }
     for module in MODULES[1:]:
         for function in own_functions(module):
             bind(function, compiled)
