@@ -11,11 +11,12 @@ import json
 import math
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any, get_type_hints
 
 from gateway.errors import ConfigError
 from gateway.friction import THESIS, Friction, from_friction
+from gateway.keys import checked, declared, keys
 
 RPM = 2.0 * math.pi / 60.0
 MILLI = 1e-3
@@ -26,43 +27,14 @@ Place = Callable[[str, str], str]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Key:
-    """One key of the file. Value in SI = value in the file * `scale`; the range is the file's."""
-
-    name: str
-    default: Any
-    scale: float
-    lower: float
-    upper: float
-    choices: tuple[str, ...]
-
-
-def _key(
-    name: str,
-    default: Any,
-    *,
-    scale: float = 1.0,
-    lower: float = -math.inf,
-    upper: float = math.inf,
-    choices: tuple[str, ...] = (),
-) -> Any:
-    found = Key(name=name, default=default, scale=scale, lower=lower, upper=upper, choices=choices)
-    return field(default=_si(found, default), metadata={"key": found})
-
-
-def _si(key: Key, value: Any) -> Any:
-    return value * key.scale if isinstance(value, float) else value
-
-
-@dataclass(frozen=True, kw_only=True)
 class PlcConfig:
     """Where the PLC is, and how long it may take [s]."""
 
-    host: str = _key("host", "127.0.0.1")
-    port: int = _key("port", 5020, lower=1, upper=65535)
-    unit: int = _key("unit", 1, lower=0, upper=255)
-    map: str = _key("map", "bench_int16")
-    timeout: float = _key("timeout_ms", 40.0, scale=MILLI, lower=1.0, upper=1000.0)
+    host: str = declared("host", "127.0.0.1")
+    port: int = declared("port", 5020, lower=1, upper=65535)
+    unit: int = declared("unit", 1, lower=0, upper=255)
+    map: str = declared("map", "bench_int16")
+    timeout: float = declared("timeout_ms", 40.0, scale=MILLI, lower=1.0, upper=1000.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,10 +42,10 @@ class LoopConfig:
     """The clock. `stale`: age at which a sample is of no more use; `overruns`: deadlines in a row
     that may be missed."""
 
-    period: float = _key("period_ms", 10.0, scale=MILLI, lower=1.0, upper=200.0)
-    stale: float = _key("stale_ms", 100.0, scale=MILLI, lower=5.0, upper=1000.0)
-    overruns: int = _key("overruns", 15, lower=1, upper=1000)
-    realtime: bool = _key("realtime", True)
+    period: float = declared("period_ms", 10.0, scale=MILLI, lower=1.0, upper=200.0)
+    stale: float = declared("stale_ms", 100.0, scale=MILLI, lower=5.0, upper=1000.0)
+    overruns: int = declared("overruns", 15, lower=1, upper=1000)
+    realtime: bool = declared("realtime", True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,16 +55,16 @@ class BenchConfig:
     torque_filter, speed_filter : time constants of first-order filters before the PLC's values [s]
     """
 
-    drum_inertia: float = _key("drum_inertia_kg_m2", 312.69, lower=1.0, upper=1e5)
-    gear_inertia: float = _key("gear_inertia_kg_m2", 0.02242, lower=0.0, upper=1e4)
-    drum_radius: float = _key("drum_radius_m", 0.645, lower=0.05, upper=5.0)
-    gear_ratio: float = _key("gear_ratio", 62.6, lower=1.0, upper=1000.0)
-    dead_time: float = _key("dead_time_ms", 63.947, scale=MILLI, lower=0.0, upper=500.0)
-    torque_filter: float = _key("torque_filter_ms", 0.0, scale=MILLI, lower=0.0, upper=1000.0)
-    speed_filter: float = _key("speed_filter_ms", 0.0, scale=MILLI, lower=0.0, upper=1000.0)
-    flux_constant: float = _key("flux_constant", 1.8506, lower=0.01, upper=100.0)
-    flux_constant_1: float = _key("flux_constant_1", 366.83, lower=1.0, upper=1e5)
-    flux_constant_2: float = _key("flux_constant_2", 8.0644, lower=0.0, upper=1e3)
+    drum_inertia: float = declared("drum_inertia_kg_m2", 312.69, lower=1.0, upper=1e5)
+    gear_inertia: float = declared("gear_inertia_kg_m2", 0.02242, lower=0.0, upper=1e4)
+    drum_radius: float = declared("drum_radius_m", 0.645, lower=0.05, upper=5.0)
+    gear_ratio: float = declared("gear_ratio", 62.6, lower=1.0, upper=1000.0)
+    dead_time: float = declared("dead_time_ms", 63.947, scale=MILLI, lower=0.0, upper=500.0)
+    torque_filter: float = declared("torque_filter_ms", 0.0, scale=MILLI, lower=0.0, upper=1000.0)
+    speed_filter: float = declared("speed_filter_ms", 0.0, scale=MILLI, lower=0.0, upper=1000.0)
+    flux_constant: float = declared("flux_constant", 1.8506, lower=0.01, upper=100.0)
+    flux_constant_1: float = declared("flux_constant_1", 366.83, lower=1.0, upper=1e5)
+    flux_constant_2: float = declared("flux_constant_2", 8.0644, lower=0.0, upper=1e3)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,18 +76,18 @@ class TruckConfig:
     grade : rise over run [1]; top_speed, acceleration, braking : what the run will ask for
     """
 
-    mass: float = _key("mass_kg", 3640.0, lower=50.0, upper=1e5)
-    load: float = _key("load_kg", 0.0, lower=0.0, upper=1e5)
-    wheel_radius: float = _key("wheel_radius_m", 0.1715, lower=0.02, upper=2.0)
-    crr: float = _key("crr", 0.011721, lower=0.0, upper=0.2)
-    crr_v: float = _key("crr_v", 9.3882e-6, lower=0.0, upper=0.1)
-    f0: float | None = _key("f0_N", None, lower=0.0, upper=1e5)
-    f1: float | None = _key("f1_N_per_m_s", None, lower=-1e4, upper=1e4)
-    f2: float | None = _key("f2_N_per_m2_s2", None, lower=-1e3, upper=1e3)
-    grade: float = _key("grade_percent", 0.0, scale=PERCENT, lower=-50.0, upper=50.0)
-    top_speed: float = _key("top_speed_km_h", 14.0, scale=1.0 / 3.6, lower=0.1, upper=100.0)
-    acceleration: float = _key("acceleration_m_s2", 0.65, lower=0.0, upper=10.0)
-    braking: float = _key("braking_m_s2", 1.05, lower=0.0, upper=10.0)
+    mass: float = declared("mass_kg", 3640.0, lower=50.0, upper=1e5)
+    load: float = declared("load_kg", 0.0, lower=0.0, upper=1e5)
+    wheel_radius: float = declared("wheel_radius_m", 0.1715, lower=0.02, upper=2.0)
+    crr: float = declared("crr", 0.011721, lower=0.0, upper=0.2)
+    crr_v: float = declared("crr_v", 9.3882e-6, lower=0.0, upper=0.1)
+    f0: float | None = declared("f0_N", None, lower=0.0, upper=1e5)
+    f1: float | None = declared("f1_N_per_m_s", None, lower=-1e4, upper=1e4)
+    f2: float | None = declared("f2_N_per_m2_s2", None, lower=-1e3, upper=1e3)
+    grade: float = declared("grade_percent", 0.0, scale=PERCENT, lower=-50.0, upper=50.0)
+    top_speed: float = declared("top_speed_km_h", 14.0, scale=1.0 / 3.6, lower=0.1, upper=100.0)
+    acceleration: float = declared("acceleration_m_s2", 0.65, lower=0.0, upper=10.0)
+    braking: float = declared("braking_m_s2", 1.05, lower=0.0, upper=10.0)
 
     @property
     def total_mass(self) -> float:
@@ -135,18 +107,20 @@ class RegulatorConfig:
     breakaway : torque over the road load at which a standing truck starts to roll [N m at the drum]
     """
 
-    name: str = _key("name", "compensated")
-    torque: str = _key("torque", "integrated", choices=("integrated", "averaged", "instantaneous"))
-    lead: float = _key("lead_s", 0.085, lower=0.0, upper=1.0)
-    trim: float = _key("trim", 0.5, lower=0.0, upper=5.0)
-    under_compensation: float = _key(
+    name: str = declared("name", "compensated")
+    torque: str = declared(
+        "torque", "integrated", choices=("integrated", "averaged", "instantaneous")
+    )
+    lead: float = declared("lead_s", 0.085, lower=0.0, upper=1.0)
+    trim: float = declared("trim", 0.5, lower=0.0, upper=5.0)
+    under_compensation: float = declared(
         "under_compensation_percent", 0.3, scale=PERCENT, lower=0.0, upper=20.0
     )
-    under_compensation_slow: float = _key(
+    under_compensation_slow: float = declared(
         "under_compensation_slow_percent", 2.0, scale=PERCENT, lower=0.0, upper=20.0
     )
-    torque_offset: float = _key("torque_offset_Nm", 0.0, lower=-20.0, upper=20.0)
-    breakaway: float = _key("breakaway_Nm", 30.0, lower=0.0, upper=2000.0)
+    torque_offset: float = declared("torque_offset_Nm", 0.0, lower=-20.0, upper=20.0)
+    breakaway: float = declared("breakaway_Nm", 30.0, lower=0.0, upper=2000.0)
     friction: Friction = THESIS
 
 
@@ -159,20 +133,20 @@ class LimitsConfig:
     watchdog : after which the PLC ramps down by itself
     """
 
-    speed_max: float = _key("speed_max_rpm", 4830.0, scale=RPM, lower=1.0, upper=4830.0)
-    rate_up: float = _key("rate_up_rpm_s", 3000.0, scale=RPM, lower=1.0, upper=30000.0)
-    rate_down: float = _key("rate_down_rpm_s", 3000.0, scale=RPM, lower=1.0, upper=30000.0)
-    deviation: float = _key("deviation_rpm", 400.0, scale=RPM, lower=1.0, upper=4830.0)
-    overspeed: float = _key("overspeed_rpm", 5070.0, scale=RPM, lower=1.0, upper=6000.0)
-    current: float = _key("current_limit_A", 72.0, lower=0.0, upper=72.0)
-    watchdog: float = _key("watchdog_ms", 200.0, scale=MILLI, lower=50.0, upper=1000.0)
+    speed_max: float = declared("speed_max_rpm", 4830.0, scale=RPM, lower=1.0, upper=4830.0)
+    rate_up: float = declared("rate_up_rpm_s", 3000.0, scale=RPM, lower=1.0, upper=30000.0)
+    rate_down: float = declared("rate_down_rpm_s", 3000.0, scale=RPM, lower=1.0, upper=30000.0)
+    deviation: float = declared("deviation_rpm", 400.0, scale=RPM, lower=1.0, upper=4830.0)
+    overspeed: float = declared("overspeed_rpm", 5070.0, scale=RPM, lower=1.0, upper=6000.0)
+    current: float = declared("current_limit_A", 72.0, lower=0.0, upper=72.0)
+    watchdog: float = declared("watchdog_ms", 200.0, scale=MILLI, lower=50.0, upper=1000.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class RecordingConfig:
     """Where recordings go."""
 
-    dir: str = _key("dir", "recordings")
+    dir: str = declared("dir", "recordings")
 
 
 SECTIONS: dict[str, type] = {
@@ -184,11 +158,6 @@ SECTIONS: dict[str, type] = {
     "limits": LimitsConfig,
     "recording": RecordingConfig,
 }
-
-
-def keys(section: type) -> dict[str, Key]:
-    """The keys of a section by the name of their field."""
-    return {one.name: one.metadata["key"] for one in fields(section) if "key" in one.metadata}
 
 
 def _defaults() -> Document:
@@ -270,24 +239,8 @@ def _section(name: str, section: type, entries: Mapping[str, Any], place: Place)
             expected = ", ".join(sorted(known))
             raise ConfigError("unknown key", place=where, value=entry, expected=expected)
         field_name, key = known[entry]
-        values[field_name] = _checked(key, hints[field_name], value, where)
+        values[field_name] = checked(key, hints[field_name], value, where)
     return section(**values)
-
-
-def _checked(key: Key, kind: Any, value: Any, where: str) -> Any:
-    wanted = next((one for one in (str, bool, int) if kind is one), float)
-    numeric = wanted is float and isinstance(value, int) and not isinstance(value, bool)
-    if type(value) is not wanted and not numeric:
-        name = {str: "text", bool: "true or false", int: "a whole number", float: "a number"}
-        raise ConfigError("wrong type", place=where, value=value, expected=name[wanted])
-    if key.choices and value not in key.choices:
-        raise ConfigError(
-            "unknown choice", place=where, value=value, expected=" or ".join(key.choices)
-        )
-    if wanted in (int, float) and not key.lower <= value <= key.upper:
-        expected = f"{key.lower:g} .. {key.upper:g}"
-        raise ConfigError("out of range", place=where, value=value, expected=expected)
-    return _si(key, float(value) if numeric else value)
 
 
 def _form_of_road_load(document: Mapping[str, Any], place: Place) -> None:

@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 
 import gateway
-from gateway.config import SECTIONS, Config, config_hash, from_document, keys
+from gateway.config import SECTIONS, Config, config_hash, from_document
 from gateway.config_file import load, with_values
 from gateway.errors import ConfigError
+from gateway.keys import keys
 
 EXAMPLES = Path(gateway.__file__).parent / "examples"
 

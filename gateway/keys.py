@@ -1,0 +1,60 @@
+"""One key of a configuration file: declared once beside the field it fills, and checked by that."""
+
+import math
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from gateway.errors import ConfigError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Key:
+    """One key of the file. Value in SI = value in the file * `scale`; the range is the file's."""
+
+    name: str
+    default: Any
+    scale: float
+    lower: float
+    upper: float
+    choices: tuple[str, ...]
+
+
+def declared(
+    name: str,
+    default: Any,
+    *,
+    scale: float = 1.0,
+    lower: float = -math.inf,
+    upper: float = math.inf,
+    choices: tuple[str, ...] = (),
+) -> Any:
+    """A field of a section with its key."""
+    found = Key(name=name, default=default, scale=scale, lower=lower, upper=upper, choices=choices)
+    return field(default=si(found, default), metadata={"key": found})
+
+
+def si(key: Key, value: Any) -> Any:
+    """Value of the file in SI; whole numbers and texts have no unit."""
+    return value * key.scale if isinstance(value, float) else value
+
+
+def keys(section: type) -> dict[str, Key]:
+    """The keys of a section by the name of their field."""
+    return {one.name: one.metadata["key"] for one in fields(section) if "key" in one.metadata}
+
+
+def checked(key: Key, kind: Any, value: Any, where: str) -> Any:
+    """Value in SI; raises ConfigError that names `where`, value and what would be right."""
+    wanted = next((one for one in (str, bool, int) if kind is one), float)
+    numeric = wanted is float and isinstance(value, int) and not isinstance(value, bool)
+    if type(value) is not wanted and not numeric:
+        name = {str: "text", bool: "true or false", int: "a whole number", float: "a number"}
+        raise ConfigError("wrong type", place=where, value=value, expected=name[wanted])
+    if key.choices and value not in key.choices:
+        raise ConfigError(
+            "unknown choice", place=where, value=value, expected=" or ".join(key.choices)
+        )
+    if wanted in (int, float) and not key.lower <= value <= key.upper:
+        expected = f"{key.lower:g} .. {key.upper:g}"
+        raise ConfigError("out of range", place=where, value=value, expected=expected)
+    return si(key, float(value) if numeric else value)
