@@ -20,6 +20,15 @@ if TYPE_CHECKING:
     from plant_emulator.parameters import ParameterSet
 
 STEP = 1e-3
+(
+    MOTOR_SPEED,
+    DRUM_SPEED,
+    ARMATURE_CURRENT,
+    SHAFT_TORQUE,
+    ARMATURE_VOLTAGE,
+    SHELL_TEMPERATURE,
+    WHEEL_TORQUE,
+) = range(len(CHANNELS))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,6 +75,7 @@ class Bench:
         self._step = step
         self._motor_angle = 0.0
         self._drum_angle = 0.0
+        self._truck = (0.0, 0.0)
 
     @property
     def time(self) -> float:
@@ -82,7 +92,7 @@ class Bench:
         wheel_torque : the truck's drive at its own wheel [N m]
         brake_torque : its brake, >= 0, holds a standing drum up to that torque [N m at the wheel]
         """
-        self._stage.wheel_torque, self._stage.brake_torque = wheel_torque, brake_torque
+        self._load(wheel_torque, brake_torque)
         out = np.zeros((len(references), len(CHANNELS)))
         self._newest = self._kernel.advance(
             vector([float(r) for r in references]),
@@ -95,17 +105,23 @@ class Bench:
             self._p,
             out,
         )
-        column = {name: out[:, k] for k, name in enumerate(CHANNELS)}
-        self._motor_angle += float(column["motor_speed"].sum()) * self._step
-        self._drum_angle += float(column["drum_speed"].sum()) * self._step
+        sums = out.sum(axis=0).tolist()
+        self._motor_angle += sums[MOTOR_SPEED] * self._step
+        self._drum_angle += sums[DRUM_SPEED] * self._step
         return BenchSamples(
-            motor_speed=column["motor_speed"],
-            drum_speed=column["drum_speed"],
-            armature_current=column["armature_current"],
-            armature_voltage=column["armature_voltage"],
-            shaft_torque=column["shaft_torque"],
-            wheel_torque=float(column["wheel_torque"].mean()),
-            shell_temperature=float(column["shell_temperature"][-1]),
+            motor_speed=out[:, MOTOR_SPEED],
+            drum_speed=out[:, DRUM_SPEED],
+            armature_current=out[:, ARMATURE_CURRENT],
+            armature_voltage=out[:, ARMATURE_VOLTAGE],
+            shaft_torque=out[:, SHAFT_TORQUE],
+            wheel_torque=sums[WHEEL_TORQUE] / len(out),
+            shell_temperature=float(out[-1, SHELL_TEMPERATURE]),
             motor_angle=self._motor_angle,
             drum_angle=self._drum_angle,
         )
+
+    def _load(self, wheel_torque: float, brake_torque: float) -> None:
+        """Set the truck's torques; writing a record costs more than a step of the bench."""
+        if (wheel_torque, brake_torque) != self._truck:
+            self._stage.wheel_torque, self._stage.brake_torque = wheel_torque, brake_torque
+            self._truck = (wheel_torque, brake_torque)

@@ -57,7 +57,7 @@ def compiled(function: Callable[..., Any], *, on_disk: bool = False) -> Callable
 
 
 def private_copy() -> Callable[..., Any]:
-    """A compiled function that copies a record to where no other pointer leads.
+    """A compiled function that copies the record in an array to where no other pointer leads.
 
     With everything inlined around it such a copy dissolves into registers; what is only written
     is not computed. Written back by `write_back`.
@@ -68,32 +68,34 @@ def private_copy() -> Callable[..., Any]:
     llvm: Any = cgutils  # has no types
 
     @intrinsic
-    def private(_typing: Any, record: Any) -> Any:
-        def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-            place = llvm.alloca_once(builder, arguments[0].type.pointee)
-            llvm.raw_memcpy(builder, place, arguments[0], llvm.intp_t(record.size), 1)
+    def private(_typing: Any, array: Any) -> Any:
+        def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+            found = context.make_array(array)(context, builder, arguments[0]).data
+            place = llvm.alloca_once(builder, found.type.pointee)
+            llvm.raw_memcpy(builder, place, found, llvm.intp_t(array.dtype.size), 1)
             return place
 
-        return record(record), generate
+        return array.dtype(array), generate
 
     found: Callable[..., Any] = private
     return found
 
 
 def write_back() -> Callable[..., Any]:
-    """A compiled function (copy, record) that brings a private copy back to its record."""
+    """A compiled function (copy, array) that brings a private copy back to its array."""
     from numba.core import cgutils, types
     from numba.extending import intrinsic
 
     llvm: Any = cgutils  # has no types
 
     @intrinsic
-    def publish(_typing: Any, private: Any, record: Any) -> Any:
+    def publish(_typing: Any, record: Any, array: Any) -> Any:
         def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-            llvm.raw_memcpy(builder, arguments[1], arguments[0], llvm.intp_t(record.size), 1)
+            target = context.make_array(array)(context, builder, arguments[1]).data
+            llvm.raw_memcpy(builder, target, arguments[0], llvm.intp_t(record.size), 1)
             return context.get_dummy_value()
 
-        return types.none(private, record), generate
+        return types.none(record, array), generate
 
     found: Callable[..., Any] = publish
     return found
