@@ -13,9 +13,13 @@ from gateway.config import Config
 from gateway.friction import friction_torque
 from gateway.road_load import road_load
 from gateway.samples import NEEDS
-from gateway.stability import Loop, smallest_mass, spectral_radius
+from gateway.stability import DRIVE, Loop, smallest_mass, spectral_radius
 from register_maps.register_map import RegisterMap
 
+RESPONSE = 0.1
+"""[s] in which a dynamometer has to settle within 10 % (40 CFR 1066.245)."""
+DRIVE_LAG = 1.0 / DRIVE
+"""[s] of the speed-controlled motor behind its reference."""
 SCAN = 0.01
 """[s] over which the PLC's mean is taken (its fast task, domain research 5.1)."""
 RHO_REFUSED, RHO_WARNED = 0.9, 0.5
@@ -186,6 +190,15 @@ def _timing(config: Config) -> Iterator[Finding]:
         ("error", "limits.watchdog_ms", "PLC ramps down between writes", 2 * period, watchdog),
         ("warning", "limits.watchdog_ms", "PLC ramps down before the gateway", stale, watchdog),
     )
+    yield _delay(config)
+    if period < SCAN - 1e-9:
+        yield Finding(
+            severity="warning",
+            where="loop.period_ms",
+            what="the PLC makes one sample a scan: faster polls read the same one again",
+            value=round(period * 1e3, 3),
+            allowed=f">= {SCAN * 1e3:g} ms",
+        )
     for severity, where, what, value, most in pairs:
         if value > most + 1e-9:
             yield Finding(
@@ -197,11 +210,27 @@ def _timing(config: Config) -> Iterator[Finding]:
             )
 
 
+def delay_of(config: Config) -> float:
+    """From a change of torque to the motor's answer [s]: dead time, drive, a scan, half a poll."""
+    return config.bench.dead_time + DRIVE_LAG + SCAN + config.loop.period / 2
+
+
+def _delay(config: Config) -> Finding:
+    delay = delay_of(config)
+    return Finding(
+        severity="info" if delay <= RESPONSE + 1e-9 else "warning",
+        where="bench.dead_time_ms",
+        what="delay from torque to motor (dead time, drive, scan, half a poll) in ms",
+        value=round(delay * 1e3, 1),
+        allowed=f"<= {RESPONSE * 1e3:g}, the response that 40 CFR 1066.245 asks of dynamometers",
+    )
+
+
 def _speeds(config: Config) -> Iterator[Finding]:
     """Whether the cycle fits into the limits of the setpoint."""
     truck, bench, most = config.truck, config.bench, config.limits
     to_motor = bench.gear_ratio / bench.drum_radius
-    delay = bench.dead_time + 0.02 + config.loop.period
+    delay = bench.dead_time + DRIVE_LAG + config.loop.period
     speed, rise = truck.top_speed * to_motor, truck.acceleration * to_motor
     fall = truck.braking * to_motor
     needs = (

@@ -18,7 +18,15 @@ from register_maps.register_map import RegisterMap
 COLOURS = {"error": "red", "warning": "yellow", "info": "green"}
 
 
-@click.command()
+EXAMPLE = """
+\b
+Examples:
+  gateway check -c bench.toml
+  gateway check -c bench.toml --set truck.mass_kg=500 --set regulator.lead_s=0
+"""
+
+
+@click.command(epilog=EXAMPLE)
 @click.option("-c", "--config", type=click.Path(path_type=Path), required=True, help="TOML file")
 @click.option("--live", is_flag=True, help="also compare the register map with the device")
 @click.option("--set", "values", multiple=True, metavar="KEY=VALUE", help="instead of the file's")

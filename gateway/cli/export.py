@@ -7,8 +7,14 @@ import click
 from gateway import export, recording
 from gateway.header import map_of
 
+EXAMPLE = """
+\b
+Example:
+  gateway export recordings/20261121T061045.260875Z.rlrec --to run.csv
+"""
 
-@click.command()
+
+@click.command(epilog=EXAMPLE)
 @click.argument("file", metavar="RECORDING", type=click.Path(path_type=Path))
 @click.option(
     "--to",

@@ -22,8 +22,16 @@ from gateway.inspection import (
 from register_maps.register_map import Register, RegisterMap
 from register_maps.signals import RESERVED
 
+EXAMPLE = """
+\b
+Examples:
+  gateway registers list bench_int16
+  gateway registers watch bench_int16 --port 5020
+  gateway registers verify bench_float32 --port 5020
+"""
 
-@click.group()
+
+@click.group(epilog=EXAMPLE)
 def command() -> None:
     """Look at a register MAP (a shipped name or a TOML file), on paper and on a live device."""
 

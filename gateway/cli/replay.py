@@ -19,8 +19,15 @@ from gateway.record import number
 from gateway.replay_report import Compared, draw, write_csv
 from gateway.road_load import road_load
 
+EXAMPLE = """
+\b
+Examples:
+  gateway replay recordings/20261121T061045.260875Z.rlrec
+  gateway replay program6.csv.gz --set regulator.name=thesis --plot replay.png
+"""
 
-@click.command()
+
+@click.command(epilog=EXAMPLE)
 @click.argument("file", metavar="LOG|RECORDING", type=click.Path(path_type=Path))
 @click.option("-c", "--config", type=click.Path(path_type=Path), help="TOML file")
 @click.option("--set", "values", multiple=True, metavar="KEY=VALUE", help="another parameter")

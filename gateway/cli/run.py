@@ -9,8 +9,15 @@ from gateway import daemon
 from gateway.cli._settings import assignments
 from gateway.config_file import load, with_values
 
+EXAMPLE = """
+\b
+Examples:
+  gateway run -c bench.toml --shadow
+  gateway run -c bench.toml
+"""
 
-@click.command()
+
+@click.command(epilog=EXAMPLE)
 @click.option("-c", "--config", type=click.Path(path_type=Path), required=True, help="TOML file")
 @click.option("--shadow", is_flag=True, help="read and compute, write nothing")
 @click.option("--duration", type=click.FloatRange(min=0.0), help="stop by itself after so long [s]")

@@ -31,7 +31,16 @@ class Mass(click.ParamType[float | None]):
         return mass
 
 
-@click.command()
+EXAMPLE = """
+\b
+Examples:
+  plant-emulator serve
+  plant-emulator serve --truck 5240 --remote-after 5 --log bench.csv
+  plant-emulator serve --truck none --fault frozen_heartbeat@20
+"""
+
+
+@click.command(epilog=EXAMPLE)
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
 @click.option(
     "--port",
