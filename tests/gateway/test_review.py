@@ -116,17 +116,28 @@ def test_times_have_to_fit_into_each_other(where, values, severity):
     assert found(where, **values)[:1] == severity
 
 
+def test_delay_beyond_the_response_of_a_dynamometer_is_warned_of():
+    # 64 + 9.5 + 10 + 5 = 88 ms; 80 + 9.5 + 10 + 5 = 104 ms
+    assert found("bench.dead_time_ms") == ["info"]
+    assert found("bench.dead_time_ms", bench__dead_time_ms=80) == ["warning"]
+
+
+def test_poll_faster_than_the_scan_is_warned_of():
+    assert found("loop.period_ms", loop__period_ms=10) == []
+    assert found("loop.period_ms", loop__period_ms=5) == ["warning"]
+
+
 @pytest.mark.parametrize(
     ("where", "values"),
     [
         ("limits.speed_max_rpm", {"limits__speed_max_rpm": 3600}),
         ("limits.rate_up_rpm_s", {"limits__rate_up_rpm_s": 600}),
         ("limits.rate_down_rpm_s", {"limits__rate_down_rpm_s": 970}),
-        ("limits.deviation_rpm", {"limits__deviation_rpm": 90}),
+        ("limits.deviation_rpm", {"limits__deviation_rpm": 80}),
     ],
 )
 def test_a_limit_that_the_cycle_would_meet_is_refused(where, values):
-    """14 km/h are 3604 rpm; 0.65 and 1.05 m/s2 are 602 and 973 rpm/s; 94 ms late is 91 rpm."""
+    """14 km/h are 3604 rpm; 0.65 and 1.05 m/s2 are 602 and 973 rpm/s; 83.5 ms late are 81 rpm."""
     assert found(where, **values) == ["error"]
     assert found(where) == ["info"]
 
