@@ -1,0 +1,264 @@
+"""What tools/bench.py measures: the emulator next to general solvers and to its own budgets."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf
+from pathlib import Path
+
+import click
+import numpy as np
+import peers
+from timing import Action, alone, side_by_side
+
+from plant_emulator import kernel, parameter_sets, programs
+from plant_emulator.bench import Bench
+from plant_emulator.integrate import CHANNELS
+from plant_emulator.log import Array, Log
+from plant_emulator.simulate import LARGEST_STEP, run_of, simulate
+
+PROGRAM = "program1"
+# Worst channel's NRMSD that a solver may have [%], and how far the converged solutions may differ.
+ERROR_BOUND = 0.02
+CONVERGED, INDEPENDENT = 1e-8, 1e-6
+LADDER = (1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)
+FIXED_STEP = 1e-3
+SCAN = 10
+TICK_BUDGET = 50e-6
+MANY = 1000
+FIRST_RESULT = """
+import sys
+from plant_emulator import parameter_sets, programs
+from plant_emulator.log import Log
+from plant_emulator.simulate import run_of, simulate
+time, reference = programs.PROGRAMS[sys.argv[1]].reference()
+simulate(run_of(Log(time, {"speed_reference": reference})), parameter_sets.load().values())
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One comparison; errors are the worst channel's NRMSD [%] where there are such."""
+
+    name: str
+    ours: float | None
+    peer: str
+    peers: float | None
+    unit: str = "s"
+    ratio: float | None
+    target: float
+    holds: bool
+    ours_error: float | None = None
+    peers_error: float | None = None
+
+
+def row(name: str, ours: float, peer: str, their: float, target: float, **more: object) -> Row:
+    """A row from its two figures."""
+    ratio = their / ours
+    return Row(
+        name=name,
+        ours=ours,
+        peer=peer,
+        peers=their,
+        ratio=ratio,
+        target=target,
+        holds=ratio >= target,
+        **more,  # type: ignore[arg-type]
+    )
+
+
+class Study:
+    """The emulator on the program, prepared, and what its errors are measured against."""
+
+    def __init__(self) -> None:
+        program = programs.PROGRAMS[PROGRAM]
+        assert isinstance(program, programs.SpeedProgram)
+        self.time, reference = program.reference()
+        self.run = run_of(Log(self.time, {"speed_reference": reference}, PROGRAM))
+        self.duration = program.duration
+        last = program.corners[-1][1]
+        self.corners = ((0.0, program.corners[0][1]), *program.corners, (program.duration, last))
+        self.values = parameter_sets.load().values()
+
+    def raw(self, model: kernel.Kernel, tolerance: float, step: float = LARGEST_STEP) -> Action:
+        """The kernel's own call on inputs prepared beforehand; returns the channels."""
+        run, p = self.run, model.parameter_record(self.values)
+        stage, work = model.stage_record(), model.work()
+        out = np.zeros((len(self.time), len(CHANNELS)))
+        inputs = (run.time, run.reference, run.slope, run.corners, run.wheel_torque, run.parked)
+
+        def action() -> Array:
+            work[:] = 0.0
+            x = model.state(p, 0.0)
+            model.run(*inputs, (tolerance, step), x, work, stage, p, out)
+            return out
+
+        return action
+
+    def simulated(self, tolerance: float) -> Array:
+        """The compared channels as users get them."""
+        log = simulate(self.run, self.values, tolerance=tolerance)
+        return np.column_stack([log[name] for name in peers.CHANNELS])
+
+    @cached_property
+    def converged(self) -> Array:
+        """The compared channels at a tolerance far below all others."""
+        return self.simulated(CONVERGED)
+
+    def error(self, found: Array) -> float:
+        """NRMSD of the worst channel against the converged solution [%]."""
+        rms = np.sqrt(np.mean((found - self.converged) ** 2, axis=0))
+        return float(100.0 * np.max(rms / np.ptp(self.converged, axis=0)))
+
+    def at_bound(self, solve: Callable[[float], Array]) -> tuple[float, float]:
+        """Loosest tolerance from which on every error is within the bound, and its error."""
+        found, error = 0.0, inf
+        for tolerance in reversed(LADDER):
+            now = self.error(solve(tolerance))
+            if now > ERROR_BOUND:
+                break
+            found, error = tolerance, now
+        if not found:
+            raise click.ClickException(f"no tolerance down to {LADDER[-1]:g} meets the error")
+        return found, error
+
+    @cached_property
+    def ours(self) -> tuple[float, float]:
+        """Our tolerance at the bound and its error."""
+        return self.at_bound(self.simulated)
+
+
+Rows = Iterator[Row]
+
+
+def compared(
+    study: Study, name: str, peer: str, solve: Callable[[float], Array], target: float
+) -> Rows:
+    """The kernel, then `simulate`, against one general solver at the same error."""
+    tolerance, error = study.ours
+    theirs, their_error = study.at_bound(solve)
+    label = f"{peer}, rtol {theirs:g}"
+    ways = {
+        name: study.raw(kernel.kernel(), tolerance),
+        f"{name}_simulate": lambda: simulate(study.run, study.values, tolerance=tolerance),
+    }
+    for key, action in ways.items():
+        times = side_by_side(action, lambda: solve(theirs))
+        yield row(key, times[0], label, times[1], target, ours_error=error, peers_error=their_error)
+
+
+def reference(study: Study) -> Rows:
+    """Whether an independent solver converges to the same."""
+    solve = peers.Lsoda(study.time, peers.tuned(study.corners, study.values), study.values)
+    apart = study.error(solve(INDEPENDENT))
+    label = f"difference from LSODA at {INDEPENDENT:g}; a tenth of the error bound"
+    yield row("reference", apart, label, 0.1 * ERROR_BOUND, 1.0, unit="%")
+
+
+def lsoda(study: Study) -> Rows:
+    """scipy, right-hand side as one writes it."""
+    solve = peers.Lsoda(study.time, peers.plain(study.corners, study.values), study.values)
+    yield from compared(study, "lsoda", "scipy LSODA, right-hand side in Python", solve, 80.0)
+
+
+def lsoda_tuned(study: Study) -> Rows:
+    """scipy, right-hand side as fast as Python gets."""
+    solve = peers.Lsoda(study.time, peers.tuned(study.corners, study.values), study.values)
+    yield from compared(study, "lsoda_tuned", "scipy LSODA, the same tuned by hand", solve, 0.0)
+
+
+def cvodes(study: Study) -> Rows:
+    """CasADi, where it is installed."""
+    try:
+        import casadi  # noqa: F401
+    except ImportError as error:
+        click.echo(f"cvodes: {error}; pip install 'road-load-bench[bench]' brings it", err=True)
+        yield Row(
+            name="cvodes",
+            ours=None,
+            peer="CasADi CVODES: not installed",
+            peers=None,
+            ratio=None,
+            target=8.0,
+            holds=False,
+        )
+        return
+    solve = peers.Cvodes(study.time, study.corners, study.values)
+    yield from compared(study, "cvodes", "CasADi CVODES", solve, 8.0)
+
+
+def realtime(study: Study) -> Rows:
+    """Simulated over CPU time, adaptive and with fixed steps."""
+    tolerance, error = study.ours
+    model = kernel.kernel()
+    adaptive = alone(study.raw(model, tolerance))
+    yield row("realtime_adaptive", adaptive, "real time", study.duration, 1e4, ours_error=error)
+    fixed = alone(study.raw(model, inf, FIXED_STEP))
+    yield row("realtime_fixed", fixed, f"real time, {FIXED_STEP:g} s", study.duration, 2e3)
+
+
+def tick(_: Study) -> Rows:
+    """The running bench: one step, and the steps of one PLC scan, in one call."""
+    bench = Bench(parameter_sets.load())
+    for steps in (1, SCAN):
+        time = alone(lambda steps=steps: bench.advance([100.0] * steps))  # type: ignore[misc]
+        yield row(f"tick_{steps}", time, f"budget of {steps} ms of bench", TICK_BUDGET, 1.0)
+
+
+def effects(study: Study) -> Rows:
+    """What all effects cost while none is there."""
+    tolerance, _ = study.ours
+    every, none = kernel.kernel(), kernel.build({})
+    times = side_by_side(study.raw(every, tolerance), study.raw(none, tolerance))
+    yield row("effects", times[0], "the kernel without effects", times[1], 0.5)
+
+
+def thousand(study: Study) -> Rows:
+    """A thousand simulations, each with its own parameters."""
+    random, (tolerance, _) = np.random.default_rng(1), study.ours
+
+    def action() -> None:
+        inertia, gain = study.values["drum_inertia"], study.values["speed_gain"]
+        for share in random.uniform(0.9, 1.1, MANY):
+            changed = {"drum_inertia": share * inertia, "speed_gain": gain / share}
+            simulate(study.run, {**study.values, **changed}, tolerance=tolerance)
+
+    yield row("thousand", alone(action, 1), f"real time of {MANY} runs", MANY * study.duration, 0.0)
+
+
+def first_result(study: Study) -> Rows:
+    """A fresh process up to its first simulation, without and with a cache on disk."""
+    with tempfile.TemporaryDirectory() as folder:
+        for name in ("first_result_cold", "first_result_warm"):
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
+            environment = {**os.environ, "ROADLOAD_CACHE": folder}
+            root = Path(__file__).resolve().parent.parent
+            subprocess.run(
+                [sys.executable, "-c", FIRST_RESULT, PROGRAM], env=environment, cwd=root, check=True
+            )
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+            yield row(name, used, "real time of the run", study.duration, 0.0)
+
+
+GROUPS = {
+    group.__name__: group
+    for group in (
+        reference,
+        lsoda,
+        lsoda_tuned,
+        cvodes,
+        realtime,
+        tick,
+        effects,
+        thousand,
+        first_result,
+    )
+}
