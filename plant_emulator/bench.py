@@ -76,6 +76,7 @@ class Bench:
         self._motor_angle = 0.0
         self._drum_angle = 0.0
         self._truck = (0.0, 0.0)
+        self._own_current_limit = self._p.armature_current_limit
 
     @property
     def time(self) -> float:
@@ -119,6 +120,10 @@ class Bench:
             motor_angle=self._motor_angle,
             drum_angle=self._drum_angle,
         )
+
+    def limit_current(self, limit: float) -> None:
+        """Let the drive ask for no more armature current than that, nor than its own limit [A]."""
+        self._p.armature_current_limit = min(limit, self._own_current_limit)
 
     def _load(self, wheel_torque: float, brake_torque: float) -> None:
         """Set the truck's torques; writing a record costs more than a step of the bench."""

@@ -69,6 +69,7 @@ class Plc:
         self.switches = Switches()
         self.road_load_since: float | None = None
         self._at_limit = False
+        self._current_limit = self.inbox.command.current_limit
         field = register_map.register("field_current")
         # The bench has no field circuit; where the map cannot say so, an unused input shows zero.
         self._field_current = None if field is None or field.not_available is not None else 0.0
@@ -148,7 +149,10 @@ class Plc:
         self.state = state
 
     def _plan(self) -> None:
-        """Decide the reference of the next scan."""
+        """Decide the reference of the next scan, and hand the drive its current limit."""
+        if self.inbox.command.current_limit != self._current_limit:
+            self._current_limit = self.inbox.command.current_limit
+            self.bench.limit_current(self._current_limit)
         target = self._target()
         self.reference = self.path[-1]
         self.path = reference.trajectory(self.reference, target, STEP, STEPS)

@@ -22,6 +22,9 @@ class Bench(Protocol):
     ) -> BenchSamples:
         """Run one sub-step an entry; torques [N m] at the truck's wheel."""
 
+    def limit_current(self, limit: float) -> None:
+        """Let the drive ask for no more than that armature current [A]."""
+
 
 class Driver(Protocol):
     """Whoever drives the truck on the drum."""

@@ -21,8 +21,12 @@ class LinearBench:
     def __init__(self) -> None:
         self.references: list[float] = []
         self.wheel: list[tuple[float, float]] = []
+        self.current_limit = 72.0
         self.push = 0.0
         self.angle = 0.0
+
+    def limit_current(self, limit: float) -> None:
+        self.current_limit = limit
 
     def advance(
         self, references: Sequence[float], *, wheel_torque: float = 0.0, brake_torque: float = 0.0

@@ -83,3 +83,18 @@ def test_unknown_effect_or_parameter_is_refused(
 ) -> None:
     with pytest.raises(ParameterError, match="neither a parameter of the bench nor of an effect"):
         Bench(nominal, effects)
+
+
+def test_current_is_held_to_the_limit_asked_for_and_never_above_the_drives_own(
+    nominal: ParameterSet,
+) -> None:
+    # the motor alone takes J_m x 100 rad/s^2 / 1.85 = 7 A, with the drum behind it some 50 A; the
+    # current loop stays below its reference by the back-EMF over its gain (thesis, eq. 3.3)
+    steep = references(100.0, 1500)
+    held, free, asked_too_much = Bench(nominal), Bench(nominal), Bench(nominal)
+    held.limit_current(20.0)
+    asked_too_much.limit_current(500.0)
+    assert 15.0 < held.advance(steep).armature_current.max() <= 20.0
+    unlimited = free.advance(steep).armature_current
+    assert unlimited.max() > 25.0
+    np.testing.assert_array_equal(unlimited, asked_too_much.advance(steep).armature_current)

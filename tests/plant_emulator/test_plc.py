@@ -282,6 +282,15 @@ def test_ends_of_the_allowed_ranges_are_accepted(running, place, end):
     assert not running.scan().alarm
 
 
+def test_current_limit_of_an_accepted_command_reaches_the_drive(running):
+    running.write_raw(CURRENT, 2050)
+    running.scan()
+    assert running.plc.bench.current_limit == pytest.approx(20.5)
+    running.write_raw(CURRENT, 7201)
+    running.scan()
+    assert running.plc.bench.current_limit == pytest.approx(20.5)
+
+
 @pytest.mark.parametrize("words", [(0x7FC0, 0), (0x7F80, 0), (0xFF80, 0), (0, 1)])
 def test_float_that_is_no_number_is_refused_at_every_place(words):
     # NaN, both infinities, the smallest subnormal; floats of the block: domain guide 5.3
