@@ -136,9 +136,7 @@ def observe(row: int, out: State, s: Record, p: Record) -> None:
 
 def delayed(tau: float, k: int, time: State, value: State, slope: State) -> float:
     """Reference of segment k at the time tau, before the first sample its value [rad/s]."""
-    reference: float = value[0]
-    if k >= 0:
-        reference = value[k] + slope[k] * (tau - time[k])
+    reference: float = value[k] + slope[k] * (max(tau, time[0]) - time[k])
     return reference
 
 
@@ -179,7 +177,7 @@ def run(
     load(x, s)
     evaluate_laws(s, p)
     observe(0, out, s, p)
-    t, h, segment, edge, steps = time[0], largest, -1, 0, 0
+    t, h, segment, edge, steps = time[0], largest, 0, 0, 0
     for row in range(1, len(time)):
         s.wheel_torque, s.parked = wheel_torque[row], parked[row]
         while t < time[row]:
@@ -196,7 +194,7 @@ def run(
             middle = t + 0.5 * length - b
             while segment + 1 < len(time) and time[segment + 1] <= middle:
                 segment += 1
-            while segment >= 0 and time[segment] > middle:  # the step was refused and shortened
+            while segment > 0 and time[segment] > middle:  # the step was refused and shortened
                 segment -= 1
             r = (
                 delayed(t + GAMMA * length - b, segment, time, value, slope),
