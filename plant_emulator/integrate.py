@@ -11,12 +11,13 @@ x + (1 - gamma)/gamma (X1 - x) and f itself is never evaluated.
 
 Error estimate: the slopes at t, t + gamma h and t + h give a quadrature of order 3; its difference
 from the method's is the local error. Where a contact closes or a limit is reached the slopes jump,
-and the step shrinks. A step ends on every sample and on every corner of the delayed reference.
+and the step shrinks. Steps end on samples and on every corner of the delayed reference. A step may
+pass samples as long as the truck's torque stays; these lie on the cubic through both ends.
 """
 
 from __future__ import annotations
 
-from math import ceil, sqrt
+from math import ceil, inf, sqrt
 from typing import TYPE_CHECKING
 
 from plant_emulator.laws import (
@@ -32,6 +33,7 @@ from plant_emulator.plant import (
     acting_wheel_torque,
     evaluate_laws,
     load,
+    show,
     solve_stage,
     store,
 )
@@ -134,10 +136,46 @@ def observe(row: int, out: State, s: Record, p: Record) -> None:
     out[row, 6] = acting_wheel_torque(s, p)
 
 
+def segment_at(tau: float, k: int, time: State) -> int:
+    """Segment of the samples that tau lies in, looked for from segment k on."""
+    while k + 1 < len(time) and time[k + 1] <= tau:
+        k += 1
+    while k > 0 and time[k] > tau:
+        k -= 1
+    return k
+
+
 def delayed(tau: float, k: int, time: State, value: State, slope: State) -> float:
     """Reference of segment k at the time tau, before the first sample its value [rad/s]."""
     reference: float = value[k] + slope[k] * (max(tau, time[0]) - time[k])
     return reference
+
+
+def landing_sample(row: int, reach: float, time: State, wheel_torque: State, parked: State) -> int:
+    """The last sample within reach, from `row` on, up to which the truck's torque stays."""
+    while (
+        row + 1 < len(time)
+        and time[row + 1] <= reach * (1.0 + 1e-12)
+        and wheel_torque[row + 1] == wheel_torque[row]
+        and parked[row + 1] == parked[row]
+    ):
+        row += 1
+    return row
+
+
+def interpolate(since: float, h: float, x: State, w: State) -> State:
+    """State a time `since` after the begin of the step: the cubic through both ends and slopes.
+
+    It takes the place of the first stage, which is of no more use.
+    """
+    first, base, last, slope = w[FIRST], w[BASE], w[LAST], w[SLOPE]
+    u = since / h
+    rise, start, end = u * u * (3.0 - 2.0 * u), since * (1.0 - u) ** 2, since * u * (u - 1.0)
+    per_stage = 1.0 / (GAMMA * h)
+    for k in range(len(x)):
+        slope_1 = (last[k] - base[k]) * per_stage
+        first[k] = x[k] + rise * (last[k] - x[k]) + start * slope[k] + end * slope_1
+    return first
 
 
 def private(stage: Record) -> Record:
@@ -177,39 +215,42 @@ def run(
     load(x, s)
     evaluate_laws(s, p)
     observe(0, out, s, p)
-    t, h, segment, edge, steps = time[0], largest, 0, 0, 0
-    for row in range(1, len(time)):
+    t, h, segment, edge, steps, row = time[0], largest, 0, 0, 0, 1
+    while row < len(time):
         s.wheel_torque, s.parked = wheel_torque[row], parked[row]
-        while t < time[row]:
-            b = dead_time(s, p)
-            while edge < len(edges) and edges[edge] + b <= t + SMALLEST_STEP:
-                edge += 1
-            end = time[row]
-            if edge < len(edges):
-                end = min(end, edges[edge] + b)
-            if end > time[row] - SMALLEST_STEP:
-                end = time[row]
-            pieces = ceil((end - t) / min(h, largest) - 1e-9)
-            length = (end - t) / pieces
-            middle = t + 0.5 * length - b
-            while segment + 1 < len(time) and time[segment + 1] <= middle:
-                segment += 1
-            while segment > 0 and time[segment] > middle:  # the step was refused and shortened
-                segment -= 1
-            r = (
-                delayed(t + GAMMA * length - b, segment, time, value, slope),
-                delayed(t + length - b, segment, time, value, slope),
-            )
-            step(length, t, r, x, w, s, p)
-            steps += 1
-            if tolerance < 1e9:
-                error = local_error(length, x, w) / tolerance
-                h = length * growth(error)
-                if error > 1.0 and length > SMALLEST_STEP:
-                    continue
-            accept(length, x, w)
-            t = end if pieces == 1 else t + length
-        observe(row, out, s, p)
+        b = dead_time(s, p)
+        while edge < len(edges) and edges[edge] + b <= t + SMALLEST_STEP:
+            edge += 1
+        corner = edges[edge] + b if edge < len(edges) else inf
+        reach = min(t + min(h, largest), corner + SMALLEST_STEP)
+        landing = landing_sample(row, reach, time, wheel_torque, parked)
+        end = corner if corner < time[landing] - SMALLEST_STEP else time[landing]
+        pieces = 1 if landing > row else ceil((end - t) / min(h, largest) - 1e-9)
+        length = (end - t) / pieces
+        early = segment_at(t + GAMMA * length - b, segment, time)
+        segment = segment_at(t + length - b - 0.5 * SMALLEST_STEP, early, time)
+        r = (
+            delayed(t + GAMMA * length - b, early, time, value, slope),
+            delayed(t + length - b, segment, time, value, slope),
+        )
+        step(length, t, r, x, w, s, p)
+        steps += 1
+        if tolerance < 1e9:
+            error = local_error(length, x, w) / tolerance
+            h = length * growth(error)
+            if error > 1.0 and length > SMALLEST_STEP:
+                continue
+        if pieces == 1 and end == time[landing]:
+            observe(landing, out, s, p)
+            for k in range(row, landing):
+                early = segment_at(time[k] - b, early, time)
+                s.delayed_reference = delayed(time[k] - b, early, time, value, slope)
+                s.time = time[k]
+                show(interpolate(time[k] - t, length, x, w), s, p)
+                observe(k, out, s, p)
+            row = landing + 1
+        accept(length, x, w)
+        t = end if pieces == 1 else t + length
     publish(s, stage)
     return steps
 

@@ -387,6 +387,15 @@ def memories(base: State, a: float, s: Record, p: Record) -> None:
     """
 
 
+def show(x: State, s: Record, p: Record) -> None:
+    """Write the states x to the stage, and what follows from them: laws, voltage, torque."""
+    load(x, s)
+    evaluate_laws(s, p)
+    armature(x, 0.0, s, p)
+    damped = s.motor_shaft_damping * (s.motor_speed - p.gear_ratio * s.gear_speed)
+    s.motor_shaft_torque = p.motor_shaft_stiffness * s.motor_shaft_twist + damped
+
+
 def solve_stage(base: State, a: float, s: Record, p: Record) -> None:
     """Solve X = base + a f(X). On entry s holds an estimate of X, on return the solution.
 
