@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from gateway import recording
 from plant_emulator.process import EmulatorProcess
 
 CONFIG = """
@@ -55,6 +56,12 @@ class Gateway:
         """Send a signal; its exit code."""
         self.process.send_signal(number)
         return self.process.wait(20)
+
+    def passed(self) -> list[str]:
+        """Names of the states in the order of their first tick, from the recording itself."""
+        (file,) = (self.folder / "recordings").glob("*.rlrec")
+        made = recording.read(file)
+        return list(dict.fromkeys(made.state(int(code)) for code in made.records["state"]))
 
     def rows(self) -> list[dict[str, str]]:
         """The recording as `gateway export` writes it."""
