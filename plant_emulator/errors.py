@@ -19,3 +19,7 @@ class ParameterError(InputError):
 
 class LogError(InputError):
     """A log file that cannot be read; the message names line and column."""
+
+
+class UnsettledError(EmulatorError):
+    """A simulation whose equations were not solved at every step: its numbers mean nothing."""

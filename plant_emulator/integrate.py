@@ -53,6 +53,8 @@ WEIGHT = (1.0 / 70.0, 1.0 / 400.0, 1.0 / 1.2e-3, 1.0 / 6.5)
 
 SHRINK, GROW, SAFETY = 0.2, 5.0, 0.9
 SMALLEST_STEP = 1e-6
+# Error that a step with an unsettled stage counts as, in tolerances.
+UNSETTLED = 1e6
 # Below this share of the tolerance a step grows by GROW, above by the root.
 EASY = (SAFETY / GROW) ** 3
 
@@ -233,13 +235,19 @@ def run(
             delayed(t + GAMMA * length - b, early, time, value, slope),
             delayed(t + length - b, segment, time, value, slope),
         )
+        unsettled = s.unsettled
         step(length, t, r, x, w, s, p)
         steps += 1
         if tolerance < 1e9:
             error = local_error(length, x, w) / tolerance
+            if s.unsettled > unsettled:  # a shorter step is nearer to where it was linearised
+                error = UNSETTLED
             h = length * growth(error)
             if error > 1.0 and length > SMALLEST_STEP:
+                s.unsettled = unsettled
                 continue
+            if s.unsettled > unsettled:
+                break  # no step is short enough: the caller refuses the result
         if pieces == 1 and end == time[landing]:
             observe(landing, out, s, p)
             for k in range(row, landing):

@@ -102,6 +102,7 @@ STAGE = (
     "wanted_voltage",
     "wanted_voltage_slope",
     "armature_voltage",
+    "unsettled",
     "current_slope",
     "speed_integral_slope",
     "current_integral_slope",
@@ -147,6 +148,12 @@ BISECT_FROM = 8
 PARKED = 1e9
 
 
+def drum_friction_level(s: Record, p: Record) -> float:
+    """Coulomb friction on the drum [N m]: its bearings', the truck's brake, a parked truck."""
+    brake = p.drum_radius / p.wheel_radius * s.brake_torque + PARKED * s.parked
+    return drum_coulomb_friction(s, p) + brake
+
+
 def evaluate_laws(s: Record, p: Record) -> None:
     """Write every law at the present estimate into the stage."""
     s.reference = reference(s, p)
@@ -166,8 +173,7 @@ def evaluate_laws(s: Record, p: Record) -> None:
     s.gear_viscous_friction = gear_viscous_friction(s, p)
     s.gear_torque = gear_torque(s, p)
     s.backlash_half_gap = backlash_half_gap(s, p)
-    brake = p.drum_radius / p.wheel_radius * s.brake_torque + PARKED * s.parked
-    s.drum_coulomb_friction = drum_coulomb_friction(s, p) + brake
+    s.drum_coulomb_friction = drum_friction_level(s, p)
     s.drum_viscous_friction = drum_viscous_friction(s, p)
     s.drum_torque = drum_torque(s, p)
 
@@ -189,7 +195,12 @@ def laws_moved(change: float, s: Record, p: Record) -> bool:
         or moved(gear_torque(s, p), s.gear_torque)
         or moved(backlash_half_gap(s, p), s.backlash_half_gap)
         or moved(drum_torque(s, p), s.drum_torque)
+        or moved(drum_friction_level(s, p), s.drum_coulomb_friction)
         or moved(drum_viscous_friction(s, p), s.drum_viscous_friction)
+        or moved(motor_shaft_damping(s, p), s.motor_shaft_damping)
+        or moved(tachometer_gain(s, p), s.tachometer_gain)
+        or moved(integration_at_limit(s, p), s.integration_at_limit)
+        or moved(speed_limit(s, p), s.speed_limit)
         or moved(motor_coulomb_friction(s, p), s.motor_coulomb_friction)
         or moved(motor_viscous_friction(s, p), s.motor_viscous_friction)
         or moved(reference(s, p), s.reference)
@@ -399,7 +410,7 @@ def show(x: State, s: Record, p: Record) -> None:
 def solve_stage(base: State, a: float, s: Record, p: Record) -> None:
     """Solve X = base + a f(X). On entry s holds an estimate of X, on return the solution.
 
-    a : implicit step, gamma h [s]
+    a : implicit step, gamma h [s]. A stage whose passes ran out is counted in s.unsettled.
     """
     for attempt in range(MAX_PASSES):
         evaluate_laws(s, p)
@@ -418,4 +429,5 @@ def solve_stage(base: State, a: float, s: Record, p: Record) -> None:
         s.backlash_angle = base[BACKLASH] + a * (s.gear_speed - s.drum_speed)
         memories(base, a, s, p)
         if settled and not laws_moved(change, s, p):
-            break
+            return
+    s.unsettled += 1.0

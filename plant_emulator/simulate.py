@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from plant_emulator.errors import UnsettledError
 from plant_emulator.integrate import CHANNELS
 from plant_emulator.kernel import Kernel
 from plant_emulator.kernel import kernel as default_kernel
@@ -111,6 +112,7 @@ def simulate(
     p = model.parameter_record(values)
     x = model.state(p, gap_position * values["backlash_half_gap"])
     settings = (tolerance, largest_step) if step is None else (inf, step)
+    stage = model.stage_record()
     model.run(
         run.time,
         run.reference,
@@ -121,10 +123,15 @@ def simulate(
         settings,
         x,
         model.work(),
-        model.stage_record(),
+        stage,
         p,
         out,
     )
+    if (unsettled := stage.unsettled) > 0.0:
+        raise UnsettledError(
+            f"{run.source}: {unsettled:.0f} implicit stages did not settle; the result is not the "
+            "model's; a shorter step or other effects may help"
+        )
     signals = {name: out[:, k] for k, name in enumerate(CHANNELS)}
     if not run.truck:  # a log with this column would be read as a staircase with a parked truck
         del signals["wheel_torque"]

@@ -96,3 +96,38 @@ def test_file_that_lacks_something_is_refused(
 def test_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="no Python file with an effect"):
         effects.from_file(tmp_path / "ghost.py")
+
+
+CONTRADICTION = '''"""A torque that is there while the gear turns without it. Source: a test."""
+
+from plant_emulator.effects import EffectParameter
+
+SUBSYSTEM = "gear"
+PARAMETERS = {
+    "size": EffectParameter(
+        neutral=0.0, lower=0.0, upper=1e6, plausible=1e5, unit="N m", meaning="T"
+    )
+}
+
+
+def gear_torque(value, s, p):
+    return value + (p.contradiction_size if s.gear_speed > 0.1 else 0.0)
+'''
+
+
+def test_simulation_that_has_no_solution_is_refused_not_returned(tmp_path: Path) -> None:
+    path = tmp_path / "contradiction.py"
+    path.write_text(CONTRADICTION, encoding="utf-8")
+    code = SIMULATED.replace("oil_drag_factor", "contradiction_size").replace("20.0", "1e7")
+    code = code.replace("30.0", "3.0")
+    result = subprocess.run(
+        [sys.executable, "-c", code, str(path)],
+        cwd=ROOT,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert result.returncode != 0
+    assert "implicit stages did not settle" in result.stderr
