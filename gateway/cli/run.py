@@ -1,6 +1,9 @@
 """The daemon: make the bench feel like the road, over Modbus TCP."""
 
+import shlex
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -8,6 +11,10 @@ import register_maps
 from gateway import daemon
 from gateway.cli._settings import assignments
 from gateway.config_file import load, with_values
+
+if TYPE_CHECKING:
+    from gateway.config import Config
+    from register_maps.register_map import RegisterMap
 
 EXAMPLE = """
 \b
@@ -26,14 +33,33 @@ def command(config: Path, *, shadow: bool, duration: float | None, values: tuple
     """Run until Ctrl-C or SIGTERM: ramp down, hang up, keep the recording.
 
     Exit code 0: ended by the operator; 1: a fault of the PLC or of ours ended the last run, or the
-    PLC was not there; 2: bad configuration.
+    PLC was not there; 2: bad configuration, also one that `gateway check` refuses. With --shadow
+    such a one is only warned of, as nothing is written.
     """
     settings = with_values(load(config), assignments(values))
-    ended = daemon.run(
-        settings, register_maps.load(settings.plc.map), shadow=shadow, duration=duration
-    )
+    register_map = register_maps.load(settings.plc.map)
+    refused = list(refusals(settings, register_map))
+    told = shlex.join(["gateway", "check", "-c", str(config), *_repeated("--set", values)])
+    for line in refused:
+        click.echo(f"{'warning' if shadow else 'error'}: {config}: {line}; see {told}", err=True)
+    if refused and not shadow:
+        return 2
+    ended = daemon.run(settings, register_map, shadow=shadow, duration=duration)
     click.echo(report(ended))
     return 0 if ended.reason is None else 1
+
+
+def refusals(config: "Config", register_map: "RegisterMap") -> Iterator[str]:
+    """What the review holds to be an error: place, value, and what would be right, one a line."""
+    from gateway.review import review  # numpy's eigenvalues: done with before real time begins
+
+    for one in review(config, register_map):
+        if one.severity == "error":
+            yield f"{one.where}: {one.what}: found {one.value}, expected {one.allowed}"
+
+
+def _repeated(option: str, values: tuple[str, ...]) -> list[str]:
+    return [word for value in values for word in (option, value)]
 
 
 def report(ended: daemon.Ended) -> str:

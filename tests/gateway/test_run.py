@@ -156,3 +156,39 @@ def test_a_bad_configuration_is_one_line_and_exit_code_2(
     assert ended.returncode == 2
     assert says in ended.stderr
     assert ended.stderr.count("\n") == 1
+
+
+LIGHT = "[truck]\nmass_kg = 300\n[plc]\nport = 1\n"
+
+
+def run_with(tmp_path: Path, text: str, *options: str) -> subprocess.CompletedProcess[str]:
+    (tmp_path / "bench.toml").write_text(text)
+    return subprocess.run(
+        [sys.executable, "-m", "gateway", "run", "-c", "bench.toml", *options],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        check=False,
+        timeout=60,
+    )
+
+
+def test_what_check_refuses_is_not_run_one_line_a_finding(tmp_path: Path) -> None:
+    """rho = 312.71 / (300 x 0.645^2) = 2.5056; 60 ms are over half of 100 ms."""
+    ended = run_with(tmp_path, LIGHT, "--set", "loop.period_ms=60")
+    first, second = ended.stderr.splitlines()
+    assert ended.returncode == 2
+    assert "rho" in first
+    assert "found 2.5056" in first
+    assert "loop.period_ms" in second
+    told = "see gateway check -c bench.toml --set loop.period_ms=60"
+    assert first.endswith(told)
+    assert second.endswith(told)
+    assert not (tmp_path / "recordings").exists()
+
+
+def test_shadow_only_warns_of_what_check_refuses(tmp_path: Path) -> None:
+    ended = run_with(tmp_path, LIGHT, "--shadow", "--duration", "0.3")
+    assert "warning: bench.toml: truck.mass_kg" in ended.stderr
+    assert "error:" not in ended.stderr
+    assert list((tmp_path / "recordings").glob("*.rlrec"))
