@@ -1,13 +1,18 @@
 """The last word on every setpoint. Knows no regulator and no state: whoever asks gets the same.
 
 A setpoint is finite, inside the bench's range, no faster than its slopes allow, and rises neither
-more than `deviation` over the measured speed nor on stale data. Downward is the safe direction:
-measurements never keep a setpoint from falling. What is not a number counts as standstill.
+more than `deviation` over the measured speed nor on stale data. The PLC goes on along the slope
+that came with a setpoint when no further one comes; where that ends has to hold as well. Downward
+is the safe direction: measurements never keep a setpoint from falling. What is not a number counts
+as standstill.
 """
 
 from dataclasses import dataclass
 from enum import Flag, auto
 from math import isfinite
+
+HOLD = 0.1
+"""[s] for which the PLC follows a slope after the last write."""
 
 
 class Limit(Flag):
@@ -57,12 +62,16 @@ def limit(
     """
     stale = not age <= limits.stale
     speed, by = _finite(wanted)
-    speed, by = _at_most(speed, _ceiling(last, measured, limits), Limit.DEVIATION, by)
+    ceiling = _ceiling(last, measured, limits)
+    speed, by = _at_most(speed, ceiling, Limit.DEVIATION, by)
     if stale:
         speed, by = _at_most(speed, last, Limit.STALE, by)
     speed, by = _sloped(speed, by, last, _interval(dt, limits), limits)
     speed, by = _ranged(speed, by, limits)
-    return Limited(speed=speed, rate=_slope(rate, by, limits, stale=stale), by=by)
+    if by or not isfinite(rate):
+        return Limited(speed=speed, rate=0.0, by=by)
+    steepest = 0.0 if stale else _steepest(speed, ceiling, limits)
+    return Limited(speed=speed, rate=min(max(rate, -limits.rate_down), steepest), by=by)
 
 
 def _finite(wanted: float) -> tuple[float, Limit]:
@@ -99,8 +108,6 @@ def _noted(speed: float, allowed: float, name: Limit, by: Limit) -> tuple[float,
     return allowed, by if allowed == speed else by | name
 
 
-def _slope(rate: float, by: Limit, limits: Limits, *, stale: bool) -> float:
-    """Slope that goes with the setpoint: none where a limit holds it, no rise on stale data."""
-    if by or not isfinite(rate):
-        return 0.0
-    return min(max(rate, -limits.rate_down), 0.0 if stale else limits.rate_up)
+def _steepest(speed: float, ceiling: float, limits: Limits) -> float:
+    """Steepest rise with which the PLC, left alone, still ends under all ceilings [rad/s^2]."""
+    return min(limits.rate_up, (min(ceiling, limits.speed_max) - speed) / HOLD)

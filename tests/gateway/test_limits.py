@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.limits import Limit, Limits, limit
+from gateway.limits import HOLD, Limit, Limits, limit
+from plant_emulator import plc_reference
 
 # At rates of 100 up and 200 down, 10 ms are worth 1 up and 2 down.
 LIMITS = Limits(speed_max=500.0, rate_up=100.0, rate_down=200.0, deviation=40.0, stale=0.1)
@@ -108,6 +109,26 @@ def test_slope_downward_is_held_to_rate_down(rate, allowed):
     assert of(100.0, rate).rate == allowed
 
 
+@pytest.mark.parametrize(("rate", "allowed"), [(19.0, 19.0), (20.0, 20.0), (21.0, 20.0)])
+def test_slope_ends_within_deviation_over_the_measured_speed(rate, allowed):
+    """2 rad/s are left, in the 0.1 s for which the PLC goes on by itself: 20 rad/s^2."""
+    assert of(100.0, rate, measured=62.0).rate == pytest.approx(allowed)
+
+
+@pytest.mark.parametrize(("rate", "allowed"), [(19.0, 19.0), (20.0, 20.0), (21.0, 20.0)])
+def test_slope_ends_at_the_maximum(rate, allowed):
+    passed = of(498.0, rate, last=498.0, measured=498.0)
+    assert (passed.rate, passed.by) == (pytest.approx(allowed), Limit.NONE)
+
+
+def test_slope_downward_is_free_at_every_ceiling():
+    assert of(500.0, -150.0, last=500.0, measured=460.0).rate == -150.0
+
+
+def test_slope_is_followed_for_as_long_as_the_plc_does():
+    assert HOLD == plc_reference.HOLD
+
+
 @pytest.mark.parametrize("rate", [nan, inf, -inf])
 def test_slope_that_is_no_number_is_none(rate):
     assert of(100.0, rate).rate == 0.0
@@ -132,3 +153,5 @@ def test_no_input_gets_past_the_limits(wanted, rate, measured, age, dt, last):
     assert -200.0 <= passed.rate <= 100.0
     assert passed.speed <= last or age <= 0.1
     assert passed.speed <= last or passed.speed <= measured + 40.0
+    if passed.rate > 0.0:
+        assert passed.speed + passed.rate * HOLD <= min(measured + 40.0, 500.0) + 1e-9
