@@ -82,10 +82,8 @@ class State:
 def seed(params: Params, motor_speed: float, drum_speed: float) -> State:
     """Virtual truck with which the demand is the measured motor speed."""
     gear_speed = motor_speed / params.gear_ratio
-    behind = _bounded(
-        (gear_speed - drum_speed) / (1.0 + params.trim), TRIM_MOST / (1 + params.trim)
-    )
-    virtual = gear_speed - params.trim * behind
+    behind = (gear_speed - drum_speed) / (1.0 + params.trim)
+    virtual = gear_speed - _bounded(params.trim * behind, TRIM_MOST)
     return State(virtual_speed=max(virtual, 0.0), moving=gear_speed > START_SPEED)
 
 

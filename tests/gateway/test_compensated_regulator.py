@@ -135,3 +135,13 @@ def test_seeding_is_bumpless_also_while_the_drum_is_ahead_or_behind(drum):
     state = compensated.seed(PARAMS, 200.0, drum)
     trim = 0.8 * (state.virtual_speed - drum)
     assert 62.6 * (state.virtual_speed + trim) == pytest.approx(200.0)
+
+
+@pytest.mark.parametrize(
+    ("ahead", "trimmed"), [(2.0, 2.0 / 3.0), (-2.0, -2.0 / 3.0), (2.7, 0.8), (-2.7, -0.8)]
+)
+def test_seeding_is_bumpless_up_to_the_bound_of_the_trim_and_beyond(ahead, trimmed):
+    """Gear ahead of the drum by 2: 0.5 x 2 / 1.5 is trimmed; by 2.7: 0.9, bounded to 0.8."""
+    params = replace(PARAMS, trim=0.5)
+    state = compensated.seed(params, 62.6 * 4.0, 4.0 - ahead)
+    assert state.virtual_speed == pytest.approx(4.0 - trimmed)
