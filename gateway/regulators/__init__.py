@@ -10,6 +10,7 @@ A regulator is one module here, found by its name. It gives `Params` (frozen, wi
 All are pure. `test_every_regulator.py` holds whatever module it finds here to that.
 """
 
+from functools import lru_cache
 from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any, Protocol, cast
@@ -44,8 +45,9 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(found.name for found in iter_modules(__path__) if found.name != "window"))
 
 
+@lru_cache
 def load(name: str) -> Regulator:
-    """The regulator of that name."""
+    """The regulator of that name; the folder is looked through once, not at every tick."""
     if name not in names():
         raise ConfigError(
             "unknown regulator", place="regulator.name", value=name, expected=" or ".join(names())

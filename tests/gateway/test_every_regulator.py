@@ -38,6 +38,12 @@ def test_both_are_found_and_an_unknown_one_is_refused():
         regulators.load("best")
 
 
+def test_the_folder_is_not_looked_through_at_every_tick(monkeypatch):
+    first = regulators.load("thesis")
+    monkeypatch.setattr(regulators, "names", lambda: pytest.fail("looked through again"))
+    assert regulators.load("thesis") is first
+
+
 @pytest.mark.parametrize("motor", [50.0, 377.0])
 def test_first_demand_after_seeding_is_the_measured_speed_but_for_one_window(
     regulator, params, motor
