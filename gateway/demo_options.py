@@ -1,0 +1,45 @@
+"""What a demo shows, and the gateway's configuration that follows from it."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+UNLOADED: Final = 3640.0
+LOADS: Final = (0.0, 1600.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """What is shown: loads [kg], period [s], duration of the cycle [s]; names as on the line."""
+
+    loads: tuple[float, ...] = LOADS
+    driver: str = "none"
+    regulator: str = "compensated"
+    torque: str = "integrated"
+    period: float = 0.01
+    map: str = "bench_int16"
+    bench_parameters: str = "thesis_table_3_1"
+    friction: str | None = None
+    duration: float = 30.0
+    fast: bool = False
+    out: Path = Path("demo_output")
+
+    def config_text(
+        self, *, load_mass: float, rolling: tuple[float, float], address: tuple[str, int]
+    ) -> str:
+        """The gateway's configuration of one run, as an operator would write it.
+
+        load_mass : [kg]; rolling : Crr [1] and Crr_v [s/rad] of the truck; address : of the PLC
+        """
+        friction = ""
+        if self.friction is not None:
+            friction = f"friction = {json.dumps(str(Path(self.friction).resolve()))}\n"
+        return (
+            f'[plc]\nhost = "{address[0]}"\nport = {address[1]}\nmap = "{self.map}"\n\n'
+            f"[loop]\nperiod_ms = {1e3 * self.period:g}\n\n"
+            f"[truck]\nmass_kg = {UNLOADED!r}\nload_kg = {load_mass!r}\n"
+            f"crr = {rolling[0]!r}\ncrr_v = {rolling[1]!r}\n\n"
+            f'[regulator]\nname = "{self.regulator}"\ntorque = "{self.torque}"\n{friction}\n'
+            f"[recording]\ndir = {json.dumps(str(self.out.resolve()))}\n"
+        )
