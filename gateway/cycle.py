@@ -28,9 +28,9 @@ from register_maps.signals import Measurement, Setpoint, Status
 
 UNLINKED = frozenset({State.OFF, State.CONNECT})
 REMOTE, CONFIRMED = Status.REMOTE, Status.ENABLED | Status.ROAD_LOAD
-FOLLOWED = Limit.NOT_FINITE | Limit.DEVIATION | Limit.STALE
+FOLLOWED = Limit.NOT_FINITE | Limit.DEVIATION
 """Limits that the regulator must know of, or it goes on from where the bench never was. The slope
-limit is not among them: what it delays is caught up with."""
+limit is not among them: what it delays is caught up with. Nor are stale data: they end the run."""
 BRIDGED = 2.0
 """Periods for which a demand goes on along its slope without a new sample."""
 
@@ -125,7 +125,7 @@ def step(
         state = _bumpless(state, now)
     state = _regulated(config, register_map, replace(state, supervisor=supervisor), now)
     limited = _limited(config, state, now)
-    state = _followed(config, state, limited)
+    state = _followed(config, state, limited, now)
     state, setpoint = _written(config, register_map, state, limited, now)
     return state, Output(
         setpoint=setpoint,
@@ -216,11 +216,11 @@ def _wanted(config: Config, state: CycleState, now: float) -> Demand:
     return replace(demand, speed=demand.speed + demand.rate * since)
 
 
-def _followed(config: Config, state: CycleState, limited: Limited) -> CycleState:
-    """State after the regulator has been told what the limits did."""
+def _followed(config: Config, state: CycleState, limited: Limited, now: float) -> CycleState:
+    """State after the regulator has been told, once, what the limits did to a demand of its."""
     newest, demand = state.samples.newest, state.demand
-    running = state.supervisor.state is State.RUN and limited.by & FOLLOWED
-    if not running or newest is None or demand is None:
+    is_told = state.supervisor.state is State.RUN and state.demanded == now
+    if not (is_told and limited.by & FOLLOWED) or newest is None or demand is None:
         return state
     regulator = regulators.load(config.regulator.name)
     if not isfinite(demand.speed):

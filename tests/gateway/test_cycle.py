@@ -312,6 +312,76 @@ def test_a_sample_shown_twice_is_neither_news_nor_a_fault(running):
     assert running.last.state is State.RUN
 
 
+def slower(loop, reading):
+    """A motor 60 rad/s behind its setpoint; 400 rpm = 41.9 rad/s are allowed."""
+    return replace(reading, motor_speed=reading.motor_speed - 60.0)
+
+
+def again(loop, reading):
+    """The last reading once more."""
+    return loop.observations[-1].measurement
+
+
+@pytest.fixture
+def thesis():
+    loop = ClosedLoop(CONFIG.with_values({"regulator.name": "thesis"}))
+    loop.start()
+    loop.run(4.5)
+    return loop
+
+
+def reference_of(loop):
+    """xi (rho theta_d' + integral), the motor speed that the thesis's regulator stands at."""
+    drum = loop.observations[-1].measurement.drum_speed
+    return 62.6 * (312.71242 / (3640.0 * 0.645**2) * drum + loop.state.regulator.integral)
+
+
+def test_a_regulator_goes_on_from_what_the_deviation_has_let_pass(thesis):
+    thesis.disturb = slower
+    thesis.run(SCAN)
+    passed = thesis.last.setpoint.speed_setpoint
+    assert passed < thesis.last.demand - 1.0
+    assert reference_of(thesis) == pytest.approx(passed)
+
+
+@pytest.mark.parametrize("kind", ["thesis", "running"])
+def test_a_regulator_is_told_once_of_a_demand_that_was_not_passed(kind, request):
+    loop = request.getfixturevalue(kind)
+    loop.disturb = slower
+    loop.run(SCAN)
+    told = loop.state.regulator
+    loop.disturb = again
+    loop.run(3 * SCAN)
+    assert loop.last.state is State.RUN
+    assert loop.state.regulator == told
+
+
+def test_a_regulator_that_has_lost_its_number_begins_at_the_measured_speed(thesis):
+    thesis.disturb = lambda _, reading: replace(reading, shaft_torque_integral=np.nan)
+    thesis.run(SCAN)
+    assert not np.isfinite(thesis.last.demand)
+    measured = thesis.observations[-1].measurement.motor_speed
+    assert reference_of(thesis) == pytest.approx(measured)
+
+
+def test_a_regulator_is_told_of_no_limit_outside_a_run():
+    """In shadow a standing setpoint is far below what the regulator of a turning bench wants."""
+    loop = ClosedLoop(CONFIG.with_values({"regulator.name": "thesis"}), shadow=True)
+    loop.disturb = lambda _, reading: replace(
+        reading, motor_speed=200.0, drum_speed=200.0 / 62.6, shaft_torque_integral=np.nan
+    )
+    loop.run(0.1)
+    assert not np.isfinite(loop.state.regulator.integral)
+
+
+def test_without_a_sample_the_setpoint_goes_on_for_two_periods_and_then_waits(running):
+    begin, slope = running.last.setpoint.speed_setpoint, running.last.setpoint.speed_rate
+    assert slope > 10.0
+    running.disturb = again
+    steps = [running.run(SCAN).setpoint.speed_setpoint - begin for _ in range(4)]
+    assert steps == pytest.approx([0.01 * slope, 0.02 * slope, 0.02 * slope, 0.02 * slope])
+
+
 @pytest.mark.parametrize("alarm", [Alarm.DRIVE, Alarm.OVERSPEED, Alarm.SETPOINT_REJECTED])
 def test_an_alarm_keeps_from_arming(idle, alarm):
     idle.disturb = alarmed(alarm)
