@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.errors import EmulatorError
 from plant_emulator.integrate import CHANNELS
 from plant_emulator.kernel import Kernel, vector
 from plant_emulator.kernel import kernel as default_kernel
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from plant_emulator.parameters import ParameterSet
 
 STEP = 1e-3
+# How much longer than nominal effects may make the dead time [s]; the bench remembers that much.
+LONGER_DEAD_TIME = 0.5
 (
     MOTOR_SPEED,
     DRUM_SPEED,
@@ -70,7 +73,9 @@ class Bench:
         self._stage = self._kernel.stage_record()
         self._x = self._kernel.state(self._p, gap_position * self._p.backlash_half_gap)
         self._work = self._kernel.work()
-        self._history = vector([0.0] * (ceil(self._p.dead_time / step) + 4))
+        self._longest_dead_time = self._p.dead_time + LONGER_DEAD_TIME
+        # The last step's first stage looks less than one step further back.
+        self._history = vector([0.0] * (ceil(self._longest_dead_time / step) + 3))
         self._newest = 0
         self._step = step
         self._motor_angle = 0.0
@@ -106,6 +111,11 @@ class Bench:
             self._p,
             out,
         )
+        if self._newest < 0:
+            raise EmulatorError(
+                f"bench at {self.time:g} s: the drive's dead time, with its effects, lies outside "
+                f"of 0 to {self._longest_dead_time:.4g} s, which the running bench remembers"
+            )
         sums = out.sum(axis=0).tolist()
         self._motor_angle += sums[MOTOR_SPEED] * self._step
         self._drum_angle += sums[DRUM_SPEED] * self._step

@@ -98,7 +98,7 @@ def step(
 
 
 def local_error(h: float, x: State, w: State) -> float:
-    """Largest local error of the controlled states, each over its scale [1]."""
+    """Largest local error of the controlled states, each over its scale [1]; a NaN is infinite."""
     first, base, last, slope = w[FIRST], w[BASE], w[LAST], w[SLOPE]
     per_stage, error = 1.0 / (GAMMA * h), 0.0
     for j in range(len(CONTROLLED)):
@@ -106,7 +106,8 @@ def local_error(h: float, x: State, w: State) -> float:
         slope_1 = (first[k] - x[k]) * per_stage
         slope_2 = (last[k] - base[k]) * per_stage
         size = abs(h * (ERROR_0 * slope[k] + ERROR_1 * slope_1 + ERROR_2 * slope_2)) * WEIGHT[j]
-        error = max(error, size)
+        if not size <= error:
+            error = size if size > error else inf
     return error
 
 
@@ -215,11 +216,12 @@ def run(
     tolerance, largest = settings
     s, p = private(stage), private(p)
     load(x, s)
+    s.time, s.delayed_reference = time[0], value[0]
     evaluate_laws(s, p)
     observe(0, out, s, p)
     t, h, segment, edge, steps, row = time[0], largest, 0, 0, 0, 1
     while row < len(time):
-        s.wheel_torque, s.parked = wheel_torque[row], parked[row]
+        s.time, s.wheel_torque, s.parked = t, wheel_torque[row], parked[row]
         b = dead_time(s, p)
         while edge < len(edges) and edges[edge] + b <= t + SMALLEST_STEP:
             edge += 1
@@ -229,8 +231,9 @@ def run(
         end = corner if corner < time[landing] - SMALLEST_STEP else time[landing]
         pieces = 1 if landing > row else ceil((end - t) / min(h, largest) - 1e-9)
         length = (end - t) / pieces
-        early = segment_at(t + GAMMA * length - b, segment, time)
-        segment = segment_at(t + length - b - 0.5 * SMALLEST_STEP, early, time)
+        # Corners nearer than the smallest step to an end of the step lie at that end.
+        early = segment_at(t + max(GAMMA * length, SMALLEST_STEP) - b, segment, time)
+        segment = segment_at(t + max(length - SMALLEST_STEP, SMALLEST_STEP) - b, early, time)
         r = (
             delayed(t + GAMMA * length - b, early, time, value, slope),
             delayed(t + length - b, segment, time, value, slope),
@@ -239,7 +242,7 @@ def run(
         step(length, t, r, x, w, s, p)
         steps += 1
         if tolerance < 1e9:
-            error = local_error(length, x, w) / tolerance
+            error = min(local_error(length, x, w) / tolerance, UNSETTLED)
             if s.unsettled > unsettled:  # a shorter step is nearer to where it was linearised
                 error = UNSETTLED
             h = length * growth(error)
@@ -276,8 +279,10 @@ def advance(
 ) -> int:
     """Advance the running bench by one fixed step for each reference; returns the new `newest`.
 
+    -1 where the dead time is negative or longer than the history: the bench stops before that step.
+
     references : what the PLC asks at the end of each step [rad/s]
-    history : ring of past references one step apart, at least dead time / h + 3 long
+    history : ring of past references one step apart, at least dead time / h + 2 long
     out : (steps, channels), filled
     """
     s, p = private(stage), private(p)
@@ -286,6 +291,9 @@ def advance(
         newest = (newest + 1) % length
         history[newest] = references[row]
         lag = dead_time(s, p) / h
+        if not 0.0 <= lag <= length - 2.0:
+            newest = -1
+            break
         r = (
             past(lag + 1.0 - GAMMA, newest, history),
             past(lag, newest, history),
@@ -300,7 +308,6 @@ def advance(
 def past(lag: float, newest: int, history: State) -> float:
     """Reference that many steps ago, linear between the steps [rad/s]."""
     length = len(history)
-    lag = min(lag, length - 2.0)
     whole = int(lag)
     part = lag - whole
     young: float = history[(newest - whole) % length]

@@ -108,6 +108,7 @@ STAGE = (
     "current_integral_slope",
     "power_found",
     "power_per_speed",
+    "newton_failed",
     # torques
     "motor_shaft_torque",
     "gear_friction_torque",
@@ -179,8 +180,8 @@ def evaluate_laws(s: Record, p: Record) -> None:
 
 
 def moved(now: float, before: float) -> bool:
-    """Whether a law has moved by more than LAW_WITHIN of itself."""
-    return abs(now - before) > LAW_WITHIN * abs(before)
+    """Whether a law has moved by more than LAW_WITHIN of itself, or is no number."""
+    return not (now == before or abs(now - before) <= LAW_WITHIN * abs(before))
 
 
 def laws_moved(change: float, s: Record, p: Record) -> bool:
@@ -366,6 +367,8 @@ def slide(speed: float, direction: float, certain: bool, s: Record, p: Record) -
         left = direction * total + level + viscous
         if abs(step) <= STRAIGHT_WITHIN * speed and abs(left) <= BALANCED_WITHIN:
             break
+    else:
+        s.newton_failed = 1.0
     s.gear_friction_torque = direction * (level + viscous)
     return speed
 
@@ -417,9 +420,10 @@ def solve_stage(base: State, a: float, s: Record, p: Record) -> None:
         armature(base, a, s, p)
         prepare_motor(base, a, s, p)
         prepare_drum(base, a, s, p)
+        s.newton_failed = 0.0
         s.gear_speed = gear_speed_of(s, p)
         change = s.next_motor_speed - s.motor_speed
-        settled = abs(change) <= LINEAR_WITHIN and same_limits(change, s)
+        settled = abs(change) <= LINEAR_WITHIN and same_limits(change, s) and s.newton_failed == 0.0
         if settled:
             move_drive(change, s)
         elif attempt >= UNDAMPED_PASSES:

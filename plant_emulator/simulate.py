@@ -29,7 +29,8 @@ Hold = Literal["linear", "staircase"]
 # Error per step over the range of a full-speed run; the figures are in the README's table.
 TOLERANCE = 1e-6
 # At most one sample by default: the step control watches the nominal states only, not the memories
-# of effects, and a run then changes smoothly with its parameters, which a fit needs.
+# of effects, and a run then changes smoothly with its parameters, which a fit needs. A log slower
+# than 100 Hz is stepped as one of 100 Hz.
 LARGEST_STEP = 0.01
 # A kink of the reference that is stepped onto [rad/s^2]; smaller ones are left to the error
 # control.
@@ -43,6 +44,7 @@ class Run:
     """The inputs of one run as the kernel takes them, shape (n,) each but `corners`.
 
     truck : whether there is one; without it the drum is free and the log has no wheel torque
+    interval : between most samples [s]
     """
 
     time: Array
@@ -53,6 +55,7 @@ class Run:
     parked: Array
     truck: bool
     source: str
+    interval: float
 
 
 def run_of(log: Log, hold: Hold | None = None) -> Run:
@@ -79,6 +82,7 @@ def run_of(log: Log, hold: Hold | None = None) -> Run:
         parked=_parked(wheel_torque) if truck else np.zeros_like(reference),
         truck=truck,
         source=log.source,
+        interval=float(np.median(np.diff(time))),
     )
 
 
@@ -95,7 +99,7 @@ def simulate(
     *,
     gap_position: float = 0.0,
     tolerance: float = TOLERANCE,
-    largest_step: float = LARGEST_STEP,
+    largest_step: float | None = None,
     step: float | None = None,
     kernel: Kernel | None = None,
 ) -> Log:
@@ -103,14 +107,17 @@ def simulate(
 
     values : parameters, and those of effects as <effect>_<parameter> [SI]
     gap_position : (theta_g - theta_d) / alpha at the start, -1 to 1; +1: driving flank in contact
-    largest_step : adapted steps longer than a sample pass over samples [s]; two to three times
-        faster where reference and truck are smooth, for a bench without effects
+    largest_step : of adapted steps [s]; None: one sample of the log, at most 10 ms. Longer ones
+        pass over samples: two to three times faster where reference and truck are smooth, for a
+        bench without effects
     step : a fixed step [s] instead of adapted ones
     """
     model = kernel or default_kernel()
     out = np.zeros((len(run.time), len(CHANNELS)))
     p = model.parameter_record(values)
     x = model.state(p, gap_position * values["backlash_half_gap"])
+    if largest_step is None:
+        largest_step = min(LARGEST_STEP, run.interval)
     settings = (tolerance, largest_step) if step is None else (inf, step)
     stage = model.stage_record()
     model.run(
@@ -131,6 +138,12 @@ def simulate(
         raise UnsettledError(
             f"{run.source}: {unsettled:.0f} implicit stages did not settle; the result is not the "
             "model's; a shorter step or other effects may help"
+        )
+    if not np.isfinite(out).all():
+        row, column = np.argwhere(~np.isfinite(out))[0]
+        raise UnsettledError(
+            f"{run.source}: {CHANNELS[column]} at {run.time[row]:g} s is not finite; the result is "
+            "not the model's; other parameters or effects may help"
         )
     signals = {name: out[:, k] for k, name in enumerate(CHANNELS)}
     if not run.truck:  # a log with this column would be read as a staircase with a parked truck

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from plant_emulator import logs, parameter_sets
+from plant_emulator import compiler, effects, logs, parameter_sets
+from plant_emulator.kernel import Kernel, build
 from plant_emulator.log import Log
 from plant_emulator.parameters import ParameterSet
 
@@ -28,3 +29,29 @@ def bench_log() -> Callable[[str], Log]:
         return logs.read(DATA / f"{name}.csv.gz")
 
     return read
+
+
+NO_EFFECT = '''"""An effect for a test: x = y. Source: a test."""
+
+from plant_emulator.effects import EffectParameter, Memory
+
+SUBSYSTEM = "gear"
+PARAMETERS = {
+    "size": EffectParameter(
+        neutral=0.0, lower=-1e9, upper=1e9, plausible=1.0, unit="1", meaning="k"
+    )
+}
+'''
+
+
+@pytest.fixture
+def model_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Kernel]:
+    """Return a function: laws of an effect `own` with the parameter `size` -> uncompiled kernel."""
+    monkeypatch.setattr(compiler, "ENABLED", False)
+
+    def built(laws: str) -> Kernel:
+        path = tmp_path / "own.py"
+        path.write_text(f"{NO_EFFECT}\n\n{laws}", encoding="utf-8")
+        return build({"own": effects.from_file(path)})
+
+    return built

@@ -1,10 +1,13 @@
 """The running bench of the emulator."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 from plant_emulator.bench import Bench
-from plant_emulator.errors import ParameterError
+from plant_emulator.errors import EmulatorError, ParameterError
+from plant_emulator.kernel import Kernel
 from plant_emulator.parameters import ParameterSet
 from tests.plant_emulator.runs import linear, simulate
 
@@ -98,3 +101,34 @@ def test_current_is_held_to_the_limit_asked_for_and_never_above_the_drives_own(
     unlimited = free.advance(steep).armature_current
     assert unlimited.max() > 25.0
     np.testing.assert_array_equal(unlimited, asked_too_much.advance(steep).armature_current)
+
+
+# --- dead time ----------------------------------------------------------------------------------
+
+LONGER = """
+def dead_time(value, s, p):
+    return value + p.own_size
+"""
+
+
+def arrival(model: Kernel, nominal: ParameterSet, longer: float) -> float:
+    """When a reference that jumps at the start reaches the current [s]."""
+    bench = Bench(nominal, {"own": {"size": longer}}, kernel=model)
+    return 1e-3 * float(np.flatnonzero(bench.advance([10.0] * 700).armature_current)[0])
+
+
+@pytest.mark.parametrize("longer", [-0.06, 0.0, 0.1, 0.4])
+def test_effect_on_the_dead_time_delays_the_running_bench(
+    nominal: ParameterSet, model_with: Callable[[str], Kernel], longer: float
+) -> None:
+    assert arrival(model_with(LONGER), nominal, longer) == pytest.approx(
+        0.063947 + longer, abs=1.01e-3
+    )
+
+
+@pytest.mark.parametrize("longer", [0.8, -0.07, float("nan")])
+def test_dead_time_that_the_running_bench_does_not_remember_is_refused(
+    nominal: ParameterSet, model_with: Callable[[str], Kernel], longer: float
+) -> None:
+    with pytest.raises(EmulatorError, match=r"at 0 s: .* dead time.* outside of 0 to 0\.56"):
+        arrival(model_with(LONGER), nominal, longer)

@@ -1,13 +1,18 @@
 """The stepper: its order, what tolerance buys, and when the reference arrives."""
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from plant_emulator.errors import UnsettledError
+from plant_emulator.kernel import Kernel
 from plant_emulator.log import COMPARED, Log
 from plant_emulator.parameters import ParameterSet
 from plant_emulator.programs import PROGRAMS, SpeedProgram
+from plant_emulator.simulate import run_of
+from plant_emulator.simulate import simulate as simulate_run
 from plant_emulator.validate import validate
 from tests.plant_emulator.runs import BACKLASH, CURRENT, DRUM, MOTOR, Piecewise, linear, simulate
 
@@ -108,3 +113,116 @@ def test_unevenly_sampled_log_is_the_evenly_sampled_run_at_its_samples(
     for name in COMPARED:
         scale = np.ptp(whole[name])
         np.testing.assert_allclose(part[name], whole[name][kept], rtol=0.0, atol=2e-4 * scale)
+
+
+# --- what effects may do ------------------------------------------------------------------------
+
+LISTENING = """
+TIMES = []
+
+
+def dead_time(value, s, p):
+    TIMES.append(s.time)
+    return value
+
+
+def tachometer_gain(value, s, p):
+    TIMES.append(s.time) if not TIMES else None
+    return value
+"""
+
+
+def test_dead_time_is_asked_for_at_the_begin_of_each_step(
+    nominal: ParameterSet, model_with: Callable[[str], Kernel]
+) -> None:
+    """Also after a step that was refused, and from the first sample on."""
+    model = model_with(LISTENING)
+    inputs = linear((0.0, 0.0), (0.3, 60.0), duration=0.5)
+    later = Log(inputs.time + 1000.0, inputs.signals, "later")
+    simulate(later, nominal.values(), kernel=model)
+    times = model.effects["own"].laws["dead_time"].__globals__["TIMES"]
+    assert times[0] == 1000.0
+    assert all(a <= b for a, b in pairwise(times))
+    assert times[-1] < 1000.5
+    assert len(times) > len(set(times))  # some steps were refused
+
+
+@pytest.mark.parametrize(
+    "where",
+    ["dead_time", "reference", "speed_limit", "current_limit", "voltage_limit", "tachometer_gain",
+     "integration_at_limit", "converter_voltage_drop", "resistance", "flux", "gear_torque",
+     "motor_coulomb_friction", "motor_viscous_friction", "motor_shaft_damping",
+     "gear_coulomb_friction", "gear_viscous_friction", "backlash_half_gap", "drum_torque",
+     "drum_coulomb_friction", "drum_viscous_friction", "measured_drum_speed",
+     "measured_armature_current", "measured_shaft_torque", "shell_temperature"],
+)  # fmt: skip
+@pytest.mark.parametrize("step", [None, 5e-3])
+def test_law_that_is_no_number_is_refused_not_returned(
+    nominal: ParameterSet, model_with: Callable[[str], Kernel], where: str, step: float | None
+) -> None:
+    model = model_with(
+        f"def {where}(value, s, p):\n"
+        "    return value if s.time < 0.11 else float('nan') * p.own_size"
+    )
+    inputs = linear((0.0, 0.0), (0.1, 10.0), duration=0.2)
+    values = {**nominal.values(), "dead_time": 0.0, "own_size": 1.0}
+    with pytest.raises(UnsettledError):
+        simulate(inputs, values, kernel=model, step=step)
+
+
+@pytest.mark.parametrize("name", ["gear_friction_exponent", "drum_inertia", "gear_ratio"])
+def test_parameter_that_is_no_number_is_refused(nominal: ParameterSet, name: str) -> None:
+    inputs = linear((0.0, 0.0), (0.1, 10.0), duration=0.2)
+    with pytest.raises(UnsettledError):
+        simulate(inputs, {**nominal.values(), name: float("nan")}, gap_position=1.0)
+
+
+def test_memory_that_is_no_number_is_refused(
+    nominal: ParameterSet, model_with: Callable[[str], Kernel]
+) -> None:
+    model = model_with(
+        "def start(p):\n    return 0.0\n\n\n"
+        "def advance(base, a, s, p):\n    return base if s.time < 0.1 else float('nan')\n\n\n"
+        "MEMORIES = {'shown': Memory(start, advance)}\n\n\n"
+        "def measured_drum_speed(value, s, p):\n    return value + s.own_shown"
+    )
+    with pytest.raises(UnsettledError):
+        simulate(linear((0.0, 0.0), duration=0.2), nominal.values(), kernel=model)
+
+
+@pytest.mark.parametrize("before", [0.6e-6, 0.9e-6])
+def test_jump_that_counts_as_the_sample_after_it_acts_from_there(
+    nominal: ParameterSet, before: float
+) -> None:
+    """A corner nearer to a sample than the smallest step is taken at the sample."""
+    time = 0.01 * np.arange(7)
+    inputs = Log(time, {"speed_reference": np.where(time >= 0.03, 1.0, 0.0)}, "by hand")
+    on, just_before = (
+        simulate_run(run_of(inputs, "staircase"), {**nominal.values(), "dead_time": dead_time})
+        for dead_time in (0.01, 0.01 - before)
+    )
+    assert on["armature_current"][4] == 0.0
+    assert on["armature_current"][5] > 0.0
+    np.testing.assert_array_equal(on["armature_current"], just_before["armature_current"])
+
+
+# --- samples ------------------------------------------------------------------------------------
+
+
+def test_every_sample_of_a_fast_log_is_computed_not_interpolated(nominal: ParameterSet) -> None:
+    """At 1 kHz no step passes over a sample."""
+    fast = linear((0.1, 0.0), (0.5, 80.0), duration=1.0, period=1e-3)
+    as_it_is = simulate(fast, nominal.values())
+    landing = simulate(fast, nominal.values(), largest_step=1e-3)
+    for name in COMPARED:
+        np.testing.assert_array_equal(as_it_is[name], landing[name])
+
+
+def test_slow_log_is_not_stepped_longer_than_a_hundredth_of_a_second(
+    nominal: ParameterSet,
+) -> None:
+    slow = linear((0.1, 0.0), (0.5, 80.0), duration=1.0, period=0.1)
+    as_it_is, by_hand = (
+        simulate(slow, nominal.values(), **options) for options in ({}, {"largest_step": 0.01})
+    )
+    np.testing.assert_array_equal(as_it_is["armature_current"], by_hand["armature_current"])
