@@ -8,6 +8,7 @@ from typing import Any
 
 from gateway.config import Config, changed, from_document
 from gateway.errors import ConfigError
+from gateway.friction import friction_of_file
 
 
 def load(path: str | Path) -> Config:
@@ -24,8 +25,8 @@ def with_values(config: Config, values: Mapping[str, str]) -> Config:
 
 
 def load_friction(path: str | Path) -> dict[str, Any]:
-    """The table in a friction file."""
-    return _toml(Path(path), _text(Path(path)))
+    """The friction's table out of a friction map or a parameter set of the bench."""
+    return friction_of_file(_toml(Path(path), _text(Path(path))), path)
 
 
 def _with_friction(document: dict[str, Any], directory: Path) -> dict[str, Any]:

@@ -2,6 +2,10 @@
 
 Values not given are those of the thesis (Table 3.1), identified with the gear's shell at 32 degC.
 The temperature coefficient is not in the thesis: friction falls with the oil's viscosity.
+
+A friction file is a friction map (keys of RANGES; a measured one also tells its origin in a table
+`measured`, which changes nothing), or a parameter set of the whole bench (a table a parameter, as
+identification writes it); then its three tables of PARAMETERS are taken. Names tell which it is.
 """
 
 import math
@@ -42,6 +46,13 @@ RANGES = {
     "temperature_coefficient": (-0.1, 0.1),
     "reference_temperature_celsius": (-40.0, 150.0),
 }
+MEASURED = "measured"
+PARAMETERS = {
+    "gear_coulomb_friction": ("coulomb", "N m"),
+    "gear_viscous_friction": ("viscous", "N m (s/rad)^delta_g"),
+    "gear_friction_exponent": ("exponent", "1"),
+}
+"""Table of a parameter set -> key of the friction, and the unit that the table has to name."""
 
 
 def friction_torque(omega: float, friction: Friction, temperature: float | None = None) -> float:
@@ -69,10 +80,52 @@ def from_friction(table: object, place: str) -> Friction:
     return Friction(**{key: _checked(key, value, place) for key, value in table.items()})
 
 
+def friction_of_file(document: Mapping[str, Any], file: object) -> dict[str, Any]:
+    """The friction's keys in a friction file: a friction map or a parameter set of the bench."""
+    in_set = [name for name in PARAMETERS if name in document]
+    in_map = [key for key in RANGES if key in document]
+    if in_set and in_map:
+        raise ConfigError(
+            "both a parameter set and a friction map",
+            file=file,
+            value=f"{in_set[0]} and {in_map[0]}",
+            expected="one of them",
+        )
+    if in_set:
+        return {key: _parameter(document, name, file) for name, (key, _) in PARAMETERS.items()}
+    if in_map:
+        return {key: value for key, value in document.items() if key != MEASURED}
+    raise ConfigError(
+        "neither a friction map nor a parameter set",
+        file=file,
+        value=", ".join(document) or "nothing",
+        expected=f"{', '.join(RANGES)}, or the tables {', '.join(PARAMETERS)}",
+    )
+
+
+def _parameter(document: Mapping[str, Any], name: str, file: object) -> float:
+    """Value of one table of a parameter set."""
+    key, unit = PARAMETERS[name]
+    table = document.get(name)
+    if not isinstance(table, Mapping) or "value" not in table:
+        raise ConfigError(
+            "no value", file=file, place=name, value=table, expected="a table with value and unit"
+        )
+    if table.get("unit") != unit:
+        raise ConfigError(
+            "wrong unit", file=file, place=f"{name}.unit", value=table.get("unit"), expected=unit
+        )
+    return _in_range(key, table["value"], f"{file}: {name}.value")
+
+
 def _checked(key: str, value: Any, place: str) -> float:
     where = f"{place}.{key}"
     if key not in RANGES:
         raise ConfigError("unknown key", place=where, value=key, expected=", ".join(RANGES))
+    return _in_range(key, value, where)
+
+
+def _in_range(key: str, value: Any, where: str) -> float:
     low, high = RANGES[key]
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
         raise ConfigError("bad value", place=where, value=value, expected=f"{low:g} .. {high:g}")

@@ -2,11 +2,14 @@
 
 from dataclasses import replace
 from math import exp
+from pathlib import Path
 
 import pytest
 
+import plant_emulator
+from gateway.config_file import load_friction
 from gateway.errors import ConfigError
-from gateway.friction import THESIS, friction_torque, from_friction
+from gateway.friction import THESIS, friction_of_file, friction_torque, from_friction
 
 WARMER = replace(THESIS, temperature_coefficient=0.01)
 
@@ -58,3 +61,51 @@ def test_a_document_makes_the_same_friction_again():
 def test_a_bad_table_is_refused_with_its_place(table, match):
     with pytest.raises(ConfigError, match=match):
         from_friction(table, "here")
+
+
+def parameter_set(**changes):
+    tables = {
+        "gear_coulomb_friction": {"value": 39.5879, "unit": "N m"},
+        "gear_viscous_friction": {"value": 379.918, "unit": "N m (s/rad)^delta_g"},
+        "gear_friction_exponent": {"value": 0.4418, "unit": "1"},
+        "drum_radius": {"value": 0.645, "unit": "m"},
+    }
+    return {name: table for name, table in (tables | changes).items() if table is not None}
+
+
+def test_a_parameter_set_gives_its_three_friction_values():
+    table = friction_of_file(parameter_set(), "set.toml")
+    assert table == {"coulomb": 39.5879, "viscous": 379.918, "exponent": 0.4418}
+
+
+def test_the_shipped_parameter_set_is_the_friction_that_the_gateway_starts_with():
+    shipped = Path(plant_emulator.__file__).parent / "parameter_sets" / "thesis_table_3_1.toml"
+    assert from_friction(load_friction(shipped), "here") == THESIS
+
+
+def test_origin_of_a_measured_map_changes_nothing():
+    document = {"coulomb": 40.0, "viscous": 300.0, "measured": {"date": "2026-11-21"}}
+    assert friction_of_file(document, "map.toml") == {"coulomb": 40.0, "viscous": 300.0}
+
+
+@pytest.mark.parametrize(
+    ("document", "match"),
+    [
+        ({}, r"f\.toml: neither a friction map nor a parameter set, found 'nothing'.*coulomb"),
+        ({"drum_radius": {"value": 1.0}}, r"neither.*drum_radius.*gear_viscous_friction"),
+        (parameter_set(viscous=300.0), r"f\.toml: both a parameter set and a friction map"),
+        (parameter_set(gear_friction_exponent=None), r"f\.toml: gear_friction_exponent: no value"),
+        (parameter_set(gear_coulomb_friction=36.0), "gear_coulomb_friction: no value, found 36"),
+        (
+            parameter_set(gear_coulomb_friction={"value": 36.0, "unit": "lbf ft"}),
+            r"gear_coulomb_friction\.unit: wrong unit, found 'lbf ft'; expected N m",
+        ),
+        (
+            parameter_set(gear_viscous_friction={"value": -1.0, "unit": "N m (s/rad)^delta_g"}),
+            r"f\.toml: gear_viscous_friction\.value: bad value, found -1\.0; expected 0 \.\.",
+        ),
+    ],
+)
+def test_a_friction_file_that_is_neither_or_broken_is_refused_by_name(document, match):
+    with pytest.raises(ConfigError, match=match):
+        friction_of_file(document, "f.toml")
