@@ -8,8 +8,7 @@ and a summary.
 
 import json
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -17,46 +16,30 @@ from rich.console import Console
 from gateway import demo_plot, recording
 from gateway.config_file import load
 from gateway.demo_operator import Session, operate_fast, operate_in_real_time
+from gateway.demo_options import UNLOADED, Options
 from gateway.demo_view import Screen
 from gateway.errors import GatewayError
 from gateway.evaluation import Array, agreement, cruise, traction_energy
+from gateway.reasons import Reason
 from gateway.recording import Recording
 from gateway.supervisor import State
 from plant_emulator import logs, truck
 from plant_emulator.log import Log
 from plant_emulator.process import EmulatorProcess
 
-UNLOADED: Final = 3640.0
-LOADS: Final = (0.0, 1600.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Options:
-    """What is shown: loads [kg], period [s], duration of the cycle [s]; names as on the line."""
-
-    loads: tuple[float, ...] = LOADS
-    driver: str = "none"
-    regulator: str = "compensated"
-    torque: str = "integrated"
-    period: float = 0.01
-    map: str = "bench_int16"
-    bench_parameters: str = "thesis_table_3_1"
-    friction: str | None = None
-    duration: float = 30.0
-    fast: bool = False
-    out: Path = Path("demo_output")
-
 
 @dataclass(frozen=True, kw_only=True)
 class Driven:
     """One truck's cycle on the bench, on the road, and in the gateway; SI, shape (n,) each.
 
+    exit_code : of the gateway
     road_force : what the truck's drive gives on the road
     """
 
     truck: truck.Forklift
     log: Log
     recording: Recording
+    exit_code: int
     road_speed: Array
     road_force: Array
 
@@ -71,8 +54,16 @@ class Driven:
         return self.log["wheel_torque"] / self.truck.wheel_radius
 
 
-def demo(options: Options, console: Console) -> dict[str, Any]:
-    """Drive every truck; the summary, which is also written to `out` beside logs and picture."""
+@dataclass(frozen=True, kw_only=True)
+class Shown:
+    """The summary of all runs, and what went wrong in them: a line each."""
+
+    summary: dict[str, Any]
+    failures: list[str]
+
+
+def demo(options: Options, console: Console) -> Shown:
+    """Drive every truck; the summary is also written to `out` beside logs and picture."""
     options.out.mkdir(parents=True, exist_ok=True)
     driven = [drive(options, load_mass, console) for load_mass in options.loads]
     entries = [figures(options, one) for one in driven]
@@ -80,7 +71,19 @@ def demo(options: Options, console: Console) -> dict[str, Any]:
     demo_plot.draw(curves, options.out / "demo.png")
     summary = {"schema": "demo/1", "runs": entries}
     (options.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", "utf-8")
-    return summary
+    failures = [failure(one, entry) for one, entry in zip(driven, entries, strict=True)]
+    return Shown(summary=summary, failures=list(filter(None, failures)))
+
+
+def failure(run: Driven, entry: dict[str, Any]) -> str:
+    """Why the run is none to show: only the operator may end it. Empty: he did."""
+    reason, code = entry["stop_reason"], run.exit_code
+    if reason == Reason.REMOTE_OFF.name and not code:
+        return ""
+    return (
+        f"{run.truck.mass:.0f} kg: stopped by {reason or 'nothing'}, exit code {code} of the "
+        f"gateway; expected {Reason.REMOTE_OFF.name} and 0, see {run.recording.path}"
+    )
 
 
 def drive(options: Options, load_mass: float, console: Console) -> Driven:
@@ -103,7 +106,12 @@ def drive(options: Options, load_mass: float, console: Console) -> Driven:
         ) as emulator,
         screen.showing(),
     ):
-        file.write_text(_config_text(options, forklift, load_mass, emulator), encoding="utf-8")
+        text = options.config_text(
+            load_mass=load_mass,
+            rolling=(forklift.crr, forklift.crr_v),
+            address=(emulator.host, emulator.port),
+        )
+        file.write_text(text, encoding="utf-8")
         session = Session(
             config=load(file),
             file=file,
@@ -112,7 +120,7 @@ def drive(options: Options, load_mass: float, console: Console) -> Driven:
             duration=options.duration,
         )
         operate = operate_fast if options.fast else operate_in_real_time
-        path = operate(session)
+        operated = operate(session)
         log = _cycle(emulator.log(), emulator.status()["road_load_since"], options.duration)
     if not options.fast:
         console.print(f"  bench: {emulator.report}", highlight=False)
@@ -121,26 +129,10 @@ def drive(options: Options, load_mass: float, console: Console) -> Driven:
     return Driven(
         truck=forklift,
         log=log,
-        recording=recording.read(path),
+        recording=recording.read(operated.recording),
+        exit_code=operated.exit_code,
         road_speed=road_speed,
         road_force=road_force,
-    )
-
-
-def _config_text(
-    options: Options, forklift: truck.Forklift, load_mass: float, emulator: EmulatorProcess
-) -> str:
-    """The gateway's configuration of one run, as an operator would write it."""
-    friction = ""
-    if options.friction is not None:
-        friction = f"friction = {json.dumps(str(Path(options.friction).resolve()))}\n"
-    return (
-        f'[plc]\nhost = "{emulator.host}"\nport = {emulator.port}\nmap = "{options.map}"\n\n'
-        f"[loop]\nperiod_ms = {1e3 * options.period:g}\n\n"
-        f"[truck]\nmass_kg = {forklift.mass - load_mass!r}\nload_kg = {load_mass!r}\n"
-        f"crr = {forklift.crr!r}\ncrr_v = {forklift.crr_v!r}\n\n"
-        f'[regulator]\nname = "{options.regulator}"\ntorque = "{options.torque}"\n{friction}\n'
-        f"[recording]\ndir = {json.dumps(str(options.out.resolve()))}\n"
     )
 
 
@@ -169,7 +161,7 @@ def _road(options: Options, forklift: truck.Forklift, log: Log) -> tuple[Array, 
 
 
 def figures(options: Options, run: Driven) -> dict[str, Any]:
-    """Key figures of one run, as contracts have them (run/1)."""
+    """Key figures of one run, as the command answers them (run/1)."""
     found = agreement(run.road_speed, run.speed)
     target, error = _cruise_force(run)
     road = traction_energy(run.log.time, run.road_force, run.road_speed)
@@ -190,7 +182,7 @@ def figures(options: Options, run: Driven) -> dict[str, Any]:
         "cycles": len(ticks),
         "missed_deadlines": int(ticks["missed"][-1] - ticks["missed"][0]) if len(ticks) else 0,
         "latency_ms": _latency(options, ticks["latency"]),
-        "stop_reason": _stop_reason(run.recording),
+        "stop_reason": run.recording.stop_reason(),
     }
 
 
@@ -209,12 +201,6 @@ def _latency(options: Options, seconds: Array) -> dict[str, float | None]:
         return {"p50": None, "p99": None, "max": None}
     p50, p99, highest = (float(np.quantile(1e3 * seconds, q)) for q in (0.5, 0.99, 1.0))
     return {"p50": p50, "p99": p99, "max": highest}
-
-
-def _stop_reason(made: Recording) -> str:
-    """Why the gateway left RUN."""
-    after = made.records[made.records["state"] == State.RAMPDOWN]
-    return made.reason(int(after["reason"][0])) if len(after) else ""
 
 
 def _curves(run: Driven, entry: dict[str, Any]) -> demo_plot.Curves:

@@ -57,8 +57,16 @@ class Session:
     duration: float
 
 
-def operate_in_real_time(session: Session) -> Path:
-    """The daemon through one cycle; its recording."""
+@dataclass(frozen=True, kw_only=True)
+class Operated:
+    """What a gateway left behind: its recording and its exit code."""
+
+    recording: Path
+    exit_code: int
+
+
+def operate_in_real_time(session: Session) -> Operated:
+    """The daemon through one cycle."""
     folder, words = session.file.parent, session.file.with_suffix(".txt")
     before = set(folder.glob(f"*{SUFFIX}"))
     with (
@@ -78,7 +86,7 @@ def operate_in_real_time(session: Session) -> Path:
             raise GatewayError(f"{error}; the daemon's words: {words}") from error
         finally:
             daemon.send_signal(signal.SIGTERM)
-    return path
+    return Operated(recording=path, exit_code=daemon.returncode)
 
 
 def _operate(session: Session, look: "_Follower", daemon: "subprocess.Popen[bytes]") -> None:
@@ -200,8 +208,8 @@ class _FileSink:
         self._file.close()
 
 
-def operate_fast(session: Session) -> Path:
-    """The same loop through one cycle as fast as the machine allows; its recording."""
+def operate_fast(session: Session) -> Operated:
+    """The same loop through one cycle as fast as the machine allows."""
     config = session.config
     register_map = register_maps.load(config.plc.map)
     clock, layout = _ScanClock(session.emulator), Layout.of(register_map)
@@ -228,4 +236,4 @@ def operate_fast(session: Session) -> Path:
         loop.run(stop_requested)
     finally:
         sink.close()
-    return path
+    return Operated(recording=path, exit_code=0)

@@ -3,7 +3,8 @@
 File = magic, length of the header (4 bytes, little-endian), header (JSON), records
 (gateway.record). The header carries the texts of configuration and register map with their hashes,
 so that a recording can be replayed without the files it was made with. Only appended to: what a
-crash leaves is a file whose last record may be cut, and such a record is left out with a note.
+crash leaves is a file whose last record may be cut, and such a record is left out with a note. Any
+other record whose checksum differs is damage, and what holds damage is not used.
 """
 
 import json
@@ -16,6 +17,7 @@ import numpy as np
 
 from gateway.errors import ConfigError
 from gateway.record import MAGIC, NOTHING, Layout, intact
+from gateway.supervisor import State
 
 SUFFIX: Final = ".rlrec"
 SCHEMA: Final = "recording/1"
@@ -24,6 +26,12 @@ CHUNK: Final = 1000
 
 class RecordingError(ConfigError):
     """A file that is no recording, or cannot become one."""
+
+
+class DamageError(RecordingError):
+    """A recording of which a record is not what the gateway wrote."""
+
+    exit_code = 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +66,11 @@ class Recording:
         """Name of a reason or fault; empty: there is none."""
         return str(self.header["reasons"][str(code)][0]) if code != NOTHING else ""
 
+    def stop_reason(self) -> str:
+        """Name of the reason why the gateway left RUN first; empty: it did not."""
+        after = self.records[self.records["state"] == State.RAMPDOWN]
+        return self.reason(int(after["reason"][0])) if len(after) else ""
+
 
 def encode_header(header: dict[str, Any]) -> bytes:
     """First bytes of a recording."""
@@ -75,14 +88,38 @@ def read(path: Path) -> Recording:
         ) from error
     header, start = _header(path, content)
     layout = Layout(read_count=header["read_count"], write_count=header["write_count"])
-    body = memoryview(content)[start:]
-    whole = len(body) // layout.size
-    while whole and not intact(bytes(body[(whole - 1) * layout.size : whole * layout.size])):
-        whole -= 1
+    body = content[start:]
+    whole = _finished(body, layout.size)
     left = len(body) - whole * layout.size
-    records = np.frombuffer(body[: whole * layout.size], dtype=np.dtype(layout.formats))
+    records = np.frombuffer(body, dtype=np.dtype(layout.formats), count=whole)
+    _check(path, body, records)
     note = f"{path}: {left} bytes of an unfinished last record left out" if left else ""
     return Recording(path=path, header=header, layout=layout, records=records, note=note)
+
+
+def _finished(body: bytes, size: int) -> int:
+    """Number of records before the one that a crash left unfinished.
+
+    After it may stand zeros: a file system gives a file its length before its content.
+    """
+    last = -(-len(body.rstrip(b"\0")) // size)
+    torn = last > 0 and not intact(body[(last - 1) * size : last * size])
+    return last - torn
+
+
+def _check(path: Path, body: bytes, records: "np.ndarray[Any, np.dtype[np.void]]") -> None:
+    """Refuse records that are not what was written; the record before tells a bad one's tick."""
+    size = records.itemsize
+    places = range(0, len(records) * size, size)
+    bad = [k for k, at in enumerate(places) if not intact(body[at : at + size])]
+    if bad:
+        tick = int(records[bad[0] - 1]["tick"]) + 1 if bad[0] else 0
+        raise DamageError(
+            f"checksum differs, {len(bad)} of {len(records)} records damaged",
+            file=path,
+            place=f"tick {tick}",
+            expected="every record as the gateway wrote it",
+        )
 
 
 def is_recording(path: Path) -> bool:

@@ -19,6 +19,7 @@ SHELL = {
     "gateway.daemon": "processes",
     "gateway.demo": "processes",
     "gateway.demo_operator": "processes",
+    "gateway.demo_options": "files",
     "gateway.demo_plot": "files",
     "gateway.demo_view": "terminal",
     "gateway.device": "network",

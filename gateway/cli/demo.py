@@ -96,13 +96,16 @@ def command(
 
     Three processes: the bench with its PLC behind Modbus TCP on 127.0.0.1, the gateway, and this
     one as the operator. Leaves log, recording, configuration, demo.png and summary.json in DIR.
+    Exit code 1: anything but the operator ended a run.
     """
     from rich.console import Console
 
-    from gateway.demo import LOADS, Options, demo
+    from gateway.demo import demo
+    from gateway.demo_options import LOADS, Options
+    from gateway.errors import GatewayError
 
     console = Console(stderr=json_file == "-")
-    summary = demo(
+    shown = demo(
         Options(
             loads=LOADS if load_mass is None else (load_mass,),
             driver=driver,
@@ -118,11 +121,14 @@ def command(
         ),
         console,
     )
-    _show(console, summary, out)
+    _show(console, shown.summary, out)
+    text = json.dumps(shown.summary, indent=2)
     if json_file == "-":
-        click.echo(json.dumps(summary, indent=2))
+        click.echo(text)
     elif json_file:
-        Path(json_file).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        Path(json_file).write_text(text + "\n", encoding="utf-8")
+    if shown.failures:
+        raise GatewayError("; ".join(shown.failures))
 
 
 def _show(console: "Console", summary: dict[str, Any], out: Path) -> None:

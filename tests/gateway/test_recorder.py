@@ -123,6 +123,39 @@ def test_a_last_record_of_zeros_is_left_out(tmp_path: Path) -> None:
     assert len(read(path)) == 2
 
 
+@pytest.mark.parametrize("zeros", [1, 10, 3 * LAYOUT.size])
+def test_zeros_after_a_torn_record_are_left_out_with_it(tmp_path: Path, zeros: int) -> None:
+    path = tmp_path / "a.rlrec"
+    content = write(path, 3)
+    path.write_bytes(content[: -LAYOUT.size // 2] + bytes(zeros))
+    found = read(path)
+    assert len(found) == 2
+    assert "of an unfinished last record left out" in found.note
+
+
+@pytest.mark.parametrize(
+    ("damaged", "says"),
+    [
+        ((0,), "tick 0: checksum differs, 1 of 5 records damaged"),
+        ((3,), "tick 3: checksum differs, 1 of 5 records damaged"),
+        ((1, 2), "tick 1: checksum differs, 2 of 5 records damaged"),
+        ((3, 4), "tick 3: checksum differs, 1 of 4 records damaged"),
+    ],
+)
+def test_a_damaged_record_before_the_last_is_a_failure_that_names_its_tick(
+    tmp_path: Path, damaged: tuple[int, ...], says: str
+) -> None:
+    path = tmp_path / "a.rlrec"
+    content = bytearray(write(path, 5))
+    start = len(content) - 5 * LAYOUT.size
+    for index in damaged:
+        content[start + index * LAYOUT.size] ^= 0x40  # also its own number of the tick is wrong
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=says) as caught:
+        read(path)
+    assert caught.value.exit_code == 1
+
+
 @pytest.mark.parametrize("length", [0, 4, 11, 40])
 def test_a_file_without_a_whole_header_is_refused(tmp_path: Path, length: int) -> None:
     path = tmp_path / "a.rlrec"

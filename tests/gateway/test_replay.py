@@ -3,6 +3,7 @@
 import csv
 import gzip
 import json
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from click.testing import CliRunner, Result
 
 import register_maps
 from gateway import log, recording
+from gateway.cli import main
 from gateway.cli.export import command as export
 from gateway.cli.replay import command as replay
 from gateway.config import Config
@@ -122,11 +124,39 @@ def test_a_changed_recording_does_not_and_the_place_is_named(tmp_path: Path) -> 
     content = bytearray(path.read_bytes())
     place = found.records.dtype.fields["demand"][1]  # type: ignore[index]
     start = len(content) - len(found.records) * found.layout.size
-    content[start + 60 * found.layout.size + place] ^= 1  # the last bit of tick 60's demand
+    begin = start + 60 * found.layout.size
+    end = begin + found.layout.size
+    content[begin + place] ^= 1  # the last bit of tick 60's demand
+    content[end - 4 : end] = zlib.crc32(content[begin : end - 4]).to_bytes(4, "little")
     path.write_bytes(content)
     result = call(replay, path)
     assert result.return_value == 1
     assert "1 of 120 ticks differ, the first is tick 60 at 0.600 s: demand" in result.output
+
+
+@pytest.mark.parametrize("command", ["replay", "export"])
+def test_a_damaged_recording_is_one_line_and_code_1(tmp_path: Path, command: str) -> None:
+    path = recorded(tmp_path / "a.rlrec")
+    content = bytearray(path.read_bytes())
+    content[-1 - 60 * recording.read(path).layout.size] ^= 1  # the checksum of tick 59
+    path.write_bytes(content)
+    target = ["--to", str(tmp_path / "a.csv")] if command == "export" else []
+    result = CliRunner().invoke(main, [command, str(path), *target])
+    assert result.exit_code == 1
+    assert result.output.count("\n") == 1
+    assert "a.rlrec: tick 59: checksum differs, 1 of 120 records damaged" in result.output
+    assert not (tmp_path / "a.csv").exists()
+
+
+@pytest.mark.parametrize("command", ["replay", "export"])
+def test_a_torn_last_record_is_told_and_the_rest_is_used(tmp_path: Path, command: str) -> None:
+    path = recorded(tmp_path / "a.rlrec")
+    path.write_bytes(path.read_bytes()[:-7])
+    target = ["--to", str(tmp_path / "a.csv")] if command == "export" else []
+    result = CliRunner().invoke(main, [command, str(path), *target])
+    assert result.exit_code == 0
+    assert "119 ticks" in result.output
+    assert "of an unfinished last record left out" in result.output
 
 
 def test_other_parameters_show_the_difference_and_are_no_failure(tmp_path: Path) -> None:
