@@ -19,8 +19,6 @@ pytestmark = pytest.mark.slow
 
 WITHIN = 0.15
 TICK = 0.01
-# 10 ms of the PLC's scan, 10 ms of the gateway's tick, and a busy machine
-TOLERANCE = 0.04
 REASONS = {
     "frozen_heartbeat": {"HEARTBEAT_FROZEN"},
     "frozen_image": {"SEQUENCE_FROZEN", "HEARTBEAT_FROZEN"},
@@ -39,7 +37,10 @@ REASONS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Met:
-    """What the recording says about one fault: delay [s] from the fault to the end of RUN."""
+    """What the recording says about one fault.
+
+    delay : PLC time from the first faulty sample to the tick that leaves RUN [s]
+    """
 
     delay: float
     reason: str
@@ -59,7 +60,7 @@ def run_again(emulator: EmulatorProcess) -> None:
 
 
 def suffer(emulator: EmulatorProcess, name: str) -> float:
-    """Let one fault happen for half a second in RUN; PLC time at which it began [s]."""
+    """Let one fault happen for half a second in RUN; PLC time of the first faulty sample [s]."""
     run_again(emulator)
     start = round(emulator.status()["time"] + 0.1, 2)
     emulator.set_faults(f"{name}@{start}")
@@ -109,4 +110,4 @@ def test_every_fault_has_its_reasons_here():
 def test_fault_ends_the_run_with_its_reason_within_150_ms(all_met, name):
     assert all_met[name].reason in REASONS[name]
     assert all_met[name].next_state in ("RAMPDOWN", "SAFE")
-    assert all_met[name].delay <= WITHIN + TOLERANCE
+    assert all_met[name].delay <= WITHIN
