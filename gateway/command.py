@@ -1,4 +1,4 @@
-"""The command block: its number, its bits, and whether the PLC has taken it over.
+"""The command block: its number, its bits, whether it got through and the PLC has taken it over.
 
 Writing begins in ARMED, with enable off, because the PLC starts on its rising edge; it goes on in
 SAFE, so that a last command that got lost does not stay in force.
@@ -9,6 +9,8 @@ from math import inf
 
 from gateway.config import Config
 from gateway.limits import Limited
+from gateway.reasons import Reason
+from gateway.samples import LINK_IS_DOWN
 from gateway.supervisor import State
 from register_maps.register_map import RegisterMap
 from register_maps.signals import Control, Measurement, Mode, Setpoint
@@ -23,6 +25,8 @@ class Command:
 
     number : None: nothing written yet
     echo_moved : when the echo last changed, or the run began [s]
+    got_through : when the last block was written that is known to have arrived [s]
+    fault : of the first write since then that failed; down : of the last, and the link is gone
     """
 
     number: int | None = None
@@ -30,6 +34,9 @@ class Command:
     written: float = 0.0
     echo: int | None = None
     echo_moved: float = -inf
+    got_through: float = -inf
+    fault: Reason | None = None
+    down: bool = False
 
 
 def echoed(command: Command, newest: Measurement | None, now: float) -> Command:
@@ -38,6 +45,24 @@ def echoed(command: Command, newest: Measurement | None, now: float) -> Command:
     if echo is None or echo == command.echo:
         return command
     return replace(command, echo=echo, echo_moved=now)
+
+
+def answered(command: Command, measurement: Measurement | None, fault: Reason | None) -> Command:
+    """Note what became of the last block: a fault beside a good reading is that of the write.
+
+    Without a reading the fault is the reading's, and tells nothing of the write before it.
+    """
+    if measurement is None:
+        return command
+    if fault is None:
+        return replace(command, got_through=command.written, fault=None, down=False)
+    return replace(command, fault=command.fault or fault, down=fault in LINK_IS_DOWN)
+
+
+def complaint(command: Command, now: float, stale: float) -> Reason | None:
+    """Why no block has got through for too long, or will; None: they do."""
+    late = now - command.got_through > stale
+    return command.fault if command.down or late else None
 
 
 def nothing(command: Command, now: float) -> Command:

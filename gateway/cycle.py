@@ -41,7 +41,7 @@ class Observation:
 
     now : monotonic time of the reading [s]
     measurement : the decoded block, None: there is none, and `fault` says why
-    fault : what was wrong with this tick's reading or with the write before it
+    fault : what was wrong with this tick's reading, or else with the write before it
     shadow : never write; stop_requested : SIGTERM, Ctrl-C or the end of the demo
     overruns : deadlines missed in a row up to this tick
     """
@@ -118,8 +118,8 @@ def step(
     """One tick."""
     now = observation.now
     read = samples.take(state.samples, observation.measurement, observation.fault, now)
-    echoed = command.echoed(state.command, read.newest, now)
-    state = replace(state, samples=read, command=echoed)
+    sent = command.answered(state.command, observation.measurement, observation.fault)
+    state = replace(state, samples=read, command=command.echoed(sent, read.newest, now))
     supervisor = advance(state.supervisor, _facts(config, state, observation))
     if supervisor.state is State.RUN and state.supervisor.state is not State.RUN:
         state = _bumpless(state, now)
@@ -143,6 +143,7 @@ def _facts(config: Config, state: CycleState, observation: Observation) -> Facts
     return Facts(
         now=now,
         link=samples.complaint(state.samples, now, config.loop.stale),
+        write=command.complaint(state.command, now, config.loop.stale),
         check=None
         if newest is None
         else check(

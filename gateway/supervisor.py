@@ -67,6 +67,7 @@ class Facts:
     """What is known at one tick.
 
     link : None: a fresh sample is at hand; otherwise why there is none
+    write : None: what is written gets through; otherwise why it does not
     check : None: all checks hold; otherwise the first that does not
     remote, confirmed : status bits of the PLC: remote; enabled and road load
     at_rest : the setpoint has come down to zero
@@ -74,6 +75,7 @@ class Facts:
 
     now: float
     link: Reason | None
+    write: Reason | None
     check: Reason | None
     remote: bool
     confirmed: bool
@@ -147,6 +149,8 @@ def _armed(before: Supervisor, facts: Facts) -> Decision:
         return Event.LINK_DOWN, facts.link
     if facts.check is not None:
         return Event.CHECK_FAILS, facts.check
+    if facts.write is not None:
+        return None, facts.write
     return (Event.REMOTE_SET, None) if facts.remote and before.released else (None, None)
 
 
@@ -154,6 +158,7 @@ def _run(before: Supervisor, facts: Facts) -> Decision:
     late = facts.now - before.started > CONFIRM_WITHIN
     trips = (
         (facts.link is not None, facts.link),
+        (facts.write is not None, facts.write),
         (facts.check is not None, facts.check),
         (facts.stop_requested, Reason.STOP_REQUESTED),
         (not facts.remote, Reason.REMOTE_OFF),

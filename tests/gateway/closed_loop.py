@@ -32,13 +32,14 @@ class ClosedLoop:
     map_name: str = "bench_int16"
     shadow: bool = False
     disturb: Disturbance = undisturbed
-    deaf: bool = False
+    refused: Reason | None = None
     stop_requested: bool = False
     overruns: int = 0
     observations: list[Observation] = field(default_factory=list)
     outputs: list[Output] = field(default_factory=list)
     drum_speed: list[float] = field(default_factory=list)
     wheel_torque: list[float] = field(default_factory=list)
+    write_fault: Reason | None = None
 
     def __post_init__(self) -> None:
         self.map = load(self.map_name)
@@ -80,7 +81,7 @@ class ClosedLoop:
         seen = Observation(
             now=self.now,
             measurement=None if failed else reading,
-            fault=reading if failed else None,
+            fault=reading if failed else self.write_fault,
             shadow=self.shadow,
             stop_requested=self.stop_requested,
             overruns=self.overruns,
@@ -88,7 +89,8 @@ class ClosedLoop:
         self.state, output = cycle.step(self.config, self.map, self.state, seen)
         self.observations.append(seen)
         self.outputs.append(output)
-        if output.setpoint is not None and not self.deaf:
+        self.write_fault = None if output.setpoint is None else self.refused
+        if output.setpoint is not None and self.refused is None:
             self.words = encode_setpoint(self.map, output.setpoint)
 
     def start(self) -> None:

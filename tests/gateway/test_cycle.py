@@ -241,6 +241,56 @@ def test_each_fault_leaves_run_in_time_with_its_reason(running, disturb, reason)
     assert (running.last.state, running.last.reason) == (State.SAFE, reason)
 
 
+def without_echo():
+    """A running loop over a map that has no echo of the command's number."""
+    loop = ClosedLoop(CONFIG)
+    kept = [one for one in loop.map.registers if one.signal != "command_sequence_echo"]
+    loop.map = replace(loop.map, registers=tuple(kept))
+    loop.start()
+    loop.run(4.5)
+    return loop
+
+
+@pytest.mark.parametrize("reason", [Reason.TIMEOUT, Reason.WRONG_COUNT, Reason.EXCEPTION_2])
+def test_writes_that_fail_end_the_run_in_time_with_their_reason(reason):
+    loop = without_echo()
+    loop.refused = reason
+    assert left_run_after(loop) <= DETECTED
+    assert loop.last.reason is reason
+
+
+def test_a_link_that_is_lost_at_a_write_ends_the_run_at_once(running):
+    running.refused = Reason.CONNECTION_LOST
+    assert left_run_after(running) <= 2 * SCAN
+    assert running.last.reason is Reason.CONNECTION_LOST
+
+
+def test_a_single_write_that_fails_is_borne(running):
+    for _ in range(3):
+        running.refused = Reason.TIMEOUT
+        running.run(5 * SCAN)
+        running.refused = None
+        running.run(5 * SCAN)
+    assert running.last.state is State.RUN
+
+
+def test_a_write_and_readings_that_fail_in_turn_end_the_run_too(running):
+    """Each second reading fails: what it hides of the write before it does not count as good."""
+    running.refused = Reason.EXCEPTION_2
+    running.disturb = lambda loop, reading: Reason.TIMEOUT if loop.plc.scans % 2 else reading
+    assert left_run_after(running) <= DETECTED
+    assert running.last.reason is Reason.EXCEPTION_2
+
+
+def test_no_run_starts_while_writes_fail(idle):
+    idle.run(0.2)
+    idle.refused = Reason.EXCEPTION_2
+    idle.run(0.2)
+    idle.operate(remote=True)
+    idle.run(0.2)
+    assert (idle.last.state, idle.last.reason) == (State.ARMED, Reason.EXCEPTION_2)
+
+
 def test_missed_deadlines_end_the_run(running):
     running.overruns = CONFIG.loop.overruns - 1
     running.run(SCAN)

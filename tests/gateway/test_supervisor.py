@@ -1,4 +1,4 @@
-"""The table of states as the guide tells it, every transition, every reason, every one refused."""
+"""The table of states as specified, every transition, every reason, every one refused."""
 
 from dataclasses import replace
 
@@ -10,6 +10,7 @@ from gateway.supervisor import TRANSITIONS, Event, Facts, State, Supervisor, adv
 GOOD = Facts(
     now=10.0,
     link=None,
+    write=None,
     check=None,
     remote=False,
     confirmed=False,
@@ -115,6 +116,14 @@ def test_remote_set_while_armed_starts_the_run():
     assert running == Supervisor(state=State.RUN, started=11.0)
 
 
+def test_armed_starts_nothing_while_its_writes_fail():
+    before = Supervisor(state=State.ARMED, released=True)
+    assert after(before, replace(REMOTE, write=Reason.EXCEPTION_2)) == (
+        State.ARMED,
+        Reason.EXCEPTION_2,
+    )
+
+
 def test_remote_seen_off_stays_seen():
     seen_off = advance(Supervisor(state=State.ARMED), GOOD)
     still = advance(seen_off, replace(GOOD, now=10.5))
@@ -153,6 +162,7 @@ def test_late_confirmation_is_named():
 
 TRIPS = [
     ({"link": Reason.HEARTBEAT_FROZEN}, Reason.HEARTBEAT_FROZEN),
+    ({"write": Reason.EXCEPTION_2}, Reason.EXCEPTION_2),
     ({"check": Reason.EMERGENCY_STOP}, Reason.EMERGENCY_STOP),
     ({"stop_requested": True}, Reason.STOP_REQUESTED),
     ({"remote": False}, Reason.REMOTE_OFF),
