@@ -183,6 +183,7 @@ class LogColumn:
     signal : name in the log, without unit
     unit : unit of the column, a key of `units.UNITS` (SI everywhere but the temperature)
     measured : the field of `Measurement` that an online recording puts there, None: there is none
+    decimals : with which it is written
     """
 
     column: str
@@ -190,21 +191,29 @@ class LogColumn:
     unit: str
     needed: bool
     measured: str | None
+    decimals: int
 
 
-_LOG_COLUMNS: tuple[tuple[str, str, str, bool, str | None], ...] = (
-    ("time_s", "time", "s", True, "plc_time"),
-    ("speed_reference_rad_s", "speed_reference", "rad/s", True, "speed_reference"),
-    ("motor_speed_rad_s", "motor_speed", "rad/s", True, "motor_speed"),
-    ("drum_speed_rad_s", "drum_speed", "rad/s", True, "drum_speed"),
-    ("armature_current_A", "armature_current", "A", False, "armature_current"),
-    ("shaft_torque_Nm", "shaft_torque", "N m", True, "shaft_torque"),
-    ("wheel_torque_Nm", "wheel_torque", "N m", False, None),
-    ("armature_voltage_V", "armature_voltage", "V", False, "armature_voltage"),
-    ("shell_temperature_degC", "shell_temperature", "degC", False, "shell_temperature_1"),
+_LOG_COLUMNS: tuple[tuple[str, str, str, bool, str | None, int], ...] = (
+    ("time_s", "time", "s", True, "plc_time", 4),
+    ("speed_reference_rad_s", "speed_reference", "rad/s", True, "speed_reference", 5),
+    ("motor_speed_rad_s", "motor_speed", "rad/s", True, "motor_speed", 5),
+    ("drum_speed_rad_s", "drum_speed", "rad/s", True, "drum_speed", 6),
+    ("armature_current_A", "armature_current", "A", False, "armature_current", 5),
+    ("shaft_torque_Nm", "shaft_torque", "N m", True, "shaft_torque", 5),
+    ("wheel_torque_Nm", "wheel_torque", "N m", False, None, 4),
+    ("armature_voltage_V", "armature_voltage", "V", False, "armature_voltage", 4),
+    ("shell_temperature_degC", "shell_temperature", "degC", False, "shell_temperature_1", 2),
 )
 
 LOG_COLUMNS = {
-    column: LogColumn(column=column, signal=signal, unit=unit, needed=needed, measured=measured)
-    for column, signal, unit, needed, measured in _LOG_COLUMNS
+    column: LogColumn(
+        column=column,
+        signal=signal,
+        unit=unit,
+        needed=needed,
+        measured=measured,
+        decimals=decimals,
+    )
+    for column, signal, unit, needed, measured, decimals in _LOG_COLUMNS
 }
