@@ -1,13 +1,10 @@
-"""What every test may use: foreign programs and recorded data, or a reason why the test skips."""
+"""What every test may use: foreign programs, or a reason why the test skips."""
 
 import os
 import shutil
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).parents[1]
 
 
 def missing(reason: str) -> None:
@@ -28,12 +25,3 @@ def require_program() -> Callable[[str], str]:
         return str(found)
 
     return path_of
-
-
-@pytest.fixture(scope="session")
-def real_data() -> Path:
-    """Folder of the recorded data, which is not part of the repository: REAL_DATA names it."""
-    folder = ROOT / os.environ.get("REAL_DATA", "../shared/data")
-    if not folder.is_dir():
-        pytest.skip(f"no recorded data at {folder}; REAL_DATA names its folder")
-    return folder
