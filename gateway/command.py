@@ -13,7 +13,7 @@ from gateway.reasons import Reason
 from gateway.samples import LINK_IS_DOWN
 from gateway.supervisor import State
 from register_maps.register_map import RegisterMap
-from register_maps.signals import Control, Measurement, Mode, Setpoint
+from register_maps.signals import Control, Measurement, Mode, Setpoint, Status
 
 WRITING = frozenset({State.ARMED, State.RUN, State.RAMPDOWN, State.SAFE})
 ENABLING = frozenset({State.RUN, State.RAMPDOWN})
@@ -79,6 +79,17 @@ def following(register_map: RegisterMap, command: Command, limited: Limited, now
     return replace(command, number=number, speed=limited.speed, written=now)
 
 
+def driven(config: Config) -> Mode:
+    """The PLC's mode of a run: in a sweep of steady speeds nobody may drive a truck."""
+    return Mode.ROAD_LOAD if config.sweep is None else Mode.SPEED
+
+
+def confirmed(config: Config, status: Status) -> bool:
+    """Whether the PLC is enabled, and in the mode of the run."""
+    road_load = driven(config) is Mode.ROAD_LOAD
+    return Status.ENABLED in status and (Status.ROAD_LOAD in status) is road_load
+
+
 def block(
     config: Config, register_map: RegisterMap, command: Command, limited: Limited, *, enable: bool
 ) -> Setpoint:
@@ -88,7 +99,7 @@ def block(
         command_sequence=number,
         gateway_heartbeat=number,
         control=Control.ENABLE if enable else Control(0),
-        mode=Mode.ROAD_LOAD if enable else Mode.READY,
+        mode=driven(config) if enable else Mode.READY,
         speed_setpoint=limited.speed,
         speed_rate=limited.rate,
         ramp_limit=max(config.limits.rate_up, config.limits.rate_down),

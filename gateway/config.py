@@ -17,6 +17,7 @@ from typing import Any, get_type_hints
 from gateway.errors import ConfigError
 from gateway.friction import THESIS, Friction, from_friction
 from gateway.keys import checked, declared, keys
+from gateway.losses_speeds import Sweep, from_sweep
 
 RPM = 2.0 * math.pi / 60.0
 MILLI = 1e-3
@@ -158,6 +159,7 @@ SECTIONS: dict[str, type] = {
     "limits": LimitsConfig,
     "recording": RecordingConfig,
 }
+SWEEP = "sweep"
 
 
 def _defaults() -> Document:
@@ -173,6 +175,7 @@ def _defaults() -> Document:
 class Config:
     """Everything that is configured. Changed with `with_values`, so that `document` stays true.
 
+    sweep : steady speeds that are held instead of a road load; None: none
     document : sections, keys and values as in a file, defaults written out; JSON can hold it
     """
 
@@ -183,6 +186,7 @@ class Config:
     regulator: RegulatorConfig = field(default_factory=RegulatorConfig)
     limits: LimitsConfig = field(default_factory=LimitsConfig)
     recording: RecordingConfig = field(default_factory=RecordingConfig)
+    sweep: Sweep | None = None
     document: Document = field(default_factory=_defaults)
 
     def with_values(self, values: Mapping[str, str]) -> "Config":
@@ -213,8 +217,12 @@ def _set_place(section: str, key: str) -> str:
 def from_document(document: Mapping[str, Any], *, place: Place = _set_place) -> Config:
     """The configuration in a document; `place` names where a key stands, for the error."""
     written = _defaults()
-    sections = {}
+    sections: dict[str, Any] = {}
     for name, entries in document.items():
+        if name == SWEEP:
+            sections[name] = from_sweep(entries, place(name, "").rstrip(" ."))
+            written[name] = dict(entries)
+            continue
         if name not in SECTIONS or not isinstance(entries, Mapping):
             raise ConfigError(
                 "unknown section", place=place(name, ""), value=name, expected=", ".join(SECTIONS)

@@ -12,14 +12,15 @@ starts on its rising edge; it goes on in SAFE, so that a lost last command does 
 
 from dataclasses import dataclass, field, replace
 from math import isfinite
-from typing import Any
+from typing import Any, cast
 
-from gateway import command, limits, regulators, samples
+from gateway import command, limits, losses_sweep, regulators, samples
 from gateway.checks import check
 from gateway.command import Command
 from gateway.config import Config
 from gateway.errors import ConfigError
 from gateway.limits import Limit, Limited, Limits
+from gateway.regulators import Regulator
 from gateway.regulators.window import Demand
 from gateway.samples import Samples
 from gateway.supervisor import Facts, Reason, State, Supervisor, advance
@@ -27,7 +28,6 @@ from register_maps.register_map import RegisterMap
 from register_maps.signals import Measurement, Setpoint, Status
 
 UNLINKED = frozenset({State.OFF, State.CONNECT})
-REMOTE, CONFIRMED = Status.REMOTE, Status.ENABLED | Status.ROAD_LOAD
 FOLLOWED = Limit.NOT_FINITE | Limit.DEVIATION
 """Limits that the regulator must know of, or it goes on from where the bench never was. The slope
 limit is not among them: what it delays is caught up with. Nor are stale data: they end the run."""
@@ -101,7 +101,7 @@ def initial(config: Config, register_map: RegisterMap) -> CycleState:
             ),
         )
     return CycleState(
-        params=regulators.load(config.regulator.name).Params.of(config),
+        params=_regulator(config).Params.of(config),
         limits=Limits(
             speed_max=config.limits.speed_max,
             rate_up=config.limits.rate_up,
@@ -110,6 +110,13 @@ def initial(config: Config, register_map: RegisterMap) -> CycleState:
             stale=config.loop.stale,
         ),
     )
+
+
+def _regulator(config: Config) -> Regulator:
+    """What decides on the demand: the configured regulator, or the sweep where there is one."""
+    if config.sweep is not None:
+        return cast("Regulator", losses_sweep)
+    return regulators.load(config.regulator.name)
 
 
 def step(
@@ -153,8 +160,8 @@ def _facts(config: Config, state: CycleState, observation: Observation) -> Facts
             overruns=observation.overruns,
             echo_age=0.0 if state.command.echo is None else now - state.command.echo_moved,
         ),
-        remote=REMOTE in status,
-        confirmed=CONFIRMED in status,
+        remote=Status.REMOTE in status,
+        confirmed=command.confirmed(config, status),
         at_rest=state.command.speed == 0.0,
         stop_requested=observation.stop_requested,
         shadow=observation.shadow,
@@ -177,7 +184,7 @@ def _regulated(
     newest, supervisor = state.samples.newest, state.supervisor
     if newest is None or supervisor.state in UNLINKED:
         return replace(state, regulator=None, demand=None)
-    regulator = regulators.load(config.regulator.name)
+    regulator = _regulator(config)
     starting = supervisor.state is State.RUN and not supervisor.confirmed
     if starting or state.regulator is None:
         seeded = regulator.seed(state.params, newest.motor_speed, newest.drum_speed)
@@ -223,7 +230,7 @@ def _followed(config: Config, state: CycleState, limited: Limited, now: float) -
     is_told = state.supervisor.state is State.RUN and state.demanded == now
     if not (is_told and limited.by & FOLLOWED) or newest is None or demand is None:
         return state
-    regulator = regulators.load(config.regulator.name)
+    regulator = _regulator(config)
     if not isfinite(demand.speed):
         after = regulator.seed(state.params, newest.motor_speed, newest.drum_speed)
     else:

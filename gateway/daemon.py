@@ -7,7 +7,7 @@ watchdog ramps down.
 
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from gateway.config import Config
+from gateway.cycle import Output
 from gateway.errors import GatewayError
 from gateway.header import header
 from gateway.loop import Loop, MonotonicClock
@@ -66,6 +67,14 @@ class _Stop:
         return self.asked or (self._until is not None and time.monotonic() >= self._until)
 
 
+def _never(output: Output) -> bool:  # noqa: ARG001 - a run that only its operator ends
+    return False
+
+
+def _is_over(loop: Loop, over: Callable[[Output], bool]) -> bool:
+    return loop.before_stop is not None and over(loop.before_stop)
+
+
 def run(
     config: Config,
     register_map: RegisterMap,
@@ -73,8 +82,9 @@ def run(
     shadow: bool = False,
     duration: float | None = None,
     view: bool = True,
+    over: Callable[[Output], bool] = _never,
 ) -> Ended:
-    """Run the gateway until it is asked to stop, or for so long [s]."""
+    """Run the gateway until it is asked to stop, for so long [s], or until a tick says `over`."""
     link = TcpLink(config.plc.host, config.plc.port, config.plc.unit, config.plc.timeout)
     granted = real_time() if config.loop.realtime else nullcontext("not asked for")
     with granted as real:
@@ -94,7 +104,7 @@ def run(
                     clock=MonotonicClock(),
                     shadow=shadow,
                 )
-                loop.run(stop)
+                loop.run(lambda: stop() or _is_over(loop, over))
             finally:
                 recorder.close()
     return _ended(loop, recorder, real)

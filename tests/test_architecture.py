@@ -28,6 +28,8 @@ SHELL = {
     "gateway.live": "terminal",
     "gateway.log": "files",
     "gateway.loop": "clock",
+    "gateway.losses_report": "files",
+    "gateway.losses_source": "files",
     "gateway.plc": "network",
     "gateway.realtime": "operating system",
     "gateway.recorder": "files, processes",

@@ -1,0 +1,114 @@
+"""From a bench whose friction nobody knows to a truck that feels its road load, over the socket.
+
+The bench's friction is the thesis's, 10 % up or down, and the regulator believes in Table 3.1: in
+cruise the truck then feels about 30 % too little or too much. The sweep finds the friction; so does
+whoever identifies the bench.
+"""
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from rich.console import Console
+
+import plant_emulator
+from gateway.cli import main
+from gateway.config import Config
+from gateway.demo_operator import Session, operate_fast
+from gateway.demo_view import Screen
+from gateway.losses_live import swept_config
+from plant_emulator.process import EmulatorProcess
+
+pytestmark = pytest.mark.slow
+
+THESIS = Path(plant_emulator.__file__).parent / "parameter_sets" / "thesis_table_3_1.toml"
+# f_gc, f_g of Table 3.1
+COULOMB, VISCOUS = 35.989, 345.38
+
+
+def bench(folder: Path, share: float) -> Path:
+    """The thesis's parameter set with that share of its friction."""
+    text = THESIS.read_text().replace(f"value = {COULOMB}", f"value = {share * COULOMB!r}")
+    file = folder / "bench.toml"
+    file.write_text(text.replace(f"value = {VISCOUS}", f"value = {share * VISCOUS!r}"))
+    return file
+
+
+def gateway(*arguments: object) -> Result:
+    return CliRunner().invoke(main, [str(one) for one in arguments])
+
+
+def sweep(folder: Path, parameters: Path) -> Path:
+    """The recording of a sweep of steady speeds, without waiting for the clock."""
+    with EmulatorProcess(parameters=str(parameters), truck_mass=None, speed=None) as emulator:
+        config = swept_config(
+            Config().with_values({"plc.port": str(emulator.port)}), speeds=None, hold=None
+        )
+        assert config.sweep is not None
+        session = Session(
+            config=config,
+            file=folder / "sweep.toml",
+            emulator=emulator,
+            screen=Screen(Console(quiet=True), "", 1.0),
+            duration=config.sweep.duration + 1.0,
+        )
+        return operate_fast(session).recording
+
+
+def cruise_error(folder: Path, parameters: Path, *options: object) -> float:
+    """Of the force in cruise, relative to the road load, truck of 3640 kg with a driver."""
+    out = folder / "demo"
+    fixed = ("--fast", "--driver", "pi", "--load", 0, "--bench-parameters", parameters)
+    shown = gateway("demo", "--out", out, *fixed, *options)
+    assert shown.exit_code == 0, shown.output
+    (run,) = json.loads((out / "summary.json").read_text())["runs"]
+    assert run["truck_kg"] == 3640.0
+    return run["force"]["mean_error_newton"] / run["force"]["target_newton"]
+
+
+@pytest.fixture(scope="module", params=[1.1, 0.9], ids=["10 % up", "10 % down"])
+def measured(request, tmp_path_factory) -> tuple[float, Path, Path]:
+    """Share of the thesis's friction, the bench's parameter set, the recording of its sweep."""
+    folder = tmp_path_factory.mktemp("bench")
+    parameters = bench(folder, request.param)
+    return request.param, parameters, sweep(folder, parameters)
+
+
+def test_sweep_finds_the_friction_of_the_bench(measured, tmp_path):
+    share, _, recording = measured
+    answer = tmp_path / "losses.json"
+    result = gateway("losses", recording, "--json", answer)
+    assert result.exit_code == 0, result.output
+    found = json.loads(answer.read_text())
+    law = {name: entry["value"] for name, entry in found["friction"].items()}
+    for omega in (0.5, 1.0, 2.0, 4.0, 6.0, 7.5):
+        wanted = share * (COULOMB + VISCOUS * omega**0.4418)
+        torque = law["coulomb"] + law["viscous"] * omega ** law["exponent"]
+        assert torque == pytest.approx(wanted, rel=1e-3)
+    assert len(found["sections"]) == 8
+
+
+def test_its_map_gives_back_the_road_load(measured, tmp_path):
+    share, parameters, recording = measured
+    before = cruise_error(tmp_path, parameters)
+    file = tmp_path / "friction_map.toml"
+    assert gateway("losses", recording, "--save", file).exit_code == 0
+    after = cruise_error(tmp_path, parameters, "--friction", file)
+    print(f"friction x {share}: cruise force error {before:+.1%} -> {after:+.2%} with the map")
+    assert 0.2 < abs(before) < 0.4
+    assert abs(after) < 0.03
+
+
+def test_so_does_a_parameter_set_with_the_right_friction(measured, tmp_path):
+    share, parameters, _ = measured
+    after = cruise_error(tmp_path, parameters, "--friction", parameters)
+    print(f"friction x {share}: cruise force error {after:+.2%} with its parameter set")
+    assert abs(after) < 0.03
+
+
+def test_recording_of_a_sweep_replays_bit_for_bit(measured):
+    _, _, recording = measured
+    result = gateway("replay", recording)
+    assert result.exit_code == 0
+    assert "equal bit for bit" in result.output
