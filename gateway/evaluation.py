@@ -19,7 +19,7 @@ from gateway.errors import GatewayError
 
 Array = NDArray[np.float64]
 
-# Cruise (issue of the test method): the speed changes by less than this, for at least so long.
+# Cruise: the speed changes by less than this [m/s^2], for at least so long [s].
 STEADY = 0.02
 SHORTEST_CRUISE = 5.0
 # Speed is differentiated over this span [s]: one digit of the drum speed is 0.3 mm/s at the rim.

@@ -1,8 +1,8 @@
 """What a configuration lets expect of the bench, before any start: findings, worst first.
 
-The limits are those of the domain research (2.1, finding 3, E24). rho is the share of the bench's
-own inertia in the emulated one: up to 1 the loop is stable for any delay, from 0.9 on it holds only
-if torque and speed are seen over exactly the same window, by the same filter, without lead.
+rho = (J_g + J_d) / (m r_d^2) (thesis, eq. 4.4) is the share of the bench's own inertia in the
+emulated one: up to 1 the loop is stable for any delay, from 0.9 on it holds only if torque and
+speed are seen over exactly the same window, by the same filter, without lead.
 """
 
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ RESPONSE = 0.1
 DRIVE_LAG = 1.0 / DRIVE
 """[s] of the speed-controlled motor behind its reference."""
 SCAN = 0.01
-"""[s] over which the PLC's mean is taken (its fast task, domain research 5.1)."""
+"""[s] over which the PLC's mean is taken (its fast task hands it on every scan)."""
 RHO_REFUSED, RHO_WARNED = 0.9, 0.5
 SEVERITIES = ("error", "warning", "info")
 RPM = 2.0 * pi / 60.0
@@ -250,7 +250,7 @@ def _speeds(config: Config) -> Iterator[Finding]:
 
 
 def _torque(config: Config) -> Iterator[Finding]:
-    """Torque that the bench's motor must give against what its current allows (E24).
+    """Torque that the bench's motor must give against what its current allows.
 
     xi T_m = J theta_d'' + T_f - T_w' with T_w' = m r_d^2 theta_d'' + T_RL
     """

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 STEP = 1e-3
 DRIVE = 105.0
 """[rad/s] bandwidth of the speed loop: 133 below base speed, 70 at 14 km/h. With this value the
-smallest masses of the domain research (table 2.1, without lead) come out within about 10 %."""
+smallest masses of tests/gateway/test_stability.py come out within about 10 %, without lead."""
 CONTACT = 385.0
 """[1/s] damping of the backlash shaft in contact over the drum's inertia (thesis, Table 3.1)."""
 MARGIN = 1e-7

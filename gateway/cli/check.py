@@ -55,7 +55,7 @@ def command(config: Path, *, live: bool, values: tuple[str, ...], target: str | 
 
 
 def as_json(finding: Finding) -> dict[str, Any]:
-    """A finding as the contract has it."""
+    """A finding as it stands in check/1."""
     return {
         "severity": finding.severity,
         "where": finding.where,

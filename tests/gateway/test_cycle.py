@@ -531,7 +531,7 @@ def test_the_drum_goes_as_the_truck_would_on_the_road(name, period, val1, val2, 
 
 
 def test_instantaneous_torque_shows_the_weakness_of_the_thesis():
-    """Aliasing of a staircase with torque read at the poll (domain research, finding 3)."""
+    """Aliasing of a staircase with torque read at the poll; another program found Val1 92.2."""
     loop = ClosedLoop(
         CONFIG.with_values(
             {
@@ -547,7 +547,7 @@ def test_instantaneous_torque_shows_the_weakness_of_the_thesis():
 
 
 def test_peaks_of_the_torque_do_not_grow_for_it():
-    """84 .. 100 Nm with the thesis's regulator, at most 15 % more (domain research, 2.2)."""
+    """84 .. 100 Nm with the thesis's regulator, at most 15 % more."""
     peaks = {}
     for name in ("thesis", "compensated"):
         loop = ClosedLoop(CONFIG.with_values({"regulator.name": name}))

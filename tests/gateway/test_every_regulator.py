@@ -87,7 +87,7 @@ def test_a_pushing_truck_raises_the_demand_as_its_mass_says(regulator, params):
 
 
 def test_the_bench_accelerating_itself_moves_no_truck(regulator, params):
-    """Torque of the drum's own inertia over the window cancels the inertia term (E14)."""
+    """Torque of the drum's own inertia over the window cancels the inertia term."""
     change = 0.01
     own = -312.71242 * change / 0.01 / 62.6
     state = regulator.seed(params, 200.0, 200.0 / 62.6)

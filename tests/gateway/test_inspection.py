@@ -1,4 +1,4 @@
-"""The operator's view of a map; words as the register list and the specification give them."""
+"""The operator's view of a map; words as the map and the Modbus specification give them."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What `check` says of a configuration: the rules of the domain research, each at its edge."""
+"""What `check` says of a configuration: every rule at its edge."""
 
 import json
 
@@ -29,7 +29,7 @@ def test_the_default_configuration_holds_without_a_warning():
     assert {one.severity for one in findings} == {"info"}
 
 
-def test_rho_of_the_forklift_is_the_one_of_the_domain_research():
+def test_rho_of_the_forklift_is_the_share_of_drum_and_gear_in_its_mass():
     assert rho_of(Config()) == pytest.approx(0.207, abs=0.001)
 
 
@@ -171,7 +171,7 @@ def file(tmp_path):
     return str(written)
 
 
-def test_the_command_answers_as_the_contract_says(capsys, file):
+def test_the_command_answers_in_the_form_check_1(capsys, file):
     code, said = answer(capsys, "-c", file, "--json", "-")
     told = json.loads(said.out)
     assert (code, told["schema"], told["holds"]) == (0, "check/1", True)

@@ -1,4 +1,4 @@
-"""Road load in newtons, against the numbers of the thesis and the domain research."""
+"""Road load in newtons, against the numbers of the thesis and hand calculations."""
 
 from dataclasses import replace
 from math import atan, sin
@@ -25,7 +25,8 @@ def test_loaded_truck_of_table_4_1_needs_588_newton_at_14_km_h():
     assert loaded.force(V) == pytest.approx(588.0, abs=2.0)
 
 
-def test_f0_and_f1_of_the_domain_research_give_the_same_force():
+def test_f0_and_f1_of_the_same_truck_give_the_same_force():
+    """By hand: F0 = m g Crr = 418.5 N, F1 = m g Crr_v / r_d = 0.52 N s/m."""
     assert load_of(f0=418.5, f1=0.52).force(V) == pytest.approx(load_of().force(V), abs=0.1)
 
 
