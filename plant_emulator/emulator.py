@@ -106,7 +106,7 @@ class Emulator:
         """One line of the log.
 
         The reference of a log with a truck is a staircase: the mean of what acts until the next
-        line. Without one it is linear: the value at this moment (contracts, section 1).
+        line. Without one it is linear: the value at this moment.
         """
         plc = self.plc
         reference = sum(plc.path) / STEPS if plc.truck else plc.reference

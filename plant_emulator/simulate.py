@@ -1,7 +1,8 @@
 """From a log of inputs to a log of simulated signals.
 
 A `Run` holds what of a log the kernel needs (reference, its corners, truck torque), prepared once
-and simulated many times with other values. What holds between samples: contracts, section 1.
+and simulated many times with other values. Between samples the reference is linear, in a log with
+a truck a staircase; the wheel torque is the one that acted up to its sample.
 """
 
 from __future__ import annotations

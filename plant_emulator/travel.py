@@ -55,7 +55,8 @@ class ThesisReference:
         self.drum_reference += (
             rho * (drum_speed - self._drum_speed) + torque / inertia * self.period
         )
-        # The PLC takes no negative speed: the sum starts anew where it is limited (trap E15).
+        # The PLC takes no negative speed: the sum starts anew where it is limited, so that it does
+        # not wind up.
         self.drum_reference = max(0.0, self.drum_reference)
         self._drum_speed = drum_speed
         return value("gear_ratio") * self.drum_reference

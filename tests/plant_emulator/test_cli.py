@@ -111,7 +111,7 @@ def test_other_parameters_show_in_the_simulated_log(command: Command, tmp_path: 
 # --- validate ---------------------------------------------------------------------------------
 
 
-def test_validation_has_the_schema_of_the_contract(command: Command, tmp_path: Path) -> None:
+def test_validation_answers_in_the_form_validation_1(command: Command, tmp_path: Path) -> None:
     answer_file = tmp_path / "answer.json"
     result = command("validate", PROGRAM1, NOISY, "--json", answer_file)
     assert result.exit_code == 0

@@ -59,7 +59,7 @@ def test_bench_at_rest_is_shown_with_the_constants_of_its_map(name):
 
 
 def test_steady_speed_shows_the_friction_of_the_thesis(emulator):
-    # Domain guide R9: 15.7 A and -13.4 Nm at 4025 rpm, warm
+    # By hand from Table 3.1: -13.4 Nm and 15.7 A at 4025 rpm
     emulator.scan()
     drive(emulator, 1200, 4025 * RPM)
     measurement = shown(emulator)

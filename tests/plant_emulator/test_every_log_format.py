@@ -15,7 +15,7 @@ from plant_emulator.log import Log
 from register_maps.signals import LOG_COLUMNS
 
 # column, signal, whether it is needed: what users' files hold
-CONTRACT = [
+KNOWN = [
     ("time_s", "time", True),
     ("speed_reference_rad_s", "speed_reference", True),
     ("motor_speed_rad_s", "motor_speed", True),
@@ -52,8 +52,8 @@ def refused(tmp_path: Path) -> Callable[[str], str]:
     return says
 
 
-def test_columns_are_those_of_the_contract() -> None:
-    assert [(c.column, c.signal, c.needed) for c in LOG_COLUMNS.values()] == CONTRACT
+def test_columns_are_those_that_users_know() -> None:
+    assert [(c.column, c.signal, c.needed) for c in LOG_COLUMNS.values()] == KNOWN
 
 
 # --- reading ----------------------------------------------------------------------------------
@@ -118,7 +118,7 @@ def test_blank_lines_are_no_samples(tmp_path: Path) -> None:
 # --- refusals ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("column", [name for name, _, needed in CONTRACT if needed])
+@pytest.mark.parametrize("column", [name for name, _, needed in KNOWN if needed])
 def test_missing_needed_column_is_refused(refused: Callable[[str], str], column: str) -> None:
     said = refused(text(HEADER.replace(column, "something")))
     assert said == f"line 1: column {column} is missing; it is needed"
@@ -253,7 +253,7 @@ def test_what_is_written_is_read_again(
     steps = data.draw(st.lists(st.floats(1e-3, 10.0), min_size=count, max_size=count))
     signals = {
         signal: np.array(data.draw(st.lists(finite(500.0), min_size=count, max_size=count)))
-        for _, signal, needed in CONTRACT[1:]
+        for _, signal, needed in KNOWN[1:]
         if needed or data.draw(st.booleans())
     }
     log = Log(np.cumsum(steps), signals)
@@ -272,7 +272,7 @@ def test_what_is_written_is_read_again(
 def test_written_file_written_again_is_the_same_file(tmp_path: Path, suffix: str) -> None:
     first, second = tmp_path / f"first{suffix}", tmp_path / f"second{suffix}"
     random = np.random.default_rng(1)
-    signals = {signal: random.normal(size=9) for _, signal, _ in CONTRACT[1:]}
+    signals = {signal: random.normal(size=9) for _, signal, _ in KNOWN[1:]}
     logs.write(Log(0.01 * np.arange(9), signals), first)
     logs.write(logs.read(first), second)
     assert first.read_bytes() == second.read_bytes()
@@ -289,7 +289,7 @@ def test_independent_log_is_written_as_it_was_read(
 
 
 def test_negative_zero_is_written_as_zero(tmp_path: Path) -> None:
-    signals = {signal: np.array([-0.0, -0.0]) for _, signal, needed in CONTRACT[1:] if needed}
+    signals = {signal: np.array([-0.0, -0.0]) for _, signal, needed in KNOWN[1:] if needed}
     logs.write(Log(np.array([0.0, 1.0]), signals), tmp_path / "run.csv")
     assert "-0" not in (tmp_path / "run.csv").read_text()
 

@@ -8,8 +8,8 @@ from register_maps import load
 
 INT16 = load("bench_int16")
 FLOAT32 = load("bench_float32")
-# Contracts, section 2.
-CONTRACT = [
+# What users may type.
+KNOWN = [
     "frozen_heartbeat",
     "frozen_image",
     "late_reply",
@@ -50,11 +50,11 @@ def frame(name: str, reply: bytes = READ) -> bytes:
     return chunk.data
 
 
-def test_names_are_those_of_the_contract():
-    assert sorted(faults.NAMES) == sorted(CONTRACT)
+def test_names_are_those_that_users_know():
+    assert sorted(faults.NAMES) == sorted(KNOWN)
 
 
-@pytest.mark.parametrize("name", CONTRACT)
+@pytest.mark.parametrize("name", KNOWN)
 def test_every_name_is_understood_with_and_without_a_start(name):
     assert faults.parse(name) == Fault(name=name, start=0.0)
     assert faults.parse(f"{name}@2.5") == Fault(name=name, start=2.5)
@@ -101,7 +101,7 @@ def test_torn_image_ends_with_the_scan_before():
 
 
 def test_nan_of_a_float_map_is_in_every_measured_float_and_nowhere_else():
-    # Domain guide 5.3: floats are 108 to 126, the test constant at 138 is no measurement.
+    # In the map: floats are 108 to 126, the test constant at 138 is no measurement.
     image = shown("nan", FLOAT32)
     changed = [100 + k for k, word in enumerate(image) if word != 1000 + k]
     assert changed == list(range(108, 128))
@@ -109,7 +109,7 @@ def test_nan_of_a_float_map_is_in_every_measured_float_and_nowhere_else():
 
 
 def test_nan_of_an_integer_map_is_its_not_available():
-    # Domain guide 5.1: 8 to 17 are the int16 measurements; 28 is a constant.
+    # In the map: 8 to 17 are the int16 measurements; 28 is a constant.
     image = shown("nan")
     changed = [k for k, word in enumerate(image) if word != 1000 + k]
     assert changed == list(range(8, 18))
@@ -117,7 +117,7 @@ def test_nan_of_an_integer_map_is_its_not_available():
 
 
 def test_word_order_swaps_the_words_of_each_32_bit_value():
-    # Domain guide 5.1: T_PLC 2-3, TQ_IMPULSE 18-19, counts 20-23, TEST_U32 29-30.
+    # In the map: T_PLC 2-3, TQ_IMPULSE 18-19, counts 20-23, TEST_U32 29-30.
     image = shown("word_order")
     changed = [k for k, word in enumerate(image) if word != 1000 + k]
     assert changed == [2, 3, 18, 19, 20, 21, 22, 23, 29, 30]
@@ -164,7 +164,7 @@ def test_drop_mid_reply_sends_a_part_and_hangs_up():
 
 
 def test_only_refuse_connection_closes_the_port():
-    assert [name for name in CONTRACT if faults.refuses(frozenset({name}))] == ["refuse_connection"]
+    assert [name for name in KNOWN if faults.refuses(frozenset({name}))] == ["refuse_connection"]
 
 
 def test_faults_add_up():

@@ -9,7 +9,7 @@ from plant_emulator import parameter_sets
 from plant_emulator.errors import ParameterError
 from plant_emulator.parameters import ParameterSet, torsional_stiffness
 
-# Thesis, Table 3.1; units where the thesis is wrong as corrected in the project's trap list.
+# Thesis, Table 3.1; units corrected where the table's do not fit its equations.
 TABLE_3_1 = [
     ("armature_resistance", "R_a", 0.424, "ohm", "given"),
     ("armature_inductance", "L_a", 0.004, "H", "given"),

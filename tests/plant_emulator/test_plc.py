@@ -28,7 +28,7 @@ from tests.plant_emulator.linear_bench import BACKLASH, LinearBench
 RPM = 2 * pi / 60
 INT16 = load("bench_int16")
 FLOAT32 = load("bench_float32")
-# Where the int16 block has its registers (domain guide, section 5.2): CMD_SEQ is word 0.
+# Where the int16 block has its registers in the map: CMD_SEQ is word 0.
 HB, CTRL, MODE, SPEED_REF, SPEED_RATE, RAMP, CURRENT, WATCHDOG, VERSION = range(1, 10)
 
 
@@ -293,7 +293,7 @@ def test_current_limit_of_an_accepted_command_reaches_the_drive(running):
 
 @pytest.mark.parametrize("words", [(0x7FC0, 0), (0x7F80, 0), (0xFF80, 0), (0, 1)])
 def test_float_that_is_no_number_is_refused_at_every_place(words):
-    # NaN, both infinities, the smallest subnormal; floats of the block: domain guide 5.3
+    # NaN, both infinities, the smallest subnormal; at the floats of the command block
     for address in (196, 198, 200, 202):
         made = desk(FLOAT32)
         made.scan(2)
@@ -400,7 +400,7 @@ def test_mean_torque_is_over_exactly_the_window_of_the_speeds():
 def test_counters_count_4096_pulses_a_revolution_and_wrap(running):
     running.plc.bench.angle = 2**32 * 2 * pi / 4096 + 0.001
     words = encode_measurement(INT16, running.beat(1))
-    # MOT_COUNT, domain guide 5.1: one pulse is 1.5 mrad
+    # MOT_COUNT: one pulse is 1.5 mrad
     assert words[22:24] == (0, 0)
 
 

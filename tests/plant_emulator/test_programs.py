@@ -35,7 +35,7 @@ def test_travel_program_is_30_seconds_of_its_truck(name: str, mass: float) -> No
     assert (known.duration, known.mass) == (30.0, mass)
 
 
-def test_every_program_of_the_contract_is_there() -> None:
+def test_every_program_that_users_know_is_there() -> None:
     assert set(PROGRAMS) == {
         "program1", "program2", "program3", "program4", "program6", "program6L",
     }  # fmt: skip

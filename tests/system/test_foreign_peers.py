@@ -58,7 +58,7 @@ def test_mbpoll_reads_the_words_that_the_int16_map_says(mbpoll):
         emulator.step(41)
         read = [int(word) for word in mbpoll(emulator.port).read(0, 32)]
     measurement = decode_measurement(INT16, read)
-    # 42 scans of 10 ms; a cold start at 32 degC; domain guide 5.1 for the constants
+    # 42 scans of 10 ms; a cold start at 32 degC; the constants as the map has them
     assert (measurement.sequence_start, measurement.sequence_end) == (42, 42)
     assert measurement.plc_time == pytest.approx(0.42)
     assert measurement.shell_temperature_1 == pytest.approx(305.15)
@@ -101,7 +101,7 @@ def test_mbpoll_writes_the_command_block_and_the_plc_acts(mbpoll):
 def test_float_that_mbpoll_writes_is_the_setpoint_that_the_map_decodes(mbpoll):
     with EmulatorProcess(speed=None, map="bench_float32") as emulator:
         poll = mbpoll(emulator.port)
-        # MODE, watchdog and map version, then reference and slope: domain guide 5.3
+        # MODE, watchdog and map version, then reference and slope, as the map has them
         poll.run("-r", "195", "-t", "4", values=(4,))
         poll.run("-r", "196", "-t", "4:float", "-B", values=(104.71976, 12.5))
         read = [int(word) for word in poll.read(192, 32)]
