@@ -2,7 +2,7 @@
 
 The fields of `Measurement` and `Setpoint` are the signals. A register map says where in a PLC a
 signal lives; the log says in which column. This file knows neither. Bits and states are those of
-the bench's PLC as its register list gives them (bit and state numbers there and here are the same).
+the bench's PLC (its bit and state numbers are the ones here).
 """
 
 from dataclasses import MISSING, dataclass, fields

@@ -104,7 +104,7 @@ def test_frames_worked_out_by_hand(type_name, order, words, value):
     assert encode_value(register, value) == words
 
 
-# The whole int16 block, word by word as the register list of the bench has it.
+# The whole int16 block, word by word, written by hand.
 INT16_FRAME = (
     0x0007,  # 0 SEQ_A 7
     0x0101,  # 1 HB_PLC 257

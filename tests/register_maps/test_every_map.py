@@ -13,7 +13,7 @@ from register_maps.units import UNITS
 FOLDER = Path(register_maps.__file__).parent
 MAPS = sorted(path.stem for path in FOLDER.glob("*.toml"))
 
-# Address, name, type, value of one digit, unit: typed off the bench's register list.
+# Address, name, type, value of one digit, unit: typed by hand.
 INT16_LIST = """
 0 SEQ_A uint16 1 count
 1 HB_PLC uint16 1 count
