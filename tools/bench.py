@@ -2,10 +2,11 @@
 """How fast the emulator is, next to general solvers at the same error: a table, and bench/1.
 
 Every row is measured in this run, interleaved with what it is compared to, as CPU time, after
-everything is compiled and warm. Each solver runs at the loosest tolerance of its ladder from which
-on the error stays below the same bound: the worst channel's NRMSD on program 1 against a converged
-solution, on which the independent solver has to agree. ratio = peers / ours, and holds where it
-reaches the target; target 0: for information.
+everything is compiled and warm. Errors are the worst channel's NRMSD on program 1 against a
+converged solution, on which the independent solver has to agree. We run at the loosest tolerance
+from which on our error stays below a bound; a peer at the one where it is fastest of all at which
+it errs at most a quarter more than we do. ratio = peers / ours, and holds where it reaches the
+target; target 0: for information.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ import sys
 from dataclasses import asdict
 
 import click
-from comparisons import GROUPS, Row, Study
+from comparisons import GROUPS, Row
+from study import Study
 
 SCHEMA = "bench/1"
 

@@ -9,28 +9,25 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from math import inf
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 import numpy as np
 import peers
-from timing import Action, alone, side_by_side
+from study import ERROR_BOUND, LONG_STEP, PROGRAM, Study
+from timing import alone, side_by_side
 
-from plant_emulator import kernel, parameter_sets, programs
+from plant_emulator import kernel, parameter_sets
 from plant_emulator.bench import Bench
-from plant_emulator.integrate import CHANNELS
-from plant_emulator.log import Array, Log
-from plant_emulator.simulate import LARGEST_STEP, run_of, simulate
+from plant_emulator.simulate import LARGEST_STEP, simulate
 
-PROGRAM = "program1"
-# Worst channel's NRMSD that a solver may have [%], and how far the converged solutions may differ.
-ERROR_BOUND = 0.02
-CONVERGED, INDEPENDENT = 1e-8, 1e-6
-# Steps may pass over samples, as those of the general solvers do [s].
-LONG_STEP = 0.1
-LADDER = (1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)
+if TYPE_CHECKING:
+    from plant_emulator.log import Array
+
+# How far the converged solutions may differ.
+INDEPENDENT = 1e-6
 FIXED_STEP = 1e-3
 SCAN = 10
 TICK_BUDGET = 50e-6
@@ -76,67 +73,6 @@ def row(name: str, ours: float, peer: str, their: float, target: float, **more: 
     )
 
 
-class Study:
-    """The emulator on the program, prepared, and what its errors are measured against."""
-
-    def __init__(self) -> None:
-        program = programs.PROGRAMS[PROGRAM]
-        assert isinstance(program, programs.SpeedProgram)
-        self.time, reference = program.reference()
-        self.run = run_of(Log(self.time, {"speed_reference": reference}, PROGRAM))
-        self.duration = program.duration
-        last = program.corners[-1][1]
-        self.corners = ((0.0, program.corners[0][1]), *program.corners, (program.duration, last))
-        self.values = parameter_sets.load().values()
-
-    def raw(self, model: kernel.Kernel, tolerance: float, step: float = LONG_STEP) -> Action:
-        """The kernel's own call on inputs prepared beforehand; returns the channels."""
-        run, p = self.run, model.parameter_record(self.values)
-        stage, work = model.stage_record(), model.work()
-        out = np.zeros((len(self.time), len(CHANNELS)))
-        inputs = (run.time, run.reference, run.slope, run.corners, run.wheel_torque, run.parked)
-
-        def action() -> Array:
-            work[:] = 0.0
-            x = model.state(p, 0.0)
-            model.run(*inputs, (tolerance, step), x, work, stage, p, out)
-            return out
-
-        return action
-
-    def simulated(self, tolerance: float, largest_step: float = LONG_STEP) -> Array:
-        """The compared channels as users get them."""
-        log = simulate(self.run, self.values, tolerance=tolerance, largest_step=largest_step)
-        return np.column_stack([log[name] for name in peers.CHANNELS])
-
-    @cached_property
-    def converged(self) -> Array:
-        """The compared channels at a tolerance far below all others."""
-        return self.simulated(CONVERGED, LARGEST_STEP)
-
-    def error(self, found: Array) -> float:
-        """NRMSD of the worst channel against the converged solution [%]."""
-        rms = np.sqrt(np.mean((found - self.converged) ** 2, axis=0))
-        return float(100.0 * np.max(rms / np.ptp(self.converged, axis=0)))
-
-    def at_bound(self, solve: Callable[[float], Array]) -> tuple[float, float]:
-        """Loosest tolerance from which on every error is within the bound, and its error."""
-        found, error = 0.0, inf
-        for tolerance in reversed(LADDER):
-            now = self.error(solve(tolerance))
-            if now > ERROR_BOUND:
-                break
-            found, error = tolerance, now
-        if not found:
-            raise click.ClickException(f"no tolerance down to {LADDER[-1]:g} meets the error")
-        return found, error
-
-    @cached_property
-    def ours(self) -> tuple[float, float]:
-        """Our tolerance at the bound and its error."""
-        return self.at_bound(self.simulated)
-
-
 Rows = Iterator[Row]
 
 
@@ -145,7 +81,7 @@ def compared(
 ) -> Rows:
     """The kernel, then `simulate`, against one general solver at the same error."""
     tolerance, error = study.ours
-    theirs, their_error = study.at_bound(solve)
+    theirs, their_error = study.fastest(solve)
     label = f"{peer}, rtol {theirs:g}"
     ways = {
         name: study.raw(kernel.kernel(), tolerance),

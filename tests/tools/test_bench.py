@@ -54,6 +54,18 @@ def test_a_row_that_does_not_exist_is_refused_with_the_names_that_do() -> None:
 
 
 @pytest.mark.slow
+def test_cvodes_is_compared_where_it_errs_as_we_do() -> None:
+    pytest.importorskip("casadi")
+    found = bench("--only", "cvodes", "--json", "-")
+    rows = json.loads(found.stdout)["rows"]
+    assert [row["name"] for row in rows] == ["cvodes", "cvodes_simulate"]
+    for row in rows:
+        assert 0.0 < row["ours_error"] <= 0.015
+        assert 0.0 < row["peers_error"] <= 1.25 * row["ours_error"]
+        assert row["target"] == 8.0
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("style", ["plain", "tuned"])
 def test_scipy_on_the_thesis_equations_agrees_with_the_simulation(style: str) -> None:
     program = programs.PROGRAMS["program1"]
