@@ -12,11 +12,12 @@ NUMBA_DISABLE_JIT=1 step 3 is left out and the same functions run as they are.
 
 from __future__ import annotations
 
+import dis
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, wraps
-from types import FunctionType, ModuleType, SimpleNamespace
+from types import CodeType, FunctionType, ModuleType, SimpleNamespace
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -24,6 +25,7 @@ import numpy as np
 from plant_emulator import compiler, drive, effects, integrate, laws, plant
 from plant_emulator.errors import ParameterError
 from plant_emulator.parameters import UNITS
+from plant_emulator.trial import memory_names, raise_in_effects, try_out
 
 if TYPE_CHECKING:
     from plant_emulator.effects import Effect
@@ -99,11 +101,6 @@ def kernel(own: tuple[Effect, ...] = ()) -> Kernel:
     return build({**shipped(), **{effect.name: effect for effect in own}})
 
 
-def memory_names(known: Mapping[str, Effect]) -> list[str]:
-    """Names of all memories in the stage record, in the order of the state vector."""
-    return [f"{effect.name}_{memory}" for effect in known.values() for memory in effect.memories]
-
-
 def glue(known: Mapping[str, Effect]) -> str:
     """Source of the functions that only the list of effects determines."""
     lines: list[str] = []
@@ -126,6 +123,7 @@ def glue(known: Mapping[str, Effect]) -> str:
 
 def build(known: Mapping[str, Effect]) -> Kernel:
     """Chain, bind and compile; see the module's text."""
+    try_out(known)
     own = (*(str(module.__file__) for module in MODULES), __file__, compiler.__file__)
     compiler.use_cache([*own, *(effect.file for effect in known.values())], list(known))
     compiled: dict[Function, Function] = {}
@@ -154,21 +152,28 @@ def build(known: Mapping[str, Effect]) -> Kernel:
         effects=known,
         parameters=(*UNITS, *effects.neutral(known)),
         stage=(*plant.STAGE, *memory_names(known)),
-        run=by_arrays(compiled[integrate.run]),
-        advance=by_arrays(compiled[integrate.advance]),
+        run=by_arrays(compiled[integrate.run], known),
+        advance=by_arrays(compiled[integrate.advance], known),
         starts=tuple(m.start for e in known.values() for m in e.memories.values()),
     )
 
 
-def by_arrays(function: Function) -> Function:
-    """Give a compiled function the arrays that its records stand in: taken up ten times faster."""
-    if not compiler.ENABLED:
-        return function
+def by_arrays(function: Function, known: Mapping[str, Effect]) -> Function:
+    """Give a compiled function the arrays that its records stand in: taken up ten times faster.
+
+    Where an effect is at fault, also for what the compiler finds, the error names file and line.
+    """
 
     @wraps(function, updated=())
     def call(*arguments: Any) -> Any:
         *others, stage, p, out = arguments
-        return function(*others, stage.base, p.base, out)
+        if compiler.ENABLED:
+            stage, p = stage.base, p.base
+        try:
+            return function(*others, stage, p, out)
+        except Exception as error:
+            raise_in_effects(error, known)
+            raise
 
     return call
 
@@ -182,18 +187,35 @@ def own_functions(module: ModuleType) -> list[Function]:
     ]
 
 
-def bind(function: Function, compiled: dict[Function, Function]) -> Function:
+def bind(
+    function: Function, compiled: dict[Function, Function], callers: tuple[Function, ...] = ()
+) -> Function:
     """Compile a function whose callees are those already compiled; compiled once."""
-    if function not in compiled:
-        assert isinstance(function, FunctionType)
-        names = dict(function.__globals__)
-        for name in function.__code__.co_names:
-            callee = names.get(name)
-            if isinstance(callee, FunctionType):
-                names[name] = compiled.get(callee) or bind(callee, compiled)
-        bound = FunctionType(function.__code__, names, function.__name__)
-        # numba's cache imports the module by its name; that of a user's effect file has none.
-        bound.__module__ = function.__module__ if function.__module__ in sys.modules else __name__
-        cached = function in (integrate.run, integrate.advance)
-        compiled[function] = compiler.compiled(bound, on_disk=cached)
+    if function in compiled:
+        return compiled[function]
+    assert isinstance(function, FunctionType)
+    code, names = function.__code__, dict(function.__globals__)
+    if function in callers:
+        raise ParameterError(
+            f"{code.co_filename}:{code.co_firstlineno}: {function.__name__} calls itself; "
+            "functions without recursion are needed"
+        )
+    for name in global_names(code):
+        if isinstance(callee := function.__globals__.get(name), FunctionType):
+            names[name] = bind(callee, compiled, (*callers, function))
+    bound = FunctionType(code, names, function.__name__)
+    # numba's cache imports the module by its name; that of a user's effect file has none.
+    bound.__module__ = function.__module__ if function.__module__ in sys.modules else __name__
+    cached = function in (integrate.run, integrate.advance)
+    compiled[function] = compiler.compiled(bound, on_disk=cached)
     return compiled[function]
+
+
+def global_names(code: CodeType) -> Iterator[str]:
+    """Names that a function looks up in its module, but not those of attributes."""
+    for instruction in dis.get_instructions(code):
+        if instruction.opname == "LOAD_GLOBAL":
+            yield instruction.argval
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from global_names(constant)

@@ -2,7 +2,7 @@
 
 An effect is a module with
 
-    SUBSYSTEM    where it sits (contracts: drive, motor, motor_shaft, gear, ...)
+    SUBSYSTEM    where it sits: drive, motor, motor_shaft, gear, ...
     PARAMETERS   name -> EffectParameter; all at their neutral values = the effect is not there
     MEMORIES     name -> Memory, if it remembers anything (a lag, a temperature)
     and one function for each law of `plant_emulator.laws` that it changes, of the law's name:
@@ -22,7 +22,7 @@ import pkgutil
 from typing import TYPE_CHECKING
 
 from plant_emulator.effects.declaration import Effect, EffectParameter, Memory, effect_of
-from plant_emulator.errors import ParameterError
+from plant_emulator.errors import ParameterError, place_in
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -46,12 +46,15 @@ def load(name: str) -> Effect:
 
 
 def from_file(path: Path) -> Effect:
-    """A user's own effect; its name is the file's."""
+    """A user's own effect; its name is the file's. A fault in it is told by file and line."""
     spec = importlib.util.spec_from_file_location(path.stem, path)
     if spec is None or spec.loader is None or not path.is_file():
         raise ParameterError(f"{path}: no Python file with an effect")
     module: ModuleType = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise ParameterError(place_in([str(path)], error) or f"{path}: {error}") from error
     return effect_of(path.stem, module)
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite
-from typing import TYPE_CHECKING
+from types import FunctionType
+from typing import TYPE_CHECKING, Any
 
 from plant_emulator import laws
 from plant_emulator.errors import ParameterError
@@ -75,7 +76,7 @@ class Effect:
 
 
 def effect_of(name: str, module: ModuleType) -> Effect:
-    """The effect that a module declares; ParameterError names what is missing."""
+    """The effect that a module declares; ParameterError names what is missing or wrong."""
     for needed in ("SUBSYSTEM", "PARAMETERS"):
         if not hasattr(module, needed):
             raise ParameterError(f"effect {name}: {module.__file__} declares no {needed}")
@@ -83,6 +84,13 @@ def effect_of(name: str, module: ModuleType) -> Effect:
     changed = {key: function for key, function in own.items() if function is not None}
     if not changed:
         raise ParameterError(f"effect {name}: {module.__file__} changes no law of the bench")
+    for key, function in changed.items():
+        if not isinstance(function, FunctionType) or function.__code__.co_argcount != 3:
+            raise ParameterError(
+                f"effect {name}: {module.__file__}: {key} is no function of (value, s, p)"
+            )
+    _check_table(name, module, "PARAMETERS", EffectParameter)
+    _check_table(name, module, "MEMORIES", Memory)
     return Effect(
         name=name,
         subsystem=module.SUBSYSTEM,
@@ -92,3 +100,12 @@ def effect_of(name: str, module: ModuleType) -> Effect:
         laws=changed,
         file=str(module.__file__),
     )
+
+
+def _check_table(name: str, module: ModuleType, table: str, kind: type) -> None:
+    """Refuse a table that is no mapping of names to such records."""
+    found: Any = getattr(module, table, {})
+    if not isinstance(found, dict) or not all(isinstance(one, kind) for one in found.values()):
+        raise ParameterError(
+            f"effect {name}: {module.__file__}: {table} is no dict of names to {kind.__name__}"
+        )

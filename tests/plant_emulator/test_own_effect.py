@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from plant_emulator import effects
+from plant_emulator import compiler, effects, parameter_sets
 from plant_emulator.errors import ParameterError
+from plant_emulator.kernel import build
+from tests.plant_emulator.runs import linear, simulate
 
 ROOT = Path(__file__).parents[2]
 OIL_DRAG = '''"""Drag of the gear that rises with its speed: T = k omega_g. Source: a test."""
@@ -131,3 +133,113 @@ def test_simulation_that_has_no_solution_is_refused_not_returned(tmp_path: Path)
     )
     assert result.returncode != 0
     assert "implicit stages did not settle" in result.stderr
+
+
+# --- a file with a mistake --------------------------------------------------------------------
+
+FORCE = OIL_DRAG.replace("factor * speed", "BODY").replace("oil_drag", "own")
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "own.py"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "said"),
+    [
+        ("def drag(factor, speed):", "def drag(factor, speed)", 13, "expected ':'"),
+        ("neutral=0.0", "neutral=1/0", 8, "ZeroDivisionError: division by zero"),
+        ("neutral=0.0, ", "", 7, "TypeError: .*missing.*'neutral'"),
+        ("import EffectParameter", "import EffectParametre", 3, "ImportError: .*EffectParametre"),
+    ],
+)
+def test_mistake_in_the_file_is_told_with_its_line(
+    tmp_path: Path, old: str, new: str, line: int, said: str
+) -> None:
+    path = written(tmp_path, FORCE.replace(old, new))
+    with pytest.raises(ParameterError, match=rf"^{path}:{line}: {said}"):
+        effects.from_file(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("gear_torque = 3.0", r"gear_torque is no function of \(value, s, p\)"),
+        (
+            "def gear_torque(value, s):\n    return value",
+            r"gear_torque is no function of \(value, s, p\)",
+        ),
+        ("PARAMETERS['other'] = 1.0", "PARAMETERS is no dict of names to EffectParameter"),
+        ("MEMORIES = ['oil']", "MEMORIES is no dict of names to Memory"),
+    ],
+)
+def test_declaration_of_a_wrong_kind_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    path = written(tmp_path, f"{FORCE}\n\n{text}\n")
+    with pytest.raises(ParameterError, match=rf"effect own: {path}: {said}"):
+        effects.from_file(path)
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("p.own_fcator", "14: NameError: name 'p' is not defined"),
+        ("factor.speed", "14: AttributeError: 'float' object has no attribute 'speed'"),
+        ("'much'", "18: TypeError: .*'str'"),
+        ("drag(factor, 0.5 * speed)", "14: RecursionError"),
+        ("0.0 if speed == 0.0 else drag(factor, speed)", "13: drag calls itself"),
+    ],
+)
+def test_mistake_in_a_law_is_told_with_its_line(tmp_path: Path, body: str, said: str) -> None:
+    path = written(tmp_path, FORCE.replace("BODY", body))
+    own = effects.from_file(path)
+    with pytest.raises(ParameterError, match=rf"^{path}:{said}"):
+        build({"own": own})
+
+
+def test_misspelt_parameter_is_told_with_its_line(tmp_path: Path) -> None:
+    path = written(tmp_path, FORCE.replace("p.own_factor", "p.own_fcator"))
+    own = effects.from_file(path)
+    with pytest.raises(ParameterError, match=rf"^{path}:18: .*no attribute 'own_fcator'"):
+        build({"own": own})
+
+
+def test_law_without_a_number_is_refused(tmp_path: Path) -> None:
+    path = written(tmp_path, FORCE.replace("BODY", "0.0").replace("return value +", "value +"))
+    own = effects.from_file(path)
+    with pytest.raises(ParameterError, match=rf"^{path}:17: gear_torque gives no number"):
+        build({"own": own})
+
+
+ONLY_MOVING = "0.0 if speed == 0.0 else"
+
+
+def test_mistake_that_only_the_compiler_finds_is_told_with_its_line(tmp_path: Path) -> None:
+    path = written(tmp_path, FORCE.replace("BODY", f"{ONLY_MOVING} factor.speed"))
+    model = build({"own": effects.from_file(path)})
+    with pytest.raises(ParameterError, match=rf"^{path}:14: Unknown attribute 'speed'"):
+        simulate(linear((0.0, 0.0), duration=0.1), parameter_sets.load().values(), kernel=model)
+
+
+def test_mistake_met_during_a_run_is_told_with_its_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compiler, "ENABLED", False)
+    path = written(tmp_path, FORCE.replace("BODY", f"{ONLY_MOVING} factor.speed"))
+    model = build({"own": effects.from_file(path)})
+    inputs = linear((0.0, 0.0), (0.5, 50.0), duration=0.5)
+    with pytest.raises(ParameterError, match=rf"^{path}:14: AttributeError"):
+        simulate(inputs, parameter_sets.load().values(), kernel=model)
+
+
+def test_function_may_bear_the_name_of_a_field_that_it_reads(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """s.gear_torque is the stage's, whatever functions of that name the file has."""
+    monkeypatch.setattr(compiler, "ENABLED", False)
+    text = FORCE.replace("BODY", "factor * speed").replace("value +", "value + 0 * s.gear_torque +")
+    model = build({"own": effects.from_file(written(tmp_path, text))})
+    inputs = linear((0.0, 0.0), (0.5, 50.0), duration=0.5)
+    log = simulate(inputs, {**parameter_sets.load().values(), "own_factor": 5.0}, kernel=model)
+    assert log["motor_speed"][-1] > 10.0
