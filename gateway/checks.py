@@ -54,7 +54,7 @@ def _alarm(measurement: Measurement, *, running: bool) -> Reason | None:
         return Reason.PLC_FAULT
     if Alarm.SETPOINT_REJECTED in alarm:
         return Reason.SETPOINT_REJECTED if running else Reason.MAP_VERSION
-    if alarm & ~(Alarm(0) if running else OF_SILENCE):
+    if alarm & ~OF_SILENCE or (running and alarm):
         return Reason.PLC_ALARM
     return None
 

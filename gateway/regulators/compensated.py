@@ -21,8 +21,8 @@ from gateway.regulators.window import Demand, Window
 from gateway.road_load import RoadLoad, road_load
 
 SLOW = 0.5
-"""[rad/s] of the drum, up to which the friction may be compensated less. In cruise 1 % of the friction
-is 3 % of the truck's force."""
+"""[rad/s] of the drum, up to which the friction may be compensated less. In cruise 1 % of the
+friction is 3 % of the truck's force."""
 START_SPEED = 0.01
 """[rad/s] of the drum, with which a standing truck is taken to have started."""
 STICK_SPEED = 0.005
@@ -98,9 +98,9 @@ def update(params: Params, state: State, window: Window) -> tuple[State, Demand]
     acceleration = (speed - state.virtual_speed) / window.duration if state.moving else 0.0
     trim = _bounded(params.trim * (speed - window.drum_speed), TRIM_MOST)
     wanted = params.gear_ratio * (speed + params.lead * acceleration + trim)
-    within = 0.0 <= wanted <= params.speed_max
-    rate = params.gear_ratio * acceleration if within else 0.0
-    return after, Demand(speed=min(max(wanted, 0.0), params.speed_max), rate=rate)
+    demanded = min(max(wanted, 0.0), params.speed_max)
+    rate = params.gear_ratio * acceleration if demanded == wanted else 0.0
+    return after, Demand(speed=demanded, rate=rate)
 
 
 def follow(params: Params, state: State, demand: float, setpoint: float) -> State:

@@ -145,3 +145,118 @@ def test_seeding_is_bumpless_up_to_the_bound_of_the_trim_and_beyond(ahead, trimm
     params = replace(PARAMS, trim=0.5)
     state = compensated.seed(params, 62.6 * 4.0, 4.0 - ahead)
     assert state.virtual_speed == pytest.approx(4.0 - trimmed)
+
+
+def test_seeding_a_standing_bench_stands_however_the_drum_swings():
+    state = compensated.seed(PARAMS, 0.0, -2.0)
+    assert state == compensated.State(virtual_speed=0.0, moving=False)
+
+
+DIRECT = replace(PARAMS, gear_ratio=1.0)
+"""Motor and gear are one, so that a speed can lie exactly on an edge."""
+
+
+@pytest.mark.parametrize(("speed", "moving"), [(0.01, False), (0.0101, True)])
+def test_a_bench_that_turns_faster_than_a_start_is_seeded_as_moving(speed, moving):
+    assert compensated.seed(DIRECT, speed, speed).moving is moving
+
+
+@pytest.mark.parametrize(("speed", "sticks"), [(0.0049, True), (0.005, False), (-0.005, False)])
+def test_a_gear_sticks_below_five_thousandths(speed, sticks):
+    seen = compensated.truck_torque(DIRECT, window(torque=1.0, motor=speed))
+    assert (seen == 0.0) is sticks
+
+
+def test_a_share_left_out_at_standstill_counts_only_where_it_is_the_greater():
+    params = replace(PARAMS, under_compensation=0.01, under_compensation_slow=0.003)
+    whole = friction_torque(0.01, params.friction)
+    seen = compensated.truck_torque(params, window(motor=0.626))
+    assert 1.0 - seen / whole == pytest.approx(0.01)
+
+
+def of_road(**newtons):
+    """Parameters with that road load, without margin, lead or trim."""
+    values = {"f0_N": "0", "f1_N_per_m_s": "0", "f2_N_per_m2_s2": "0"} | newtons
+    changed = {f"truck.{key}": value for key, value in values.items()}
+    changed |= {"regulator.breakaway_Nm": "0", "regulator.lead_s": "0", "regulator.trim": "0"}
+    return compensated.Params.of(Config().with_values(changed))
+
+
+@pytest.mark.parametrize(("speed", "force"), [(2.0, 481.141), (0.2, 406.61641), (0.0, 400.0)])
+def test_the_road_slows_the_virtual_truck_by_its_speed(speed, force):
+    """400 + 50 v + 10 v^2 with v = 0.645 x speed; the truck pushes with 1000 N m, motor at rest."""
+    params = of_road(f0_N="400", f1_N_per_m_s="50", f2_N_per_m2_s2="10")
+    state = compensated.State(virtual_speed=speed, moving=True)
+    pushed = window(torque=(1000.0 + 35.989) / 62.6)
+    after, demand = compensated.update(params, state, pushed)
+    gained = (1000.0 - 0.645 * force) / INERTIA * 0.01
+    assert after.virtual_speed - speed == pytest.approx(gained, rel=1e-6)
+    assert demand.rate == pytest.approx(62.6 * gained / 0.01, rel=1e-6)
+
+
+def test_a_truck_that_comes_to_rest_stands():
+    state = compensated.State(virtual_speed=0.001, moving=True)
+    after, demand = compensated.update(PARAMS, state, window(drum=0.1, change=-0.01))
+    assert after == compensated.State(virtual_speed=0.0, moving=False)
+    assert (demand.speed, demand.rate) == (0.0, 0.0)
+
+
+def test_what_holds_a_standing_truck_back_earns_no_debt():
+    state = compensated.State(virtual_speed=0.0, moving=False)
+    after, _ = compensated.update(PARAMS, state, window(torque=-40.0))
+    assert after == state
+
+
+def test_a_truck_without_speed_does_not_move():
+    before = compensated.State(virtual_speed=0.0, moving=True)
+    after, _ = compensated.update(of_road(), before, window())
+    assert not after.moving
+
+
+@pytest.mark.parametrize(("earned", "moving"), [(0.01, False), (0.0101, True)])
+def test_a_start_has_to_be_earned_in_full(earned, moving):
+    before = compensated.State(virtual_speed=earned, moving=False)
+    after, _ = compensated.update(of_road(), before, window())
+    assert after.moving is moving
+
+
+def test_at_its_start_a_truck_has_the_speed_it_earned_and_no_lead_yet():
+    before = compensated.State(virtual_speed=0.02, moving=False)
+    params = replace(of_road(), lead=0.085)
+    after, demand = compensated.update(params, before, window(torque=(100.0 + 35.989) / 62.6))
+    assert after.virtual_speed == pytest.approx(0.02 + 100.0 / INERTIA * 0.01)
+    assert demand.speed == pytest.approx(62.6 * after.virtual_speed)
+    assert demand.rate == 0.0
+
+
+def test_the_virtual_truck_goes_no_faster_than_the_bench():
+    """4830 rpm = 505.796 rad/s of the motor = 8.0798 rad/s of the drum."""
+    before = compensated.State(virtual_speed=8.07, moving=True)
+    pushed = window(torque=200.0, motor=505.0, drum=8.07)
+    after, demand = compensated.update(of_road(), before, pushed)
+    assert after.virtual_speed == pytest.approx(8.0798, abs=1e-4)
+    assert demand.speed == pytest.approx(505.796, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("drum", "speed", "slopes"), [(2.0, 0.0, False), (0.01, 0.626, True), (-20.0, 0.626, True)]
+)
+def test_a_demand_has_its_slope_only_inside_the_range_of_the_bench(drum, speed, slopes):
+    """Virtual truck at 0.01: a drum far ahead trims it to -1.59, bounded to 0, and takes 0.8."""
+    params = replace(of_road(), trim=0.8)
+    state = compensated.State(virtual_speed=0.01, moving=True)
+    pushed = window(torque=(10.0 + 35.989) / 62.6, drum=drum)
+    _, demand = compensated.update(params, state, pushed)
+    trimmed = 62.6 * 0.8 if drum < 0.0 else 0.0
+    assert demand.speed == pytest.approx(speed + trimmed, abs=0.01)
+    assert (demand.rate == pytest.approx(62.6 * 10.0 / INERTIA)) is slopes
+    assert slopes or (demand.speed, demand.rate) == (0.0, 0.0)
+
+
+def test_following_a_limit_stops_the_virtual_truck_at_standstill_and_not_before():
+    state = compensated.State(virtual_speed=3.0, moving=True)
+    params = of_road()
+    assert compensated.follow(params, state, 62.6 * 3.0, 62.6 * 0.5).virtual_speed == (
+        pytest.approx(0.5)
+    )
+    assert compensated.follow(params, state, 62.6 * 9.0, 0.0).virtual_speed == 0.0

@@ -102,7 +102,9 @@ def test_shell_temperature_is_the_mean_of_the_thermocouples_that_work(first, sec
 
 def test_before_the_first_sample_there_is_nothing():
     assert samples.complaint(Samples(), 0.0, 0.1) is Reason.STALE
+    assert (Samples().heartbeat_moved, Samples().sequence_moved) == (-inf, -inf)
     assert Samples().age(0.0) == inf
+    assert not Samples().is_new
     assert samples.window(Config(), MAP, after(FIRST)) is None
 
 
@@ -138,3 +140,26 @@ def test_it_is_told_which_of_heartbeat_and_sequence_stands_still(moving, reason)
     later = replace(FIRST, **{moving: 8})
     later = replace(later, sequence_end=later.sequence_start)
     assert samples.complaint(after(FIRST, later), 100.105, 0.1) is reason
+
+
+def test_a_sample_of_exactly_the_stale_age_is_still_fresh():
+    seen = after(FIRST, begin=0.0)
+    assert samples.complaint(seen, 0.1, 0.1) is None
+
+
+def test_of_an_image_that_stands_still_altogether_the_heartbeat_is_named():
+    assert samples.complaint(after(FIRST), 100.2, 0.1) is Reason.HEARTBEAT_FROZEN
+
+
+TORN = replace(LATER, sequence_end=9)
+
+
+@pytest.mark.parametrize("reading", [Reason.TIMEOUT, TORN])
+def test_a_lost_or_torn_reading_is_no_news(reading):
+    seen = after(FIRST, LATER, reading)
+    assert not seen.is_new
+    assert samples.window(Config(), MAP, seen) is None
+
+
+def test_a_torn_image_shows_that_the_link_is_back():
+    assert not after(FIRST, Reason.CONNECTION_LOST, TORN).down

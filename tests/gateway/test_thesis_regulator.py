@@ -73,3 +73,43 @@ def test_rho_is_the_share_of_drum_and_gear_in_the_emulated_inertia():
     ):
         config = Config().with_values({"truck.mass_kg": str(mass)})
         assert thesis.Params.of(config).rho == pytest.approx(rho, rel=0.005)
+
+
+def grown(grade, **seen):
+    """Change of the integral over one window, from a seed at 200 rad/s of the motor."""
+    params = thesis.Params.of(Config().with_values({"truck.grade_percent": str(grade)}))
+    state = thesis.seed(params, 200.0, 0.0)
+    given = {"shaft_torque": 0.0, "motor_speed": 200.0, "drum_speed": 0.0, "drum_speed_change": 0.0}
+    after, _ = thesis.update(params, state, Window(duration=0.01, **(given | seen)))
+    return after.integral - state.integral
+
+
+INERTIA = 3640.0 * 0.645**2
+
+
+@pytest.mark.parametrize("drum_speed", [3.0, 1.0, -1.0])
+def test_a_grade_pulls_the_rolling_truck_back_and_its_descent_on(drum_speed):
+    """m g sin(atan 0.05) r_d = 1150.16 N m of gravity, whichever way the truck rolls."""
+    gravity = 3640.0 * 9.81 * 0.0499376 * 0.645
+    up, down = grown(5.0, drum_speed=drum_speed), grown(-5.0, drum_speed=drum_speed)
+    assert up - down == pytest.approx(-2.0 * gravity / INERTIA * 0.01, rel=1e-5)
+
+
+@pytest.mark.parametrize("grade", [0.0, 5.0])
+@pytest.mark.parametrize("change", [0.01, 1.0, -1.0])
+def test_at_the_instant_of_standstill_friction_and_road_vanish(grade, change):
+    """sgn(0) = 0, and gravity is held by the brake: 15 N m at the sensor are 939 at the drum."""
+    passing = grown(grade, shaft_torque=15.0, drum_speed_change=change)
+    assert passing == pytest.approx(939.0 / INERTIA * 0.01)
+
+
+@pytest.mark.parametrize("shaft_torque", [15.0, -15.0])
+def test_a_drum_that_stands_moves_no_truck_however_the_shaft_is_wound(shaft_torque):
+    assert grown(5.0, shaft_torque=shaft_torque) == 0.0
+
+
+@pytest.mark.parametrize("drum_speed", [1.0, -1.0])
+def test_a_drum_that_turns_evenly_does_not_stand(drum_speed):
+    wound = grown(0.0, drum_speed=drum_speed, shaft_torque=15.0)
+    plain = grown(0.0, drum_speed=drum_speed)
+    assert wound - plain == pytest.approx(939.0 / INERTIA * 0.01)
