@@ -1,6 +1,6 @@
 """The demo as a user calls it: the bench in its own process, the gateway, a real socket.
 
-Figures are the project's acceptance limits. The fast runs use the same loop, server and socket and
+Figures are limits that every run has to keep. The fast runs use the same loop, server and socket and
 no clock; the others keep real time.
 """
 
