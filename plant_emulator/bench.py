@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.errors import EmulatorError
+from plant_emulator.errors import EmulatorError, UnsettledError
 from plant_emulator.integrate import CHANNELS
 from plant_emulator.kernel import Kernel, vector
 from plant_emulator.kernel import kernel as default_kernel
@@ -88,6 +88,11 @@ class Bench:
         """Time since the start [s]."""
         return float(self._stage.time)
 
+    @property
+    def unsettled(self) -> int:
+        """Implicit stages so far whose equations were not solved: what follows is not the model."""
+        return int(self._stage.unsettled)
+
     def advance(
         self, references: Sequence[float], *, wheel_torque: float = 0.0, brake_torque: float = 0.0
     ) -> BenchSamples:
@@ -117,6 +122,8 @@ class Bench:
                 f"of 0 to {self._longest_dead_time:.4g} s, which the running bench remembers"
             )
         sums = out.sum(axis=0).tolist()
+        if not isfinite(sum(sums)):
+            raise UnsettledError(f"bench at {self.time:g} s: its state is not finite any more")
         self._motor_angle += sums[MOTOR_SPEED] * self._step
         self._drum_angle += sums[DRUM_SPEED] * self._step
         return BenchSamples(

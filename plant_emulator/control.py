@@ -4,7 +4,8 @@
     {"do": "interlock", "open": ["GUARD"]}   exactly these are open (names of Interlock)
     {"do": "faults", "names": ["nan@2.5"]}   exactly these faults, from now or from a PLC time on
     {"do": "step", "scans": 10}              scan so many times (an emulator that is only stepped)
-    {"do": "status"}                         PLC time, state, alarms, last refusal, speeds, pace
+    {"do": "status"}                         PLC time, state, alarms, last refusal, speeds, pace,
+                                             stages of the bench that did not settle
     {"do": "log"}                            what was logged so far, SI, one list a signal
     {"do": "stop"}                           end, as SIGTERM does
 
@@ -92,6 +93,7 @@ class Control:
             "speed_reference": plc.reference,
             "motor_speed": float(plc.samples.motor_speed[-1]),
             "drum_speed": float(plc.samples.drum_speed[-1]),
+            "unsettled": plc.bench.unsettled,
             "pace": asdict(self.pace.report()) if self.pace else None,
         }
 

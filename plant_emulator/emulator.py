@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,8 @@ from plant_emulator.plc import STEPS, Plc
 from plant_emulator.plc_surroundings import Backlash, Switches, Truck
 from plant_emulator.server import PlcServer
 from register_maps import load
-from register_maps.codec import encode_measurement
+from register_maps.codec import CodecError, encode_measurement
+from register_maps.register_map import Register, RegisterMap
 from register_maps.signals import Measurement
 
 LOGGED = (
@@ -90,7 +92,7 @@ class Emulator:
 
     def _show(self, measurement: Measurement) -> None:
         register_map = self.server.register_map
-        fresh = encode_measurement(register_map, measurement)
+        fresh = words_of(register_map, measurement)
         names = faults.active(self.faults, self.plc.time)
         shown = self.server.image
         self.server.image = (
@@ -133,6 +135,35 @@ class Emulator:
     def write_log(self, path: Path) -> None:
         """Write it to a file, in the format of the file's name."""
         logs.write(self.log(), path)
+
+
+def words_of(register_map: RegisterMap, measurement: Measurement) -> tuple[int, ...]:
+    """Words of the measurement block, also where a value does not fit its register.
+
+    A scan that never ends is no behaviour of a PLC: what its register cannot hold is shown as not
+    available, since an end of the range would be taken for a measurement. Where the map has no
+    such mark the register stays at its end, as the PLC's own conversion does.
+    """
+    try:
+        return encode_measurement(register_map, measurement)
+    except CodecError:
+        fitting: dict[str, Any] = {
+            register.signal: _shown(register, value)
+            for register in register_map.registers
+            if isinstance(value := getattr(measurement, register.signal, None), float)
+        }
+        return encode_measurement(register_map, replace(measurement, **fitting))
+
+
+def _shown(register: Register, value: float) -> float | None:
+    """The value as far as the register can hold it; None: not available."""
+    raw = (register.si_unit.from_si(value) - register.offset) / register.scale
+    if register.wraps or register.raw.low - 0.5 < raw < register.raw.high + 0.5:
+        return value
+    if register.not_available is not None:
+        return None
+    end = register.raw.high if raw > 0.0 else register.raw.low
+    return register.si_unit.to_si(end * register.scale + register.offset)
 
 
 def build(options: Options) -> Emulator:

@@ -17,6 +17,10 @@ PARKING_TORQUE = 300.0
 class Bench(Protocol):
     """Anything that runs under speed references [rad/s], one for each sub-step of 1 ms."""
 
+    @property
+    def unsettled(self) -> int:
+        """Steps so far whose equations were not solved."""
+
     def advance(
         self, references: Sequence[float], *, wheel_torque: float = 0.0, brake_torque: float = 0.0
     ) -> BenchSamples:

@@ -93,7 +93,14 @@ async def serve(options: Options, announce: Callable[[str], None], *, control: b
         emulator.write_log(options.log)
     if run.failure is not None:
         raise run.failure
-    return f"{run.pace.report()}, {policy}" if run.pace else f"{emulator.plc.scans} scans"
+    said = f"{run.pace.report()}, {policy}" if run.pace else f"{emulator.plc.scans} scans"
+    return said + unsettled_text(emulator)
+
+
+def unsettled_text(emulator: Emulator) -> str:
+    """What is wrong with the bench itself, in words; nothing as a rule."""
+    stages = emulator.plc.bench.unsettled
+    return f", {stages} IMPLICIT STAGES OF THE BENCH DID NOT SETTLE" if stages else ""
 
 
 def _ask_for_real_time(speed: float | None) -> str:
@@ -139,6 +146,8 @@ async def _show(pace: Pace, emulator: Emulator) -> None:
     while True:
         await asyncio.sleep(LIVE_EVERY)
         plc = emulator.plc
-        line = f"t {plc.time:8.1f} s  {plc.state.name:<9}  {pace.report()}"
+        line = (
+            f"t {plc.time:8.1f} s  {plc.state.name:<9}{unsettled_text(emulator)}  {pace.report()}"
+        )
         sys.stderr.write(f"\r\x1b[K{line[:150]}")
         sys.stderr.flush()

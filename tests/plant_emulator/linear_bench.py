@@ -23,6 +23,7 @@ class LinearBench:
         self.wheel: list[tuple[float, float]] = []
         self.current_limit = 72.0
         self.push = 0.0
+        self.unsettled = 0
         self.angle = 0.0
 
     def limit_current(self, limit: float) -> None:

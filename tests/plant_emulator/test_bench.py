@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from plant_emulator.bench import Bench
-from plant_emulator.errors import EmulatorError, ParameterError
+from plant_emulator.errors import EmulatorError, ParameterError, UnsettledError
 from plant_emulator.kernel import Kernel
 from plant_emulator.parameters import ParameterSet
 from tests.plant_emulator.runs import linear, simulate
@@ -132,3 +132,33 @@ def test_dead_time_that_the_running_bench_does_not_remember_is_refused(
 ) -> None:
     with pytest.raises(EmulatorError, match=r"at 0 s: .* dead time.* outside of 0 to 0\.56"):
         arrival(model_with(LONGER), nominal, longer)
+
+
+# --- equations without a solution ---------------------------------------------------------------
+
+CONTRADICTION = """
+def gear_torque(value, s, p):
+    return value + (p.own_size if s.gear_speed > 0.1 else 0.0)
+"""
+
+
+def test_stages_that_do_not_settle_are_counted(
+    nominal: ParameterSet, model_with: Callable[[str], Kernel]
+) -> None:
+    """A torque that is there only while the gear turns without it."""
+    model = model_with(CONTRADICTION)
+    solved = Bench(nominal, {"own": {"size": 0.0}}, kernel=model)
+    unsolved = Bench(nominal, {"own": {"size": 1e7}}, kernel=model)
+    for bench in (solved, unsolved):
+        bench.advance(references(20.0, 300))
+    assert solved.unsettled == 0
+    assert unsolved.unsettled > 0
+
+
+def test_bench_that_is_not_finite_any_more_is_refused(
+    nominal: ParameterSet, model_with: Callable[[str], Kernel]
+) -> None:
+    model = model_with("def resistance(value, s, p):\n    return value + p.own_size * float('nan')")
+    bench = Bench(nominal, {"own": {"size": 1.0}}, kernel=model)
+    with pytest.raises(UnsettledError, match=r"bench at .* not finite"):
+        bench.advance(references(20.0, 300))

@@ -1,6 +1,8 @@
 """The emulator put together: the real bench under the PLC, stepped without a clock."""
 
 import json
+import struct
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -8,11 +10,17 @@ import pytest
 
 from plant_emulator import logs
 from plant_emulator.control import Control as Channel
-from plant_emulator.emulator import Emulator, Options, build
+from plant_emulator.emulator import Emulator, Options, build, words_of
 from plant_emulator.faults import FaultError
+from plant_emulator.plc import Plc
+from plant_emulator.plc_surroundings import CLOSED
+from plant_emulator.server import PlcServer
+from plant_emulator.serving import unsettled_text
+from register_maps import load
 from register_maps.codec import decode_measurement, encode_setpoint
 from register_maps.register_map import MapError
 from register_maps.signals import Alarm, Control, Measurement, Mode, PlcState, Setpoint, Status
+from tests.plant_emulator.linear_bench import BACKLASH, LinearBench
 
 RPM = 2 * pi / 60
 
@@ -205,3 +213,90 @@ def test_interlocks_open_and_close_on_request(emulator):
     # GUARD is bit 1, FAN bit 2 of the six
     assert shown(emulator).interlock == 0b111001
     assert json.loads(channel.answer('{"do": "status"}'))["ok"]["state"] == "FAULT"
+
+
+# --- what does not fit, and what is not solved --------------------------------------------------
+
+
+@pytest.fixture(params=["bench_int16", "bench_float32"])
+def spiking(request):
+    """An emulator of a bench without physics, and that bench; `push` is added to its speed."""
+    bench = LinearBench()
+    plc = Plc(bench, load(request.param), backlash=BACKLASH)
+    made = Emulator(plc, PlcServer(plc.register_map, "127.0.0.1", 0))
+    made.scan()
+    return made, bench
+
+
+def raw(emulator: Emulator, signal: str) -> bytes:
+    register_map = emulator.server.register_map
+    register = register_map.register(signal)
+    assert register is not None
+    first = register.address - register_map.measurement.start
+    words = emulator.server.image[first : first + register.raw.words]
+    return b"".join(word.to_bytes(2, "big") for word in words)
+
+
+@pytest.mark.parametrize("push", [1e6, -1e6])
+def test_spike_that_its_register_cannot_hold_is_shown_as_not_available(spiking, push):
+    """int16: 0x8000. A float32 holds it: the reader judges."""
+    emulator, bench = spiking
+    bench.push = push
+    emulator.scan()
+    if emulator.server.register_map.name == "bench_int16":
+        assert raw(emulator, "motor_speed") == b"\x80\x00"
+        assert raw(emulator, "drum_speed") == b"\x80\x00"
+    else:
+        (shown_speed,) = struct.unpack(">f", raw(emulator, "motor_speed"))
+        assert abs(shown_speed) > 1e5
+        assert (shown_speed > 0) == (push > 0)
+
+
+def test_what_fits_is_shown_beside_a_spike_and_the_next_scan_is_whole_again(spiking):
+    emulator, bench = spiking
+    bench.push = 1e6
+    emulator.scan()
+    beside = raw(emulator, "armature_current")
+    assert raw(emulator, "plc_heartbeat") == (2).to_bytes(2, "big")
+    bench.push = 0.0
+    emulator.scan()
+    measurement = shown(emulator)
+    assert measurement.motor_speed == 0.0
+    assert measurement.armature_current == pytest.approx(10.0)
+    assert raw(emulator, "armature_current") == beside
+
+
+def test_register_without_a_mark_stays_at_its_end():
+    register_map = load("bench_int16")
+    registers = tuple(replace(one, not_available=None) for one in register_map.registers)
+    unmarked = replace(register_map, registers=registers)
+    speed = unmarked.register("motor_speed")
+    assert speed is not None
+    measurement = Measurement(
+        sequence_start=1, plc_heartbeat=1, plc_time=0.0, status=Status(0), sequence_end=1,
+        motor_speed=1e6, drum_speed=-1e6, shaft_torque=0.0, **OPTIONAL,
+    )  # fmt: skip
+    words = words_of(unmarked, measurement)
+    drum = unmarked.register("drum_speed")
+    assert drum is not None
+    assert words[speed.address] == 0x7FFF
+    assert words[drum.address] == 0x8000
+
+
+OPTIONAL = {
+    "plc_state": PlcState.READY, "alarm": Alarm(0), "alarm_reserved": 0, "shaft_torque_mean": 0.0,
+    "armature_current": 0.0, "armature_voltage": 0.0, "speed_reference": 0.0,
+    "shell_temperature_1": 300.0, "shell_temperature_2": 300.0, "field_current": 0.0,
+    "shaft_torque_integral": 0.0, "drum_count": 0, "motor_count": 0, "command_sequence_echo": 0,
+    "command_age": 0.0, "scan_time_max": 0.0, "interlock": CLOSED,
+}  # fmt: skip
+
+
+def test_status_tells_stages_of_the_bench_that_did_not_settle(spiking):
+    emulator, bench = spiking
+    channel = Channel(emulator, None, lambda: None)
+    assert json.loads(channel.answer('{"do": "status"}'))["ok"]["unsettled"] == 0
+    assert unsettled_text(emulator) == ""
+    bench.unsettled = 3
+    assert "3 IMPLICIT STAGES" in unsettled_text(emulator)
+    assert json.loads(channel.answer('{"do": "status"}'))["ok"]["unsettled"] == 3
