@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 
 HALF: Final = 0.5
 """[s] Before and after a moment, over which its slope is taken."""
+LONGEST: Final = 2.4 * HALF
+"""[s] For the samples of both halves together: with a gap between them they say nothing."""
 STEADY: Final = 0.5
 """[rad/s^2] of the motor: the drum's inertia then takes 2.5 N m, under 1 % of the friction."""
 MOVING: Final = 5.0
@@ -140,7 +142,8 @@ def _slope(time: Array, values: Array) -> Array:
     inside = slice(count, len(values) - count + 1)
     span = mean_time[count:] - mean_time[:-count]
     slope[inside] = (mean_value[count:] - mean_value[:-count]) / span
-    slope[inside][span > 2.0 * HALF] = np.inf
+    over_a_gap = time[2 * count - 1 :] - time[: len(time) - 2 * count + 1] > LONGEST
+    slope[inside][over_a_gap] = np.inf
     return slope
 
 
@@ -156,7 +159,7 @@ def _objection(trace: Trace, part: slice) -> str:
     if speed.mean() < 0.0:
         return "turns backwards; the bench is rated for 0..4830 rpm, forward only"
     if time[-1] - time[0] < SHORTEST:
-        return f"only {time[-1] - time[0]:.1f} s steady; expected {SHORTEST:g} s"
+        return f"only {time[-1] - time[0]:.2f} s steady; expected {SHORTEST:g} s"
     change = abs(float(np.polyfit(time - time[0], speed, 1)[0])) * (time[-1] - time[0])
     if change > DRIFT * speed.mean():
         return f"speed drifts by {100.0 * change / speed.mean():.1f} %; expected {DRIFT:.0%}"

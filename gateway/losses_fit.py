@@ -8,7 +8,7 @@ errors come from the curvature at the optimum, and from the distances of the str
 where these are larger than the scatter of the torque explains.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -97,15 +97,23 @@ def fit(sections: Sequence[Section]) -> Fit:
     )
 
 
+def different(speeds: Iterable[float]) -> int:
+    """How many speeds there are, those within APART of each other taken as one."""
+    counted, last = 0, 0.0
+    for one in sorted(speeds):
+        if one > APART * last:
+            counted, last = counted + 1, one
+    return counted
+
+
 def _refuse_too_few(omega: Array) -> None:
-    ordered = np.sort(omega)
-    speeds = 1 + int(np.sum(ordered[1:] > APART * ordered[:-1])) if len(ordered) else 0
+    speeds = different(omega)
     if speeds < FEWEST:
         raise LossesError(
             f"too few steady speeds, found {speeds}; expected at least {FEWEST}, each held for a "
             "few seconds without a truck"
         )
-    if ordered[-1] < SPREAD * ordered[0]:
+    if omega.max() < SPREAD * omega.min():
         raise LossesError(
             f"the steady speeds are too close to each other, found {_range(omega)}; expected the "
             f"fastest at least {SPREAD:g} times the slowest, or the exponent is not determined"

@@ -1,14 +1,13 @@
 """A sweep of steady speeds as a run of the daemon: its configuration, and its end (pure)."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Final
 
 from gateway import losses_speeds
 from gateway.config import Config, from_document
 from gateway.cycle import Output
 from gateway.errors import ConfigError
-from gateway.losses_fit import APART, FEWEST, SPREAD
+from gateway.losses_fit import FEWEST, SPREAD, different
 from gateway.losses_speeds import HOLD_S, RATE_RPM_S, RPM, Sweep
 from gateway.supervisor import State
 
@@ -22,20 +21,20 @@ def swept_config(config: Config, speeds: Sequence[float] | None, hold: float | N
     highest = config.limits.speed_max / RPM
     usual = [one for one in losses_speeds.DEFAULT if one <= highest * (1.0 + 1e-9)]
     asked = usual if speeds is None else list(speeds)
-    _refuse(asked, highest)
     table = {
         "speeds_rpm": asked,
         "hold_s": HOLD_S if hold is None else hold,
         "rate_rpm_s": RATE_RPM_S,
     }
-    return from_document({**config.document, "sweep": table})
+    swept = from_document({**config.document, "sweep": table})
+    _refuse(asked, highest)
+    return swept
 
 
 def _refuse(speeds: Sequence[float], highest: float) -> None:
     """Refuse what the law cannot be fitted to, before anything turns."""
     ordered = sorted(speeds)
-    different = 1 + sum(b > APART * a for a, b in pairwise(ordered))
-    if different < FEWEST or ordered[-1] < SPREAD * ordered[0]:
+    if different(speeds) < FEWEST or ordered[-1] < SPREAD * ordered[0]:
         raise ConfigError(
             "speeds that do not determine the friction",
             place="--speeds",

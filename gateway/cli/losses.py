@@ -132,12 +132,17 @@ def _swept(
 ) -> Path:
     """The recording of a sweep on the live bench."""
     import register_maps
-    from gateway import daemon
-    from gateway.errors import GatewayError
+    from gateway import daemon, review
+    from gateway.errors import ConfigError, GatewayError
     from gateway.losses_live import Progress, swept_config
 
     config = swept_config(settings, speeds, hold)
     register_map = register_maps.load(config.plc.map)
+    for one in review.review(config, register_map):
+        if one.severity == "error" and one.where.startswith(CONCERNS):
+            raise ConfigError(
+                one.what, place=one.where, value=str(one.value), expected=str(one.allowed)
+            )
     assert config.sweep is not None
     progress = Progress(config.sweep)
     click.echo(
