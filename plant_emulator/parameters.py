@@ -22,8 +22,8 @@ KINDS: tuple[Kind, ...] = ("given", "estimated", "calculated")
 class Parameter:
     """One constant of the model, SI, with where it comes from.
 
-    `std` is the prior standard deviation [unit of the value]; None where the value is not
-    estimated.
+    std : prior standard deviation [unit of the value]; None where the value is not estimated
+    standard_error : of a value that was identified from logs [unit of the value]
     """
 
     name: str
@@ -33,6 +33,7 @@ class Parameter:
     kind: Kind
     source: str
     std: float | None = None
+    standard_error: float | None = None
 
 
 def torsional_stiffness(shear_modulus: float, radius: float, length: float) -> float:
@@ -92,6 +93,8 @@ UNITS: dict[str, str] = {
     "wheel_radius": "m",
 }
 
+# Table of a set's file that is no parameter.
+ORIGIN = "origin"
 # Zero is a meaningful value only where a term may be absent from the model.
 MAY_BE_ZERO = frozenset(
     {
@@ -107,10 +110,14 @@ MAY_BE_ZERO = frozenset(
 
 @dataclass(frozen=True)
 class ParameterSet:
-    """The constants of one bench; `parameters[name]` for every name of `UNITS`."""
+    """The constants of one bench; `parameters[name]` for every name of `UNITS`.
+
+    origin : how they were identified (logs with hashes, date, version); None: from a publication
+    """
 
     name: str
     parameters: Mapping[str, Parameter]
+    origin: Mapping[str, Any] | None = None
 
     def __getitem__(self, name: str) -> Parameter:
         return self.parameters[name]
@@ -140,7 +147,7 @@ class ParameterSet:
                 new[name] = replace(new[name], value=value)
         for parameter in new.values():
             check_value(self.name, parameter)
-        return ParameterSet(self.name, new)
+        return replace(self, parameters=new)
 
 
 def check_value(place: str, parameter: Parameter) -> None:
@@ -153,17 +160,20 @@ def check_value(place: str, parameter: Parameter) -> None:
 
 def parameter_set(name: str, table: Mapping[str, Any]) -> ParameterSet:
     """A parameter set from the tables of its file; raises ParameterError naming file and key."""
-    unknown = sorted(set(table) - set(UNITS))
+    unknown = sorted(set(table) - set(UNITS) - {ORIGIN})
     if unknown:
         raise ParameterError(f"{name}: {unknown[0]} is no parameter; known: {', '.join(UNITS)}")
     missing = sorted(set(UNITS) - set(table))
     if missing:
         raise ParameterError(f"{name}: parameter {missing[0]} is missing")
     given = {key: _parameter(name, key, table[key]) for key in UNITS}
-    return ParameterSet(name, given).with_values({})
+    origin = table.get(ORIGIN)
+    if origin is not None and not isinstance(origin, Mapping):
+        raise ParameterError(f"{name}: {ORIGIN}: a table that says where the values come from")
+    return ParameterSet(name, given, origin).with_values({})
 
 
-KEYS = {"symbol", "value", "unit", "kind", "source", "std"}
+KEYS = {"symbol", "value", "unit", "kind", "source", "std", "standard_error"}
 
 
 def _parameter(place: str, name: str, entry: object) -> Parameter:
@@ -189,8 +199,13 @@ def _parameter(place: str, name: str, entry: object) -> Parameter:
         unit=UNITS[name],
         kind=kind,
         source=str(entry.get("source", "")),
-        std=None if "std" not in entry else _number(place, f"{name}.std", entry["std"]),
+        std=_optional(place, name, entry, "std"),
+        standard_error=_optional(place, name, entry, "standard_error"),
     )
+
+
+def _optional(place: str, name: str, entry: Mapping[str, Any], key: str) -> float | None:
+    return None if key not in entry else _number(place, f"{name}.{key}", entry[key])
 
 
 def _value(place: str, name: str, entry: Mapping[str, Any], kind: Kind) -> float:

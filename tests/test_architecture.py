@@ -39,6 +39,7 @@ SHELL = {
     "plant_emulator.control": "the running emulator",
     "plant_emulator.effects": "files",
     "plant_emulator.emulator": "clock",
+    "plant_emulator.identification": "files, date, processor time",
     "plant_emulator.logs": "files",
     "plant_emulator.logs.csv": "files",
     "plant_emulator.pace": "clock",

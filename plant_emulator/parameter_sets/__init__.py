@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from plant_emulator.errors import ParameterError
-from plant_emulator.parameters import ParameterSet, parameter_set
+from plant_emulator.parameters import ORIGIN, ParameterSet, parameter_set
+
+if TYPE_CHECKING:
+    from plant_emulator.parameters import Parameter
 
 FOLDER = Path(__file__).parent
 DEFAULT = "thesis_table_3_1"
@@ -30,3 +35,37 @@ def load(name: str = DEFAULT) -> ParameterSet:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ParameterError(f"{path}: {error}") from error
     return parameter_set(name, table)
+
+
+def save(parameters: ParameterSet, path: str | Path) -> None:
+    """Write a set as the TOML file that `load` reads."""
+    Path(path).write_text(text(parameters), encoding="utf-8")
+
+
+def text(parameters: ParameterSet) -> str:
+    """A set as TOML: its origin, then one table a parameter."""
+    tables = [_table(p.name, _entries(p)) for p in parameters]
+    if parameters.origin is not None:
+        tables.insert(0, _table(ORIGIN, dict(parameters.origin)))
+    return "\n".join(tables)
+
+
+def _entries(parameter: Parameter) -> dict[str, object]:
+    """What the file says of a parameter; a calculated value is left to be calculated."""
+    calculated = parameter.kind == "calculated"
+    entries = {
+        "symbol": parameter.symbol,
+        "value": None if calculated else parameter.value,
+        "unit": parameter.unit,
+        "kind": parameter.kind,
+        "std": parameter.std,
+        "standard_error": parameter.standard_error,
+        "source": parameter.source,
+    }
+    return {key: value for key, value in entries.items() if value is not None}
+
+
+def _table(name: str, entries: dict[str, object]) -> str:
+    # JSON writes strings, numbers and lists of strings as TOML does.
+    lines = [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in entries.items()]
+    return "\n".join([f"[{name}]", *lines, ""])

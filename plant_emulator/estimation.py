@@ -1,0 +1,340 @@
+"""Bounded nonlinear least squares on simulated channels, for any model that can be simulated.
+
+What is asked of a model: for each run, a function from named values to the whitened residual
+(measured minus simulated, over the noise), shape (channels, samples); 0 where a sample does not
+count. The unknowns are parameters, shared by all runs, and states, each of one run only.
+
+    minimise  sum r^2 + sum ((z - z_prior) / std)^2        z = log(value), or the value itself
+
+by scipy's trust-region method. The Jacobian is made of forward differences so small that the
+simulation keeps its sequence of steps; a state costs a simulation of its own run only.
+
+Standard errors do not believe that residuals are white. With the autocovariance g(k) of each
+channel's residual the estimate's covariance is the sandwich
+
+    H^-1 (sum J' G J + P) H^-1,   H = J' J + P,   G[t, s] = g(t - s),   P = prior precision
+
+(Newey and West, Econometrica 55 (1987) 703, tapered with Bartlett's window, for stationary
+residuals), enlarged by n/(n - p) for the unknowns that the residuals have already followed. White
+residuals of variance 1 give H^-1, as usual.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    Residual = Callable[[Mapping[str, float]], NDArray[np.float64]]
+
+Array = NDArray[np.float64]
+
+# Forward differences: a change of the residual vector of this norm, within these steps of z. It is
+# small against what the noise hides (1), far above the simulation's own jitter (1e-5), and wide
+# enough to look over the kinks that contact and limits leave in the cost.
+DIFFERENCE_NORM = 0.3
+SMALLEST_DIFFERENCE, LARGEST_DIFFERENCE = 1e-6, 1e-3
+MAX_ITERATIONS = 60
+# Relative fall of the cost that ends a fit: some 1e-6 in units of chi squared.
+COST_SETTLED = 1e-10
+Z_SETTLED = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unknown:
+    """A quantity to be estimated; start, lower and upper in its own unit.
+
+    logarithmic : estimated on a logarithmic scale, for what cannot be negative
+    prior, std : mean and standard deviation of what is known beforehand; std None: nothing
+    run : the run whose state it is; None: a parameter of all runs
+    """
+
+    name: str
+    start: float
+    lower: float
+    upper: float
+    logarithmic: bool = True
+    prior: float = 0.0
+    std: float | None = None
+    run: int | None = None
+
+    def scaled(self, value: float) -> float:
+        """The value on the scale of the estimation."""
+        return float(np.log(value)) if self.logarithmic else value
+
+    def value(self, scaled: float) -> float:
+        """Back from the scale of the estimation."""
+        return float(np.exp(scaled)) if self.logarithmic else scaled
+
+    def error(self, value: float, scaled_error: float) -> float:
+        """Standard error in the unit of the value."""
+        return value * scaled_error if self.logarithmic else scaled_error
+
+    @property
+    def scaled_std(self) -> float:
+        """Prior standard deviation on the scale of the estimation; infinite without prior."""
+        if self.std is None:
+            return float("inf")
+        return self.std / self.prior if self.logarithmic else self.std
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """What a fit found; z is on the scale of the estimation, shape (unknowns,).
+
+    residuals, jacobians : one a run, shape (channels, samples) and (channels, samples, unknowns)
+    cost : sum of squares of the whitened residuals, without the priors
+    covariance : of z, with the residuals' autocorrelation and the priors
+    information : J' J of z, from the data alone
+    """
+
+    unknowns: tuple[Unknown, ...]
+    z: Array
+    residuals: tuple[Array, ...]
+    jacobians: tuple[Array, ...]
+    covariance: Array
+    information: Array
+    cost: float
+    penalty: float
+    samples: int
+    simulations: int
+    converged: bool
+    message: str
+
+    def values(self, run: int | None = None) -> dict[str, float]:
+        """Parameters, and the states of one run, by name."""
+        return _values(self.unknowns, self.z, run)
+
+    @property
+    def standard_errors(self) -> Array:
+        """Standard errors of z."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def data_errors(self) -> Array:
+        """Standard errors of z that these data would give without any prior; may be infinite."""
+        return data_errors(self.information)
+
+    @property
+    def correlation(self) -> Array:
+        """Correlation matrix of z."""
+        error = self.standard_errors
+        return self.covariance / np.outer(error, error)
+
+    @property
+    def condition_number(self) -> float:
+        """Condition number of the Jacobian on the scale of the estimation."""
+        singular = np.sqrt(np.clip(np.linalg.eigvalsh(self.information), 0.0, None))
+        return float(singular[-1] / singular[0]) if singular[0] > 0.0 else float("inf")
+
+
+def data_errors(information: Array) -> Array:
+    """Standard errors of z from an information matrix, infinite in directions without any."""
+    scale = np.sqrt(np.diag(information))
+    safe = np.where(scale > 0.0, scale, 1.0)
+    values, vectors = np.linalg.eigh(information / np.outer(safe, safe))
+    weight = np.where(values > 1e-14 * values[-1], values, 1e-300)
+    variance = (vectors**2 / weight).sum(axis=1) / safe**2
+    return np.where(scale > 0.0, np.sqrt(variance), np.inf)
+
+
+@dataclass
+class _Problem:
+    """Residuals and Jacobians of all runs at z, each simulated once."""
+
+    unknowns: tuple[Unknown, ...]
+    residuals: Sequence[Residual]
+    progress: Callable[[float], None] | None
+    simulations: int = 0
+    known: tuple[bytes, list[Array]] = (b"", [])
+    steps: Array = field(default_factory=lambda: np.zeros(0))
+
+    def residual(self, z: Array) -> list[Array]:
+        """Residual of every run at z."""
+        key = z.tobytes()
+        if self.known[0] != key:
+            self.known = key, [self._run(k, z) for k in range(len(self.residuals))]
+            if self.progress is not None:
+                self.progress(sum(float(np.sum(r**2)) for r in self.known[1]))
+        return self.known[1]
+
+    def _run(self, k: int, z: Array) -> Array:
+        self.simulations += 1
+        return self.residuals[k](_values(self.unknowns, z, k))
+
+    def jacobian(self, z: Array) -> list[Array]:
+        """Jacobian of every run at z: forward differences, backward at an upper bound."""
+        base = self.residual(z)
+        jacobians = [np.zeros((*r.shape, len(z))) for r in base]
+        for j, unknown in enumerate(self.unknowns):
+            step = self.steps[j]
+            if z[j] + step > unknown.scaled(unknown.upper):
+                step = -step
+            changed = z.copy()
+            changed[j] += step
+            runs = range(len(base)) if unknown.run is None else (unknown.run,)
+            for k in runs:
+                jacobians[k][..., j] = (self._run(k, changed) - base[k]) / (changed[j] - z[j])
+        self.steps = _steps(jacobians)
+        return jacobians
+
+    def rows(self, z: Array) -> Array:
+        """All residuals and the priors as one vector."""
+        return np.concatenate([*(r.ravel() for r in self.residual(z)), self._prior(z)])
+
+    def slopes(self, z: Array) -> Array:
+        """Jacobian of `rows`."""
+        p = len(z)
+        weight = np.diag([1.0 / u.scaled_std for u in self.unknowns])
+        return np.concatenate([*(j.reshape(-1, p) for j in self.jacobian(z)), weight])
+
+    def _prior(self, z: Array) -> Array:
+        return np.array(
+            [
+                (z[j] - u.scaled(u.prior)) / u.scaled_std if u.std is not None else 0.0
+                for j, u in enumerate(self.unknowns)
+            ]
+        )
+
+
+def _values(unknowns: Sequence[Unknown], z: Array, run: int | None) -> dict[str, float]:
+    return {u.name: u.value(z[j]) for j, u in enumerate(unknowns) if u.run in {None, run}}
+
+
+def _steps(jacobians: Sequence[Array]) -> Array:
+    """Steps of z that change the residual vector by DIFFERENCE_NORM, within their bounds."""
+    squares = np.sum([np.einsum("cnj,cnj->j", j, j) for j in jacobians], axis=0)
+    wanted = DIFFERENCE_NORM / np.sqrt(np.maximum(squares, 1e-300))
+    return np.asarray(np.clip(wanted, SMALLEST_DIFFERENCE, LARGEST_DIFFERENCE))
+
+
+def estimate(
+    unknowns: Sequence[Unknown],
+    residuals: Sequence[Residual],
+    *,
+    iterations: int = MAX_ITERATIONS,
+    progress: Callable[[float], None] | None = None,
+) -> Estimate:
+    """Fit the unknowns from their starts.
+
+    residuals : one function a run, from the values by name to the whitened residual
+    progress : called with the sum of squares after every simulation of all runs
+    """
+    from scipy.optimize import least_squares
+
+    unknowns = tuple(unknowns)
+    lower = np.array([u.scaled(u.lower) for u in unknowns])
+    upper = np.array([u.scaled(u.upper) for u in unknowns])
+    margin = 1e-6 * (upper - lower)
+    start = np.array([u.scaled(u.start) for u in unknowns])
+    problem = _Problem(unknowns, residuals, progress)
+    problem.steps = np.full(len(unknowns), 1e-5)
+    found = least_squares(
+        problem.rows,
+        np.clip(start, lower + margin, upper - margin),
+        problem.slopes,
+        bounds=(lower, upper),
+        x_scale="jac",
+        ftol=COST_SETTLED,
+        xtol=Z_SETTLED,
+        gtol=None,
+        max_nfev=iterations,
+    )
+    return _estimate(problem, found.x, bool(found.status > 0), str(found.message))
+
+
+def at(
+    unknowns: Sequence[Unknown],
+    residuals: Sequence[Residual],
+) -> Estimate:
+    """The estimate as it would be if the starts were the optimum: what these data determine."""
+    problem = _Problem(tuple(unknowns), residuals, None)
+    problem.steps = np.full(len(unknowns), 1e-5)
+    z = np.array([u.scaled(u.start) for u in unknowns])
+    return _estimate(problem, z, True, "not fitted")
+
+
+def _estimate(problem: _Problem, z: Array, converged: bool, message: str) -> Estimate:
+    residuals, jacobians = problem.residual(z), problem.jacobian(z)
+    information = sum(np.einsum("cni,cnj->ij", j, j) for j in jacobians)
+    precision = np.diag([u.scaled_std**-2.0 for u in problem.unknowns])
+    return Estimate(
+        unknowns=problem.unknowns,
+        z=z,
+        residuals=tuple(residuals),
+        jacobians=tuple(jacobians),
+        covariance=_covariance(residuals, jacobians, information, precision),
+        information=information,
+        cost=sum(float(np.sum(r**2)) for r in residuals),
+        penalty=float(np.sum(problem.rows(z)[-len(z) :] ** 2)),
+        samples=sum(int(np.count_nonzero(r)) for r in residuals),
+        simulations=problem.simulations,
+        converged=converged,
+        message=message,
+    )
+
+
+def _covariance(
+    residuals: Sequence[Array], jacobians: Sequence[Array], information: Array, precision: Array
+) -> Array:
+    """The sandwich of the module's text."""
+    samples = sum(int(np.count_nonzero(r)) for r in residuals)
+    freedom = samples / max(1, samples - len(precision))
+    middle = precision.copy()
+    for residual, jacobian in zip(residuals, jacobians, strict=True):
+        for channel in range(len(residual)):
+            slopes = jacobian[channel]
+            middle += freedom * slopes.T @ coloured(slopes, autocovariance(residual[channel]))
+    hessian = information + precision
+    scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
+    inverse = np.linalg.pinv(hessian / np.outer(scale, scale), rcond=1e-15, hermitian=True)
+    inverse /= np.outer(scale, scale)
+    covariance = inverse @ middle @ inverse
+    return 0.5 * (covariance + covariance.T)
+
+
+def autocovariance(residual: Array) -> Array:
+    """Autocovariance of a residual at the lags 0, 1, ..., tapered to 0; shape (lags,).
+
+    Lags count until the correlation first falls under twice its standard error in white noise;
+    then Bartlett's window over twice that many. Samples of exactly 0 do not count.
+    """
+    counted = residual != 0.0
+    n = int(counted.sum())
+    if n < 2:
+        return np.zeros(1)
+    size = 1 << (2 * len(residual) - 1).bit_length()
+    product = np.fft.irfft(np.abs(np.fft.rfft(residual, size)) ** 2, size)
+    pairs = np.fft.irfft(np.abs(np.fft.rfft(counted.astype(float), size)) ** 2, size)
+    longest = max(1, len(residual) // 4)
+    covariance = product[:longest] / np.maximum(np.round(pairs[:longest]), 1.0)
+    small = covariance < 2.0 / np.sqrt(n) * covariance[0]
+    first = int(np.argmax(small)) if small.any() else longest
+    if first <= 1:
+        return np.asarray(covariance[:1])
+    reach = min(2 * first, longest)
+    taper = 1.0 - np.arange(reach) / reach
+    return np.asarray(covariance[:reach] * taper)
+
+
+def coloured(slopes: Array, covariance: Array) -> Array:
+    """G J: each column of the Jacobian multiplied by the residual's covariance matrix."""
+    if len(covariance) == 1:
+        return np.asarray(slopes * covariance[0])
+    from scipy.signal import oaconvolve
+
+    both = np.concatenate([covariance[:0:-1], covariance])
+    return np.asarray(oaconvolve(slopes, both[:, None], mode="same", axes=0))
+
+
+def correlation_time(residual: Array) -> float:
+    """Samples that one independent sample is worth: 1 + 2 sum of the correlations, at least 1."""
+    covariance = autocovariance(residual)
+    if covariance[0] <= 0.0:
+        return 1.0
+    return max(1.0, float(2.0 * covariance.sum() / covariance[0] - 1.0))

@@ -1,0 +1,119 @@
+"""Which run would determine what the logs at hand do not.
+
+Each drive program is simulated at the fitted parameters; its information matrix, as sharp as the
+noise of the logs allows, is added to theirs. Start states are eliminated (Schur complement), since
+every run has its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator import estimation
+from plant_emulator.log import COMPARED, Log
+from plant_emulator.programs import PROGRAMS, SpeedProgram
+from plant_emulator.search import GAP_POSITION
+from plant_emulator.simulate import run_of, simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.estimation import Array, Residual
+    from plant_emulator.identify import Identification
+    from plant_emulator.recording import Recording
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """The program that sharpens a parameter most, and the standard error with it [unit]."""
+
+    parameter: str
+    program: str
+    standard_error: float
+    enough: bool
+
+
+def experiments(
+    found: Identification, recordings: Sequence[Recording], values: Mapping[str, float]
+) -> list[Experiment]:
+    """For every parameter that is not identifiable the program that would say most about it.
+
+    values : all parameters, at what was found [SI]
+    """
+    open_ones = [k for k, p in enumerate(found.parameters) if not p.identifiable]
+    if not open_ones:
+        return []
+    count = len(found.parameters)
+    known = without_states(found.estimate.information, count)
+    noise = _noise(recordings)
+    errors = {
+        name: estimation.data_errors(known + _information(program, found, values, noise))
+        for name, program in PROGRAMS.items()
+        if isinstance(program, SpeedProgram)
+    }
+    answers = []
+    for k in open_ones:
+        parameter = found.parameters[k]
+        program = min(errors, key=lambda name: float(errors[name][k]))
+        unknown = found.estimate.unknowns[k]
+        error = unknown.error(parameter.value, float(errors[program][k]))
+        answers.append(
+            Experiment(
+                parameter=parameter.name,
+                program=program,
+                standard_error=error,
+                enough=error <= parameter.enough,
+            )
+        )
+    return answers
+
+
+def without_states(information: Array, count: int) -> Array:
+    """Information on the first `count` unknowns, the others free (Schur complement)."""
+    own, cross, rest = (
+        information[:count, :count],
+        information[:count, count:],
+        information[count:, count:],
+    )
+    if rest.size == 0:
+        return own
+    return np.asarray(own - cross @ np.linalg.pinv(rest, hermitian=True) @ cross.T)
+
+
+def _noise(recordings: Sequence[Recording]) -> dict[str, float]:
+    """Noise of each channel, the mean over the logs that have it [SI]."""
+    return {
+        name: float(
+            np.mean([r.noise[r.channels.index(name)] for r in recordings if name in r.channels])
+        )
+        for name in COMPARED
+        if any(name in r.channels for r in recordings)
+    }
+
+
+def _information(
+    program: SpeedProgram,
+    found: Identification,
+    values: Mapping[str, float],
+    noise: Mapping[str, float],
+) -> Array:
+    """Information of one more run on the parameters, its own start state free."""
+    time, reference = program.reference()
+    run = run_of(Log(time, {"speed_reference": reference}, program.name))
+
+    def residual(trial: Mapping[str, float]) -> Array:
+        trial = {**values, **trial}
+        simulated = simulate(run, trial, gap_position=trial.pop(GAP_POSITION))
+        return np.stack([simulated[name] / level for name, level in noise.items()])
+
+    residuals: list[Residual] = [residual]
+    count = len(found.parameters)
+    parameters = [
+        replace(u, start=p.value)
+        for u, p in zip(found.estimate.unknowns[:count], found.parameters, strict=True)
+    ]
+    state = replace(found.estimate.unknowns[count], start=0.0, run=0)
+    return without_states(estimation.at([*parameters, state], residuals).information, count)

@@ -1,0 +1,263 @@
+"""Grey-box identification of the bench from its logs.
+
+ 1. Start values without simulation (`equation_error`).
+ 2. One-dimensional scans of what that leaves open: dead time, gap, shaft damping, and where in the
+    gap each run starts, by simulation and with a loss that forgives spikes at the wrong time.
+ 3. Bounded least squares on all simulated channels of all logs at once, whitened by the noise
+    measured in the logs (`estimation`), with the start in the gap as a free state of each run.
+    Should the residual stay above the noise, it starts again from the next best valleys.
+
+Prior knowledge is the value and standard deviation of each parameter in the set. It holds what the
+logs do not determine, and is given up for a parameter that the data alone determine better, so that
+a wrong set cannot pull the answer. A parameter counts as identifiable if the data alone bring its
+standard error under half of the prior one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from plant_emulator import estimation
+from plant_emulator.equation_error import start_values
+from plant_emulator.errors import IdentificationError
+from plant_emulator.estimation import Estimate, Unknown
+from plant_emulator.search import FINE_SCANS, GAP_POSITION, Search
+from plant_emulator.simulate import TOLERANCE, values_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.estimation import Residual
+    from plant_emulator.log import Array
+    from plant_emulator.parameters import ParameterSet
+    from plant_emulator.recording import Recording
+    from plant_emulator.search import Progress
+
+# Held fixed unless asked for: a log shows it only through J_g + xi^2 J_m.
+NOT_FREE = frozenset({"gear_inertia"})
+# A parameter may leave its value in the set by this factor either way.
+BOUND_FACTOR = 5.0
+# The last fit: a step more or less in the simulation then changes the cost by less than the cost
+# changes over a thousandth of a standard error.
+FINAL_TOLERANCE = 1e-8
+# Share of the prior deviation (or of the value) under which a standard error is information.
+INFORMED = 0.5
+INFORMED_WITHOUT_PRIOR = 0.1
+# chi^2 per sample above which other valleys are tried.
+NOISE_REACHED = 1.2
+RETRIES = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """An estimated parameter [unit].
+
+    data_error : standard error that the data alone give; infinite: they say nothing
+    enough : the largest such error that still makes it identifiable
+    """
+
+    name: str
+    value: float
+    standard_error: float
+    data_error: float
+    enough: float
+    nominal: float
+    unit: str
+
+    @property
+    def identifiable(self) -> bool:
+        """Whether the data determine it, see the module's text."""
+        return self.data_error <= self.enough
+
+
+@dataclass(frozen=True, kw_only=True)
+class Identification:
+    """The fit of one bench."""
+
+    parameter_set: ParameterSet
+    parameters: tuple[Parameter, ...]
+    gap_positions: tuple[float, ...]
+    estimate: Estimate
+    chi_squared: float
+
+
+def unknowns(
+    parameters: ParameterSet, free: Sequence[str], start: Mapping[str, float], gaps: Sequence[float]
+) -> list[Unknown]:
+    """The free parameters with their priors, and the start in the gap of every run."""
+    found = []
+    for name in free:
+        value, std = parameters.value(name), parameters[name].std
+        found.append(
+            Unknown(
+                name=name,
+                start=start.get(name, value),
+                lower=value / BOUND_FACTOR,
+                upper=value * BOUND_FACTOR,
+                prior=value,
+                std=std,
+            )
+        )
+    return found + [
+        Unknown(
+            name=GAP_POSITION,
+            start=gap,
+            lower=-1.0,
+            upper=1.0,
+            logarithmic=False,
+            run=run,
+        )
+        for run, gap in enumerate(gaps)
+    ]
+
+
+def free_parameters(parameters: ParameterSet, names: Sequence[str] = ()) -> tuple[str, ...]:
+    """The names given, or all that the set calls estimated but those of NOT_FREE."""
+    for name in names:
+        if name not in parameters.values():
+            known = ", ".join(parameters.values())
+            raise IdentificationError(f"--free {name}: no parameter of the bench; known: {known}")
+        if parameters.value(name) == 0.0:
+            raise IdentificationError(
+                f"--free {name}: it is 0 in {parameters.name}; a fit needs a value above 0"
+            )
+        if parameters[name].kind == "calculated":
+            raise IdentificationError(
+                f"--free {name}: it is calculated from others; give it a value of its own, "
+                'kind = "estimated", in a parameter set'
+            )
+    estimated = [p.name for p in parameters if p.kind == "estimated" and p.name not in NOT_FREE]
+    return tuple(dict.fromkeys(names)) or tuple(estimated)
+
+
+def identify(
+    recordings: Sequence[Recording],
+    parameters: ParameterSet,
+    free: Sequence[str] = (),
+    *,
+    effects: Mapping[str, Mapping[str, float]] | None = None,
+    progress: Progress | None = None,
+) -> Identification:
+    """Estimate the free parameters of a bench from its logs.
+
+    free : names; none: all that the set calls estimated but gear_inertia
+    effects : values of effects that the bench has, by effect and parameter
+    progress : called with a stage's name and how far it has come, 0 to 1
+    """
+    free = free_parameters(parameters, free)
+    values = values_of(parameters, effects)
+    search = Search(recordings, values, free, progress)
+    logs = [r.log for r in recordings]
+    search.values |= start_values(logs, values, free)
+    search.scan()
+    best = least_squares(recordings, parameters, free, search, progress)
+    for retry in range(RETRIES):
+        if chi_squared(best) <= NOISE_REACHED:
+            break
+        again = _next_valley(recordings, values, free, best, retry)
+        other = least_squares(recordings, parameters, free, again, progress)
+        search.simulations += again.simulations
+        best = min(best, other, key=lambda e: e.cost + e.penalty)
+    best = replace(best, simulations=best.simulations + search.simulations)
+    return answer(best, parameters, free, len(recordings))
+
+
+def least_squares(
+    recordings: Sequence[Recording],
+    parameters: ParameterSet,
+    free: Sequence[str],
+    search: Search,
+    progress: Progress | None = None,
+) -> Estimate:
+    """Least squares from where a search has come to; priors that the data outdo are given up."""
+    coarse = residual_functions(recordings, search.values, free)
+    fine = residual_functions(recordings, search.values, free, FINAL_TOLERANCE)
+    counted = sum(int(r.use.sum()) for r in recordings)
+
+    def tell(cost: float) -> None:
+        if progress is not None:  # chi^2 falls to 1: half way is where it has fallen to 2
+            progress("least squares", min(1.0, counted / max(cost, 1.0)))
+
+    wanted = unknowns(parameters, free, search.values, search.gaps)
+    first = estimation.estimate(wanted, coarse, progress=tell)
+    outdone = [
+        replace(u, start=u.value(float(z)), std=None if error < u.scaled_std else u.std)
+        for u, z, error in zip(first.unknowns, first.z, first.data_errors, strict=True)
+    ]
+    last = estimation.estimate(outdone, fine, progress=tell)
+    return replace(last, simulations=first.simulations + last.simulations)
+
+
+def residual_functions(
+    recordings: Sequence[Recording],
+    values: Mapping[str, float],
+    free: Sequence[str],
+    tolerance: float = TOLERANCE,
+) -> list[Residual]:
+    """For every run the residual as a function of the unknowns; the rest stays at `values`."""
+    fixed = {n: v for n, v in values.items() if n not in free}
+
+    def of(recording: Recording) -> Residual:
+        def residual(found: Mapping[str, float]) -> Array:
+            values = {**fixed, **found}
+            return recording.residual(values, values.pop(GAP_POSITION), tolerance)
+
+        return residual
+
+    return [of(recording) for recording in recordings]
+
+
+def _next_valley(
+    recordings: Sequence[Recording],
+    values: Mapping[str, float],
+    free: Sequence[str],
+    best: Estimate,
+    retry: int,
+) -> Search:
+    """A search that starts at the fit but with the gap moved out of its valley."""
+    search = Search(recordings, {**values, **best.values()}, free)
+    search.values.pop(GAP_POSITION, None)
+    search.gaps = [best.values(k)[GAP_POSITION] for k in range(len(recordings))]
+    if retry:
+        search.values |= {
+            name: search.values[name] * (1.0 + 0.05 * (-1) ** retry)
+            for name in ("backlash_half_gap", "dead_time")
+            if name in free
+        }
+    search.scan(FINE_SCANS)
+    return search
+
+
+def chi_squared(found: Estimate) -> float:
+    """Mean square of the whitened residual; 1 where nothing but the noise is left."""
+    return found.cost / max(1, found.samples - len(found.unknowns))
+
+
+def answer(
+    found: Estimate, parameters: ParameterSet, free: Sequence[str], runs: int
+) -> Identification:
+    """The estimate in the parameters' own terms."""
+    estimated = [_parameter(found, k, parameters) for k in range(len(free))]
+    return Identification(
+        parameter_set=parameters.with_values({p.name: p.value for p in estimated}),
+        parameters=tuple(estimated),
+        gap_positions=tuple(found.values(k)[GAP_POSITION] for k in range(runs)),
+        estimate=found,
+        chi_squared=chi_squared(found),
+    )
+
+
+def _parameter(found: Estimate, k: int, parameters: ParameterSet) -> Parameter:
+    unknown = found.unknowns[k]
+    value = unknown.value(float(found.z[k]))
+    std = parameters[unknown.name].std
+    return Parameter(
+        name=unknown.name,
+        value=value,
+        standard_error=unknown.error(value, float(found.standard_errors[k])),
+        data_error=unknown.error(value, float(found.data_errors[k])),
+        nominal=parameters.value(unknown.name),
+        enough=INFORMED_WITHOUT_PRIOR * value if std is None else INFORMED * std,
+        unit=parameters[unknown.name].unit,
+    )

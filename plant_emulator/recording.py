@@ -1,0 +1,67 @@
+"""A log ready to be fitted: its inputs, and what of it counts in units of its own noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.errors import IdentificationError, UnsettledError
+from plant_emulator.log import COMPARED, Array, Log
+from plant_emulator.noise import noise
+from plant_emulator.simulate import TOLERANCE, Hold, Run, run_of, simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+# Residual of values that the model cannot simulate [noise]: a bad place, but no end of a search.
+IMPOSSIBLE = 100.0
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A log, the inputs of its simulation, and the noise of its compared channels [SI].
+
+    use : samples that count, shape (channels, samples)
+    """
+
+    log: Log
+    run: Run
+    channels: tuple[str, ...]
+    noise: Array
+    use: NDArray[np.bool_]
+
+    def residual(
+        self, values: Mapping[str, float], gap_position: float, tolerance: float = TOLERANCE
+    ) -> Array:
+        """Measured minus simulated over the noise, shape (channels, samples)."""
+        try:
+            found = simulate(self.run, values, gap_position=gap_position, tolerance=tolerance)
+        except UnsettledError:
+            return np.where(self.use, IMPOSSIBLE, 0.0)
+        difference = np.stack([self.log[name] - found[name] for name in self.channels])
+        return np.where(self.use, difference / self.noise[:, None], 0.0)
+
+
+def recording(
+    log: Log,
+    hold: Hold | None = None,
+    use: Mapping[str, NDArray[np.bool_]] | None = None,
+) -> Recording:
+    """A log as it is fitted.
+
+    use : samples that count, by channel; all where a channel is not named
+    """
+    channels = tuple(name for name in COMPARED if name in log)
+    everything = np.ones(len(log.time), bool)
+    counted = np.stack([(use or {}).get(name, everything) for name in channels])
+    levels = [noise(log[name], counted[k]) for k, name in enumerate(channels)]
+    if not all(level > 0.0 for level in levels):
+        still = channels[int(np.argmin(levels))]
+        raise IdentificationError(
+            f"{log.source}: {still} does not move; a run that excites it is needed"
+        )
+    return Recording(log, run_of(log, hold), channels, np.array(levels), counted)
