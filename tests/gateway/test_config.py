@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 import gateway
-from gateway.config import SECTIONS, Config, config_hash, from_document
+from gateway.config import Config, config_hash, from_document
 from gateway.config_file import load, with_values
+from gateway.config_sections import SECTIONS
 from gateway.errors import ConfigError
 from gateway.keys import keys
 
