@@ -11,8 +11,8 @@ from gateway import device, inspection, review
 from gateway.cli._settings import assignments
 from gateway.config import Config
 from gateway.config_file import load, with_values
+from gateway.finding import Finding, holds
 from gateway.plc import LinkError
-from gateway.review import Finding
 from register_maps.register_map import RegisterMap
 
 COLOURS = {"error": "red", "warning": "yellow", "info": "green"}
@@ -43,15 +43,15 @@ def command(config: Path, *, live: bool, values: tuple[str, ...], target: str | 
         found = [*compared(settings, register_map), *found]
     answer = {
         "schema": "check/1",
-        "holds": review.holds(found),
+        "holds": holds(found),
         "findings": [as_json(finding) for finding in found],
     }
     if target != "-":
-        show(found, holds=review.holds(found))
+        show(found, holds=holds(found))
     if target is not None:
         with click.open_file(target, "w", encoding="utf-8") as file:
             file.write(json.dumps(answer, indent=2) + "\n")
-    return 0 if review.holds(found) else 1
+    return 0 if holds(found) else 1
 
 
 def as_json(finding: Finding) -> dict[str, Any]:

@@ -8,7 +8,9 @@ from gateway.cli import main
 from gateway.config import Config
 from gateway.config_file import load
 from gateway.device import Device
-from gateway.review import holds, review, rho_of
+from gateway.finding import holds
+from gateway.review import review
+from gateway.review_loop import rho_of
 from plant_emulator.process import EmulatorProcess
 from register_maps import load as load_map
 
