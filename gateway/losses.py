@@ -35,6 +35,10 @@ MOVING: Final = 5.0
 """[rad/s] of the motor; slower is standstill."""
 SHORTEST, WORTH_NAMING = 1.0, 0.2
 """[s] Of a stretch that is used; of one that is told of when it is not."""
+COARSEST: Final = 0.5 * HALF
+"""[s] Between two samples."""
+APART: Final = 0.1
+"""Of drum and gear, relative: more is a wrong ratio, scale or a channel that stands."""
 DRIFT: Final = 0.02
 """Change of speed over a stretch, relative to its mean."""
 BATCHES: Final = 5
@@ -109,10 +113,15 @@ def steady(trace: Trace, bench: BenchConfig, torque_offset: float = 0.0) -> Stea
     Raises LossesError where the torque has the sign of a truck that pushes, or of a sensor whose
     sign is wrong.
     """
+    every = float(np.median(np.diff(trace.time)))
+    if every > COARSEST:
+        raise LossesError(
+            f"a sample every {every:g} s; expected one every {COARSEST:g} s or faster"
+        )
     sections: list[Section] = []
     left_out: list[LeftOut] = []
     for part in _stretches(trace):
-        why = _objection(trace, part)
+        why = _objection(trace, part, bench.gear_ratio)
         if why:
             left_out.append(_left_out(trace, part, why))
         else:
@@ -153,7 +162,7 @@ def _moving_mean(values: Array, count: int) -> Array:
     return mean
 
 
-def _objection(trace: Trace, part: slice) -> str:
+def _objection(trace: Trace, part: slice, gear_ratio: float) -> str:
     """Why a stretch cannot be used; empty: it can."""
     time, speed, torque = trace.time[part], trace.motor_speed[part], trace.shaft_torque[part]
     if speed.mean() < 0.0:
@@ -163,6 +172,9 @@ def _objection(trace: Trace, part: slice) -> str:
     change = abs(float(np.polyfit(time - time[0], speed, 1)[0])) * (time[-1] - time[0])
     if change > DRIFT * speed.mean():
         return f"speed drifts by {100.0 * change / speed.mean():.1f} %; expected {DRIFT:.0%}"
+    gear, drum = speed.mean() / gear_ratio, float(trace.drum_speed[part].mean())
+    if abs(gear - drum) > APART * gear:
+        return f"gear {gear:.3f} rad/s and drum {drum:.3f} rad/s do not belong together"
     spread, mean = float(np.ptp(_batch_means(torque))), abs(float(torque.mean()))
     if spread > UNSTEADY * mean:
         return f"torque is not steady: its means differ by {spread:.1f} N m of {mean:.1f} N m"

@@ -16,6 +16,7 @@ from gateway.header import config_of, map_of
 from gateway.log import LogError
 from gateway.losses import Array, LossesError, Trace
 from register_maps.register_map import RegisterMap
+from register_maps.signals import Status
 
 TRUCK: Final = 1.0
 """[N m] of the truck's wheel, over which there is a truck that drives or brakes."""
@@ -83,6 +84,11 @@ def _of_recording(found: recording.Recording, register_map: RegisterMap) -> Trac
     rows = found.records[fresh(found)]
     if len(rows) < 2:
         raise LossesError(f"{found.path}: holds no samples of the PLC; expected a run")
+    if np.any(rows["measured_status"].astype(int) & Status.ROAD_LOAD):
+        raise LossesError(
+            f"{found.path}: was made in road load: a truck is on the drum, and what it pushes is "
+            "no loss of the bench; expected a sweep of steady speeds (gateway losses -c CONFIG)"
+        )
     time = elapsed(rows["measured_plc_time"], register_map.modulus("plc_time"))
     return Trace(
         name=found.path.name,

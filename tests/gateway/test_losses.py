@@ -89,6 +89,31 @@ def test_a_stretch_that_cannot_be_used_is_left_out_with_its_reason(motor_speed, 
     assert why in out.why
 
 
+def test_a_drum_that_does_not_turn_with_the_gear_is_left_out_by_name():
+    run = trace(lambda t: 200.0, lambda t: -9.0)
+    (out,) = steady(replace(run, drum_speed=0.5 * run.drum_speed), BENCH).left_out
+    assert "gear 3.195 rad/s and drum 1.597 rad/s do not belong together" in out.why
+
+
+def test_a_log_that_is_sampled_too_coarsely_is_refused_by_name():
+    run = trace(lambda t: 200.0, lambda t: -9.0)
+    names = ("time", "motor_speed", "drum_speed", "shaft_torque")
+    coarse = replace(run, **{name: getattr(run, name)[::40] for name in names})
+    with pytest.raises(LossesError, match=r"a sample every 0\.4 s; expected one every 0\.25 s"):
+        steady(coarse, BENCH)
+
+
+@pytest.mark.parametrize("every", [2, 5, 20])
+def test_other_sample_rates_show_the_same_friction(every):
+    log = read(DATA / "bench_nominal" / "program2.csv.gz").trace
+    names = ("time", "motor_speed", "drum_speed", "shaft_torque")
+    thinned = replace(log, **{name: getattr(log, name)[::every] for name in names})
+    found = steady(thinned, BENCH).sections
+    assert len(found) == 5
+    for one in found:
+        assert one.friction == pytest.approx(table_3_1(one.gear_speed), rel=1e-3)
+
+
 def test_ramps_and_standstill_are_no_stretches():
     found = steady(trace(lambda t: np.maximum(0.0, 20.0 * (t - 5.0)), lambda t: -9.0), BENCH)
     assert found.sections == found.left_out == ()

@@ -76,13 +76,19 @@ def test_machine_gets_nothing_but_the_answer():
         assert abs(entry["value"] - value) < 3.0 * entry["standard_error"]
 
 
-def test_bench_of_the_configuration_counts(tmp_path):
+def test_zero_of_the_sensor_in_the_configuration_counts(tmp_path):
+    config = tmp_path / "bench.toml"
+    config.write_text("[regulator]\ntorque_offset_Nm = 0.5\n")
+    found = json.loads(losses(PROGRAM_2, "-c", config, "--json", "-").stdout)["sections"]
+    assert found[0]["friction_torque_Nm"] == pytest.approx(496.58 + 62.6 * 0.5, rel=1e-3)
+
+
+def test_a_gear_ratio_that_is_not_the_benchs_is_told_by_name(tmp_path):
     config = tmp_path / "bench.toml"
     config.write_text("[bench]\ngear_ratio = 31.3\n")
-    found = json.loads(losses(PROGRAM_2, "-c", config, "--json", "-").stdout)["sections"]
-    # half the ratio: twice the gear speed, half the torque at the gear output
-    assert found[0]["gear_speed_rad_s"] == pytest.approx(2 * 1.9186, rel=1e-3)
-    assert found[0]["friction_torque_Nm"] == pytest.approx(496.58 / 2, rel=1e-3)
+    result = losses(PROGRAM_2, "-c", config)
+    assert result.exit_code == 2
+    assert "do not belong together" in result.stderr
 
 
 def flipped(folder: Path) -> Path:

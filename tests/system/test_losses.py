@@ -100,6 +100,16 @@ def test_its_map_gives_back_the_road_load(measured, tmp_path):
     assert abs(after) < 0.03
 
 
+def test_recording_of_a_truck_on_the_drum_is_refused_by_name(measured, tmp_path):
+    _, parameters, _ = measured
+    cruise_error(tmp_path, parameters)
+    (recording,) = (tmp_path / "demo").glob("*.rlrec")
+    refused = gateway("losses", recording, "--save", tmp_path / "map.toml")
+    assert refused.exit_code == 2
+    assert "was made in road load: a truck is on the drum" in refused.stderr
+    assert not (tmp_path / "map.toml").exists()
+
+
 def test_so_does_a_parameter_set_with_the_right_friction(measured, tmp_path):
     share, parameters, _ = measured
     after = cruise_error(tmp_path, parameters, "--friction", parameters)
