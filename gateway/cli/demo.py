@@ -58,7 +58,11 @@ Examples:
     metavar="SET",
     help="The emulated bench; the regulator goes on believing in Table 3.1.",
 )
-@click.option("--friction", metavar="FILE", help="Friction map that the regulator compensates.")
+@click.option(
+    "--friction",
+    metavar="FILE",
+    help="Friction that the regulator compensates: a friction map, or a parameter set.",
+)
 @click.option(
     "--duration",
     type=click.FloatRange(1.0, 600.0),
