@@ -46,6 +46,8 @@ SHELL = {
     "plant_emulator.parameter_sets": "files",
     "plant_emulator.plots": "files",
     "plant_emulator.process": "processes",
+    "plant_emulator.road_log": "files",
+    "plant_emulator.road_plot": "files",
     "plant_emulator.server": "network",
     "plant_emulator.serving": "network",
     "plant_emulator.session": "files",
