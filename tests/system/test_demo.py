@@ -1,7 +1,7 @@
 """The demo as a user calls it: the bench in its own process, the gateway, a real socket.
 
-Figures are limits that every run has to keep. The fast runs use the same loop, server and socket and
-no clock; the others keep real time.
+Figures are limits that every run has to keep. The fast runs use the same loop, server and socket
+and no clock; the others keep real time.
 """
 
 import json
