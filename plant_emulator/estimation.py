@@ -14,8 +14,8 @@ channel's residual the estimate's covariance is the sandwich
 
     H^-1 (sum J' G J + P) H^-1,   H = J' J + P,   G[t, s] = g(t - s),   P = prior precision
 
-(Newey and West, Econometrica 55 (1987) 703, tapered with Bartlett's window, for stationary
-residuals), enlarged by n/(n - p) for the unknowns that the residuals have already followed. White
+(Newey and West, Econometrica 55 (1987) 703, for stationary residuals; tapered by a trapezoid,
+Politis and Romano, J. Time Series Analysis 16 (1995) 67), enlarged by n/(n - p) for the unknowns that the residuals have already followed. White
 residuals of variance 1 give H^-1, as usual.
 """
 
@@ -301,8 +301,8 @@ def _covariance(
 def autocovariance(residual: Array) -> Array:
     """Autocovariance of a residual at the lags 0, 1, ..., tapered to 0; shape (lags,).
 
-    Lags count until the correlation first falls under twice its standard error in white noise;
-    then Bartlett's window over twice that many. Samples of exactly 0 do not count.
+    Lags count in full until the correlation first falls under twice its standard error in white
+    noise, and fall off over as many more. Samples of exactly 0 do not count.
     """
     counted = residual != 0.0
     n = int(counted.sum())
@@ -318,8 +318,15 @@ def autocovariance(residual: Array) -> Array:
     if first <= 1:
         return np.asarray(covariance[:1])
     reach = min(2 * first, longest)
-    taper = 1.0 - np.arange(reach) / reach
-    return np.asarray(covariance[:reach] * taper)
+    taper = np.minimum(1.0, 2.0 * (1.0 - np.arange(reach) / reach))
+    return _with_spectrum(covariance[:reach] * taper)
+
+
+def _with_spectrum(covariance: Array) -> Array:
+    """The autocovariance with what of its spectrum came out negative set to 0."""
+    both = np.concatenate([covariance, covariance[:0:-1]])
+    spectrum = np.maximum(np.fft.rfft(both).real, 0.0)
+    return np.asarray(np.fft.irfft(spectrum, len(both))[: len(covariance)])
 
 
 def coloured(slopes: Array, covariance: Array) -> Array:

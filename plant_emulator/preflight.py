@@ -33,6 +33,8 @@ Use = NDArray[np.bool_]
 CHANCE = 1e-6
 SHORTEST_FROZEN = 5
 SHORTEST_CLIPPED = 4
+# Equal samples that no noise explains; the rest tells how many are due to chance.
+CERTAINLY_FROZEN = 50
 # Share of the range above which a channel's noise is noise, not rounding.
 NOISY = 2.0 * FLOOR
 # A channel that repeats more than this share of its samples while it moves is sampled and held.
@@ -166,9 +168,10 @@ def _counting(measured: Log, name: str) -> tuple[Use, list[str]]:
     nothing = np.zeros(len(channel), bool)
     repeated = _repeated(channel)
     others = np.sum([_repeated(measured[o]) for o in COMPARED if o in measured], axis=0) - repeated
-    noisy = noise(channel) > NOISY * np.ptp(channel)
+    alive = ~_runs(repeated, others, CERTAINLY_FROZEN)
+    noisy = noise(channel, alive) > NOISY * np.ptp(channel)
     held = repeated if _held(channel, repeated) else nothing
-    frozen = _frozen(repeated, others) if noisy else nothing
+    frozen = _frozen(repeated, others, float(np.mean(repeated[alive]))) if noisy else nothing
     clipped = _clipped(channel, repeated, others) if noisy else nothing
     causes = {
         "is slower than the log and held between its samples": held,
@@ -200,12 +203,11 @@ def _held(channel: Array, repeated: Use) -> bool:
     return bool(moving.sum() > 20 and np.mean(repeated[moving]) > HELD_SHARE)
 
 
-def _frozen(repeated: Use, others: Array) -> Use:
+def _frozen(repeated: Use, others: Array, share: float) -> Use:
     """Samples in runs of equal ones that are too long for chance.
 
-    others : how many other channels repeat each sample
+    others : how many other channels repeat each sample; share : of repeated samples by chance
     """
-    share = float(np.mean(repeated))
     if not 0.0 < share < HELD_SHARE:
         return np.zeros(len(repeated), bool)
     return _runs(
