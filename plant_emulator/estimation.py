@@ -15,8 +15,8 @@ channel's residual the estimate's covariance is the sandwich
     H^-1 (sum J' G J + P) H^-1,   H = J' J + P,   G[t, s] = g(t - s),   P = prior precision
 
 (Newey and West, Econometrica 55 (1987) 703, for stationary residuals; tapered by a trapezoid,
-Politis and Romano, J. Time Series Analysis 16 (1995) 67), enlarged by n/(n - p) for the unknowns that the residuals have already followed. White
-residuals of variance 1 give H^-1, as usual.
+Politis and Romano, J. Time Series Analysis 16 (1995) 67), enlarged by n/(n - p) for the unknowns
+that the residuals have already followed. White residuals of variance 1 give H^-1, as usual.
 """
 
 from __future__ import annotations
@@ -226,6 +226,7 @@ def estimate(
     progress : called with the sum of squares after every simulation of all runs
     """
     from scipy.optimize import least_squares
+    from threadpoolctl import threadpool_limits
 
     unknowns = tuple(unknowns)
     lower = np.array([u.scaled(u.lower) for u in unknowns])
@@ -234,17 +235,19 @@ def estimate(
     start = np.array([u.scaled(u.start) for u in unknowns])
     problem = _Problem(unknowns, residuals, progress)
     problem.steps = np.full(len(unknowns), 1e-5)
-    found = least_squares(
-        problem.rows,
-        np.clip(start, lower + margin, upper - margin),
-        problem.slopes,
-        bounds=(lower, upper),
-        x_scale="jac",
-        ftol=COST_SETTLED,
-        xtol=Z_SETTLED,
-        gtol=None,
-        max_nfev=iterations,
-    )
+    # Threads that wait for each other in a decomposition of ten columns take most of the time.
+    with threadpool_limits(1):
+        found = least_squares(
+            problem.rows,
+            np.clip(start, lower + margin, upper - margin),
+            problem.slopes,
+            bounds=(lower, upper),
+            x_scale="jac",
+            ftol=COST_SETTLED,
+            xtol=Z_SETTLED,
+            gtol=None,
+            max_nfev=iterations,
+        )
     return _estimate(problem, found.x, bool(found.status > 0), str(found.message))
 
 

@@ -112,7 +112,8 @@ def lines(
     if found.chi_squared > 1.5:
         rows += ["  the model lacks something that these logs show: see plant-emulator diagnose"]
     for title, fits in (("fitted", estimation), ("held out", held_out)):
-        rows += [row for source, channels in fits.items() for row in table(title, source, channels)]
+        for source, channels in fits.items():
+            rows += [f"{source} ({title})", *table_rows(channels)]
     return rows
 
 
@@ -131,16 +132,24 @@ def _advice(e: Experiment) -> str:
     )
 
 
-def table(title: str, source: str, channels: Mapping[str, Fit]) -> list[str]:
-    """Val1, Val2, NRMSD and rms of every channel of a log."""
-    rows = [
-        f"{source} ({title})",
-        f"  {'channel':18}{'Val1 %':>9}{'Val2 %':>9}{'NRMSD %':>10}{'rms':>11}",
-    ]
+def table_rows(channels: Mapping[str, Fit]) -> list[str]:
+    """Val1, Val2, NRMSD and rms of every channel of a log, for the terminal."""
+    rows = [f"  {'channel':18}{'Val1 %':>9}{'Val2 %':>9}{'NRMSD %':>10}{'rms':>11}"]
     return rows + [
         f"  {name:18}{fit.val1:9.3f}{fit.val2:9.3f}{100 * fit.nrmsd:10.4f}{fit.rms:11.4g}"
         for name, fit in channels.items()
     ]
+
+
+def table_of(fits: Fits) -> str:
+    """The measures as CSV text, a row a channel of a log."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(["log", "channel", "val1_percent", "val2_percent", "nrmsd_percent", "rms_SI"])
+    for source, channels in fits.items():
+        for name, fit in channels.items():
+            writer.writerow([source, name, fit.val1, fit.val2, 100.0 * fit.nrmsd, fit.rms])
+    return out.getvalue()
 
 
 def spreadsheet(found: Identification) -> str:

@@ -48,3 +48,31 @@ def validate(measured: Log, simulated: Log) -> dict[str, Fit]:
         for name in COMPARED
         if name in measured
     }
+
+
+def zero_phase(log: Log, cutoff: float) -> Log:
+    """The log with its compared channels low-passed forwards and backwards, its edges dropped.
+
+    cutoff : frequency at which the two passes together leave half of the amplitude [Hz]; a
+        Butterworth filter of second order each way. One period of it is dropped at either end.
+    Measured and simulated logs must go through the same one: filtering only one of them changes
+    the spikes of the backlash. Raises LogError for a log that is too short, or not evenly sampled.
+    """
+    from scipy.signal import butter, sosfiltfilt
+
+    interval = float(np.median(np.diff(log.time)))
+    if float(np.ptp(np.diff(log.time))) > 0.1 * interval:
+        raise LogError(f"{log.source}: not evenly sampled; a filter needs one interval throughout")
+    edge = round(1.0 / (cutoff * interval))
+    if not 0.0 < cutoff < 0.5 / interval or len(log.time) < 4 * edge:
+        raise LogError(
+            f"{log.source}: cannot be filtered at {cutoff:g} Hz; a cut-off between "
+            f"{4.0 / (len(log.time) * interval):.2g} and {0.5 / interval:g} Hz is needed"
+        )
+    sections = butter(2, cutoff, fs=1.0 / interval, output="sos")
+    kept = slice(edge, -edge)
+    signals = {
+        name: sosfiltfilt(sections, values)[kept] if name in COMPARED else values[kept]
+        for name, values in log.signals.items()
+    }
+    return Log(log.time[kept], signals, log.source, log.other)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import click
@@ -21,6 +22,14 @@ Example:
 @_options.effect
 @_options.reference
 @_options.start
+@click.option(
+    "--filter",
+    "cutoff",
+    type=click.FloatRange(min=0.0, min_open=True),
+    metavar="HZ",
+    help="Low-pass both with the same zero-phase filter first and drop the edges; default: none.",
+)
+@click.option("--table", metavar="CSV", help="Write the measures for a spreadsheet.")
 @click.option("--plot", metavar="PNG", help="Draw measured, simulated and residual.")
 @_options.json_file
 def command(
@@ -29,6 +38,8 @@ def command(
     effect_texts: tuple[str, ...],
     reference: str | None,
     start: str,
+    cutoff: float | None,
+    table: str | None,
     plot: str | None,
     json_file: str | None,
 ) -> None:
@@ -38,33 +49,25 @@ def command(
     """
     from plant_emulator import effects, parameter_sets
     from plant_emulator import logs as log_files
+    from plant_emulator.identification_report import measures, table_of, table_rows
     from plant_emulator.session import followed
-    from plant_emulator.validate import validate
+    from plant_emulator.validate import validate, zero_phase
 
     values, effect_values = parameter_sets.load(parameters), effects.parse(effect_texts)
     measured = [log_files.read(path) for path in logs]
     pairs = [(log, followed(log, values, effect_values, reference, start)) for log in measured]
+    if cutoff is not None:
+        pairs = [(zero_phase(log, cutoff), zero_phase(other, cutoff)) for log, other in pairs]
     fits = {log.source: validate(log, simulation) for log, simulation in pairs}
-    answer: dict[str, Any] = {
-        "schema": "validation/1",
-        "logs": {
-            source: {
-                name: {"val1": fit.val1, "val2": fit.val2, "nrmsd": fit.nrmsd}
-                for name, fit in channels.items()
-            }
-            for source, channels in fits.items()
-        },
-    }
+    answer: dict[str, Any] = {"schema": "validation/1", "logs": measures(fits)}
     if plot:
         from plant_emulator.plots import draw_validation
 
         draw_validation(pairs, plot)
+    if table:
+        Path(table).write_text(table_of(fits), encoding="utf-8")
     if json_file:
         _options.write_json(answer, json_file)
     if json_file != "-":
         for source, channels in fits.items():
-            click.echo(source)
-            click.echo(f"  {'channel':18}{'Val1 %':>9}{'Val2 %':>9}{'NRMSD %':>10}{'rms':>11}")
-            for name, fit in channels.items():
-                numbers = f"{fit.val1:9.3f}{fit.val2:9.3f}{100 * fit.nrmsd:10.4f}{fit.rms:11.4g}"
-                click.echo(f"  {name:18}{numbers}")
+            click.echo("\n".join([source, *table_rows(channels)]))
