@@ -1,7 +1,7 @@
 """Builds the simulation kernel: the model's plain functions, the effects chained in, compiled.
 
-The functions of laws, drive, plant and integrate are ordinary Python. Building means, for one list
-of effects:
+The functions of the model, from `laws` to `integrate`, are ordinary Python. Building means, for one
+list of effects:
  1. write a few lines of glue that only the list determines: each law followed by the effects that
     change it, the copying of states and memories (`glue`);
  2. rebind every function to the glue and to its compiled callees;
@@ -22,7 +22,19 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from plant_emulator import compiler, drive, effects, integrate, laws, plant
+from plant_emulator import (
+    compiler,
+    contact,
+    delay,
+    drive,
+    effects,
+    friction,
+    integrate,
+    laws,
+    plant,
+    sdirk,
+    stage,
+)
 from plant_emulator.errors import ParameterError
 from plant_emulator.parameters import UNITS
 from plant_emulator.trial import memory_names, raise_in_effects, try_out
@@ -32,7 +44,7 @@ if TYPE_CHECKING:
     from plant_emulator.kernel_types import Record, State
 
 Function = Callable[..., Any]
-MODULES: tuple[ModuleType, ...] = (laws, drive, plant, integrate)
+MODULES: tuple[ModuleType, ...] = (laws, drive, contact, friction, plant, sdirk, delay, integrate)
 
 
 @dataclass(frozen=True)
@@ -59,13 +71,13 @@ class Kernel:
 
     def state(self, p: Record, backlash_angle: float) -> State:
         """State at rest with the gap at that angle [rad], memories at their starts."""
-        x = [0.0] * plant.FIRST_MEMORY + [start(p) for start in self.starts]
-        x[plant.BACKLASH] = backlash_angle
+        x = [0.0] * stage.FIRST_MEMORY + [start(p) for start in self.starts]
+        x[stage.BACKLASH] = backlash_angle
         return vector(x)
 
     def work(self) -> State:
         """Work space of the stepper."""
-        size = plant.FIRST_MEMORY + len(self.starts)
+        size = stage.FIRST_MEMORY + len(self.starts)
         rows = [[0.0] * size for _ in range(4)]
         return np.array(rows) if compiler.ENABLED else rows
 
@@ -110,12 +122,12 @@ def glue(known: Mapping[str, Effect]) -> str:
             if law.__name__ in effect.laws:
                 value = f"{effect.name}__{law.__name__}({value}, s, p)"
         lines += [f"def {law.__name__}(s, p):", f"    return {value}"]
-    states = [*plant.STATES, *memory_names(known)]
+    states = [*stage.STATES, *memory_names(known)]
     lines += ["def load(x, s):", *(f"    s.{name} = x[{k}]" for k, name in enumerate(states))]
     lines += ["def store(s, x):", *(f"    x[{k}] = s.{name}" for k, name in enumerate(states))]
     lines += ["def memories(base, a, s, p):", "    pass"]
     lines += [
-        f"    s.{name} = {name}__advance(base[{plant.FIRST_MEMORY + k}], a, s, p)"
+        f"    s.{name} = {name}__advance(base[{stage.FIRST_MEMORY + k}], a, s, p)"
         for k, name in enumerate(memory_names(known))
     ]
     return "\n".join(lines) + "\n"
@@ -151,7 +163,7 @@ def build(known: Mapping[str, Effect]) -> Kernel:
     return Kernel(
         effects=known,
         parameters=(*UNITS, *effects.neutral(known)),
-        stage=(*plant.STAGE, *memory_names(known)),
+        stage=(*stage.STAGE, *memory_names(known)),
         run=by_arrays(compiled[integrate.run], known),
         advance=by_arrays(compiled[integrate.advance], known),
         starts=tuple(m.start for e in known.values() for m in e.memories.values()),

@@ -1,7 +1,7 @@
 """Types of what the kernel's functions share.
 
 A Record is read and written by attribute, all floats; which attributes it has is data
-(`plant.STAGE`, the parameter names), laid out when the kernel is built: a NumPy structured scalar
+(`stage.STAGE`, the parameter names), laid out when the kernel is built: a NumPy structured scalar
 for the compiled kernel, a plain namespace for the uncompiled one. A State is a vector or table of
 floats: a NumPy array, or (nested) lists.
 """

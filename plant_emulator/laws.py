@@ -1,7 +1,7 @@
 """Constitutive laws of the bench, one function each, and the places where an effect can act.
 
 Every law is called as `law(s, p)`: s is the record of the implicit stage being solved (the present
-estimate of all speeds, torques and currents, see `plant.STAGE`), p the flat record of parameter
+estimate of all speeds, torques and currents, see `stage.STAGE`), p the flat record of parameter
 values. An effect changes a law by a function of the same name, `law(value, s, p)`, that takes the
 value so far and returns the changed one (see `effects`); the kernel chains them. A law whose
 nominal value is 0 or 1 marks a term that the thesis neglects.
@@ -114,6 +114,28 @@ def gear_viscous_friction(s: Record, p: Record) -> float:
     return p.gear_viscous_friction
 
 
+def gear_direction_factor(s: Record, p: Record) -> float:
+    """Gear friction of eq. 3.27 in this direction, s.gear_direction, over that of the table [1].
+
+    This law and the next two are evaluated at direction, speed and torques of the solution itself,
+    see `friction`: here an effect may depend on them.
+    """
+    return 1.0
+
+
+def gear_speed_friction(s: Record, p: Record) -> float:
+    """Further friction of the gear [N m] by its speed s.gear_speed; may fall with it."""
+    return 0.0
+
+
+def gear_load_friction(s: Record, p: Record) -> float:
+    """Further friction of the gear [N m] by its load, s.motor_shaft_torque, s.drum_shaft_torque.
+
+    It may change by less than the load itself does.
+    """
+    return 0.0
+
+
 def gear_torque(s: Record, p: Record) -> float:
     """Further torque against the motion of the gear output [N m]."""
     return 0.0
@@ -181,6 +203,9 @@ LAWS = (
     motor_shaft_damping,
     gear_coulomb_friction,
     gear_viscous_friction,
+    gear_direction_factor,
+    gear_speed_friction,
+    gear_load_friction,
     gear_torque,
     backlash_half_gap,
     drum_coulomb_friction,

@@ -135,7 +135,16 @@ def simulate(
         p,
         out,
     )
-    if (unsettled := stage.unsettled) > 0.0:
+    _refuse_unsolved(run, stage.unsettled, out)
+    signals = {name: out[:, k] for k, name in enumerate(CHANNELS)}
+    if not run.truck:  # a log with this column would be read as a staircase with a parked truck
+        del signals["wheel_torque"]
+    return Log(run.time, {"speed_reference": run.reference, **signals}, run.source)
+
+
+def _refuse_unsolved(run: Run, unsettled: float, out: Array) -> None:
+    """Raise UnsettledError for a result that is not the model's."""
+    if unsettled > 0.0:
         raise UnsettledError(
             f"{run.source}: {unsettled:.0f} implicit stages did not settle; the result is not the "
             "model's; a shorter step or other effects may help"
@@ -146,10 +155,6 @@ def simulate(
             f"{run.source}: {CHANNELS[column]} at {run.time[row]:g} s is not finite; the result is "
             "not the model's; other parameters or effects may help"
         )
-    signals = {name: out[:, k] for k, name in enumerate(CHANNELS)}
-    if not run.truck:  # a log with this column would be read as a staircase with a parked truck
-        del signals["wheel_torque"]
-    return Log(run.time, {"speed_reference": run.reference, **signals}, run.source)
 
 
 def values_of(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, cast
 
-from plant_emulator import effects, plant
+from plant_emulator import effects, stage
 from plant_emulator.errors import ParameterError, place_in
 from plant_emulator.parameters import UNITS
 
@@ -62,7 +62,7 @@ def _calls(
 ) -> Iterator[tuple[Callable[..., Any], tuple[Any, ...]]]:
     own = {f"{effect.name}_{key}": value for key, value in effect.plausible().items()}
     p = cast("Record", Parameters(**dict.fromkeys(UNITS, 1.0) | effects.neutral(known) | own))
-    s = cast("Record", Stage(**dict.fromkeys((*plant.STAGE, *memory_names(known)), 0.0)))
+    s = cast("Record", Stage(**dict.fromkeys((*stage.STAGE, *memory_names(known)), 0.0)))
     for law in effect.laws.values():
         yield law, (0.0, s, p)
     for memory in effect.memories.values():

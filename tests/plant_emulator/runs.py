@@ -37,7 +37,7 @@ def simulate(inputs: Log, values: Mapping[str, float], **options: Any) -> Log:
 class Piecewise:
     """The compiled bench under a reference that is linear from call to call, without dead time.
 
-    x : the states, to be read and written between calls (see plant.STATES)
+    x : the states, to be read and written between calls (see stage.STATES)
     """
 
     values: Mapping[str, float]

@@ -6,6 +6,7 @@ import pytest
 
 from plant_emulator import drive, laws, plant
 from plant_emulator.parameters import ParameterSet
+from plant_emulator.stage import STAGE
 
 A = 1e-4  # implicit step [s]
 
@@ -17,7 +18,7 @@ def p(nominal: ParameterSet) -> SimpleNamespace:
 
 def stage(p: SimpleNamespace, reference: float, motor_speed: float) -> SimpleNamespace:
     """A stage with its laws evaluated."""
-    s = SimpleNamespace(**dict.fromkeys(plant.STAGE, 0.0))
+    s = SimpleNamespace(**dict.fromkeys(STAGE, 0.0))
     s.delayed_reference, s.motor_speed = reference, motor_speed
     plant.evaluate_laws(s, p)
     return s

@@ -10,7 +10,7 @@ import numba
 import numpy as np
 import pytest
 
-from plant_emulator import compiler, effects, laws, plant
+from plant_emulator import compiler, effects, laws, stage
 from plant_emulator.kernel import build, glue, kernel
 from plant_emulator.log import COMPARED
 from plant_emulator.parameters import ParameterSet
@@ -103,9 +103,9 @@ def test_state_at_rest_holds_gap_and_start_temperature(nominal: ParameterSet) ->
     oil = {"gear_oil_temperature": {"start_temperature": 300.0}}
     p = model.parameter_record(values_of(nominal, oil))
     x = model.state(p, 0.1)
-    assert x[plant.BACKLASH] == 0.1
-    assert 300.0 in x[plant.FIRST_MEMORY :]
-    assert sum(abs(x[: plant.BACKLASH])) + abs(x[plant.DRUM_SPEED]) == 0.0
+    assert x[stage.BACKLASH] == 0.1
+    assert 300.0 in x[stage.FIRST_MEMORY :]
+    assert sum(abs(x[: stage.BACKLASH])) + abs(x[stage.DRUM_SPEED]) == 0.0
 
 
 @pytest.fixture

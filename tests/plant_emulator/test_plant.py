@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from plant_emulator import plant
+from plant_emulator import contact, plant, stage
 from plant_emulator.bench import Bench
 from plant_emulator.parameters import ParameterSet
 from tests import reference_plant as thesis
@@ -36,20 +36,20 @@ BREAKAWAY = 35.989 / 62.6  # torque at the motor side that the gear withstands a
     [(0.0, 0.0), (0.1, 0.0), (-0.15, 0.0), (0.15, 0.0), (0.25, 0.1), (-0.25, -0.1)],
 )
 def test_dead_zone_by_hand(y: float, expected: float) -> None:
-    assert plant.dead_zone(y, 0.15) == pytest.approx(expected)
+    assert contact.dead_zone(y, 0.15) == pytest.approx(expected)
 
 
 @given(y=st.floats(-10.0, 10.0), step=st.floats(0.0, 1.0), half_gap=st.floats(0.0, 1.0))
 def test_dead_zone_is_odd_and_rises_by_no_more_than_its_argument(
     y: float, step: float, half_gap: float
 ) -> None:
-    assert plant.dead_zone(-y, half_gap) == -plant.dead_zone(y, half_gap)
-    rise = plant.dead_zone(y + step, half_gap) - plant.dead_zone(y, half_gap)
+    assert contact.dead_zone(-y, half_gap) == -contact.dead_zone(y, half_gap)
+    rise = contact.dead_zone(y + step, half_gap) - contact.dead_zone(y, half_gap)
     assert -1e-12 <= rise <= step + 1e-12
 
 
 def test_friction_takes_up_to_its_level_and_leaves_the_rest() -> None:
-    assert [plant.slipping(torque, 2.0) for torque in (5.0, 2.0, -1.0, -2.0, -5.0)] == [
+    assert [contact.slipping(torque, 2.0) for torque in (5.0, 2.0, -1.0, -2.0, -5.0)] == [
         3.0, 0.0, 0.0, 0.0, -3.0,
     ]  # fmt: skip
 
@@ -83,12 +83,12 @@ def test_stage_solves_the_equations_of_the_thesis(
     """(X - base) / a = f(X), f typed in tests/reference_plant.py; stick within its level."""
     motor = 62.6 * gear + slip
     base = [0.01 * current, 0.1 * motor, current, motor, twist, gear, gap, gear + drum]
-    s = SimpleNamespace(**dict.fromkeys(plant.STAGE, 0.0))
-    vars(s).update(zip(plant.STATES, base, strict=True))
+    s = SimpleNamespace(**dict.fromkeys(stage.STAGE, 0.0))
+    vars(s).update(zip(stage.STATES, base, strict=True))
     s.gear_speed = gear + estimate
     s.delayed_reference, s.wheel_torque = motor + error, wheel_torque
     plant.solve_stage(base, a, s, TABLE)
-    found = [getattr(s, name) for name in plant.STATES]
+    found = [getattr(s, name) for name in stage.STATES]
 
     omega_g = found[GEAR]
     friction = thesis.friction(omega_g, sign=np.sign) if omega_g else s.gear_friction_torque

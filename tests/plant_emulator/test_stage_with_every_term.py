@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from plant_emulator import plant
+from plant_emulator import plant, stage
 from tests import reference_plant as thesis
 from tests.plant_emulator.test_plant import TABLE, size
 
@@ -68,8 +68,8 @@ def test_stage_balances_every_torque(
     gear = motor / 62.6 + slip
     drum = 0.0 if drum_at_rest else gear + drum_slip
     base = [0.01 * current, 0.1 * motor, current, motor, twist, gear, gap, drum]
-    s = SimpleNamespace(**dict.fromkeys(plant.STAGE, 0.0))
-    vars(s).update(zip(plant.STATES, base, strict=True))
+    s = SimpleNamespace(**dict.fromkeys(stage.STAGE, 0.0))
+    vars(s).update(zip(stage.STATES, base, strict=True))
     s.delayed_reference, s.wheel_torque = motor, wheel_torque
     plant.solve_stage(base, a, s, p)
 
