@@ -217,7 +217,6 @@ def estimate(
     unknowns: Sequence[Unknown],
     residuals: Sequence[Residual],
     *,
-    iterations: int = MAX_ITERATIONS,
     progress: Callable[[float], None] | None = None,
 ) -> Estimate:
     """Fit the unknowns from their starts.
@@ -246,7 +245,7 @@ def estimate(
             ftol=COST_SETTLED,
             xtol=Z_SETTLED,
             gtol=None,
-            max_nfev=iterations,
+            max_nfev=MAX_ITERATIONS,
         )
     return _estimate(problem, found.x, bool(found.status > 0), str(found.message))
 

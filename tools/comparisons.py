@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING
 import click
 import numpy as np
 import peers
+from fits import Fits, Fitted
 from study import ERROR_BOUND, LONG_STEP, PROGRAM, Study
-from timing import alone, side_by_side
+from timing import alone, duration, side_by_side
 
 from plant_emulator import kernel, parameter_sets
 from plant_emulator.bench import Bench
@@ -73,6 +74,11 @@ def row(name: str, ours: float, peer: str, their: float, target: float, **more: 
     )
 
 
+def missing(name: str, peer: str, target: float) -> Row:
+    """A row that could not be measured."""
+    return Row(name=name, ours=None, peer=peer, peers=None, ratio=None, target=target, holds=False)
+
+
 Rows = Iterator[Row]
 
 
@@ -118,15 +124,7 @@ def cvodes(study: Study) -> Rows:
         import casadi  # noqa: F401
     except ImportError as error:
         click.echo(f"cvodes: {error}; pip install 'road-load-bench[bench]' brings it", err=True)
-        yield Row(
-            name="cvodes",
-            ours=None,
-            peer="CasADi CVODES: not installed",
-            peers=None,
-            ratio=None,
-            target=8.0,
-            holds=False,
-        )
+        yield missing("cvodes", "CasADi CVODES: not installed", 8.0)
         return
     solve = peers.Cvodes(study.time, study.corners, study.values)
     yield from compared(study, "cvodes", "CasADi CVODES", solve, 8.0)
@@ -193,6 +191,24 @@ def first_result(study: Study) -> Rows:
             yield row(name, used, "real time of the run", study.duration, 0.0)
 
 
+def identification(_: Study) -> Rows:
+    """A fit of nine parameters and a start state to one log, from the nominal parameters."""
+    try:
+        import lmfit  # noqa: F401
+    except ImportError as error:
+        click.echo(f"identification: {error}; pip install 'road-load-bench[bench]'", err=True)
+        yield missing("identification", "lmfit on scipy LSODA: not installed", 100.0)
+        return
+    fits = Fits()
+    ours = fits.ours()
+    before = duration(fits.ours, 3)
+    theirs: list[Fitted] = []
+    peer = duration(lambda: theirs.append(fits.lmfit()), 1)
+    mine = 0.5 * (before + duration(fits.ours, 3))
+    costs = f"sum of squares {ours.estimate.cost:.1f}, its {theirs[0].cost:.1f}"
+    yield row("identification", mine, f"lmfit on scipy LSODA; ours {costs}", peer, 100.0)
+
+
 GROUPS = {
     group.__name__: group
     for group in (
@@ -203,6 +219,7 @@ GROUPS = {
         realtime,
         tick,
         effects,
+        identification,
         thousand,
         first_result,
     )

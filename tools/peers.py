@@ -131,14 +131,19 @@ class Lsoda:
         self._time, self._p = time, p
         self._f = right_hand_side
 
-    def __call__(self, tolerance: float) -> Array:
-        """The channels at the sample times, solved to that relative tolerance."""
+    def __call__(self, tolerance: float, backlash_angle: float = 0.0) -> Array:
+        """The channels at the sample times, solved to that relative tolerance.
+
+        backlash_angle : gear minus drum at the start [rad]
+        """
         from scipy.integrate import solve_ivp
 
+        start = np.zeros(STATES)
+        start[6] = backlash_angle
         found = solve_ivp(
             self._f,
             (self._time[0], self._time[-1]),
-            np.zeros(STATES),
+            start,
             method="LSODA",
             max_step=LARGEST_STEP,
             t_eval=self._time,

@@ -1,0 +1,86 @@
+"""The same fit by a general estimator on a general solver: lmfit on scipy's LSODA."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import peers
+
+from plant_emulator import logs, parameter_sets, programs
+from plant_emulator.identify import free_parameters, identify
+from plant_emulator.recording import recording
+from plant_emulator.search import GAP_POSITION
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from plant_emulator.identify import Identification
+    from plant_emulator.log import Array
+
+LOG = Path(__file__).resolve().parent.parent / "tests/data/bench_practice/practice_008"
+PROGRAM = "program1"
+# Tolerance at which the solver's error is far below the noise, and the step of lmfit's differences
+# that stands out of it: epsfcn is its square.
+TOLERANCE, DIFFERENCE = 1e-6, 1e-8
+# Bounds of the search, the same as ours.
+FACTOR = 5.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fitted:
+    """An optimum: values by name [SI], and the sum of squared whitened residuals."""
+
+    values: Mapping[str, float]
+    cost: float
+
+
+class Fits:
+    """One log of the independent bench, to be fitted both ways from the nominal parameters."""
+
+    def __init__(self, log: Path = LOG / f"{PROGRAM}.csv.gz") -> None:
+        self.nominal = parameter_sets.load()
+        self.recording = recording(logs.read(log))
+        self.free = free_parameters(self.nominal)
+        program = programs.PROGRAMS[PROGRAM]
+        assert isinstance(program, programs.SpeedProgram)
+        last = program.corners[-1][1]
+        self.corners = ((0.0, program.corners[0][1]), *program.corners, (program.duration, last))
+
+    def ours(self) -> Identification:
+        """The fit as users get it."""
+        return identify([self.recording], self.nominal)
+
+    def residual(self, values: Mapping[str, float], gap_position: float) -> Array:
+        """Whitened residual of the log by LSODA, shape (channels, samples)."""
+        p = {**self.nominal.values(), **values}
+        solver = peers.Lsoda(self.recording.log.time, peers.plain(self.corners, p), p)
+        found = solver(TOLERANCE, gap_position * p["backlash_half_gap"])
+        names = [peers.CHANNELS.index(name) for name in self.recording.channels]
+        measured = np.stack([self.recording.log[name] for name in self.recording.channels])
+        return np.asarray((measured - found.T[names]) / self.recording.noise[:, None])
+
+    def lmfit(self, start: Mapping[str, float] | None = None, gap: float = 0.0) -> Fitted:
+        """lmfit's leastsq (MINPACK) on logarithms of the parameters and the start in the gap."""
+        import lmfit
+
+        unknowns = lmfit.Parameters()
+        for name in self.free:
+            value, nominal = (start or {}).get(name), self.nominal.value(name)
+            unknowns.add(
+                name,
+                value=np.log(value or nominal),
+                min=np.log(nominal / FACTOR),
+                max=np.log(nominal * FACTOR),
+            )
+        unknowns.add(GAP_POSITION, value=gap, min=-1.0, max=1.0)
+
+        def residual(trial: Any) -> Array:
+            values = {name: float(np.exp(trial[name].value)) for name in self.free}
+            return self.residual(values, float(trial[GAP_POSITION].value)).ravel()
+
+        found = lmfit.minimize(residual, unknowns, method="leastsq", epsfcn=DIFFERENCE)
+        values = {name: float(np.exp(found.params[name].value)) for name in self.free}
+        return Fitted(values=values, cost=float(found.chisqr))
