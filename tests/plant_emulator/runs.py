@@ -7,11 +7,18 @@ from typing import Any
 
 import numpy as np
 
+import pytest
+
+from plant_emulator import compiler
 from plant_emulator.kernel import Kernel, kernel
 from plant_emulator.log import Array, Log
 from plant_emulator.programs import sample_times
 from plant_emulator.simulate import run_of
 from plant_emulator.simulate import simulate as simulate_run
+
+needs_compiler = pytest.mark.skipif(
+    not compiler.ENABLED, reason="is about the compiler, which NUMBA_DISABLE_JIT switches off"
+)
 
 INT_SPEED, INT_CURRENT, CURRENT, MOTOR, TWIST, GEAR, BACKLASH, DRUM = range(8)
 

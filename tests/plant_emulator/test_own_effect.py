@@ -10,7 +10,7 @@ import pytest
 from plant_emulator import compiler, effects, parameter_sets
 from plant_emulator.errors import ParameterError
 from plant_emulator.kernel import build
-from tests.plant_emulator.runs import linear, simulate
+from tests.plant_emulator.runs import linear, needs_compiler, simulate
 
 ROOT = Path(__file__).parents[2]
 OIL_DRAG = '''"""Drag of the gear that rises with its speed: T = k omega_g. Source: a test."""
@@ -215,6 +215,7 @@ def test_law_without_a_number_is_refused(tmp_path: Path) -> None:
 ONLY_MOVING = "0.0 if speed == 0.0 else"
 
 
+@needs_compiler
 def test_mistake_that_only_the_compiler_finds_is_told_with_its_line(tmp_path: Path) -> None:
     path = written(tmp_path, FORCE.replace("BODY", f"{ONLY_MOVING} factor.speed"))
     model = build({"own": effects.from_file(path)})
