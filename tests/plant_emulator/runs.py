@@ -6,7 +6,6 @@ from math import inf
 from typing import Any
 
 import numpy as np
-
 import pytest
 
 from plant_emulator import compiler
