@@ -106,9 +106,16 @@ class Estimate:
     converged: bool
     message: str
 
-    def values(self, run: int | None = None) -> dict[str, float]:
-        """Parameters, and the states of one run, by name."""
-        return _values(self.unknowns, self.z, run)
+    def parameters(self) -> dict[str, float]:
+        """Values of the parameters by name."""
+        return {u.name: u.value(z) for u, z in self._pairs() if u.run is None}
+
+    def states(self, run: int) -> dict[str, float]:
+        """Values of the states of one run by name."""
+        return {u.name: u.value(z) for u, z in self._pairs() if u.run == run}
+
+    def _pairs(self) -> list[tuple[Unknown, float]]:
+        return [(u, float(z)) for u, z in zip(self.unknowns, self.z, strict=True)]
 
     @property
     def standard_errors(self) -> Array:
@@ -202,8 +209,8 @@ class _Problem:
         )
 
 
-def _values(unknowns: Sequence[Unknown], z: Array, run: int | None) -> dict[str, float]:
-    return {u.name: u.value(z[j]) for j, u in enumerate(unknowns) if u.run in {None, run}}
+def _values(unknowns: Sequence[Unknown], z: Array, run: int) -> dict[str, float]:
+    return {u.name: u.value(float(z[j])) for j, u in enumerate(unknowns) if u.run in {None, run}}
 
 
 def _steps(jacobians: Sequence[Array]) -> Array:

@@ -115,5 +115,5 @@ def _information(
         replace(u, start=p.value)
         for u, p in zip(found.estimate.unknowns[:count], found.parameters, strict=True)
     ]
-    state = replace(found.estimate.unknowns[count], start=0.0, run=0)
-    return without_states(estimation.at([*parameters, state], residuals).information, count)
+    states = [replace(u, run=0) for u in found.estimate.unknowns[count:] if u.run == 0]
+    return without_states(estimation.at([*parameters, *states], residuals).information, count)

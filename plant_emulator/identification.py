@@ -17,7 +17,9 @@ from plant_emulator.identify import identify
 from plant_emulator.kernel import kernel
 from plant_emulator.preflight import preflight
 from plant_emulator.recording import recording
-from plant_emulator.simulate import Hold, fit_start, simulate, values_of
+from plant_emulator.search import GAP_POSITION
+from plant_emulator.simulate import Hold, simulate, values_of
+from plant_emulator.start_states import fit_states, states_of, with_own
 from plant_emulator.validate import validate
 
 if TYPE_CHECKING:
@@ -91,21 +93,18 @@ def identified(
     hold : as the option --reference; effects : those that the bench is known to have
     """
     hashes = _hashes([*paths, *held_out])
+    kernel()  # compiling is not part of the fit's time
     estimation, notes = _load(paths, parameters, hold)
     prediction, more = _load(held_out, parameters, hold)
-    kernel()  # compiling is not part of the fit's time
+    estimation = [with_own(r, effects) for r in estimation]
+    prediction = [with_own(r, effects) for r in prediction]
     begin = process_time()
     found = identify(estimation, parameters, free, effects=effects, progress=progress)
     spent = process_time() - begin
     values = values_of(found.parameter_set, effects)
-    fitted = [
-        (r.log, simulate(r.run, values, gap_position=position))
-        for r, position in zip(estimation, found.gap_positions, strict=True)
-    ]
-    predicted = [
-        (r.log, simulate(r.run, values, gap_position=fit_start(r.log, r.run, values)))
-        for r in prediction
-    ]
+    states = states_of(effects)
+    fitted = [_simulated(r, values, s) for r, s in zip(estimation, found.states, strict=True)]
+    predicted = [_simulated(r, values, fit_states(r, values, states)) for r in prediction]
     return Result(
         found=found,
         pairs=(*fitted, *predicted),
@@ -116,6 +115,14 @@ def identified(
         notes=(*notes, *more),
         cpu_seconds=spent,
     )
+
+
+def _simulated(
+    recording: Recording, values: Mapping[str, float], states: Mapping[str, float]
+) -> Pair:
+    """A run as measured and as simulated."""
+    own = {**values, **recording.own, **states}
+    return recording.log, simulate(recording.run, own, gap_position=own.pop(GAP_POSITION))
 
 
 def _hashes(paths: Sequence[str]) -> dict[str, str]:

@@ -24,6 +24,7 @@ from plant_emulator.errors import IdentificationError
 from plant_emulator.estimation import Estimate, Unknown
 from plant_emulator.search import FINE_SCANS, GAP_POSITION, Search
 from plant_emulator.simulate import TOLERANCE, values_of
+from plant_emulator.start_states import GAP, states_of, with_own
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from plant_emulator.parameters import ParameterSet
     from plant_emulator.recording import Recording
     from plant_emulator.search import Progress
+    from plant_emulator.start_states import Effects
 
 # Held fixed unless asked for: a log shows it only through J_g + xi^2 J_m.
 NOT_FREE = frozenset({"gear_inertia"})
@@ -73,42 +75,46 @@ class Parameter:
 
 @dataclass(frozen=True, kw_only=True)
 class Identification:
-    """The fit of one bench."""
+    """The fit of one bench; states : of every run, by name."""
 
     parameter_set: ParameterSet
     parameters: tuple[Parameter, ...]
-    gap_positions: tuple[float, ...]
+    states: tuple[Mapping[str, float], ...]
     estimate: Estimate
     chi_squared: float
 
+    @property
+    def gap_positions(self) -> tuple[float, ...]:
+        """Where in the gap each run starts, -1 to 1."""
+        return tuple(states[GAP_POSITION] for states in self.states)
+
 
 def unknowns(
-    parameters: ParameterSet, free: Sequence[str], start: Mapping[str, float], gaps: Sequence[float]
+    parameters: ParameterSet,
+    free: Sequence[str],
+    start: Mapping[str, float],
+    gaps: Sequence[float],
+    states: Sequence[Unknown] = (GAP,),
 ) -> list[Unknown]:
-    """The free parameters with their priors, and the start in the gap of every run."""
-    found = []
-    for name in free:
-        value, std = parameters.value(name), parameters[name].std
-        found.append(
-            Unknown(
-                name=name,
-                start=start.get(name, value),
-                lower=value / BOUND_FACTOR,
-                upper=value * BOUND_FACTOR,
-                prior=value,
-                std=std,
-            )
-        )
-    return found + [
+    """The free parameters with their priors, and the states of every run.
+
+    start : values [SI] of the parameters; gaps : of every run, -1 to 1
+    """
+    wide = [
         Unknown(
-            name=GAP_POSITION,
-            start=gap,
-            lower=-1.0,
-            upper=1.0,
-            logarithmic=False,
-            run=run,
+            name=name,
+            start=start[name],
+            lower=parameters.value(name) / BOUND_FACTOR,
+            upper=parameters.value(name) * BOUND_FACTOR,
+            prior=parameters.value(name),
+            std=parameters[name].std,
         )
+        for name in free
+    ]
+    return wide + [
+        replace(state, run=run, start=gap if state.name == GAP_POSITION else state.start)
         for run, gap in enumerate(gaps)
+        for state in states
     ]
 
 
@@ -136,27 +142,30 @@ def identify(
     parameters: ParameterSet,
     free: Sequence[str] = (),
     *,
-    effects: Mapping[str, Mapping[str, float]] | None = None,
+    effects: Effects | None = None,
     progress: Progress | None = None,
 ) -> Identification:
     """Estimate the free parameters of a bench from its logs.
 
     free : names; none: all that the set calls estimated but gear_inertia
-    effects : values of effects that the bench has, by effect and parameter
+    effects : values of effects that the bench has, by effect and parameter; what of them is a run's
+        own is fitted too, or taken from its log
     progress : called with a stage's name and how far it has come, 0 to 1
     """
     free = free_parameters(parameters, free)
+    states = states_of(effects or {})
+    recordings = [with_own(r, effects or {}) for r in recordings]
     values = values_of(parameters, effects)
     search = Search(recordings, values, free, progress)
     logs = [r.log for r in recordings]
     search.values |= start_values(logs, values, free)
     search.scan()
-    best = least_squares(recordings, parameters, free, search, progress)
+    best = least_squares(recordings, parameters, free, search, states, progress)
     for retry in range(RETRIES):
         if chi_squared(best) <= NOISE_REACHED:
             break
         again = _next_valley(recordings, values, free, best, retry)
-        other = least_squares(recordings, parameters, free, again, progress)
+        other = least_squares(recordings, parameters, free, again, states, progress)
         search.simulations += again.simulations
         best = min(best, other, key=lambda e: e.cost + e.penalty)
     best = replace(best, simulations=best.simulations + search.simulations)
@@ -168,6 +177,7 @@ def least_squares(
     parameters: ParameterSet,
     free: Sequence[str],
     search: Search,
+    states: Sequence[Unknown] = (GAP,),
     progress: Progress | None = None,
 ) -> Estimate:
     """Least squares from where a search has come to; priors that the data outdo are given up."""
@@ -179,7 +189,7 @@ def least_squares(
         if progress is not None:  # chi^2 falls to 1: half way is where it has fallen to 2
             progress("least squares", min(1.0, counted / max(cost, 1.0)))
 
-    wanted = unknowns(parameters, free, search.values, search.gaps)
+    wanted = unknowns(parameters, free, search.values, search.gaps, states)
     first = estimation.estimate(wanted, coarse, progress=tell)
     outdone = [
         replace(u, start=u.value(float(z)), std=None if error < u.scaled_std else u.std)
@@ -200,8 +210,8 @@ def residual_functions(
 
     def of(recording: Recording) -> Residual:
         def residual(found: Mapping[str, float]) -> Array:
-            values = {**fixed, **found}
-            return recording.residual(values, values.pop(GAP_POSITION), tolerance)
+            trial = {**fixed, **recording.own, **found}
+            return recording.residual(trial, trial.pop(GAP_POSITION), tolerance)
 
         return residual
 
@@ -216,9 +226,8 @@ def _next_valley(
     retry: int,
 ) -> Search:
     """A search that starts at the fit but with the gap moved out of its valley."""
-    search = Search(recordings, {**values, **best.values()}, free)
-    search.values.pop(GAP_POSITION, None)
-    search.gaps = [best.values(k)[GAP_POSITION] for k in range(len(recordings))]
+    search = Search(recordings, {**values, **best.parameters()}, free)
+    search.gaps = [best.states(k)[GAP_POSITION] for k in range(len(recordings))]
     if retry:
         search.values |= {
             name: search.values[name] * (1.0 + 0.05 * (-1) ** retry)
@@ -242,7 +251,7 @@ def answer(
     return Identification(
         parameter_set=parameters.with_values({p.name: p.value for p in estimated}),
         parameters=tuple(estimated),
-        gap_positions=tuple(found.values(k)[GAP_POSITION] for k in range(runs)),
+        states=tuple(found.states(k) for k in range(runs)),
         estimate=found,
         chi_squared=chi_squared(found),
     )

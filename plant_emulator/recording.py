@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,6 +26,7 @@ class Recording:
     """A log, the inputs of its simulation, and the noise of its compared channels [SI].
 
     use : samples that count, shape (channels, samples)
+    own : values of the model that the log itself tells, such as the shell's temperature [SI]
     """
 
     log: Log
@@ -33,6 +34,7 @@ class Recording:
     channels: tuple[str, ...]
     noise: Array
     use: NDArray[np.bool_]
+    own: Mapping[str, float] = field(default_factory=dict)
 
     def residual(
         self, values: Mapping[str, float], gap_position: float, tolerance: float = TOLERANCE

@@ -72,7 +72,7 @@ class Search:
             if self.progress is not None:
                 self.progress("start values", done / len(scans))
             if name == GAP_POSITION:
-                self._scan_gaps(count)
+                self.scan_gaps(count)
             elif name in self.free:
                 self._scan(name, np.geomspace(1.0 / factor, factor, count))
 
@@ -81,7 +81,8 @@ class Search:
         losses = [self.total(candidate) for candidate in candidates]
         self.values = candidates[int(np.argmin(losses))]
 
-    def _scan_gaps(self, count: int) -> None:
+    def scan_gaps(self, count: int) -> None:
+        """Choose the start in the gap of every run among so many positions."""
         for k, gap in enumerate(self.gaps):
             positions = [gap, *np.linspace(-1.0, 1.0, count)]
             losses = [self.loss(k, self.values, float(g)) for g in positions]

@@ -24,6 +24,10 @@ class EffectParameter:
     `plausible` is a size met on real benches, used when none is given and by planning tools.
     A parameter that only shapes the effect (absent anyway while another is neutral) has neutral =
     plausible.
+    per_run : its value is one run's own, such as a temperature at the start
+    measured : the signal of a log whose mean is its value in that run, where the log has it
+    std : standard deviation of what is known beforehand of a shape or a value per run; None: a fit
+        leaves it free if it is a size, and else where it is
     """
 
     neutral: float
@@ -32,6 +36,9 @@ class EffectParameter:
     plausible: float
     unit: str
     meaning: str
+    per_run: bool = False
+    measured: str | None = None
+    std: float | None = None
 
 
 @dataclass(frozen=True)

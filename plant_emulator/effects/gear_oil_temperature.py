@@ -25,13 +25,27 @@ PARAMETERS = {
         neutral=0.0, lower=0.0, upper=0.1, plausible=0.02, unit="1/K", meaning="beta"
     ),
     "start_temperature": EffectParameter(
-        neutral=305.15, lower=253.15, upper=393.15, plausible=293.15, unit="K", meaning="T at start"
+        neutral=305.15,
+        lower=253.15,
+        upper=393.15,
+        plausible=293.15,
+        unit="K",
+        meaning="T at start",
+        per_run=True,
+        std=15.0,
     ),
     "nominal_temperature": EffectParameter(
         neutral=313.15, lower=273.15, upper=373.15, plausible=313.15, unit="K", meaning="T_n"
     ),
     "shell_temperature": EffectParameter(
-        neutral=305.15, lower=253.15, upper=373.15, plausible=293.15, unit="K", meaning="T_shell"
+        neutral=305.15,
+        lower=253.15,
+        upper=373.15,
+        plausible=293.15,
+        unit="K",
+        meaning="T_shell",
+        per_run=True,
+        measured="shell_temperature",
     ),
     "heat_capacity": EffectParameter(
         neutral=1e5, lower=1e3, upper=1e7, plausible=1e5, unit="J/K", meaning="C"

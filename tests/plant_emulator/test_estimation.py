@@ -58,8 +58,8 @@ def test_certified_regression_is_reproduced(start: tuple[float, float]) -> None:
     ]
     found = estimate(unknowns, [residual])
     assert found.converged
-    assert found.values()["b1"] == pytest.approx(2.3894212918e02, rel=1e-5)
-    assert found.values()["b2"] == pytest.approx(5.5015643181e-04, rel=1e-5)
+    assert found.parameters()["b1"] == pytest.approx(2.3894212918e02, rel=1e-5)
+    assert found.parameters()["b2"] == pytest.approx(5.5015643181e-04, rel=1e-5)
     assert found.cost == pytest.approx(1.2455138894e-01, rel=1e-6)
 
 
@@ -120,7 +120,7 @@ def test_intervals_under_coloured_residuals_cover_the_truth() -> None:
 
 def test_prior_alone_gives_back_itself() -> None:
     found = estimate([number("silent", 1.0, prior=3.0, std=0.2)], [lambda v: np.ones((1, 50))])
-    assert found.values()["silent"] == pytest.approx(3.0)
+    assert found.parameters()["silent"] == pytest.approx(3.0)
     assert found.standard_errors[0] == pytest.approx(0.2)
     assert found.data_errors[0] == np.inf
 
@@ -130,7 +130,7 @@ def test_prior_and_data_are_weighed_by_their_precision() -> None:
     found = estimate(
         [number("a", 0.3, prior=0.0, std=0.1)], [lambda v: np.full((1, 100), 1.0 - v["a"])]
     )
-    assert found.values()["a"] == pytest.approx(0.5, rel=1e-6)
+    assert found.parameters()["a"] == pytest.approx(0.5, rel=1e-6)
 
 
 def test_state_belongs_to_its_run_only() -> None:
@@ -143,8 +143,8 @@ def test_state_belongs_to_its_run_only() -> None:
         number("offset", 0.0, run=1),
     ]
     found = estimate(unknowns, [run(4.0), run(-2.0)])  # type: ignore[list-item]
-    assert found.values(0)["offset"] == pytest.approx(4.0)
-    assert found.values(1)["offset"] == pytest.approx(-2.0)
+    assert found.states(0)["offset"] == pytest.approx(4.0)
+    assert found.states(1)["offset"] == pytest.approx(-2.0)
     # a state costs a simulation of its own run only: 2 runs, then 2 + 1 + 1 a Jacobian
     assert np.all(found.jacobians[0][..., 2] == 0.0)
 
@@ -158,7 +158,7 @@ def test_direction_that_the_data_do_not_see_has_no_finite_error() -> None:
 def test_bound_holds() -> None:
     unknowns = [number("a", 0.5, lower=0.0, upper=1.0)]
     found = estimate(unknowns, [lambda v: np.full((1, 10), 3.0 - v["a"])])
-    assert found.values()["a"] == pytest.approx(1.0, abs=1e-5)
+    assert found.parameters()["a"] == pytest.approx(1.0, abs=1e-5)
 
 
 def test_information_is_that_of_the_starts_where_nothing_is_fitted() -> None:

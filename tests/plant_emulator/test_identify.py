@@ -267,6 +267,23 @@ def test_what_is_not_free_is_believed_by_the_start(
     assert start["drum_inertia"] == pytest.approx(312.69, rel=0.01)
 
 
+def test_temperature_at_the_start_belongs_to_its_run(nominal: ParameterSet) -> None:
+    """Two runs with the same gear, one cold, one half warm; what the shell shows is taken."""
+    own = {"viscosity_coefficient": 0.02, "start_temperature": 305.15, "shell_temperature": 305.15}
+    time, reference = PROGRAMS["program1"].reference()  # type: ignore[union-attr]
+    run = run_of(Log(time, {"speed_reference": reference}, "made"))
+    recordings = []
+    for seed, (oil, shell) in enumerate([(285.0, 284.0), (300.0, 298.0)]):
+        there = own | {"start_temperature": oil, "shell_temperature": shell}
+        values = values_of(nominal, {"gear_oil_temperature": there}) | {"drum_inertia": 330.0}
+        recordings.append(recording(noisy(simulate(run, values), seed)))
+    found = identify(recordings, nominal, ("drum_inertia",), effects={"gear_oil_temperature": own})
+    assert found.parameters[0].value == pytest.approx(330.0, rel=2e-3)
+    temperatures = [s["gear_oil_temperature_start_temperature"] for s in found.states]
+    assert temperatures == pytest.approx([285.0, 300.0], abs=0.5)
+    assert found.chi_squared == pytest.approx(1.0, abs=0.05)
+
+
 def repeats(nominal: ParameterSet, log: Log, count: int) -> Sequence[np.ndarray]:
     """Errors over standard errors of fits to synthetic logs, one row a repeat."""
     run, rows = run_of(log), []

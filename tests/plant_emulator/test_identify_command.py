@@ -90,7 +90,8 @@ def test_saved_set_says_where_it_comes_from_and_predicts_as_the_fit_did(
     )
     again = json.loads(validated.stdout)["logs"][RUNS[1]]
     before = json.loads((folder / "a.json").read_text())["held_out"][RUNS[1]]
-    assert again == before
+    for channel, fit in before.items():
+        assert again[channel]["val1"] == pytest.approx(fit["val1"], abs=1e-5), channel
 
 
 def test_table_is_read_by_a_spreadsheet(fitted: tuple[Path, Result]) -> None:
