@@ -11,13 +11,13 @@ import csv
 import gzip
 import re
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import inf, isfinite
 from typing import Final
 
-from register_maps.signals import LOG_COLUMNS
+from register_maps.signals import LOG_COLUMNS, LogColumn
 from register_maps.units import UNITS
 
 GZIP: Final = b"\x1f\x8b"
@@ -43,20 +43,20 @@ class CsvLog:
     other: tuple[str, ...]
 
 
-def parse(data: bytes) -> CsvLog:
-    """The log in these bytes."""
+def parse(data: bytes, columns: Mapping[str, LogColumn] = LOG_COLUMNS) -> CsvLog:
+    """The log in these bytes. columns : by name, what may stand in it; `time_s` among them"""
     rows = _rows(_text(data))
     line, header = rows[0] if rows else (1, [])
     names = [name.strip() for name in header]
-    _check_header(line, names)
+    _check_header(line, names, columns)
     if len(rows) < 3:
         raise CsvLogError(f"{len(rows) - 1} samples; at least 2 are needed")
-    known = {k: name for k, name in enumerate(names) if name in LOG_COLUMNS}
-    columns = _columns(rows[1:], known, len(names))
-    if columns is None:
+    known = {k: name for k, name in enumerate(names) if name in columns}
+    table = _columns(rows[1:], known, len(names))
+    if table is None:
         raise _first_fault(rows[1:], known, len(names))
-    signals = {LOG_COLUMNS[name].signal: _si(name, values) for name, values in columns.items()}
-    return CsvLog(signals=signals, other=tuple(name for name in names if name not in LOG_COLUMNS))
+    signals = {columns[name].signal: _si(columns[name], values) for name, values in table.items()}
+    return CsvLog(signals=signals, other=tuple(name for name in names if name not in columns))
 
 
 def _text(data: bytes) -> str:
@@ -86,11 +86,11 @@ def _quoted(lines: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
         raise CsvLogError(f"line {reader.line_num}: {error}") from error
 
 
-def _check_header(line: int, names: Sequence[str]) -> None:
+def _check_header(line: int, names: Sequence[str], columns: Mapping[str, LogColumn]) -> None:
     for name in names:
-        if name in LOG_COLUMNS and names.count(name) > 1:
+        if name in columns and names.count(name) > 1:
             raise CsvLogError(f"line {line}: column {name} stands twice")
-    absent = [column for column in LOG_COLUMNS.values() if column.column not in names]
+    absent = [column for column in columns.values() if column.column not in names]
     for column in absent:
         for name in names:
             rest = name.removeprefix(column.signal)
@@ -150,6 +150,6 @@ def _lacking(cell: str) -> str:
         return "a number"
 
 
-def _si(name: str, values: list[float]) -> list[float]:
-    unit = UNITS[LOG_COLUMNS[name].unit]
-    return values if unit.si == LOG_COLUMNS[name].unit else [unit.to_si(v) for v in values]
+def _si(column: LogColumn, values: list[float]) -> list[float]:
+    unit = UNITS[column.unit]
+    return values if unit.si == column.unit else [unit.to_si(v) for v in values]

@@ -33,6 +33,7 @@ UNITS = {
     "s": Unit(si="s"),
     "ms": Unit(si="s", factor=1e-3),
     "us": Unit(si="s", factor=1e-6),
+    "m/s": Unit(si="m/s"),
     "rad/s": Unit(si="rad/s"),
     "rpm": Unit(si="rad/s", factor=_PER_REVOLUTION),
     "rad/s^2": Unit(si="rad/s^2"),
