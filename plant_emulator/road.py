@@ -45,8 +45,8 @@ class RoadParameters:
 
     crr, crr_v : rolling resistance [1], and its part with the drum's speed [s]
     efficiency : of the truck's gear; torque_gain [1], torque_offset [N m] : of the load cell
-    clock_ahead, clock_skew : the velocity sample stamped t belongs to the torque's time
-        t (1 + clock_skew) + clock_ahead [s]
+    clock_ahead [s], clock_skew [1] : the velocity sample stamped t belongs to the torque's time
+        t + clock_skew (t - t_0) + clock_ahead, t_0 the first stamp of the velocity
     initial_velocity : where the logs begin on the move [m/s]
     """
 

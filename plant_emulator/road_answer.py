@@ -35,8 +35,9 @@ CONTRADICTION = 4.0
 """Standard deviations from what was known of the gain, from which mass or gearing must be wrong."""
 EXPLAINED = 98.0
 """Val1 of the velocity [percent] below which the model is not what happened."""
-NOISE = 2.0
-"""Long-run variance of the whitened residual from which it is no noise, even with a random walk."""
+EXCELLENT, NOISE = 99.8, 2.0
+"""Val1 [percent] below which the residual has to be noise, and the long-run variance of the white
+residual from which it is none."""
 MASS = (
     "mass from torque_gain: only their product is seen; the given mass is taken as exact, f0 and "
     "f1 are proportional to it"
@@ -143,12 +144,15 @@ def residual_variance(fit: RoadFit) -> float:
 
 
 def long_run_variance(white: Array, lags: int) -> float:
-    """Variance of a sum of neighbours, per sample; white noise has its variance."""
+    """Variance of a sum of neighbours, per sample; white noise has its variance.
+
+    At least 1, what the noise of the sensors themselves makes: less is chance.
+    """
     total = float(np.mean(white**2))
     for lag in range(1, lags):
         weight = 2.0 * (1.0 - lag / lags)
         total += weight * float(np.mean(white[lag:] * white[:-lag]))
-    return max(total, 0.25 * float(np.mean(white**2)))
+    return max(total, 1.0)
 
 
 def velocity_fit(fit: RoadFit) -> Fit:
@@ -222,7 +226,7 @@ def problems(fit: RoadFit, quality: Fit) -> list[str]:
             f"the truck's velocity is not explained: Val1 {quality.val1:.1f} %, at least "
             f"{EXPLAINED:g} expected; level road, no foot brake, both logs of one run?"
         )
-    elif (variance := residual_variance(fit)) > NOISE:
+    elif quality.val1 < EXCELLENT and (variance := residual_variance(fit)) > NOISE:
         found.append(
             f"the residual is no noise, its long-run variance is {variance:.1f} times what noise "
             "leaves: level road, no foot brake, both logs of one run?"

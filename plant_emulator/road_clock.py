@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.errors import LogError
-from plant_emulator.road_signal import low_pass
+from plant_emulator.road_signal import low_pass, noise
 
 if TYPE_CHECKING:
     from plant_emulator.log import Array
-    from plant_emulator.road_signal import Signal
+    from plant_emulator.road_signal import Mask, Signal
 
 PERIOD = 0.01
 CUTOFF = 4.0
@@ -24,6 +24,8 @@ FARTHEST = 10.0
 """[s] by which the clocks may be apart."""
 LEAST_OVERLAP = 5.0
 """[s] of common time without which nothing is estimated."""
+STEEPEST = 30.0
+"""[m/s^2] that no truck has."""
 LEAST_ACCELERATION = 0.1
 """[m/s^2] in the liveliest part, below which a run says nothing about mass against road load."""
 LEAST_SPEED = 0.3
@@ -37,18 +39,21 @@ def clock_ahead(torque: Signal, velocity: Signal) -> float:
     Raises LogError where the two logs do not belong together or do not move enough.
     """
     _check_overlap(torque, velocity)
+    _check_jumps(velocity)
     _check_motion(velocity)
-    begin = min(torque.start, velocity.start)
-    grid = even(begin, max(torque.end, velocity.end))
-    drive = low_pass(on(torque, grid), PERIOD, CUTOFF)
+    grid = even(velocity.start, velocity.end)
+    wide = even(velocity.start - FARTHEST, velocity.end + FARTHEST)
+    drive = low_pass(on(torque, wide), PERIOD, CUTOFF)
+    there = (wide >= torque.start) & (wide <= torque.end)
     acceleration = np.gradient(low_pass(on(velocity, grid), PERIOD, CUTOFF), PERIOD)
-    lags, correlation = correlated(drive, acceleration)
+    lags, correlation = correlated(drive - drive[there].mean(), there, acceleration)
     best, worst = int(np.argmax(correlation)), int(np.argmin(correlation))
     names = f"{torque.source}, {velocity.source}"
     if -correlation[worst] > max(correlation[best], LEAST_CORRELATION):
         raise LogError(
             f"{names}: torque and acceleration have opposite signs (correlation "
-            f"{correlation[worst]:.2f}); a positive torque has to drive the truck forwards"
+            f"{correlation[worst]:.2f}), one of the two logs has the wrong sign; a positive torque "
+            "has to drive the truck forwards, to positive velocity"
         )
     if correlation[best] < LEAST_CORRELATION:
         raise LogError(
@@ -70,16 +75,27 @@ def on(channel: Signal, grid: Array) -> Array:
     return np.interp(grid, channel.time, smooth)
 
 
-def correlated(drive: Array, acceleration: Array) -> tuple[Array, Array]:
-    """Lags [s], and the correlation of drive(t + lag) with acceleration(t), shape (lags,) each."""
+def correlated(drive: Array, there: Mask, acceleration: Array) -> tuple[Array, Array]:
+    """Lags [s], and the correlation of drive(t + lag) with acceleration(t), shape (lags,) each.
+
+    there : where drive was measured; lags at which less than half of what there is to compare
+    would be compared have none
+    """
     from scipy.signal import correlate
 
-    count = round(FARTHEST / PERIOD)
-    drive = np.pad(drive - drive.mean(), count)
-    acceleration = acceleration - acceleration.mean()
-    scale = np.linalg.norm(drive) * np.linalg.norm(acceleration)
-    found: Array = correlate(drive, acceleration, mode="valid") / scale
-    return even(-FARTHEST, FARTHEST), found
+    acceleration = acceleration - float(acceleration.mean())
+    drive = np.where(there, drive, 0.0)
+
+    def summed(left: Array, right: Array) -> Array:
+        found: Array = correlate(left, right, mode="valid")
+        return found
+
+    measured, all_of_it = there.astype(np.float64), np.ones(len(acceleration))
+    count = summed(measured, all_of_it)
+    power = summed(drive**2, all_of_it) * summed(measured, acceleration**2)
+    found = summed(drive, acceleration) / np.sqrt(np.maximum(power, 1e-9 * power.max()))
+    lags = PERIOD * np.arange(len(found), dtype=np.float64) - FARTHEST
+    return lags, np.where(count > 0.5 * count.max(), found, 0.0)
 
 
 def _peak(correlation: Array, best: int) -> float:
@@ -97,6 +113,17 @@ def _check_overlap(torque: Signal, velocity: Signal) -> None:
             f"{torque.source}: {torque.start:g} .. {torque.end:g} s, {velocity.source}: "
             f"{velocity.start:g} .. {velocity.end:g} s; at least {LEAST_OVERLAP:g} s in common "
             "are needed"
+        )
+
+
+def _check_jumps(velocity: Signal) -> None:
+    step = np.abs(np.diff(velocity.values))
+    step[~(velocity.known[1:] & velocity.known[:-1])] = 0.0
+    worst = int(np.argmax(step))
+    if step[worst] > 15.0 * noise(velocity.values) + STEEPEST * velocity.period:
+        raise LogError(
+            f"{velocity.source}: the velocity jumps by {step[worst]:.3g} m/s at "
+            f"{velocity.time[worst + 1]:.4g} s; no truck does, use the part before or after it"
         )
 
 

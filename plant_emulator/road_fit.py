@@ -1,7 +1,7 @@
 """Estimates a truck's road load, gear and load cell from its two road logs (pure).
 
 Several starts, because a simulated truck that stops where the real one crept on (or the other way
-round) makes valleys of its own. From each a bounded nonlinear least-squares fit of the whitened
+round) can make valleys of its own. From each a bounded nonlinear least-squares fit of the whitened
 residual, beside which what is known beforehand stands as residuals of its own; the best is kept.
 The share of the random walk in the noise (see `road_whiten`) is at least what the load cell's own
 noise makes, and as much as the residual asks for: roads are not even.

@@ -7,10 +7,7 @@ the rate of its own logger.
 
 from __future__ import annotations
 
-import gzip
 import hashlib
-import math
-import zlib
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -19,94 +16,46 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.errors import LogError
+from register_maps.csv_log import TIME, CsvLogError, parse
+from register_maps.signals import LOG_COLUMNS, LogColumn
 
 if TYPE_CHECKING:
     from plant_emulator.log import Array
 
-TIME, TORQUE, VELOCITY = "time_s", "motor_torque_Nm", "velocity_m_s"
-ROLES = {TORQUE: "TORQUE", VELOCITY: "VELOCITY"}
+
+def channel(column: str, signal: str, unit: str) -> LogColumn:
+    """A column of a road log; whether it is there is judged by `read`, which knows the files."""
+    return LogColumn(
+        column=column, signal=signal, unit=unit, needed=False, measured=None, decimals=4
+    )
 
 
-def read(path: str, column: str) -> tuple[Array, Array]:
-    """Time [s] and the column, shape (n,) each; LogError names file, line and column."""
-    header, _, body = _text(path).partition("\n")
-    names = [name.strip() for name in header.lstrip("\ufeff").split(",")]
-    _check_header(path, names, column)
-    places = [names.index(TIME), names.index(column)]
-    lines = [line for line in body.splitlines() if line.strip()]
+TORQUE = channel("motor_torque_Nm", "motor_torque", "N m")
+VELOCITY = channel("velocity_m_s", "velocity", "m/s")
+ROLES = {TORQUE.column: "TORQUE", VELOCITY.column: "VELOCITY"}
+
+
+def read(path: str, wanted: LogColumn) -> tuple[Array, Array]:
+    """Time [s] and the channel, shape (n,) each; LogError names file, line and column."""
     try:
-        if not lines or any(line.count(",") != len(names) - 1 for line in lines):
-            raise _first_fault(path, names, places, body)
-        table = np.loadtxt(lines, delimiter=",", ndmin=2, usecols=places, comments=None)
-    except ValueError:
-        raise _first_fault(path, names, places, body) from None
-    if not (np.isfinite(table).all() and (np.diff(table[:, 0]) > 0.0).all()):
-        raise _first_fault(path, names, places, body)
-    return table[:, 0], table[:, 1]
-
-
-def _text(path: str) -> str:
-    try:
-        data = Path(path).read_bytes()
-        if data.startswith(b"\x1f\x8b"):
-            data = gzip.decompress(data)
-        return data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise LogError(f"{path}: byte {error.start}: not UTF-8 text") from error
-    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
-        raise LogError(f"{path}: damaged gzip file ({error})") from error
-
-
-def _check_header(path: str, names: list[str], column: str) -> None:
-    other = next(name for name in ROLES if name != column)
-    if column not in names and other in names:
+        columns = {TIME: LOG_COLUMNS[TIME], wanted.column: wanted}
+        found = parse(Path(path).read_bytes(), columns)
+    except CsvLogError as error:
+        raise LogError(f"{path}: {error}") from error
+    if wanted.signal not in found.signals:
+        swapped = next((name for name in found.other if name in ROLES), None)
+        hint = f", found {swapped}: the order is TORQUE VELOCITY" if swapped else ""
         raise LogError(
-            f"{path}: line 1: column {other}; the file given as {ROLES[column]} needs {column}, "
-            "the order is TORQUE VELOCITY"
+            f"{path}: line 1: column {wanted.column} is missing; the file given as "
+            f"{ROLES[wanted.column]} needs it{hint}"
         )
-    for needed in (TIME, column):
-        if names.count(needed) != 1:
-            found = "stands twice" if needed in names else "is missing; it is needed"
-            raise LogError(f"{path}: line 1: column {needed} {found}, found {', '.join(names)}")
-
-
-def _first_fault(path: str, names: list[str], places: list[int], body: str) -> LogError:
-    """The first fault of the text, with line and column; found cell by cell."""
-    last = -math.inf
-    for number, line in enumerate(body.splitlines(), start=2):
-        cells = line.split(",")
-        if not line.strip():
-            continue
-        if len(cells) != len(names):
-            return LogError(f"{path}: line {number}: {len(cells)} values; expected {len(names)}")
-        for place in places:
-            if not _finite(cells[place]):
-                return LogError(
-                    f"{path}: line {number}, column {names[place]}: {cells[place]!r}; expected a "
-                    "finite number"
-                )
-        time = float(cells[places[0]])
-        if time <= last:
-            return LogError(
-                f"{path}: line {number}, column {TIME}: {time:g} after {last:g}; time must "
-                "increase strictly"
-            )
-        last = time
-    return LogError(f"{path}: line 2: no sample")
-
-
-def _finite(cell: str) -> bool:
-    try:
-        return math.isfinite(float(cell))
-    except ValueError:
-        return False
+    return np.array(found.signals["time"]), np.array(found.signals[wanted.signal])
 
 
 def origin(*paths: str) -> list[str]:
     """Where a result comes from: date, version of the program, logs with their SHA-256."""
-    logs = [
-        f"{path}, SHA-256 {hashlib.sha256(Path(path).read_bytes()).hexdigest()}" for path in paths
-    ]
+    digests = [hashlib.sha256(Path(path).read_bytes()).hexdigest() for path in paths]
+    logs = [f"{path}, SHA-256 {digest}" for path, digest in zip(paths, digests, strict=True)]
     made = (
         f"{datetime.now(tz=UTC):%Y-%m-%d %H:%M} UTC, road-load-bench {version('road-load-bench')}"
     )

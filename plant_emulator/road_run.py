@@ -19,7 +19,7 @@ import numpy as np
 
 from plant_emulator import road
 from plant_emulator.errors import LogError
-from plant_emulator.road_clock import clock_ahead
+from plant_emulator.road_clock import LEAST_OVERLAP, clock_ahead
 from plant_emulator.road_signal import low_pass, noise, resting, trimmed
 
 if TYPE_CHECKING:
@@ -34,6 +34,8 @@ EDGE = 0.2
 CREEP = 0.05
 """[m/s] below which nothing is compared but standstill: the moment at which a truck stops wipes out
 what the load cell's noise had added up to, and would weigh as if it were knowledge."""
+QUIETEST = (0.02, 0.001)
+"""[N m] and [m/s] of noise below which the model itself, not the sensor, is the limit."""
 UNSURE = (0.3, 0.5)
 """[s] after a stop and before a start in which the motor's torque may already or still be there."""
 LEAST_REST = 0.3
@@ -83,7 +85,7 @@ class RoadRun:
     @cached_property
     def torque_noise(self) -> float:
         """Standard deviation of one sample of the torque [N m]."""
-        return noise(self.torque.values)
+        return max(noise(self.torque.values), QUIETEST[0])
 
     @cached_property
     def velocity_noise(self) -> float:
@@ -92,7 +94,7 @@ class RoadRun:
         What white noise has below the low pass: as that of a mean over the samples left out.
         """
         shrink = self.velocity.period / self.spacing
-        return max(noise(self.velocity.values), 1e-4) * float(np.sqrt(shrink))
+        return max(noise(self.velocity.values), QUIETEST[1]) * float(np.sqrt(shrink))
 
     def simulated(self, parameters: RoadParameters) -> Array:
         """Velocity at the torque's samples from `first` on [m/s], low-passed."""
@@ -103,9 +105,9 @@ class RoadRun:
 
     def compared(self, parameters: RoadParameters, time: Array) -> Array:
         """Simulated velocity at those times of the velocity's clock [m/s]."""
-        on_torque_clock = time * (1.0 + parameters.clock_skew) + parameters.clock_ahead
+        late = parameters.clock_skew * (time - self.velocity.start) + parameters.clock_ahead
         torque_time = self.torque.time[self.first :]
-        return np.interp(on_torque_clock, torque_time, self.simulated(parameters))
+        return np.interp(time + late, torque_time, self.simulated(parameters))
 
     def residual(self, parameters: RoadParameters) -> Array:
         """Measured minus simulated velocity on the grid [m/s], shape (m,)."""
@@ -128,9 +130,11 @@ def prepared(torque: Signal, velocity: Signal, truck: Truck) -> RoadRun:
     rests = resting(velocity.values, velocity.period)
     samples = [round(part / velocity.period) for part in (*UNSURE, LEAST_REST)]
     stands = trimmed(rests, *samples)
+    moves = np.abs(smooth) > CREEP
+    known = _sure(velocity, 0.5 / cutoff) & (moves | stands)
+    _check_amount(known[chosen], period, torque, velocity)
     nearest = np.round((torque.time - ahead - velocity.start) / velocity.period).astype(np.int64)
     held = stands[np.clip(nearest, 0, len(stands) - 1)]
-    moves = np.abs(smooth) > CREEP
     return RoadRun(
         truck=truck,
         torque=torque,
@@ -139,7 +143,7 @@ def prepared(torque: Signal, velocity: Signal, truck: Truck) -> RoadRun:
         held=held,
         time=velocity.time[chosen],
         measured=smooth[chosen],
-        known=(_sure(velocity, 0.5 / cutoff) & (moves | stands))[chosen],
+        known=known[chosen],
         rests=rests[chosen],
         moves=moves[chosen],
         ahead=ahead,
@@ -154,11 +158,20 @@ def _sure(velocity: Signal, reach: float) -> Mask:
     return missing < 0.5
 
 
+def _check_amount(known: Mask, period: float, torque: Signal, velocity: Signal) -> None:
+    length = period * int(np.count_nonzero(known))
+    if length < LEAST_OVERLAP:
+        raise LogError(
+            f"{torque.source}, {velocity.source}: only {length:.3g} s can be compared; at least "
+            f"{LEAST_OVERLAP:g} s of the same travel are needed in both"
+        )
+
+
 def _check_gaps(torque: Signal) -> None:
     for start, length in torque.gaps():
         if length > BRIDGED:
             raise LogError(
-                f"{torque.source}: no torque for {length:.3g} s from {start:.4g} s on; the truck's "
-                f"speed after it is unknown, at most {BRIDGED:g} s can be bridged: use the part "
-                "before or after it"
+                f"{torque.source}: no torque (missing, held or saturated) for {length:.3g} s from "
+                f"{start:.4g} s on; the speed after it is unknown, at most {BRIDGED:g} s can be "
+                "bridged: use the part before or after it"
             )

@@ -62,24 +62,46 @@ class Signal:
         ]
 
 
-def signal(time: Array, values: Array, source: str) -> Signal:
+def signal(time: Array, values: Array, source: str, *, rest: float | None = None) -> Signal:
     """Even samples of a channel, time [s] strictly increasing, shape (n,) each.
 
+    rest : the value at which the sensor may honestly stand still, if there is one
     Raises LogError where it was sampled too slowly, or sampled slower than it was written.
     """
     if len(time) < 50:
         raise LogError(f"{source}: {len(time)} samples; a run of some seconds is needed")
     _check_rate(time, values, source)
-    measured = ~held(time, values)
-    time, values = time[measured], values[measured]
-    step = float(np.median(np.diff(time)))
-    count = np.round((time - time[0]) / step)
-    period = float((time[-1] - time[0]) / count[-1])
-    grid = np.arange(int(count[-1]) + 1)
+    measured = ~held(time, values, rest) & ~spikes(values)
+    since, values = time[measured] - time[0], values[measured]
+    period = period_of(since)
+    grid = np.arange(int(np.round(since[-1] / period)) + 1)
     known = np.zeros(len(grid), dtype=np.bool_)
-    known[np.clip(np.round((time - time[0]) / period).astype(np.int64), 0, len(grid) - 1)] = True
-    even = np.interp(grid * period, time - time[0], values)
-    return Signal(start=float(time[0]), period=period, values=even, known=known, source=source)
+    known[np.clip(np.round(since / period).astype(np.int64), 0, len(grid) - 1)] = True
+    even = np.interp(grid * period, since, values)
+    # One or two samples that jitter took away, or a spike, are bridged and no gap.
+    lost = trimmed(~known, 0, 0, 1 + min(2, int(0.01 / period)))
+    return Signal(start=float(time[0]), period=period, values=even, known=~lost, source=source)
+
+
+def period_of(time: Array) -> float:
+    """Time between two samples [s], also where some are lost, late, or their stamps rounded.
+
+    Stamps over their numbers, the numbers counted from stamp to stamp.
+    """
+    steps = np.diff(time)
+    number = np.r_[0.0, np.cumsum(np.round(steps / np.median(steps)))]
+    number -= number.mean()
+    return float(number @ (time - time.mean()) / (number @ number))
+
+
+def spikes(values: Array) -> Mask:
+    """Lone samples far off the median of their five neighbours, shape (n,)."""
+    from scipy.signal import medfilt
+
+    off = np.abs(values - medfilt(values, 5))
+    found: Mask = off > 12.0 * noise(values)
+    found[[0, 1, -2, -1]] = False
+    return found & (noise(values) > 0.0)
 
 
 def _check_rate(time: Array, values: Array, source: str) -> None:
@@ -88,18 +110,18 @@ def _check_rate(time: Array, values: Array, source: str) -> None:
         raise LogError(f"{source}: {rate:.3g} samples a second; at least {SLOWEST:g} are needed")
     lengths = np.diff(np.flatnonzero(np.r_[True, np.diff(values) != 0.0, True]))
     usual = int(np.median(lengths))
-    if usual > 1 and np.mean(lengths == usual) > 0.8:
+    if len(lengths) > 50 and usual > 1 and np.mean(lengths == usual) > 0.8:
         raise LogError(
             f"{source}: every value stands {usual} times; it was sampled at {rate / usual:.4g} Hz "
             f"and held, keep one of {usual} rows"
         )
 
 
-def held(time: Array, values: Array) -> Mask:
+def held(time: Array, values: Array, rest: float | None) -> Mask:
     """Samples that only repeat the one before, shape (n,): a logger that waits for its sensor.
 
     Told by runs of equal values that are far longer than the signal's usual ones; one without
-    noise, whose runs are long as a rule, has none. Zero is left alone: a truck stands.
+    noise, whose runs are long as a rule, has none, and runs at `rest` are none.
     """
     firsts = np.flatnonzero(np.r_[True, np.diff(values) != 0.0])
     lengths = np.diff(np.r_[firsts, len(values)])
@@ -107,7 +129,9 @@ def held(time: Array, values: Array) -> Mask:
     if np.median(per_sample) > 5:
         return np.zeros(len(values), dtype=np.bool_)
     lasts = firsts + lengths - 1
-    frozen = (lengths > 10) & (time[lasts] - time[firsts] >= HELD) & (values[firsts] != 0.0)
+    frozen = (lengths > 10) & (time[lasts] - time[firsts] >= HELD)
+    if rest is not None:
+        frozen &= values[firsts] != rest
     repeats = np.repeat(frozen, lengths)
     repeats[firsts] = False
     return repeats
@@ -117,9 +141,12 @@ def noise(values: Array) -> float:
     """Standard deviation of the white part of a signal, in its unit, from third differences.
 
     A smooth signal has none; their variance is 20 times that of the noise. Median of magnitudes,
-    so that steps do not count.
+    so that steps do not count. At least what rounding to the signal's smallest step makes.
     """
-    return float(np.median(np.abs(np.diff(values, 3))) / 0.6745 / np.sqrt(20.0))
+    steps = np.abs(np.diff(values))
+    rounding = float(np.min(steps[steps > 0.0], initial=np.inf)) / np.sqrt(12.0)
+    white = float(np.median(np.abs(np.diff(values, 3))) / 0.6745 / np.sqrt(20.0))
+    return max(white, float(rounding)) if np.isfinite(rounding) else white
 
 
 def low_pass(values: Array, period: float, cutoff: float) -> Array:

@@ -88,7 +88,7 @@ def command(
 
     truck = Truck(mass=mass, ratio=ratio, wheel_radius=wheel_radius, drum_radius=drum_radius)
     shown = signal(*road_log.read(torque, road_log.TORQUE), torque)
-    driven = signal(*road_log.read(velocity, road_log.VELOCITY), velocity)
+    driven = signal(*road_log.read(velocity, road_log.VELOCITY), velocity, rest=0.0)
     found = fit(prepared(shown, driven, truck), gain_uncertainty)
     said = answer(found)
     if plot:
