@@ -116,6 +116,7 @@ def descended(
 ) -> RoadFit:
     """The optimum that bounded least squares finds from there."""
     from scipy.optimize import least_squares
+    from threadpoolctl import threadpool_limits
 
     base, scale = vector(start), STEPS[free]
 
@@ -138,9 +139,11 @@ def descended(
 
     bounds = (LOWER[free] / scale, UPPER[free] / scale)
     x0 = np.clip(base[free] / scale, bounds[0], bounds[1])
-    found = least_squares(
-        rows, x0, slopes, bounds, xtol=1e-7, ftol=1e-7, gtol=1e-7, max_nfev=EVALUATIONS
-    )
+    # Decompositions of eight columns gain nothing from a second thread and spend twice the time.
+    with threadpool_limits(1):
+        found = least_squares(
+            rows, x0, slopes, bounds, xtol=1e-7, ftol=1e-7, gtol=1e-7, max_nfev=EVALUATIONS
+        )
     return RoadFit(
         run=run,
         values=parameters(values_at(found.x)),
