@@ -50,6 +50,7 @@ class Unknown:
     """A quantity to be estimated; start, lower and upper in its own unit.
 
     logarithmic : estimated on a logarithmic scale, for what cannot be negative
+    scale : of what is not: a change that matters [its unit]
     prior, std : mean and standard deviation of what is known beforehand; std None: nothing
     run : the run whose state it is; None: a parameter of all runs
     """
@@ -59,28 +60,29 @@ class Unknown:
     lower: float
     upper: float
     logarithmic: bool = True
+    scale: float = 1.0
     prior: float = 0.0
     std: float | None = None
     run: int | None = None
 
     def scaled(self, value: float) -> float:
         """The value on the scale of the estimation."""
-        return float(np.log(value)) if self.logarithmic else value
+        return float(np.log(value)) if self.logarithmic else value / self.scale
 
     def value(self, scaled: float) -> float:
         """Back from the scale of the estimation."""
-        return float(np.exp(scaled)) if self.logarithmic else scaled
+        return float(np.exp(scaled)) if self.logarithmic else scaled * self.scale
 
     def error(self, value: float, scaled_error: float) -> float:
         """Standard error in the unit of the value."""
-        return value * scaled_error if self.logarithmic else scaled_error
+        return (value if self.logarithmic else self.scale) * scaled_error
 
     @property
     def scaled_std(self) -> float:
         """Prior standard deviation on the scale of the estimation; infinite without prior."""
         if self.std is None:
             return float("inf")
-        return self.std / self.prior if self.logarithmic else self.std
+        return self.std / (self.prior if self.logarithmic else self.scale)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -224,11 +226,13 @@ def estimate(
     unknowns: Sequence[Unknown],
     residuals: Sequence[Residual],
     *,
+    settled: float = COST_SETTLED,
     progress: Callable[[float], None] | None = None,
 ) -> Estimate:
     """Fit the unknowns from their starts.
 
     residuals : one function a run, from the values by name to the whitened residual
+    settled : relative fall of the cost that ends the fit
     progress : called with the sum of squares after every simulation of all runs
     """
     from scipy.optimize import least_squares
@@ -249,7 +253,7 @@ def estimate(
             problem.slopes,
             bounds=(lower, upper),
             x_scale="jac",
-            ftol=COST_SETTLED,
+            ftol=settled,
             xtol=Z_SETTLED,
             gtol=None,
             max_nfev=MAX_ITERATIONS,

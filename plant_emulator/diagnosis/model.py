@@ -1,0 +1,76 @@
+"""What the diagnosis asks of a machine: parameters, effects, states, and simulated residuals.
+
+The bench is one such machine, a single motor-driven axis another; nothing else here knows either.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.estimation import Array, Residual, Unknown
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """An effect that the nominal model lacks.
+
+    sizes : its unknowns that are absent at their neutral value, starting at a plausible one
+    shapes : its unknowns that only shape it, each with a prior
+    states : its unknowns of one run only
+    neutral : values of the sizes at which the effect is absent
+    fixed : values of the rest while the effect is there
+    """
+
+    name: str
+    subsystem: str
+    sizes: tuple[Unknown, ...]
+    shapes: tuple[Unknown, ...]
+    states: tuple[Unknown, ...]
+    neutral: Mapping[str, float]
+    fixed: Mapping[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """A measured run.
+
+    time : of its samples [s], shape (n,); noise : of each channel [SI], shape (channels,)
+    """
+
+    source: str
+    channels: tuple[str, ...]
+    time: Array
+    noise: Array
+
+
+class Model(Protocol):
+    """A machine that can be simulated, and the runs that it was given."""
+
+    @property
+    def runs(self) -> Sequence[Run]:
+        """The measured runs."""
+
+    @property
+    def parameters(self) -> tuple[Unknown, ...]:
+        """Parameters that drift, with their priors."""
+
+    @property
+    def states(self) -> tuple[Unknown, ...]:
+        """States of a run, without those of effects."""
+
+    @property
+    def candidates(self) -> Mapping[str, Candidate]:
+        """The library of effects by name."""
+
+    def residual(self, run: int, effects: Sequence[str]) -> Residual:
+        """With these effects there: from values by name to the whitened residual.
+
+        Measured minus simulated over the noise, shape (channels, samples); 0: does not count.
+        """
+
+    def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
+        """Parameters, and the states of each of these runs, near the best fit without effects."""
