@@ -28,14 +28,14 @@ if TYPE_CHECKING:
     from plant_emulator.road_fit import RoadFit
 
 NORMAL_95 = 1.959964
-LAGS = 0.5
+LAGS = 1.5
 """[s] over which neighbours of the residual are compared."""
 COLLINEAR = 0.95
 CONTRADICTION = 4.0
 """Standard deviations from what was known of the gain, from which mass or gearing must be wrong."""
 EXPLAINED = 98.0
 """Val1 of the velocity [percent] below which the model is not what happened."""
-EXCELLENT, NOISE = 99.8, 2.0
+EXCELLENT, NOISE = 99.8, 3.5
 """Val1 [percent] below which the residual has to be noise, and the long-run variance of the white
 residual from which it is none."""
 MASS = (

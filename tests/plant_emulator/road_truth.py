@@ -17,7 +17,10 @@ FULL_CYCLE = ((2.0, 4.0), (16.0, 0.0), (24.0, -3.0), (38.0, 0.0), (46.0, 2.3), (
 
 @dataclass(frozen=True, kw_only=True)
 class Truth:
-    """What the logs are made with: the names and units of the answer, and the loggers."""
+    """What the logs are made with: the names and units of the answer, and the loggers.
+
+    grade : how steep the road's waves are, 16 m long [1]; the code under test takes it as level
+    """
 
     mass: float = 3640.0
     crr: float = 0.0115
@@ -31,6 +34,7 @@ class Truth:
     velocity_rate: float = 1000.0
     torque_noise: float = 0.35
     velocity_noise: float = 0.01
+    grade: float = 0.0
     duration: float = 60.0
     targets: Sequence[tuple[float, float]] = FULL_CYCLE
 
@@ -39,7 +43,7 @@ def driven(truth: Truth) -> tuple[Array, Array, Array]:
     """Time [s], velocity [m/s] and motor torque [N m] of the ride."""
     count = round(truth.duration / STEP) + 1
     velocity, torque = np.zeros(count), np.zeros(count)
-    v = t = 0.0
+    v = t = x = 0.0
     target, turn = 0.0, 0
     for k in range(1, count):
         if turn < len(truth.targets) and k * STEP >= truth.targets[turn][0]:
@@ -48,6 +52,8 @@ def driven(truth: Truth) -> tuple[Array, Array, Array]:
         wanted = 0.0 if target == 0.0 and abs(v) < 0.02 else 90.0 * (target - v)
         t += STEP / 0.12 * (min(max(wanted, -60.0), 60.0) - t)
         v = moved(truth, v, t)
+        v -= STEP * 9.81 * truth.grade * np.sin(x / 2.5) if v != 0.0 else 0.0
+        x += STEP * v
         velocity[k], torque[k] = v, t
     return STEP * np.arange(count), velocity, torque
 

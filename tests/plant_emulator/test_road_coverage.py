@@ -74,6 +74,22 @@ def test_other_loggers_give_the_same_truck(loggers: dict[str, float]) -> None:
     assert np.max(np.abs(distances(truth, found))) < 3.5
 
 
+def test_waves_of_the_road_widen_the_intervals() -> None:
+    """0.2 permille, which is waves of 0.5 mm, does more than the noise of the load cell."""
+    level, uneven = Truth(), Truth(grade=2e-4)
+    found = identified(uneven, 1)
+    assert found.converged
+    assert np.max(np.abs(distances(uneven, found))) < 3.0
+    error = identified(level, 1).estimates["crr"].standard_error
+    assert found.estimates["crr"].standard_error > 2.0 * error
+
+
+def test_a_road_too_steep_to_be_level_is_told() -> None:
+    found = identified(Truth(grade=5e-3), 1)
+    assert not found.converged
+    assert "level road" in found.problems[0]
+
+
 def test_without_braking_the_efficiency_is_as_unsure_as_the_gain() -> None:
     """2 % of 0.9 is 0.018; with braking it is 0.0002."""
     found = identified(Truth(targets=((2.0, 4.0),), duration=14.0), 1)
