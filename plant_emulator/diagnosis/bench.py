@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from plant_emulator.diagnosis.model import Candidate, Run
 from plant_emulator.equation_error import start_values
 from plant_emulator.estimation import Unknown
 from plant_emulator.identify import free_parameters, unknowns
+from plant_emulator.parameters import UNITS
 from plant_emulator.search import GAP_POSITION, Search
 from plant_emulator.simulate import values_of
 from plant_emulator.start_states import GAP, with_own
@@ -19,6 +22,9 @@ if TYPE_CHECKING:
     from plant_emulator.estimation import Array, Residual
     from plant_emulator.parameters import ParameterSet
     from plant_emulator.recording import Recording
+
+# Positions in the gap that a predicted run is tried from.
+GAPS = 41
 
 
 def candidate(effect: Effect) -> Candidate:
@@ -52,7 +58,32 @@ def candidate(effect: Effect) -> Candidate:
         states=tuple(states),
         neutral={u.name: neutral[u.name] for u in sizes},
         fixed={name: value for name, value in plausible.items() if name not in free},
+        units={f"{effect.name}_{key}": d.unit for key, d in effect.parameters.items()},
     )
+
+
+# Where the parameters of the model belong.
+SUBSYSTEMS = {
+    "drive": ("dead_time", "speed_gain", "speed_integral_time", "current_gain"),
+    "motor": ("flux_constant", "flux_constant_1", "flux_constant_2", "motor_inertia"),
+    "motor_shaft": ("motor_shaft_stiffness",),
+    "gear": (
+        "gear_inertia",
+        "gear_ratio",
+        "gear_coulomb_friction",
+        "gear_viscous_friction",
+        "gear_friction_exponent",
+    ),
+    "backlash_shaft": ("backlash_half_gap", "drum_shaft_damping", "drum_shaft_stiffness"),
+    "drum": ("drum_inertia",),
+}
+SUBSYSTEM_OF = {name: place for place, names in SUBSYSTEMS.items() for name in names}
+CHANNEL_UNITS = {
+    "motor_speed": "rad/s",
+    "drum_speed": "rad/s",
+    "armature_current": "A",
+    "shaft_torque": "N m",
+}
 
 
 class BenchModel:
@@ -74,17 +105,29 @@ class BenchModel:
         self._recordings = [with_own(r, everything, effects) for r in recordings]
         self.candidates = {name: candidate(effect) for name, effect in effects.items()}
         self.parameters = tuple(unknowns(parameters, self._free, self._values, ()))
+        self.units = {name: UNITS[name] for name in self._free}
+        self.subsystems = {name: SUBSYSTEM_OF.get(name, "drive") for name in self._free}
         self.runs = [
-            Run(source=r.log.source, channels=r.channels, time=r.log.time, noise=r.noise)
+            Run(
+                source=r.log.source,
+                channels=r.channels,
+                units=tuple(CHANNEL_UNITS[name] for name in r.channels),
+                time=r.log.time,
+                measured=np.stack([r.log[name] for name in r.channels]),
+                noise=r.noise,
+            )
             for r in recordings
         ]
 
+    def _fixed(self, run: int, effects: Sequence[str]) -> dict[str, float]:
+        """Values that no fit changes: of the set, of the effects, and what the log tells."""
+        there = {k: v for name in effects for k, v in self.candidates[name].fixed.items()}
+        own = {k: v for k, v in self._recordings[run].own.items() if k in there}
+        return {**self._values, **there, **own}
+
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
         """See `Model`."""
-        recording = self._recordings[run]
-        there = {k: v for name in effects for k, v in self.candidates[name].fixed.items()}
-        own = {k: v for k, v in recording.own.items() if k in there}
-        fixed = {**self._values, **there, **own}
+        recording, fixed = self._recordings[run], self._fixed(run, effects)
 
         def residual(found: Mapping[str, float]) -> Array:
             trial = {**fixed, **found}
@@ -102,3 +145,13 @@ class BenchModel:
             {name: search.values[name] for name in self._free},
             [{GAP_POSITION: gap} for gap in search.gaps],
         )
+
+    def start_states(
+        self, run: int, effects: Sequence[str], values: Mapping[str, float]
+    ) -> dict[str, float]:
+        """See `Model`."""
+        own = {u.name: u.start for name in effects for u in self.candidates[name].states}
+        everything = {**self._fixed(run, effects), **own, **values}
+        search = Search([self._recordings[run]], everything, ())
+        search.scan_gaps(GAPS)
+        return {GAP_POSITION: search.gaps[0], **own}

@@ -3,13 +3,14 @@
  1. One converged fit without effects.
  2. For each effect its signature: the residual's change when the effect comes in at some size, all
     else as fitted; and what of that the drifting parameters cannot imitate (the part orthogonal to
-    their tangents: Basseville and Nikiforov, nuisance rejection).
+    their tangents: Basseville and Nikiforov, INRIA RR-4438, 2002).
  3. A joint fit of drift and effect, started from the size whose signature explains most, the drift
     moved by what the linear picture says.
  4. The fit without effects starts again from every joint fit's drift: should it get as low, there
     was no effect, only a better valley.
-Evidence is the fall of the penalised sum of squares, times the share of samples that are
-independent (the residual's autocorrelation time).
+
+Every step is a function of a model and plain data, so that steps run side by side on other
+processes.
 """
 
 from __future__ import annotations
@@ -19,36 +20,46 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.estimation import Estimate, estimate
+from plant_emulator.estimation import Estimate, at, correlation_time, estimate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.model import Model
+    from plant_emulator.diagnosis.model import Candidate, Model
     from plant_emulator.estimation import Array, Unknown
 
 # Relative fall of the cost that ends a fit here: a few hundredths in units of chi squared.
 SETTLED = 1e-6
 # Sizes at which a signature is tried, in plausible sizes.
-SIZES = (0.1, 0.3, 1.0, 2.0)
+SIZES = (0.03, 0.1, 0.3, 1.0, 2.0)
+# A fit that is to be improved by starting again has to fall by more than this [chi squared].
+WORTH = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fitted:
-    """A joint fit; cost : sum of squares with the priors."""
+class Point:
+    """Where a joint fit has come to.
+
+    values : parameters, sizes and shapes by name; states : of every run of the fit, by name
+    cost : sum of squares with the priors; squares : of the residuals alone; samples : counted
+    share : of the samples that are independent, from the residual's autocorrelation time
+    errors : standard errors by name of `values`
+    """
 
     effects: tuple[str, ...]
-    estimate: Estimate
-
-    @property
-    def cost(self) -> float:
-        """Sum of squares of residuals and priors."""
-        return self.estimate.cost + self.estimate.penalty
+    values: Mapping[str, float]
+    states: tuple[Mapping[str, float], ...]
+    cost: float
+    squares: float
+    samples: int
+    share: float
+    errors: Mapping[str, float]
+    converged: bool
 
     @property
     def chi_squared(self) -> float:
-        """Mean square of the whitened residual."""
-        return self.estimate.cost / self.estimate.samples
+        """Mean square of the whitened residual; 1: only the noise is left."""
+        return self.squares / self.samples
 
 
 def template(model: Model, effects: Sequence[str], runs: Sequence[int]) -> list[Unknown]:
@@ -62,10 +73,11 @@ def template(model: Model, effects: Sequence[str], runs: Sequence[int]) -> list[
 def started(
     unknowns: Sequence[Unknown], values: Mapping[str, float], states: Sequence[Mapping[str, float]]
 ) -> list[Unknown]:
-    """The unknowns, starting at these values where there are such."""
+    """The unknowns, starting at these values where there are such, within their bounds."""
+    wanted = [(values if u.run is None else states[u.run]).get(u.name, u.start) for u in unknowns]
     return [
-        replace(u, start=(values if u.run is None else states[u.run]).get(u.name, u.start))
-        for u in unknowns
+        replace(u, start=float(np.clip(value, u.lower, u.upper)))
+        for u, value in zip(unknowns, wanted, strict=True)
     ]
 
 
@@ -75,20 +87,51 @@ def fit(
     runs: Sequence[int],
     values: Mapping[str, float],
     states: Sequence[Mapping[str, float]],
-) -> Fitted:
+) -> Point:
     """Joint fit of drift, states and these effects, from these values."""
     unknowns = started(template(model, effects, runs), values, states)
     residuals = [model.residual(k, effects) for k in runs]
-    return Fitted(effects=tuple(effects), estimate=estimate(unknowns, residuals, settled=SETTLED))
+    return point(effects, estimate(unknowns, residuals, settled=SETTLED), len(runs))
 
 
-def again(model: Model, effects: Sequence[str], runs: Sequence[int], start: Fitted) -> Fitted:
+def again(model: Model, effects: Sequence[str], runs: Sequence[int], start: Point) -> Point:
     """Joint fit with these effects from where another fit has come to."""
-    states = [start.estimate.states(k) for k in range(len(runs))]
-    return fit(model, effects, runs, start.estimate.parameters(), states)
+    return fit(model, effects, runs, start.values, start.states)
 
 
-def null_fit(model: Model, runs: Sequence[int]) -> Fitted:
+def linearised(model: Model, where: Point, runs: Sequence[int]) -> Estimate:
+    """Residuals and Jacobians of a fit that has ended."""
+    unknowns = started(template(model, where.effects, runs), where.values, where.states)
+    return at(unknowns, [model.residual(k, where.effects) for k in runs])
+
+
+def point(effects: Sequence[str], found: Estimate, runs: int) -> Point:
+    """An estimate as plain data."""
+    errors = zip(found.unknowns, found.z, found.standard_errors, strict=True)
+    return Point(
+        effects=tuple(effects),
+        values=found.parameters(),
+        states=tuple(found.states(k) for k in range(runs)),
+        cost=found.cost + found.penalty,
+        squares=found.cost,
+        samples=found.samples,
+        share=independent_share(found),
+        errors={
+            u.name: u.error(u.value(float(z)), float(e)) for u, z, e in errors if u.run is None
+        },
+        converged=found.converged,
+    )
+
+
+def independent_share(found: Estimate) -> float:
+    """Share of the samples that are independent: the inverse of the mean autocorrelation time."""
+    channels = [channel for residual in found.residuals for channel in residual]
+    weight = np.array([np.count_nonzero(channel) for channel in channels], float)
+    times = np.array([correlation_time(channel) for channel in channels])
+    return float(weight.sum() / (weight * times).sum())
+
+
+def null_fit(model: Model, runs: Sequence[int]) -> Point:
     """The fit without effects, from the model's own search."""
     values, states = model.search(runs)
     return fit(model, (), runs, values, states)
@@ -98,85 +141,135 @@ def null_fit(model: Model, runs: Sequence[int]) -> Fitted:
 class Signature:
     """What an effect does to the whitened residual of a fit that lacks it.
 
-    sizes : of the effect, by name; shift : of the fit's z that the linear picture expects
-    norm : of the part that drift cannot imitate; gain : fall of the sum of squares expected
-    direction : that part over its norm, all runs and channels in one vector
+    start : where a joint fit may begin, by name; states : the same of every run
+    norm : of the part that drift cannot imitate, at the plausible size
+    raw : of the whole, at the plausible size
+    gain : fall of the sum of squares that the linear picture expects at the best size
+    imitated_by : the parameter that follows it most
+    direction : the part that drift cannot imitate over its norm, all runs and channels
     """
 
-    sizes: Mapping[str, float]
-    shift: Array
+    effect: str
+    start: Mapping[str, float]
+    states: tuple[Mapping[str, float], ...]
     norm: float
+    raw: float
     gain: float
+    imitated_by: str
     direction: Array
 
 
 class Tangents:
     """The drift's tangent space at a fit, for removing from signatures what drift can imitate."""
 
-    def __init__(self, fitted: Fitted) -> None:
-        estimate = fitted.estimate
-        p = len(estimate.z)
-        self.residual = np.concatenate([r.ravel() for r in estimate.residuals])
-        self._slopes = np.concatenate([j.reshape(-1, p) for j in estimate.jacobians])
-        precision = np.diag([u.scaled_std**-2.0 for u in estimate.unknowns])
-        hessian = estimate.information + precision
-        self._inverse = np.linalg.pinv(hessian, hermitian=True)
+    def __init__(self, found: Estimate) -> None:
+        p = len(found.z)
+        self.found = found
+        self.residual = np.concatenate([r.ravel() for r in found.residuals])
+        self._slopes = np.concatenate([j.reshape(-1, p) for j in found.jacobians])
+        precision = np.diag([u.scaled_std**-2.0 for u in found.unknowns])
+        self._inverse = np.linalg.pinv(found.information + precision, hermitian=True)
 
-    def imitation(self, signature: Array) -> Array:
+    def imitation(self, change: Array) -> Array:
         """Shift of z that follows a change of the residual best."""
-        return -self._inverse @ (self._slopes.T @ signature)
+        return np.asarray(-self._inverse @ (self._slopes.T @ change))
 
-    def rest(self, signature: Array) -> Array:
+    def rest(self, change: Array) -> Array:
         """The change of the residual that remains when drift follows it."""
-        return signature + self._slopes @ self.imitation(signature)
+        return np.asarray(change + self._slopes @ self.imitation(change))
+
+    def moved(self, shift: Array, runs: int) -> tuple[dict[str, float], list[dict[str, float]]]:
+        """Values and states after a shift of z, within their bounds."""
+        values: dict[str, float] = {}
+        states: list[dict[str, float]] = [{} for _ in range(runs)]
+        for u, z in zip(self.found.unknowns, self.found.z + shift, strict=True):
+            value = u.value(float(np.clip(z, u.scaled(u.lower), u.scaled(u.upper))))
+            (values if u.run is None else states[u.run])[u.name] = value
+        return values, states
 
 
 def signature(
-    model: Model, name: str, base: Fitted, runs: Sequence[int], tangents: Tangents
+    model: Model, name: str, where: Point, runs: Sequence[int], tangents: Tangents
 ) -> Signature | None:
-    """The signature of an effect at the size that explains most; None: it changes nothing."""
+    """The signature of an effect at a fit that lacks it; None: it changes nothing there."""
+    trials = [
+        _trial(model, name, where, runs, tangents, sign * size)
+        for size in SIZES
+        for sign in signs(model.candidates[name].sizes)
+    ]
+    moving = [trial for trial in trials if trial.norm > 1e-6]
+    if not moving:
+        return None
+    best = max(moving, key=lambda trial: trial.gain)
+    plausible = max((t for t in trials if abs(t.size) == 1.0), key=lambda t: t.norm)
+    values, states = tangents.moved(tangents.imitation(best.change), len(runs))
+    own = {u.name: u.start for u in model.candidates[name].states}
+    names = [u.name for u in tangents.found.unknowns]
+    follows = np.abs(tangents.imitation(plausible.change)) * _lengths(tangents.found)
+    return Signature(
+        effect=name,
+        start={**values, **best.sizes},
+        states=tuple({**state, **own} for state in states),
+        norm=plausible.norm,
+        raw=float(np.linalg.norm(plausible.change)),
+        gain=best.gain,
+        imitated_by=names[int(np.argmax(follows))],
+        direction=plausible.rest / max(plausible.norm, 1e-12),
+    )
+
+
+def _lengths(found: Estimate) -> Array:
+    """Length of each column of the Jacobian: what a unit of z moves in the residual."""
+    return np.asarray(np.sqrt(np.diag(found.information)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Trial:
+    size: float
+    sizes: Mapping[str, float]
+    change: Array
+    rest: Array
+    norm: float
+    gain: float
+
+
+def _trial(
+    model: Model, name: str, where: Point, runs: Sequence[int], tangents: Tangents, size: float
+) -> _Trial:
+    """The effect at one size, in plausible sizes."""
     candidate = model.candidates[name]
-    effects = (*base.effects, name)
-    residuals = [model.residual(k, effects) for k in runs]
-    best: Signature | None = None
-    for factor in SIZES:
-        for sign in signs(candidate.sizes):
-            sizes = {
-                u.name: bounded(u, candidate.neutral[u.name], sign * factor)
-                for u in candidate.sizes
-            }
-            shapes = {u.name: u.start for u in candidate.shapes}
-            starts = {u.name: u.start for u in candidate.states}
-            changed = np.concatenate(
-                [
-                    residuals[i](
-                        {
-                            **base.estimate.parameters(),
-                            **base.estimate.states(i),
-                            **starts,
-                            **sizes,
-                            **shapes,
-                        }
-                    ).ravel()
-                    for i in range(len(runs))
-                ]
-            )
-            change = changed - tangents.residual
-            rest = tangents.rest(change)
-            norm = float(np.linalg.norm(rest))
-            if norm < 1e-9:
-                continue
-            after = tangents.residual + rest
-            gain = float(tangents.residual @ tangents.residual - after @ after)
-            if best is None or gain > best.gain:
-                best = Signature(
-                    sizes=sizes,
-                    shift=tangents.imitation(change),
-                    norm=norm,
-                    gain=gain,
-                    direction=rest / norm,
-                )
-    return best
+    sizes = {u.name: bounded(u, candidate.neutral[u.name], size) for u in candidate.sizes}
+    sizes |= {u.name: u.start for u in candidate.shapes}
+    changed = _residual(model, candidate, where, runs, sizes)
+    change = changed - tangents.residual
+    rest = tangents.rest(change)
+    after = tangents.residual + rest
+    return _Trial(
+        size=size,
+        sizes=sizes,
+        change=change,
+        rest=rest,
+        norm=float(np.linalg.norm(rest)),
+        gain=float(tangents.residual @ tangents.residual - after @ after),
+    )
+
+
+def _residual(
+    model: Model,
+    candidate: Candidate,
+    where: Point,
+    runs: Sequence[int],
+    sizes: Mapping[str, float],
+) -> Array:
+    """Residual of all runs with one more effect, all else as fitted."""
+    effects = (*where.effects, candidate.name)
+    own = {u.name: u.start for u in candidate.states}
+    return np.concatenate(
+        [
+            model.residual(k, effects)({**where.values, **state, **own, **sizes}).ravel()
+            for k, state in zip(runs, where.states, strict=True)
+        ]
+    )
 
 
 def signs(sizes: Sequence[Unknown]) -> tuple[float, ...]:
@@ -188,3 +281,15 @@ def bounded(unknown: Unknown, neutral: float, factor: float) -> float:
     """A size in plausible sizes from neutral, within its bounds."""
     value = neutral + factor * (unknown.start - neutral)
     return float(np.clip(value, unknown.lower, unknown.upper))
+
+
+def joint(model: Model, found: Signature, base: Point, runs: Sequence[int]) -> Point:
+    """Joint fit of one more effect, from its signature's start and from the drift as it is."""
+    effects = (*base.effects, found.effect)
+    best = fit(model, effects, runs, found.start, found.states)
+    if found.gain > 0.0 and best.cost < base.cost:
+        return best
+    own = {u.name: u.start for u in model.candidates[found.effect].states}
+    states = [{**state, **own} for state in base.states]
+    small = {**found.start, **base.values}
+    return min(best, fit(model, effects, runs, small, states), key=lambda p: p.cost)

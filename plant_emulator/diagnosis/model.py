@@ -23,6 +23,7 @@ class Candidate:
     states : its unknowns of one run only
     neutral : values of the sizes at which the effect is absent
     fixed : values of the rest while the effect is there
+    units : of all its parameters, by name
     """
 
     name: str
@@ -32,18 +33,22 @@ class Candidate:
     states: tuple[Unknown, ...]
     neutral: Mapping[str, float]
     fixed: Mapping[str, float]
+    units: Mapping[str, str]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
     """A measured run.
 
-    time : of its samples [s], shape (n,); noise : of each channel [SI], shape (channels,)
+    time : of its samples [s], shape (n,); measured : shape (channels, n) [units]
+    noise : standard deviation of each channel's noise, shape (channels,) [units]
     """
 
     source: str
     channels: tuple[str, ...]
+    units: tuple[str, ...]
     time: Array
+    measured: Array
     noise: Array
 
 
@@ -56,7 +61,15 @@ class Model(Protocol):
 
     @property
     def parameters(self) -> tuple[Unknown, ...]:
-        """Parameters that drift, with their priors."""
+        """Parameters that drift, with their priors; the prior's mean is the nominal value."""
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Units of the parameters by name."""
+
+    @property
+    def subsystems(self) -> Mapping[str, str]:
+        """Where each parameter belongs, by name."""
 
     @property
     def states(self) -> tuple[Unknown, ...]:
@@ -74,3 +87,8 @@ class Model(Protocol):
 
     def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
         """Parameters, and the states of each of these runs, near the best fit without effects."""
+
+    def start_states(
+        self, run: int, effects: Sequence[str], values: Mapping[str, float]
+    ) -> dict[str, float]:
+        """States of a run near the best at these values of everything else."""
