@@ -57,6 +57,7 @@ class Bench:
     """Drive, motor, gear and drum at rest, waiting for references.
 
     effects : effect -> parameter -> value [SI]; gap_position: see `simulate`; step [s]
+    truck : whether one stands on the drum
     """
 
     def __init__(
@@ -65,12 +66,14 @@ class Bench:
         effects: Mapping[str, Mapping[str, float]] | None = None,
         *,
         gap_position: float = 0.0,
+        truck: bool = False,
         step: float = STEP,
         kernel: Kernel | None = None,
     ) -> None:
         self._kernel = kernel or default_kernel()
         self._p = self._kernel.parameter_record(values_of(parameters, effects))
         self._stage = self._kernel.stage_record()
+        self._stage.truck = float(truck)
         self._x = self._kernel.state(self._p, gap_position * self._p.backlash_half_gap)
         self._work = self._kernel.work()
         self._longest_dead_time = self._p.dead_time + LONGER_DEAD_TIME

@@ -22,10 +22,14 @@ def limited(value: float, limit: float) -> float:
 
 
 def flux_slope(k_phi: float, s: Record, p: Record) -> float:
-    """Slope of the flux with the motor speed [N m s/(A rad)]: 0 below base speed (eq. 3.18)."""
-    if k_phi >= p.flux_constant:
+    """Slope of the flux with the motor speed [N m s/(A rad)]: 0 below base speed (eq. 3.18).
+
+    Base speed is that of the nominal field: an effect that weakens the flux does not move it.
+    """
+    per_speed = 1.0 / (p.flux_constant_2 + abs(s.motor_speed))
+    if p.flux_constant_1 * per_speed >= p.flux_constant:
         return 0.0
-    slope = k_phi / (p.flux_constant_2 + abs(s.motor_speed))
+    slope = k_phi * per_speed
     return -slope if s.motor_speed > 0.0 else slope
 
 

@@ -175,7 +175,7 @@ def build(options: Options) -> Emulator:
     # The first call compiles: better here than in the first scan.
     Bench(parameters, chosen).advance([0.0] * STEPS)
     plc = Plc(
-        Bench(parameters, chosen),
+        Bench(parameters, chosen, truck=options.truck_mass is not None),
         register_map,
         backlash=Backlash(
             ratio=parameters.value("gear_ratio"),

@@ -14,9 +14,10 @@ from __future__ import annotations
 
 import dis
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, wraps
+from itertools import islice
 from types import CodeType, FunctionType, ModuleType, SimpleNamespace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -117,20 +118,33 @@ def glue(known: Mapping[str, Effect]) -> str:
     """Source of the functions that only the list of effects determines."""
     lines: list[str] = []
     for law in laws.LAWS:
-        value = f"nominal_{law.__name__}(s, p)"
-        for effect in known.values():
-            if law.__name__ in effect.laws:
-                value = f"{effect.name}__{law.__name__}({value}, s, p)"
-        lines += [f"def {law.__name__}(s, p):", f"    return {value}"]
+        lines += [f"def {law.__name__}(s, p):", f"    return {chain(law.__name__, known.values())}"]
     states = [*stage.STATES, *memory_names(known)]
     lines += ["def load(x, s):", *(f"    s.{name} = x[{k}]" for k, name in enumerate(states))]
     lines += ["def store(s, x):", *(f"    x[{k}] = s.{name}" for k, name in enumerate(states))]
     lines += ["def memories(base, a, s, p):", "    pass"]
     lines += [
-        f"    s.{name} = {name}__advance(base[{stage.FIRST_MEMORY + k}], a, s, p)"
-        for k, name in enumerate(memory_names(known))
+        f"    s.{name} = {name}__advance(base[{stage.FIRST_MEMORY + k}], a, {value}s, p)"
+        for k, (name, value) in enumerate(zip(memory_names(known), followed(known), strict=True))
     ]
     return "\n".join(lines) + "\n"
+
+
+def chain(law: str, effects: Iterable[Effect]) -> str:
+    """Expression of a law as these effects, one after the other, change it."""
+    value = f"nominal_{law}(s, p)"
+    for effect in effects:
+        if law in effect.laws:
+            value = f"{effect.name}__{law}({value}, s, p)"
+    return value
+
+
+def followed(known: Mapping[str, Effect]) -> Iterator[str]:
+    """What the advance of each memory takes besides: the value of the law that it follows."""
+    for k, effect in enumerate(known.values()):
+        for memory in effect.memories.values():
+            before = islice(known.values(), k)
+            yield "" if memory.follows is None else f"{chain(memory.follows, before)}, "
 
 
 def build(known: Mapping[str, Effect]) -> Kernel:

@@ -121,6 +121,7 @@ def simulate(
         largest_step = min(LARGEST_STEP, run.interval)
     settings = (tolerance, largest_step) if step is None else (inf, step)
     stage = model.stage_record()
+    stage.truck = float(run.truck)
     model.run(
         run.time,
         run.reference,

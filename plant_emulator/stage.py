@@ -24,6 +24,7 @@ STAGE = (
     "wheel_torque",
     "brake_torque",
     "parked",
+    "truck",
     # the laws at the present estimate
     "reference",
     "speed_limit",

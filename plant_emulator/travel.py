@@ -73,7 +73,7 @@ def travel(
     """The log of a travel program: truck on the drum, reference in a loop around the bench."""
     truck = Forklift(mass=program.mass)
     who = driver or ReplayedTorque(truck)
-    bench = Bench(parameters, effects, gap_position=gap_position, step=STEP)
+    bench = Bench(parameters, effects, gap_position=gap_position, truck=True, step=STEP)
     regulator = ThesisReference(parameters, truck)
     time = sample_times(program.duration)
     rows = np.zeros((len(time), 7))

@@ -67,7 +67,8 @@ def _calls(
         yield law, (0.0, s, p)
     for memory in effect.memories.values():
         yield memory.start, (p,)
-        yield memory.advance, (0.0, SHORT, s, p)
+        value = () if memory.follows is None else (0.0,)
+        yield memory.advance, (0.0, SHORT, *value, s, p)
 
 
 def raise_in_effects(error: Exception, known: Mapping[str, Effect]) -> None:

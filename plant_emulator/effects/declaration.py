@@ -48,10 +48,13 @@ class Memory:
     start   : p -> value at the start of a run
     advance : (base, a, s, p) -> the solution x of x = base + a * rate(x), the memory's own
               implicit stage; it must be finite for a time constant of 0
+    follows : name of a law of which the memory takes in the value, as the effects before this one
+              leave it (a filter, a lag); advance then is (base, a, value, s, p) -> x
     """
 
     start: Callable[[Record], float]
-    advance: Callable[[float, float, Record, Record], float]
+    advance: Callable[..., float]
+    follows: str | None = None
 
 
 @dataclass(frozen=True, eq=False)  # compared and hashed as the one object that was loaded
@@ -98,6 +101,7 @@ def effect_of(name: str, module: ModuleType) -> Effect:
             )
     _check_table(name, module, "PARAMETERS", EffectParameter)
     _check_table(name, module, "MEMORIES", Memory)
+    _check_memories(name, module)
     return Effect(
         name=name,
         subsystem=module.SUBSYSTEM,
@@ -116,3 +120,15 @@ def _check_table(name: str, module: ModuleType, table: str, kind: type) -> None:
         raise ParameterError(
             f"effect {name}: {module.__file__}: {table} is no dict of names to {kind.__name__}"
         )
+
+
+def _check_memories(name: str, module: ModuleType) -> None:
+    """Refuse a memory that follows what is no law."""
+    memories: dict[str, Memory] = getattr(module, "MEMORIES", {})
+    known = [law.__name__ for law in laws.LAWS]
+    for key, memory in memories.items():
+        if memory.follows not in (None, *known):
+            raise ParameterError(
+                f"effect {name}: {module.__file__}: memory {key} follows {memory.follows!r}, "
+                f"which is no law; known: {', '.join(known)}"
+            )

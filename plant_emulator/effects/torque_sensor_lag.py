@@ -28,21 +28,19 @@ def start(p: Record) -> float:
     return 0.0
 
 
-def advance(base: float, a: float, s: Record, p: Record) -> float:
-    """Shown torque at the end of an implicit stage of size a [N m].
-
-    Written around the torque itself: exactly that at tau = 0.
-    """
+def advance(base: float, a: float, value: float, s: Record, p: Record) -> float:
+    """Shown torque at the end of an implicit stage of size a [N m]; at tau = 0 of no use."""
     tau = p.torque_sensor_lag_time_constant
-    torque = -s.motor_shaft_torque
-    return torque + (base - torque) * (tau / (tau + a))
+    if tau == 0.0:
+        return base
+    return value + (base - value) * (tau / (tau + a))
 
 
-MEMORIES = {"shown": Memory(start, advance)}
+MEMORIES = {"shown": Memory(start, advance, follows="measured_shaft_torque")}
 
 
 def measured_shaft_torque(value: float, s: Record, p: Record) -> float:
     """What the sensor shows [N m]."""
     if p.torque_sensor_lag_time_constant == 0.0:
         return value
-    return value + (s.torque_sensor_lag_shown + s.motor_shaft_torque)
+    return s.torque_sensor_lag_shown

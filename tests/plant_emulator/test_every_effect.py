@@ -12,6 +12,7 @@ from plant_emulator.errors import ParameterError
 from plant_emulator.log import Log
 from plant_emulator.parameters import ParameterSet
 from plant_emulator.simulate import run_of, simulate, values_of
+from plant_emulator.stage import STAGE
 from tests.plant_emulator.runs import linear
 
 ReadLog = Callable[[str], Log]
@@ -22,6 +23,7 @@ SUBSYSTEMS = {
 RUNS = {
     "up, field weakening, stop": linear((0.2, 0.0), (2.2, 330.0), (4.0, 0.0), duration=5.0),
     "both directions": linear((0.2, 0.0), (0.8, 70.0), (1.8, -90.0), (2.6, 0.0), duration=3.5),
+    "limits": linear((0.2, 0.0), (0.4, 480.0), (4.0, 480.0), (4.2, 100.0), duration=5.0),
 }
 
 every_effect = pytest.mark.parametrize("name", effects.names())
@@ -29,7 +31,7 @@ every_effect = pytest.mark.parametrize("name", effects.names())
 
 @pytest.fixture(scope="session")
 def inputs(bench_log: ReadLog) -> dict[str, Log]:
-    """Runs that excite what an effect may need: field weakening, reversal, rest, a truck."""
+    """Runs that excite what an effect may need: field weakening, reversal, limits, a truck."""
     truck = bench_log("bench_nominal/program6")
     first = slice(0, 801)
     signals = {key: signal[first] for key, signal in truck.signals.items()}
@@ -92,7 +94,7 @@ def test_effect_of_plausible_size_shows_in_some_channel(
 ) -> None:
     """By more than a tenth of a sensor's noise somewhere in some run."""
     noise = {"motor_speed": 0.15, "drum_speed": 0.01, "armature_current": 0.25,
-             "shaft_torque": 0.25}  # fmt: skip
+             "shaft_torque": 0.25, "armature_voltage": 0.5}  # fmt: skip
     values = values_of(nominal, {name: effects.load(name).plausible()})
     changes = []
     for run, log in inputs.items():
@@ -134,17 +136,26 @@ def test_every_function_named_like_a_law_takes_value_stage_and_parameters(name: 
 
 
 @every_effect
-def test_memory_with_a_step_of_zero_keeps_its_value_or_is_without_inertia(name: str) -> None:
+def test_memory_with_a_step_of_zero_keeps_its_value_or_is_without_inertia(
+    name: str, nominal: ParameterSet
+) -> None:
     effect = effects.load(name)
     neutral = {f"{name}_{key}": p.neutral for key, p in effect.parameters.items()}
     for memory in effect.memories.values():
-        s = SimpleNamespace(**dict.fromkeys(STAGE_NAMES, 0.0), **{f"{name}_x": 0.0})
-        assert np.isfinite(memory.start(SimpleNamespace(**neutral)))
-        assert np.isfinite(memory.advance(1.0, 1e-9, s, SimpleNamespace(**neutral)))
+        own = (f"{name}_{key}" for key in effect.memories)
+        s = SimpleNamespace(**dict.fromkeys((*STAGE, *own), 0.0))
+        p = SimpleNamespace(**{**nominal.values(), **neutral})
+        value = () if memory.follows is None else (1.0,)
+        assert np.isfinite(memory.start(p))
+        assert np.isfinite(memory.advance(1.0, 1e-9, *value, s, p))
 
 
-STAGE_NAMES = ("motor_shaft_torque", "gear_friction_torque", "gear_speed", "motor_speed",
-               "drum_speed", "armature_current", "time", "delayed_reference")  # fmt: skip
+def test_all_effects_at_once_settle(nominal: ParameterSet, inputs: dict[str, Log]) -> None:
+    """Each of plausible size; a stage that does not settle is refused by `simulate`."""
+    values = values_of(nominal, {name: effects.load(name).plausible() for name in effects.names()})
+    for log in inputs.values():
+        found = simulate(run_of(log), values)
+        assert all(np.isfinite(signal).all() for signal in found.signals.values())
 
 
 # --- texts of the command line ----------------------------------------------------------------

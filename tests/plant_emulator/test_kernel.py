@@ -4,6 +4,8 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numba
@@ -11,7 +13,7 @@ import numpy as np
 import pytest
 
 from plant_emulator import compiler, effects, laws, stage
-from plant_emulator.kernel import build, glue, kernel
+from plant_emulator.kernel import Kernel, build, glue, kernel
 from plant_emulator.log import COMPARED
 from plant_emulator.parameters import ParameterSet
 from plant_emulator.simulate import values_of
@@ -90,6 +92,26 @@ def test_effects_are_chained_in_the_order_of_the_list() -> None:
     assert "torque_sensor_lag__measured_shaft_torque(nominal_measured_shaft_torque(s, p)" in text
     assert "x[8] = s.torque_sensor_lag_shown" in text
     assert "x[9] = s.gear_oil_temperature_oil" in text
+
+
+def test_memory_takes_in_the_law_it_follows_as_the_effects_before_it_leave_it(
+    nominal: ParameterSet, model_with: Callable[[str], Kernel]
+) -> None:
+    """A sensor that is 3 N m off, and then lags: at rest it shows 3 (1 - exp(-t / tau))."""
+    lag = model_with(
+        "def start(p):\n    return 0.0\n\n\n"
+        "def advance(base, a, value, s, p):\n"
+        "    return value + (base - value) * (p.own_size / (p.own_size + a))\n\n\n"
+        "MEMORIES = {'shown': Memory(start, advance, follows='measured_shaft_torque')}\n\n\n"
+        "def measured_shaft_torque(value, s, p):\n    return s.own_shown"
+    )
+    offset = model_with("def measured_shaft_torque(value, s, p):\n    return value + 3.0")
+    before, after = offset.effects["own"], lag.effects["own"]
+    model = build({"before": replace(before, name="before"), "own": after})
+    rest = linear((0.0, 0.0), duration=0.3, period=1e-3)
+    log = simulate(rest, {**nominal.values(), "own_size": 0.1}, kernel=model)
+    expected = 3.0 * (1.0 - np.exp(-rest.time / 0.1))
+    np.testing.assert_allclose(log["shaft_torque"], expected, atol=1e-3)
 
 
 def test_glue_without_effects_is_the_nominal_model() -> None:

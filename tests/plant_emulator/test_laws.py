@@ -51,6 +51,7 @@ def test_flux_slope_is_the_difference_quotient(p: SimpleNamespace, speed: float)
 
 def test_flux_has_no_slope_below_base_speed(p: SimpleNamespace) -> None:
     assert drive.flux_slope(p.flux_constant, SimpleNamespace(motor_speed=100.0), p) == 0.0
+    assert drive.flux_slope(0.9 * p.flux_constant, SimpleNamespace(motor_speed=100.0), p) == 0.0
 
 
 def test_friction_at_one_rad_per_second_is_the_sum_of_the_tables_values(

@@ -140,6 +140,11 @@ def test_simulation_that_has_no_solution_is_refused_not_returned(tmp_path: Path)
 FORCE = OIL_DRAG.replace("factor * speed", "BODY").replace("oil_drag", "own")
 
 
+FOLLOWS = """from plant_emulator.effects import Memory
+
+MEMORIES = {"oil": Memory(float, float, follows="ghost")}"""
+
+
 def written(folder: Path, text: str) -> Path:
     path = folder / "own.py"
     path.write_text(text, encoding="utf-8")
@@ -173,6 +178,7 @@ def test_mistake_in_the_file_is_told_with_its_line(
         ),
         ("PARAMETERS['other'] = 1.0", "PARAMETERS is no dict of names to EffectParameter"),
         ("MEMORIES = ['oil']", "MEMORIES is no dict of names to Memory"),
+        (FOLLOWS, "memory oil follows 'ghost', which is no law; known: dead_time, .*flux"),
     ],
 )
 def test_declaration_of_a_wrong_kind_is_refused(tmp_path: Path, text: str, said: str) -> None:
