@@ -108,9 +108,22 @@ def shipped() -> dict[str, Effect]:
     return {name: effects.load(name) for name in effects.names()}
 
 
+# A user's own effects that this process knows beside the shipped ones.
+_own: list[Effect] = []
+
+
+def know(*own: Effect) -> None:
+    """Let every kernel of this process have these effects of a user's own."""
+    _own[:] = own
+
+
+def kernel() -> Kernel:
+    """The kernel with the shipped effects and those that this process knows; built once."""
+    return _kernel(tuple(_own))
+
+
 @cache
-def kernel(own: tuple[Effect, ...] = ()) -> Kernel:
-    """The kernel with the shipped effects and a user's own ones; built once a process."""
+def _kernel(own: tuple[Effect, ...]) -> Kernel:
     return build({**shipped(), **{effect.name: effect for effect in own}})
 
 

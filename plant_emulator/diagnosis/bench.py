@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import hashlib
+import pickle
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from plant_emulator.diagnosis.model import Candidate, Run
+from plant_emulator.effects import from_file
 from plant_emulator.equation_error import start_values
 from plant_emulator.estimation import Unknown
 from plant_emulator.identify import free_parameters, unknowns
+from plant_emulator.kernel import kernel, know
 from plant_emulator.parameters import UNITS
 from plant_emulator.search import GAP_POSITION, Search
 from plant_emulator.simulate import values_of
@@ -155,3 +160,29 @@ class BenchModel:
         search = Search([self._recordings[run]], everything, ())
         search.scan_gaps(GAPS)
         return {GAP_POSITION: search.gaps[0], **own}
+
+
+@dataclass(frozen=True)
+class BenchRecipe:
+    """What builds a `BenchModel` on another process.
+
+    without : effects that are taken out of the library; own : paths of a user's own effect files
+    """
+
+    recordings: tuple[Recording, ...]
+    parameters: ParameterSet
+    without: tuple[str, ...] = ()
+    own: tuple[str, ...] = ()
+
+    def library(self) -> dict[str, Effect]:
+        """The effects in the contest by name, of those that this process knows."""
+        return {n: effect for n, effect in kernel().effects.items() if n not in self.without}
+
+    def build(self) -> BenchModel:
+        """The model; this process then knows the user's own effects."""
+        know(*(from_file(path) for path in self.own))
+        return BenchModel(self.recordings, self.parameters, self.library())
+
+    def digest(self) -> str:
+        """Hash of all that the model is made of."""
+        return hashlib.sha256(pickle.dumps(self)).hexdigest()

@@ -52,10 +52,11 @@ SIMULATED = """
 import sys
 from pathlib import Path
 from plant_emulator import effects, parameter_sets
-from plant_emulator.kernel import kernel
+from plant_emulator.kernel import kernel, know
 from tests.plant_emulator.runs import linear, simulate
 
-model = kernel((effects.from_file(Path(sys.argv[1])),))
+know(effects.from_file(Path(sys.argv[1])))
+model = kernel()
 values = {**parameter_sets.load().values(), "oil_drag_factor": 20.0}
 inputs = linear((0.5, 0.0), (3.0, 180.0), duration=30.0)
 print(sorted(model.effects), simulate(inputs, values, kernel=model)["shaft_torque"][-1])

@@ -1,0 +1,164 @@
+"""How far the gap shrinks, on runs that were not fitted.
+
+A fold fits on some runs and predicts others; a predicted run keeps all parameters, and only its own
+start states are fitted to it. The gap of a model is what its predictions leave, all held-out
+samples of a channel pooled; intervals come from resampling blocks of time that are longer than the
+residual's memory (moving-block bootstrap: Kunsch, Annals of Statistics 17 (1989) 1217).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.diagnosis.contest import Point, again
+from plant_emulator.estimation import correlation_time, estimate
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from plant_emulator.diagnosis.model import Model
+    from plant_emulator.estimation import Array
+
+# A channel counts in the closed fraction from this gap on, in the noise.
+OPEN = 1.1
+BLOCK = 3.0
+RESAMPLED = 400
+SEED = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fold:
+    """Runs to fit, and runs to predict. start, where the fit begins: values and run states."""
+
+    fitted: tuple[int, ...]
+    predicted: tuple[int, ...]
+    start: Point
+    refitted: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prediction:
+    """The whitened residual of predicted runs, one array a run, shape (channels, samples)."""
+
+    residuals: tuple[Array, ...]
+    converged: bool
+
+
+def predict(model: Model, fold: Fold) -> Prediction:
+    """Fit the fold's model on its runs, and predict the others."""
+    point = (
+        again(model, fold.start.effects, fold.fitted, fold.start) if fold.refitted else fold.start
+    )
+    residuals = tuple(_predicted(model, point, run) for run in fold.predicted)
+    return Prediction(residuals=residuals, converged=point.converged)
+
+
+def _predicted(model: Model, point: Point, run: int) -> Array:
+    """Residual of a run with all parameters kept, its own states fitted."""
+    effects = point.effects
+    start = model.start_states(run, effects, point.values)
+    own = (*model.states, *(u for name in effects for u in model.candidates[name].states))
+    states = [replace(u, run=0, start=float(np.clip(start[u.name], u.lower, u.upper))) for u in own]
+    residual = model.residual(run, effects)
+
+    def of(found: Mapping[str, float]) -> Array:
+        return residual({**point.values, **found})
+
+    return estimate(states, [of]).residuals[0] if states else of({})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gap:
+    """The held-out gap of a model: rms of the whitened residual of every channel, and its blocks.
+
+    squares, counts : sums of squares and samples, shape (channels, blocks)
+    """
+
+    channels: tuple[str, ...]
+    squares: Array
+    counts: Array
+
+    @property
+    def by_channel(self) -> Array:
+        """Rms over the noise, shape (channels,)."""
+        return np.asarray(np.sqrt(self.squares.sum(axis=1) / self.counts.sum(axis=1)))
+
+
+def gap(
+    channels: Sequence[Sequence[str]], predictions: Sequence[Prediction], blocks: Sequence[int]
+) -> Gap:
+    """The gap from the predictions of all folds.
+
+    channels : of every predicted run; blocks : samples of a block, of every predicted run
+    """
+    names = tuple(dict.fromkeys(name for run in channels for name in run))
+    residuals = [r for prediction in predictions for r in prediction.residuals]
+    squares, counts = [], []
+    for run, residual, length in zip(channels, residuals, blocks, strict=True):
+        for begin in range(0, residual.shape[1], length):
+            part = residual[:, begin : begin + length]
+            rows = {name: part[k] for k, name in enumerate(run)}
+            squares.append([float(np.sum(rows[n] ** 2)) if n in rows else 0.0 for n in names])
+            counts.append([int(np.count_nonzero(rows[n])) if n in rows else 0 for n in names])
+    return Gap(channels=names, squares=np.array(squares).T, counts=np.array(counts, float).T)
+
+
+def block_lengths(predictions: Sequence[Prediction]) -> list[int]:
+    """Samples of a block for every predicted run: some memories of its residual."""
+    return [
+        max(1, round(BLOCK * max(correlation_time(channel) for channel in residual)))
+        for prediction in predictions
+        for residual in prediction.residuals
+    ]
+
+
+def closed_fraction(
+    reference: Gap, explained: Gap, chosen: NDArray[np.intp] | None = None
+) -> float | None:
+    """Share of the gap beyond the noise that an explanation closes; None where there is no gap.
+
+    1 - sum max(0, explained^2 - 1) / sum (reference^2 - 1), over channels with a reference of OPEN
+    or more, all in the noise.   chosen : blocks that count, with repetition
+    """
+    blocks = np.arange(reference.squares.shape[1]) if chosen is None else chosen
+    before = reference.squares[:, blocks].sum(axis=1) / reference.counts[:, blocks].sum(axis=1)
+    after = explained.squares[:, blocks].sum(axis=1) / explained.counts[:, blocks].sum(axis=1)
+    counting = reference.by_channel >= OPEN
+    if not counting.any():
+        return None
+    gap_before = float(np.sum(before[counting] - 1.0))
+    if gap_before <= 0.0:
+        return None
+    return 1.0 - float(np.sum(np.maximum(0.0, after[counting] - 1.0))) / gap_before
+
+
+def interval(reference: Gap, explained: Gap) -> tuple[float, float] | None:
+    """95 % interval of the closed fraction."""
+    if closed_fraction(reference, explained) is None:
+        return None
+    random = np.random.default_rng(SEED)
+    count = reference.squares.shape[1]
+    drawn = [
+        closed_fraction(reference, explained, chosen)
+        for chosen in random.integers(0, count, size=(RESAMPLED, count))
+    ]
+    low, high = np.quantile([d for d in drawn if d is not None], [0.025, 0.975])
+    return float(low), float(high)
+
+
+def combined(found: Gap) -> tuple[float, float, float]:
+    """Rms over all channels, in the noise, with its 95 % interval."""
+    random = np.random.default_rng(SEED)
+    count = found.squares.shape[1]
+
+    def rms(blocks: NDArray[np.intp]) -> float:
+        return float(np.sqrt(found.squares[:, blocks].sum() / found.counts[:, blocks].sum()))
+
+    drawn = [rms(chosen) for chosen in random.integers(0, count, size=(RESAMPLED, count))]
+    low, high = np.quantile(drawn, [0.025, 0.975])
+    return rms(np.arange(count)), float(low), float(high)
