@@ -64,6 +64,8 @@ def candidate(effect: Effect) -> Candidate:
         neutral={u.name: neutral[u.name] for u in sizes},
         fixed={name: value for name, value in plausible.items() if name not in free},
         units={f"{effect.name}_{key}": d.unit for key, d in effect.parameters.items()},
+        title=effect.description.partition("\n")[0].rstrip("."),
+        needs=effect.needs,
     )
 
 

@@ -185,9 +185,12 @@ class Contest:
     def _counts(self, best: Point, base: Point, null: Point) -> bool:
         """Whether one more effect earns its place."""
         fall = base.cost - best.cost
-        if not base.effects:
-            return fall * max(best.share, base.share) > THRESHOLD or fall > FURTHER * excess(null)
-        return fall > THRESHOLD and fall > FURTHER * excess(null)
+        share = max(best.share, base.share)
+        further = fall > FURTHER * excess(null)
+        if base.effects:
+            return fall > THRESHOLD and further
+        # What an inadequate model leaves is correlated: then a fall is judged by the gap instead.
+        return fall > THRESHOLD and (fall * share > THRESHOLD or further)
 
     def _round(self, base: Point, stage: str) -> tuple[Point, list[Contender]]:
         """All effects on top of a fit; the fit itself started again from the best of them."""

@@ -24,6 +24,7 @@ class Candidate:
     neutral : values of the sizes at which the effect is absent
     fixed : values of the rest while the effect is there
     units : of all its parameters, by name
+    title : what it is, in one line; needs : what a log must have to show it, empty: nothing special
     """
 
     name: str
@@ -34,6 +35,8 @@ class Candidate:
     neutral: Mapping[str, float]
     fixed: Mapping[str, float]
     units: Mapping[str, str]
+    title: str
+    needs: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

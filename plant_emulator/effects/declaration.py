@@ -59,7 +59,10 @@ class Memory:
 
 @dataclass(frozen=True, eq=False)  # compared and hashed as the one object that was loaded
 class Effect:
-    """An effect as the kernel and the commands see it."""
+    """An effect as the kernel and the commands see it.
+
+    needs : the sensor or the manoeuvre without which a log hardly shows it; empty: nothing special
+    """
 
     name: str
     subsystem: str
@@ -68,6 +71,7 @@ class Effect:
     memories: Mapping[str, Memory]
     laws: Mapping[str, Callable[[float, Record, Record], float]]
     file: str
+    needs: str = ""
 
     def plausible(self) -> dict[str, float]:
         """A plausible size of the effect, by parameter."""
@@ -110,6 +114,7 @@ def effect_of(name: str, module: ModuleType) -> Effect:
         memories=dict(getattr(module, "MEMORIES", {})),
         laws=changed,
         file=str(module.__file__),
+        needs=str(getattr(module, "NEEDS", "")),
     )
 
 

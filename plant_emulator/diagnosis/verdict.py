@@ -1,0 +1,163 @@
+"""The verdict: an effect, other parameters, nothing, or unknown, and the sentence that says it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+from plant_emulator.diagnosis.explain import THRESHOLD, adequate
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.diagnosis.contest import Point
+    from plant_emulator.diagnosis.explain import Explanation
+    from plant_emulator.diagnosis.model import Candidate, Model
+
+Kind = Literal["effect", "parameter", "none", "unknown"]
+
+# A parameter has shifted from so many of its own standard errors on.
+SHIFTED = 3.0
+# Mean square of the whitened residual up to which a model without effects leaves nothing but noise.
+NOISE_ONLY = 1.1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shift:
+    """A parameter that left its nominal value; surprise : in prior standard deviations."""
+
+    name: str
+    nominal: float
+    estimated: float
+    standard_error: float
+    unit: str
+    subsystem: str
+    surprise: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """See the contract of the answer; reason : why it is unknown, empty else."""
+
+    kind: Kind
+    effects: tuple[str, ...]
+    shifts: tuple[Shift, ...]
+    reason: str
+
+
+def shifts(model: Model, found: Point) -> tuple[Shift, ...]:
+    """Parameters more than SHIFTED standard errors from nominal, the most surprising first."""
+    moved = []
+    for unknown in model.parameters:
+        value, error = found.values[unknown.name], found.errors[unknown.name]
+        if abs(value - unknown.prior) <= SHIFTED * error:
+            continue
+        std = unknown.std if unknown.std is not None else abs(unknown.prior)
+        moved.append(
+            Shift(
+                name=unknown.name,
+                nominal=unknown.prior,
+                estimated=value,
+                standard_error=error,
+                unit=model.units[unknown.name],
+                subsystem=model.subsystems[unknown.name],
+                surprise=abs(value - unknown.prior) / std,
+            )
+        )
+    return tuple(sorted(moved, key=lambda shift: -shift.surprise))
+
+
+def decide(model: Model, explained: Explanation) -> Verdict:
+    """The verdict of a contest."""
+    null, final = explained.null, explained.final
+    moved = shifts(model, final)
+    if explained.unconverged:
+        return Verdict(kind="unknown", effects=(), shifts=moved, reason=explained.unconverged)
+    if final.effects and adequate(final, null):
+        return Verdict(kind="effect", effects=final.effects, shifts=moved, reason="")
+    moved = shifts(model, null)
+    if not final.effects and null.chi_squared <= NOISE_ONLY:
+        kind: Kind = "parameter" if moved else "none"
+        return Verdict(kind=kind, effects=(), shifts=moved, reason="")
+    return Verdict(
+        kind="unknown",
+        effects=(),
+        shifts=moved,
+        reason="no effect of the library, alone or with others, brings the residual to the noise",
+    )
+
+
+def statement(
+    verdict: Verdict, candidates: Mapping[str, Candidate], closed: float | None, place: str | None
+) -> str:
+    """The verdict in one sentence."""
+    if verdict.kind == "effect":
+        names = " and ".join(
+            f"{name} ({candidates[name].title[:1].lower()}{candidates[name].title[1:]})"
+            for name in verdict.effects
+        )
+        share = "" if closed is None else f"; with it the held-out gap closes by {closed:.0%}"
+        return f"The bench has what the model lacks: {names}{share}."
+    if verdict.kind == "parameter":
+        first = verdict.shifts[0]
+        change = 100.0 * (first.estimated / first.nominal - 1.0)
+        others = len(verdict.shifts) - 1
+        more = "" if others == 0 else f" and {others} other parameters"
+        return (
+            f"The equations hold with other values: {first.name} is {change:+.1f} %{more}; "
+            "no unmodelled effect is needed."
+        )
+    if verdict.kind == "none":
+        return "The logs show no gap beyond the noise of the sensors."
+    where = "" if place is None else f" It lies in the {place.replace('_', ' ')}."
+    return f"There is a gap whose cause is unknown: {verdict.reason}.{where}"
+
+
+def undetectable(
+    explained: Explanation, candidates: Mapping[str, Candidate], least: float
+) -> list[dict[str, str]]:
+    """Effects that these logs could not show at their plausible size, with the reason."""
+    found = []
+    for contender in explained.contenders:
+        if contender.norm >= least or contender.effect in explained.final.effects:
+            continue
+        if explained.evidence(contender) > THRESHOLD:
+            continue
+        hint = candidates[contender.effect].needs
+        if contender.raw < least:
+            reason = "too small in these channels and runs at its plausible size"
+        else:
+            reason = f"drift of {contender.imitated_by} would look the same"
+        found.append(
+            {"effect": contender.effect, "reason": f"{reason}; {hint}" if hint else reason}
+        )
+    return found
+
+
+def as_answer(
+    verdict: Verdict,
+    *,
+    classes: Sequence[Sequence[str]],
+    confidence: float,
+    sentence: str,
+    next_experiment: str | None,
+) -> dict[str, Any]:
+    """The part `verdict` of the answer."""
+    return {
+        "kind": verdict.kind,
+        "effects": list(verdict.effects),
+        "class": [list(names) for names in classes] if verdict.kind == "effect" else [],
+        "parameters": [
+            {
+                "name": s.name,
+                "nominal": s.nominal,
+                "estimated": s.estimated,
+                "standard_error": s.standard_error,
+                "unit": s.unit,
+            }
+            for s in verdict.shifts
+        ],
+        "confidence": confidence,
+        "statement": sentence,
+        "next_experiment": next_experiment,
+    }
