@@ -55,7 +55,6 @@ def test_a_row_that_does_not_exist_is_refused_with_the_names_that_do() -> None:
 
 @pytest.mark.slow
 def test_cvodes_is_compared_where_it_errs_as_we_do() -> None:
-    pytest.importorskip("casadi")
     found = bench("--only", "cvodes", "--json", "-")
     rows = json.loads(found.stdout)["rows"]
     assert [row["name"] for row in rows] == ["cvodes", "cvodes_simulate"]
