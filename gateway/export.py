@@ -7,8 +7,8 @@ values are finite.
 
 import csv
 import gzip
-import importlib
-from collections.abc import Callable, Mapping, Set
+from collections.abc import Callable, Set
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from gateway.errors import ConfigError
 from gateway.record import READ, WRITTEN
 from gateway.recording import Recording
+from register_maps import mdf4_log, parquet_log
+from register_maps.log_table import Column, LogTableError
 from register_maps.register_map import RegisterMap
 from register_maps.signals import LOG_COLUMNS, SIGNALS
 from register_maps.units import UNITS
@@ -67,6 +69,14 @@ def columns(recording: Recording, register_map: RegisterMap) -> Columns:
     return {name: values for name, values in found.items() if not _missing(values)}
 
 
+def began(recording: Recording) -> datetime:
+    """When the time of the columns was zero: the date of the first sample that was read."""
+    date = datetime.fromisoformat(recording.header["date"])
+    rows = recording.records[fresh(recording)]
+    waited = float(rows["now"][0] - recording.header["started"]) if len(rows) else 0.0
+    return date + timedelta(seconds=waited)
+
+
 def fresh(recording: Recording) -> NDArray[np.intp]:
     """Ticks that read a sample which no tick before had read."""
     read = np.flatnonzero(recording.records["flags"] & READ)
@@ -113,70 +123,42 @@ def _text(value: object) -> str:
     return "" if value != value else str(value)  # noqa: PLR0124 - NaN: there is none
 
 
-def write_parquet(path: Path, found: Columns) -> None:
-    """Write a Parquet file, the unit of each column in its metadata."""
-    arrow, parquet = _extra("pyarrow", "parquet"), _extra("pyarrow.parquet", "parquet")
-    fields = [
-        arrow.field(signal, arrow.array(values).type, metadata={"unit": unit})
+def with_units(found: Columns) -> list[Column]:
+    """The columns as files hold them that keep the unit as metadata: by signal, with unit."""
+    return [
+        Column(name=signal, unit=unit, values=values)
         for (signal, unit), values in zip(map(split_unit, found), found.values(), strict=True)
     ]
-    arrays = [arrow.array(values) for values in found.values()]
-    parquet.write_table(arrow.Table.from_arrays(arrays, schema=arrow.schema(fields)), path)
-
-
-def write_mdf4(path: Path, found: Columns) -> None:
-    """Write an MDF4 file, the unit at each channel."""
-    asammdf = _extra("asammdf", "mdf4")
-    signals = [
-        asammdf.Signal(
-            samples=values.astype("S") if values.dtype.kind == "U" else values,
-            timestamps=found["time_s"],
-            name=signal,
-            unit=unit,
-            encoding="utf-8",
-        )
-        for (signal, unit), values in zip(map(split_unit, found), found.values(), strict=True)
-        if signal != "time"
-    ]
-    with asammdf.MDF(version="4.10") as file:
-        file.append(signals, comment="exported recording")
-        file.save(path, overwrite=True)
 
 
 def split_unit(column: str) -> tuple[str, str]:
     """Signal and unit of a column's name."""
     if column in LOG_COLUMNS:
         return LOG_COLUMNS[column].signal, LOG_COLUMNS[column].unit
-    for unit, suffix in SUFFIXES.items():
-        if suffix and column.endswith(suffix):
-            return column.removesuffix(suffix), unit
-    return column, "1"
+    # The longest, because _rad_s ends in _s; no suffix fits every name.
+    fitting = {suffix: unit for unit, suffix in SUFFIXES.items() if column.endswith(suffix)}
+    suffix = max(fitting, key=len)
+    return column.removesuffix(suffix), fitting[suffix]
 
 
-def _extra(module: str, extra: str) -> Any:
+def write(path: Path, found: Columns, start: datetime) -> None:
+    """Write the columns in the form that the file's name asks for.
+
+    start : when their time was zero
+    """
     try:
-        return importlib.import_module(module)
-    except ModuleNotFoundError:
-        raise ConfigError(
-            f"this form needs {module}",
-            place="--to",
-            expected=f"pip install 'road-load-bench[{extra}]', or a file that ends in .csv",
-        ) from None
-
-
-WRITERS: Final[Mapping[str, Callable[[Path, Columns], None]]] = {
-    ".csv": write_csv,
-    ".csv.gz": write_csv,
-    ".parquet": write_parquet,
-    ".mf4": write_mdf4,
-}
-
-
-def write(path: Path, found: Columns) -> None:
-    """Write the columns in the form that the file's name asks for."""
-    for ending, writer in WRITERS.items():
-        if path.name.endswith(ending):
-            return writer(path, found)
-    raise ConfigError(
-        "unknown form", place="--to", value=str(path), expected=f"one of {', '.join(WRITERS)}"
-    )
+        if path.name.endswith((".csv", ".csv.gz")):
+            write_csv(path, found)
+        elif path.name.endswith(".parquet"):
+            path.write_bytes(parquet_log.encode(with_units(found)))
+        elif path.name.endswith(".mf4"):
+            path.write_bytes(mdf4_log.encode(with_units(found), start))
+        else:
+            raise ConfigError(
+                "unknown form",
+                place="--to",
+                value=str(path),
+                expected="one of .csv, .csv.gz, .parquet, .mf4",
+            )
+    except LogTableError as error:
+        raise ConfigError(str(error), place="--to") from error

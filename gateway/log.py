@@ -1,4 +1,4 @@
-"""CSV logs as the gateway replays them: `register_maps.csv_log` on a file."""
+"""Logs as the gateway replays them: the readers of `register_maps` on a file."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from gateway.errors import ConfigError
-from register_maps.csv_log import CsvLogError, parse
+from register_maps import csv_log, mdf4_log, parquet_log
+from register_maps.log_table import LogTableError
 from register_maps.signals import LOG_COLUMNS
 
 Column = np.ndarray[Any, np.dtype[np.float64]]
@@ -35,14 +36,14 @@ class Log:
 
 
 def read(path: Path) -> Log:
-    """The log in a .csv or .csv.gz file."""
+    """The log in a CSV (plain or compressed), Parquet or MDF4 file, known by its content."""
     try:
-        found = parse(path.read_bytes())
-    except CsvLogError as error:
+        data = path.read_bytes()
+        binary = (form for form in (parquet_log, mdf4_log) if form.recognises(data))
+        found = next(binary, csv_log).parse(data)
+    except LogTableError as error:
         raise LogError(str(error), file=path) from error
     except OSError as error:
-        raise LogError(
-            error.strerror or "cannot be read", file=path, expected="a CSV log"
-        ) from error
+        raise LogError(error.strerror or "cannot be read", file=path, expected="a log") from error
     columns = {signal: np.array(values) for signal, values in found.signals.items()}
     return Log(path=path, time=columns.pop("time"), columns=columns)

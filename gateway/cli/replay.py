@@ -46,7 +46,7 @@ def command(
     """Feed what was measured to the same regulator, supervisor and limits.
 
     A RECORDING without -c and --set must come out bit for bit (exit code 1 otherwise). With them,
-    and for a CSV LOG, the setpoint is compared with the recorded one or with the logged reference.
+    and for a LOG, the setpoint is compared with the recorded one or with the logged reference.
     """
     changed = assignments(values)
     if recording.is_recording(file):

@@ -1,7 +1,7 @@
 """Log formats: one module each with recognises(head), read(path) and write(log, path).
 
 `read` finds the format by the file's first bytes, `write` by the file's name; a new format is a new
-file here.
+file here. A leading underscore makes it no format.
 """
 
 from __future__ import annotations
@@ -24,7 +24,9 @@ HEAD = 4096
 def formats() -> list[ModuleType]:
     """The format modules, by name."""
     found = sorted(module.name for module in pkgutil.iter_modules(__path__))
-    return [importlib.import_module(f"{__name__}.{name}") for name in found]
+    return [
+        importlib.import_module(f"{__name__}.{name}") for name in found if not name.startswith("_")
+    ]
 
 
 def read(path: str | Path) -> Log:

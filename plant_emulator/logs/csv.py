@@ -5,19 +5,17 @@ from __future__ import annotations
 import gzip
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from plant_emulator.errors import LogError
-from plant_emulator.log import Log
-from register_maps.csv_log import GZIP, CsvLogError, parse
-from register_maps.signals import LOG_COLUMNS
-from register_maps.units import UNITS
+from plant_emulator.logs import _files
+from register_maps.csv_log import GZIP, parse
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from plant_emulator.log import Log
+
 NAME = "CSV"
 SUFFIXES = (".csv", ".csv.gz")
+BINARY = frozenset(range(32)) - frozenset(b"\t\r\n\f")
 
 
 def recognises(head: bytes) -> bool:
@@ -25,27 +23,17 @@ def recognises(head: bytes) -> bool:
     if head.startswith(GZIP):
         return True
     line = head.split(b"\n", 1)[0]
-    return b"," in line and b"\0" not in line
+    return b"," in line and BINARY.isdisjoint(line)
 
 
 def read(path: Path) -> Log:
     """The log of a CSV file; LogError names file, line and column."""
-    try:
-        found = parse(path.read_bytes())
-    except CsvLogError as error:
-        raise LogError(f"{path}: {error}") from error
-    signals = {signal: np.array(values) for signal, values in found.signals.items()}
-    return Log(signals.pop("time"), signals, str(path), found.other)
+    return _files.read(path, parse)
 
 
 def text(log: Log) -> str:
     """The signals of a log with their units in the column names, as the text of a CSV file."""
-    all_signals = {"time": log.time, **log.signals}
-    columns = [column for column in LOG_COLUMNS.values() if column.signal in all_signals]
-    values = [
-        (all_signals[column.signal] - UNITS[column.unit].shift) / UNITS[column.unit].factor
-        for column in columns
-    ]
+    columns, values = zip(*_files.in_units(log), strict=True)
     lines = [",".join(column.column for column in columns)]
     formats = [f"{{:.{column.decimals}f}}".format for column in columns]
     lines += [

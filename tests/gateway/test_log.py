@@ -1,4 +1,4 @@
-"""CSV logs in the gateway. What is read and refused: tests/register_maps/test_csv_log.py."""
+"""Logs in the gateway. What is read and refused: tests/register_maps/test_csv_log.py and beside."""
 
 from pathlib import Path
 

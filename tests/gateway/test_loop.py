@@ -199,7 +199,8 @@ def test_an_exported_recording_is_a_log(run: Run, tmp_path: Path) -> None:
     running(run)
     recorded = run.recording
     path = tmp_path / "run.csv"
-    export.write(path, export.columns(recorded, map_of(recorded.header)))
+    columns = export.columns(recorded, map_of(recorded.header))
+    export.write(path, columns, export.began(recorded))
     exported = log.read(path)
     assert exported.time[0] == 0.0
     assert np.diff(exported.time) == pytest.approx(0.01)

@@ -3,13 +3,17 @@
 import csv
 import gzip
 import json
+import sys
 import zlib
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import asammdf
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from pyarrow import parquet
 
 import register_maps
 from gateway import log, recording
@@ -191,6 +195,79 @@ def test_export_writes_a_log_with_the_recorded_numbers(tmp_path: Path) -> None:
     with gzip.open(target, "rt") as file:
         last = list(csv.DictReader(file))[-1]
     assert (last["state"], last["reason"], last["written"]) == ("RUN", "", "1")
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".mf4"])
+def test_export_in_other_forms_holds_the_same_numbers_as_csv(tmp_path: Path, suffix: str) -> None:
+    path = recorded(tmp_path / "a.rlrec")
+    for target in (tmp_path / "a.csv", tmp_path / f"a{suffix}"):
+        assert "120 samples of 120 ticks" in call(export, path, "--to", target).output
+    wanted, found = log.read(tmp_path / "a.csv"), log.read(tmp_path / f"a{suffix}")
+    assert found.time.tolist() == wanted.time.tolist()
+    assert found.columns.keys() == wanted.columns.keys()
+    for name, values in wanted.columns.items():
+        assert found.columns[name].tolist() == values.tolist(), name
+
+
+def test_exported_parquet_holds_units_and_the_gateways_own_columns(tmp_path: Path) -> None:
+    target = tmp_path / "a.parquet"
+    call(export, recorded(tmp_path / "a.rlrec"), "--to", target)
+    table = parquet.read_table(target)
+    units = {field.name: field.metadata[b"unit"].decode() for field in table.schema}
+    assert units["motor_speed"] == units["demand_motor_speed"] == "rad/s"
+    assert (units["time"], units["shaft_torque"], units["tick"]) == ("s", "N m", "1")
+    assert units["shell_temperature"] == "degC"
+    assert table["state"][-1].as_py() == "RUN"
+    assert table["written"][-1].as_py() is True
+    assert table["shell_temperature"][0].as_py() == pytest.approx(32.0)
+
+
+def test_exported_mdf4_holds_units_texts_and_the_date_of_its_first_sample(tmp_path: Path) -> None:
+    path, target = recorded(tmp_path / "a.rlrec"), tmp_path / "a.mf4"
+    call(export, path, "--to", target)
+    with asammdf.MDF(target) as file:
+        began = file.start_time
+        torque, state = file.get("shaft_torque"), file.get("state")
+    assert torque.unit == "N m"
+    assert torque.timestamps == pytest.approx(np.arange(120) * 0.01)
+    assert state.samples[-1] == b"RUN"
+    found = recording.read(path)
+    waited = float(found.records["now"][0]) - found.header["started"]
+    assert (began - datetime.fromisoformat(found.header["date"])).total_seconds() == pytest.approx(
+        waited, abs=1e-3
+    )
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".mf4"])
+def test_an_exported_recording_replays_like_its_csv(tmp_path: Path, suffix: str) -> None:
+    path, answers = recorded(tmp_path / "a.rlrec"), []
+    for target in (tmp_path / "a.csv", tmp_path / f"a{suffix}"):
+        call(export, path, "--to", target)
+        answers.append(json.loads(call(replay, target, "--json", "-").output))
+    assert answers[0] == answers[1]
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".mf4"])
+def test_a_recording_without_a_sample_is_exported_empty(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / "a.rlrec"
+    path.write_bytes(
+        encode_header(header(Config(), MAP, started=0.0, shadow=False, real_time="no"))
+    )
+    assert "0 samples of 0 ticks" in call(export, path, "--to", tmp_path / f"a{suffix}").output
+    with pytest.raises(log.LogError, match="0 samples; at least 2"):
+        log.read(tmp_path / f"a{suffix}")
+
+
+def test_export_without_the_package_names_the_extra_and_leaves_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    path = recorded(tmp_path / "a.rlrec")
+    result = CliRunner().invoke(main, ["export", str(path), "--to", str(tmp_path / "a.parquet")])
+    assert result.exit_code == 2
+    assert result.stderr.count("\n") == 1
+    assert "pip install 'road-load-bench[parquet]'" in result.stderr
+    assert not (tmp_path / "a.parquet").exists()
 
 
 def test_export_of_an_unknown_form_names_the_known_ones(tmp_path: Path) -> None:

@@ -1,0 +1,49 @@
+"""What the formats share: a file's bytes as a log, and a log's signals in the units of files."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.errors import LogError
+from plant_emulator.log import Array, Log
+from register_maps.log_table import Column, LogTable, LogTableError
+from register_maps.signals import LOG_COLUMNS, LogColumn
+from register_maps.units import UNITS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+
+def read(path: Path, parse: Callable[[bytes], LogTable]) -> Log:
+    """The log in that file; LogError names file, place and column."""
+    try:
+        found = parse(path.read_bytes())
+    except LogTableError as error:
+        raise LogError(f"{path}: {error}") from error
+    signals = {signal: np.array(values) for signal, values in found.signals.items()}
+    return Log(signals.pop("time"), signals, str(path), found.other)
+
+
+def write(log: Log, path: Path, encode: Callable[[Sequence[Column]], bytes]) -> None:
+    """Write the signals under their names, each with its unit, the numbers in full."""
+    columns = [
+        Column(name=column.signal, unit=column.unit, values=values)
+        for column, values in in_units(log)
+    ]
+    try:
+        path.write_bytes(encode(columns))
+    except LogTableError as error:
+        raise LogError(f"{path}: {error}") from error
+
+
+def in_units(log: Log) -> list[tuple[LogColumn, Array]]:
+    """The columns that a log fills, each with its values in its own unit."""
+    signals = {"time": log.time, **log.signals}
+    return [
+        (column, (signals[column.signal] - UNITS[column.unit].shift) / UNITS[column.unit].factor)
+        for column in LOG_COLUMNS.values()
+        if column.signal in signals
+    ]

@@ -1,0 +1,199 @@
+"""An MDF4 log (ASAM MDF, version 4) as bytes: one channel a signal, its unit at the channel.
+
+The time is the groups' master. The channels may stand in several groups that were sampled at the
+same times. The package asammdf is loaded when the first such log is read or written; it keeps
+what it writes in a temporary file of its own. No other file is opened here.
+"""
+
+import contextlib
+import io
+import struct
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import UTC, datetime
+from importlib import import_module
+from math import nan
+from typing import Any, Final
+
+from register_maps.log_table import (
+    WITH_METADATA,
+    Column,
+    LogTable,
+    LogTableError,
+    table,
+    with_metadata,
+    without_package,
+)
+
+MAGIC: Final = b"MDF     4"
+FIRST_BLOCK: Final = 64
+BLOCK: Final = struct.Struct("<2s6xQQ")
+"""A block begins so: "##", its length, how many links to other blocks follow; 0 is no link."""
+MASTER: Final = (2, 3)
+"""Types of a channel that holds its group's master: stored, and computed from the row."""
+IN_SECONDS: Final = 1
+"""What a master tells, where that is the time."""
+TIME: Final = with_metadata("time_s", "")
+SAME_TIME: Final = 0.5e-4
+"""[s] Times that differ by less are the same: a CSV log does not tell them apart either."""
+UNKNOWN_START: Final = datetime(1970, 1, 1, tzinfo=UTC)
+"""A file has to tell when its time is zero; told of a log whose date nobody knows."""
+
+
+def recognises(head: bytes) -> bool:
+    """Whether bytes that begin so are an MDF4 file."""
+    return head.startswith(MAGIC)
+
+
+def parse(data: bytes) -> LogTable:
+    """The log in these bytes."""
+    asammdf = _package()
+    _check_blocks(data)
+    failure = ""
+    with _silent(asammdf):
+        try:
+            with asammdf.MDF(io.BytesIO(data)) as file:
+                return _table(file)
+        except LogTableError:
+            raise
+        except Exception as error:  # noqa: BLE001 - it fails in any way when a file is damaged
+            failure = " ".join(f"{type(error).__name__}: {error}".split())
+    # Not from the error, which would keep alive what the package left half made.
+    raise LogTableError(f"damaged MDF4 file ({failure})")
+
+
+def _check_blocks(data: bytes) -> None:
+    """Refuse a file of which a block is not where another one says: it was cut, or damaged."""
+    seen, left = {0}, [FIRST_BLOCK]
+    while left:
+        start = left.pop()
+        if start in seen:
+            continue
+        seen.add(start)
+        if start + BLOCK.size > len(data):
+            raise LogTableError(f"damaged MDF4 file (ends before its block at byte {start})")
+        mark, length, links = BLOCK.unpack_from(data, start)
+        if mark != b"##" or start + length > len(data) or BLOCK.size + 8 * links > length:
+            raise LogTableError(f"damaged MDF4 file (no whole block at byte {start})")
+        left += struct.unpack_from(f"<{links}Q", data, start + BLOCK.size)
+
+
+def encode(columns: Sequence[Column], start: datetime = UNKNOWN_START) -> bytes:
+    """The columns as an MDF4 file; the one in seconds that is called time is the master.
+
+    start : when that time is zero
+    """
+    asammdf = _package()
+    [time] = [column.values for column in columns if column.name == "time"]
+    signals = [
+        asammdf.Signal(
+            samples=_samples(column.values),
+            timestamps=time,
+            name=column.name,
+            unit=column.unit,
+            encoding="utf-8",
+        )
+        for column in columns
+        if column.name != "time"
+    ]
+    sink = io.BytesIO()
+    with _silent(asammdf), asammdf.MDF(version="4.10") as file:
+        file.start_time = start
+        file.append(signals)
+        file.save(sink)
+    return sink.getvalue()
+
+
+def _samples(values: Any) -> Any:
+    """Texts as the bytes that MDF holds, truths as numbers."""
+    if values.dtype.kind == "U":
+        return values.astype("S")
+    return values.astype("u1") if values.dtype.kind == "b" else values
+
+
+def _package() -> Any:
+    try:
+        return import_module("asammdf")
+    except ModuleNotFoundError:
+        raise without_package("MDF4", "asammdf", "mdf4") from None
+
+
+@contextlib.contextmanager
+def _silent(asammdf: Any) -> Iterator[None]:
+    """Keep the package from printing tracebacks of a damaged file beside our one line."""
+    logs, asammdf.logger.disabled = asammdf.logger.disabled, True
+    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            yield
+    finally:
+        asammdf.logger.disabled, sys.unraisablehook = logs, hook
+
+
+def _table(file: Any) -> LogTable:
+    """The log in an open file."""
+    places = [
+        (group, index)
+        for group, content in enumerate(file.groups)
+        for index, channel in enumerate(content.channels)
+        if channel.channel_type not in MASTER
+    ]
+    names = [_name(file.groups[group].channels[index]) for group, index in places]
+    groups = {
+        group: name
+        for (group, _), name in zip(places, names, strict=True)
+        if name in WITH_METADATA and name != TIME
+    }
+
+    def numbers(k: int) -> list[float]:
+        return _numbers(file, names[k - 1], *places[k - 1]) if k else _time(file, groups)
+
+    return table([TIME, *names], numbers)
+
+
+def _name(channel: Any) -> str:
+    unit = (channel.conversion and channel.conversion.unit) or channel.unit
+    return with_metadata(channel.name, unit or "")
+
+
+def _time(file: Any, groups: Mapping[int, str]) -> list[float]:
+    """The time of all these groups [s]; of each, one column is named that it holds."""
+    times = {name: _master(file, group, name) for group, name in groups.items()}
+    (first, time), *others = times.items()
+    for name, other in others:
+        if len(other) != len(time) or bool((abs(other - time) >= SAME_TIME).any()):
+            raise LogTableError(
+                f"column {name}: was not sampled at the times of {first}; expected one time for all"
+            )
+    found: list[float] = time.tolist()
+    return found
+
+
+def _master(file: Any, group: int, name: str) -> Any:
+    content = file.groups[group]
+    masters = [c for c in content.channels if c.channel_type in MASTER]
+    if not any(master.sync_type == IN_SECONDS for master in masters):
+        raise LogTableError(f"column {name}: its group has no time; expected a master in seconds")
+    _check_place(content, masters[0], TIME)
+    return file.get_master(group).astype("f8")
+
+
+def _check_place(group: Any, channel: Any, name: str) -> None:
+    """Refuse a channel outside its group's records: the package would read foreign memory."""
+    end = 8 * channel.byte_offset + channel.bit_offset + channel.bit_count
+    if end > 8 * group.channel_group.samples_byte_nr:
+        raise LogTableError(f"damaged MDF4 file (column {name} lies outside its records)")
+
+
+def _numbers(file: Any, name: str, group: int, index: int) -> list[float]:
+    """The values of a channel, NaN where the file says that they are not valid."""
+    _check_place(file.groups[group], file.groups[group].channels[index], name)
+    # The package's default leaves such values out, and shifts all that come after them.
+    signal = file.get(group=group, index=index, ignore_invalidation_bits=True)
+    if signal.samples.ndim != 1 or signal.samples.dtype.kind not in "fiu":
+        raise LogTableError(f"column {name}: holds {signal.samples.dtype}; expected numbers")
+    values = signal.samples.astype("f8")
+    if signal.invalidation_bits is not None:
+        values[signal.invalidation_bits.astype(bool)] = nan
+    found: list[float] = values.tolist()
+    return found

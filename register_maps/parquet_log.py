@@ -1,0 +1,80 @@
+"""A Parquet log as bytes: one column a signal, its unit in the metadata of its field, key `unit`.
+
+A column without metadata may hold its unit in its name, as in CSV: so data frames are written. The
+package pyarrow is loaded when the first such log is read or written. No file is opened here.
+"""
+
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any, Final
+
+from register_maps.log_table import (
+    Column,
+    LogTable,
+    LogTableError,
+    table,
+    with_metadata,
+    without_package,
+)
+
+MAGIC: Final = b"PAR1"
+
+
+def recognises(head: bytes) -> bool:
+    """Whether bytes that begin so are a Parquet file."""
+    return head.startswith(MAGIC)
+
+
+def parse(data: bytes) -> LogTable:
+    """The log in these bytes."""
+    arrow, parquet = _packages()
+    try:
+        file = parquet.ParquetFile(arrow.BufferReader(data))
+        fields = list(file.schema_arrow)
+        return table(
+            [with_metadata(field.name, _unit(field)) for field in fields],
+            lambda k: _numbers(arrow, file, fields, k),
+        )
+    except (arrow.ArrowException, OSError, ValueError) as error:
+        raise LogTableError(f"damaged Parquet file ({_line(error)})") from error
+
+
+def encode(columns: Sequence[Column]) -> bytes:
+    """The columns as a Parquet file."""
+    arrow, parquet = _packages()
+    arrays = [arrow.array(column.values) for column in columns]
+    fields = [
+        arrow.field(column.name, array.type, metadata={"unit": column.unit})
+        for column, array in zip(columns, arrays, strict=True)
+    ]
+    sink = arrow.BufferOutputStream()
+    parquet.write_table(arrow.Table.from_arrays(arrays, schema=arrow.schema(fields)), sink)
+    data: bytes = sink.getvalue().to_pybytes()
+    return data
+
+
+def _packages() -> tuple[Any, Any]:
+    try:
+        return import_module("pyarrow"), import_module("pyarrow.parquet")
+    except ModuleNotFoundError:
+        raise without_package("Parquet", "pyarrow", "parquet") from None
+
+
+def _unit(field: Any) -> str:
+    unit: bytes = (field.metadata or {}).get(b"unit", b"")
+    return unit.decode("utf-8", "replace")
+
+
+def _numbers(arrow: Any, file: Any, fields: Sequence[Any], k: int) -> list[float]:
+    """The values of a column, NaN where there is none."""
+    name, kind = fields[k].name, fields[k].type
+    if not (arrow.types.is_floating(kind) or arrow.types.is_integer(kind)):
+        raise LogTableError(f"column {name}: holds {kind}; expected numbers")
+    namesakes = [field.name for field in fields[:k]].count(name)
+    column = file.read([name]).column(namesakes).cast(arrow.float64(), safe=False)
+    values: list[float] = column.to_numpy().tolist()
+    return values
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())
