@@ -1,0 +1,33 @@
+"""Friction of the gear proportional to the torque that it transmits.
+
+    T_l = a |T_gd|,   friction = that of the table + T_l
+
+Source: ISO/TR 14179-1 (2001), load-dependent losses: sliding in the meshes takes a share of the
+transmitted power. |T_gd|: the loss is against the motion, whichever side drives. Driving, the motor
+side gives (1 + a) T_gd, an efficiency of 1 / (1 + a); driven back, it receives (1 - a) |T_gd|.
+One mesh of ground teeth takes 0.01 to 0.02; this gear has three, and its bearings.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from plant_emulator.effects.declaration import EffectParameter
+
+if TYPE_CHECKING:
+    from plant_emulator.kernel_types import Record
+
+SUBSYSTEM = "gear"
+PARAMETERS = {
+    "share": EffectParameter(
+        neutral=0.0, lower=0.0, upper=0.5, plausible=0.05, unit="1", meaning="a"
+    ),
+}
+
+
+def gear_load_friction(value: float, s: Record, p: Record) -> float:
+    """Friction beyond that of the table at the torque to the drum [N m]."""
+    share = p.load_dependent_gear_loss_share
+    if share == 0.0:
+        return value
+    return value + share * abs(s.drum_shaft_torque)
