@@ -1,0 +1,96 @@
+"""Two thyristor bridges feed the armature: a pause at reversal, a voltage drop, ripple.
+
+    i = 0    for t_0 where it would change sign: the other bridge waits until this one is off
+    u_a = u - U i / (|i| + i_g)       drop, steep below i_g where the current is discontinuous
+    i_meas = i + I cos(2 pi 300 Hz t) |i| / (|i| + i_g)              six pulses a mains period
+
+Sources: W. Leonhard, Control of Electrical Drives, chapter on line-commutated converters (interval
+without torque at reversal, discontinuous current); N. Mohan, T. M. Undeland, W. P. Robbins, Power
+Electronics. The ripple is too quick for speeds and torque; a log of 100 Hz shows it folded down.
+"""
+
+from __future__ import annotations
+
+from math import cos, pi
+from typing import TYPE_CHECKING
+
+from plant_emulator.effects.declaration import EffectParameter, Memory
+
+if TYPE_CHECKING:
+    from plant_emulator.kernel_types import Record
+
+SUBSYSTEM = "drive"
+PARAMETERS = {
+    "pause": EffectParameter(
+        neutral=0.0, lower=0.0, upper=0.1, plausible=0.0066, unit="s", meaning="t_0"
+    ),
+    "drop": EffectParameter(
+        neutral=0.0, lower=0.0, upper=50.0, plausible=6.0, unit="V", meaning="U"
+    ),
+    "discontinuous_below": EffectParameter(
+        neutral=2.0, lower=0.5, upper=20.0, plausible=2.0, unit="A", meaning="i_g"
+    ),
+    "ripple": EffectParameter(
+        neutral=0.0, lower=0.0, upper=10.0, plausible=0.5, unit="A", meaning="I"
+    ),
+}
+RIPPLE_FREQUENCY = 300.0
+# Resistance of blocked thyristors [ohm].
+OPEN = 1e6
+
+
+def start(p: Record) -> float:
+    """The bridge for driving forwards is ready [1]."""
+    return 1.0
+
+
+def sense(s: Record) -> float:
+    """Sign of the current, or of what leaks while it would flow but for the pause [1]."""
+    if s.armature_current == 0.0:
+        return 0.0
+    return 1.0 if s.armature_current > 0.0 else -1.0
+
+
+def advance(base: float, a: float, s: Record, p: Record) -> float:
+    """Which bridge is ready at the end of an implicit stage of size a [1].
+
+    1 or -1: that of this sign of the current; it takes the pause from one to the other.
+    """
+    pause = p.converter_dead_time_pause
+    if pause == 0.0:
+        return base
+    return max(-1.0, min(1.0, base + 2.0 * a / pause * sense(s)))
+
+
+MEMORIES = {"bridge": Memory(start, advance)}
+
+
+def resistance(value: float, s: Record, p: Record) -> float:
+    """Resistance of the armature's circuit [ohm], open while no bridge is ready for the current.
+
+    The sign of what leaks is that of the current that would flow: the stage finds one solution.
+    """
+    if p.converter_dead_time_pause == 0.0 or s.converter_dead_time_bridge * sense(s) >= 1.0:
+        return value
+    return value if s.armature_current == 0.0 else OPEN
+
+
+def conducting(s: Record, p: Record) -> float:
+    """Share of the mains period in which current flows, with its sign [1]."""
+    current = s.armature_current
+    return current / (abs(current) + p.converter_dead_time_discontinuous_below)
+
+
+def converter_voltage_drop(value: float, s: Record, p: Record) -> float:
+    """What the converter loses [V]."""
+    if p.converter_dead_time_drop == 0.0:
+        return value
+    return value + p.converter_dead_time_drop * conducting(s, p)
+
+
+def measured_armature_current(value: float, s: Record, p: Record) -> float:
+    """Current with its ripple [A]."""
+    if p.converter_dead_time_ripple == 0.0:
+        return value
+    wave = cos(2.0 * pi * RIPPLE_FREQUENCY * s.time)
+    return value + p.converter_dead_time_ripple * wave * abs(conducting(s, p))

@@ -1,0 +1,48 @@
+"""The dead time of the reference varies from scan to scan.
+
+    b_k = b + A u_k,   u_k in [-1, 1], evenly spread, one for each scan of length T_s
+
+Source: J. Nilsson, Real-Time Control Systems with Delays, thesis, Lund 1998 (random delays in loops
+closed over a network). u_k is a sequence of the scan's number and `sequence`: a run can be
+repeated. The one of a real drive is another: its log shows A by the spread, not by the course.
+"""
+
+from __future__ import annotations
+
+from math import floor, sin
+from typing import TYPE_CHECKING
+
+from plant_emulator.effects.declaration import EffectParameter
+
+if TYPE_CHECKING:
+    from plant_emulator.kernel_types import Record
+
+SUBSYSTEM = "drive"
+PARAMETERS = {
+    "amplitude": EffectParameter(
+        neutral=0.0, lower=0.0, upper=0.05, plausible=0.005, unit="s", meaning="A"
+    ),
+    "scan_period": EffectParameter(
+        neutral=0.01, lower=0.001, upper=0.1, plausible=0.01, unit="s", meaning="T_s"
+    ),
+    "sequence": EffectParameter(
+        neutral=0.0, lower=0.0, upper=1000.0, plausible=0.0, unit="1", meaning="which sequence"
+    ),
+}
+
+
+def even(number: float) -> float:
+    """A number in [0, 1) that looks drawn: the last digits of a sine, times a large number."""
+    long = sin(12.9898 * number + 78.233) * 43758.5453
+    return long - floor(long)
+
+
+def dead_time(value: float, s: Record, p: Record) -> float:
+    """Dead time in the scan that runs [s]."""
+    amplitude = p.delay_jitter_amplitude
+    if amplitude == 0.0:
+        return value
+    # A scan begins at its time also where that is rounded below it.
+    scan = floor(s.time / p.delay_jitter_scan_period + 1e-6)
+    drawn = 2.0 * even(scan + 1e4 * p.delay_jitter_sequence) - 1.0
+    return max(0.0, value + amplitude * drawn)

@@ -1,0 +1,29 @@
+"""The drive's integrators go on while their output is limited.
+
+    d(integral)/dt = k error while the output is at its limit and the error leads further outwards
+
+Source: K. J. Astrom, T. Hagglund, PID Controllers: Theory, Design, and Tuning, chapter on
+integrator windup. k = 0 is conditional integration, the nominal drive; k = 1 no measure against
+windup.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from plant_emulator.effects.declaration import EffectParameter
+
+if TYPE_CHECKING:
+    from plant_emulator.kernel_types import Record
+
+SUBSYSTEM = "drive"
+PARAMETERS = {
+    "share": EffectParameter(
+        neutral=0.0, lower=0.0, upper=1.0, plausible=1.0, unit="1", meaning="k"
+    ),
+}
+
+
+def integration_at_limit(value: float, s: Record, p: Record) -> float:
+    """Share of its error that a limited integrator takes in [1]."""
+    return value + (1.0 - value) * p.integrator_windup_share

@@ -1,0 +1,49 @@
+"""The drive limits the slope of its speed reference, as a ramp generator does.
+
+    |domega_r/dt| <= omega_max / T,   omega_r follows the reference within that
+
+Source: W. Leonhard, Control of Electrical Drives, chapter on the cascade control of drives
+(reference generators in front of the speed controller). omega_max is the drive's largest speed; T,
+the setting that drives call ramp-up time, is what the reference takes from standstill to it.
+T = 0: no limit.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from plant_emulator.effects.declaration import EffectParameter, Memory
+
+if TYPE_CHECKING:
+    from plant_emulator.kernel_types import Record
+
+SUBSYSTEM = "drive"
+PARAMETERS = {
+    "ramp_time": EffectParameter(
+        neutral=0.0, lower=0.0, upper=100.0, plausible=8.0, unit="s", meaning="T"
+    ),
+}
+
+
+def start(p: Record) -> float:
+    """The bench starts at rest [rad/s]."""
+    return 0.0
+
+
+def advance(base: float, a: float, value: float, s: Record, p: Record) -> float:
+    """Limited reference at the end of an implicit stage of size a [rad/s]."""
+    ramp_time = p.reference_ramp_limit_ramp_time
+    if ramp_time == 0.0:
+        return base
+    reach = a * p.speed_limit / ramp_time
+    return base + max(-reach, min(reach, value - base))
+
+
+MEMORIES = {"reference": Memory(start, advance, follows="reference")}
+
+
+def reference(value: float, s: Record, p: Record) -> float:
+    """Reference behind the ramp generator [rad/s]."""
+    if p.reference_ramp_limit_ramp_time == 0.0:
+        return value
+    return s.reference_ramp_limit_reference
