@@ -1,0 +1,32 @@
+"""The flux falls with the armature current, whose field saturates one tip of each pole.
+
+    k Phi = (k Phi)_0 (1 - a |i| / i_max)
+
+Source: A. E. Fitzgerald, C. Kingsley, S. D. Umans, Electric Machinery, chapter on DC machines
+(armature reaction, its demagnetising effect). i_max is the drive's nominal largest current: a is
+the share of the flux that is lost there.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from plant_emulator.effects.declaration import EffectParameter
+
+if TYPE_CHECKING:
+    from plant_emulator.kernel_types import Record
+
+SUBSYSTEM = "motor"
+PARAMETERS = {
+    "share": EffectParameter(
+        neutral=0.0, lower=0.0, upper=0.5, plausible=0.1, unit="1", meaning="a"
+    ),
+}
+
+
+def flux(value: float, s: Record, p: Record) -> float:
+    """Flux under load [N m/A]."""
+    if p.armature_reaction_share == 0.0:
+        return value
+    current = abs(s.armature_current) / p.armature_current_limit
+    return value * (1.0 - p.armature_reaction_share * current)
