@@ -1,0 +1,41 @@
+"""The measuring wheel slips on the drum, the more the harder the drum accelerates.
+
+    omega_meas = (1 - k omega_d') omega_d
+
+Source: H. B. Pacejka, Tyre and Vehicle Dynamics, on longitudinal slip: small slip is in proportion
+to the force, here the one that accelerates the wheel's own inertia J_w, so that
+k = J_w r_d / (C r_w^2) with its radius r_w and slip stiffness C. While the drum brakes the wheel
+runs ahead.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from plant_emulator.effects.declaration import EffectParameter
+
+if TYPE_CHECKING:
+    from plant_emulator.kernel_types import Record
+
+SUBSYSTEM = "speed_sensor"
+PARAMETERS = {
+    "slip_per_acceleration": EffectParameter(
+        neutral=0.0, lower=0.0, upper=0.2, plausible=0.01, unit="s^2/rad", meaning="k"
+    ),
+}
+
+
+def acceleration(s: Record, p: Record) -> float:
+    """Acceleration of the turning drum [rad/s^2]."""
+    friction = s.drum_viscous_friction * s.drum_speed
+    if s.drum_speed != 0.0:
+        friction += s.drum_coulomb_friction if s.drum_speed > 0.0 else -s.drum_coulomb_friction
+    return (s.drum_shaft_torque + s.drum_torque - friction) / p.drum_inertia
+
+
+def measured_drum_speed(value: float, s: Record, p: Record) -> float:
+    """What the measuring wheel shows [rad/s]."""
+    k = p.drum_speed_slip_slip_per_acceleration
+    if k == 0.0:
+        return value
+    return value * (1.0 - k * acceleration(s, p))

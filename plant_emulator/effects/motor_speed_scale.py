@@ -1,0 +1,28 @@
+"""The motor's tachometer shows too much or too little; drive and log both read it.
+
+    omega_read = (1 + e) omega_m
+
+Source: JCGM 200, International Vocabulary of Metrology, on the sensitivity of a measuring system.
+The speed controller holds what it reads at the reference: the motor turns the slower, the larger e.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from plant_emulator.effects.declaration import EffectParameter
+
+if TYPE_CHECKING:
+    from plant_emulator.kernel_types import Record
+
+SUBSYSTEM = "speed_sensor"
+PARAMETERS = {
+    "error": EffectParameter(
+        neutral=0.0, lower=-0.3, upper=0.3, plausible=0.01, unit="1", meaning="e"
+    ),
+}
+
+
+def tachometer_gain(value: float, s: Record, p: Record) -> float:
+    """Motor speed that is read, over the true one [1]."""
+    return value * (1.0 + p.motor_speed_scale_error)
