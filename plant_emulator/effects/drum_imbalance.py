@@ -1,0 +1,56 @@
+"""The drum's centre of mass lies off its axis, and its weight turns the drum.
+
+    T_d = ... - M sin theta_d,   M = m g e
+
+Source: ISO 1940-1 / ISO 21940-11 (imbalance U = m e of a rotor). theta_d is counted from where the
+centre of mass is lowest; at the start of a run it is `start_angle`.
+"""
+
+from __future__ import annotations
+
+from math import sin
+from typing import TYPE_CHECKING
+
+from plant_emulator.effects.declaration import EffectParameter, Memory
+
+if TYPE_CHECKING:
+    from plant_emulator.kernel_types import Record
+
+SUBSYSTEM = "drum"
+PARAMETERS = {
+    "moment": EffectParameter(
+        neutral=0.0, lower=0.0, upper=200.0, plausible=10.0, unit="N m", meaning="M"
+    ),
+    "start_angle": EffectParameter(
+        neutral=0.0,
+        lower=-3.2,
+        upper=3.2,
+        plausible=0.0,
+        unit="rad",
+        meaning="theta_d at start",
+        per_run=True,
+        std=2.0,
+    ),
+}
+
+
+def start(p: Record) -> float:
+    """Angle of the drum at the start of a run [rad]."""
+    return p.drum_imbalance_start_angle
+
+
+def advance(base: float, a: float, s: Record, p: Record) -> float:
+    """Angle of the drum at the end of an implicit stage of size a [rad]."""
+    if p.drum_imbalance_moment == 0.0:
+        return base
+    return base + a * s.drum_speed
+
+
+MEMORIES = {"angle": Memory(start, advance)}
+
+
+def drum_torque(value: float, s: Record, p: Record) -> float:
+    """Torque on the drum from outside [N m]."""
+    if p.drum_imbalance_moment == 0.0:
+        return value
+    return value - p.drum_imbalance_moment * sin(s.drum_imbalance_angle)
