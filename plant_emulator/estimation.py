@@ -227,12 +227,13 @@ def estimate(
     residuals: Sequence[Residual],
     *,
     settled: float = COST_SETTLED,
+    iterations: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Estimate:
     """Fit the unknowns from their starts.
 
     residuals : one function a run, from the values by name to the whitened residual
-    settled : relative fall of the cost that ends the fit
+    settled : relative fall of the cost that ends the fit; iterations : at most; None: MAX_ITERATIONS
     progress : called with the sum of squares after every simulation of all runs
     """
     from scipy.optimize import least_squares
@@ -256,7 +257,7 @@ def estimate(
             ftol=settled,
             xtol=Z_SETTLED,
             gtol=None,
-            max_nfev=MAX_ITERATIONS,
+            max_nfev=iterations or MAX_ITERATIONS,
         )
     return _estimate(problem, found.x, bool(found.status > 0), str(found.message))
 

@@ -7,13 +7,12 @@ import io
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from plant_emulator.parameters import ParameterSet
-
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.experiments import Experiment
     from plant_emulator.identify import Identification, Parameter
+    from plant_emulator.parameters import ParameterSet
     from plant_emulator.validate import Fit
 
     Fits = Mapping[str, Mapping[str, Fit]]
@@ -188,4 +187,4 @@ def parameter_set(
         "converged": found.estimate.converged,
         "residual_over_noise": round(found.chi_squared**0.5, 4),
     }
-    return ParameterSet(found.parameter_set.name, new, origin)
+    return replace(found.parameter_set, parameters=new, origin=origin)

@@ -8,7 +8,7 @@ computes the `calculated` parameters from the `given` ones. Reading files is lef
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import isfinite, pi
 from typing import Any, Literal
 
@@ -93,8 +93,8 @@ UNITS: dict[str, str] = {
     "wheel_radius": "m",
 }
 
-# Table of a set's file that is no parameter.
-ORIGIN = "origin"
+# Tables of a set's file that are no parameters.
+ORIGIN, EFFECTS = "origin", "effects"
 # Zero is a meaningful value only where a term may be absent from the model.
 MAY_BE_ZERO = frozenset(
     {
@@ -113,11 +113,13 @@ class ParameterSet:
     """The constants of one bench; `parameters[name]` for every name of `UNITS`.
 
     origin : how they were identified (logs with hashes, date, version); None: from a publication
+    effects : effects that this bench has beside the nominal model, by effect and parameter [SI]
     """
 
     name: str
     parameters: Mapping[str, Parameter]
     origin: Mapping[str, Any] | None = None
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Parameter:
         return self.parameters[name]
@@ -160,7 +162,7 @@ def check_value(place: str, parameter: Parameter) -> None:
 
 def parameter_set(name: str, table: Mapping[str, Any]) -> ParameterSet:
     """A parameter set from the tables of its file; raises ParameterError naming file and key."""
-    unknown = sorted(set(table) - set(UNITS) - {ORIGIN})
+    unknown = sorted(set(table) - set(UNITS) - {ORIGIN, EFFECTS})
     if unknown:
         raise ParameterError(f"{name}: {unknown[0]} is no parameter; known: {', '.join(UNITS)}")
     missing = sorted(set(UNITS) - set(table))
@@ -170,7 +172,18 @@ def parameter_set(name: str, table: Mapping[str, Any]) -> ParameterSet:
     origin = table.get(ORIGIN)
     if origin is not None and not isinstance(origin, Mapping):
         raise ParameterError(f"{name}: {ORIGIN}: a table that says where the values come from")
-    return ParameterSet(name, given, origin).with_values({})
+    own = _effects(name, table.get(EFFECTS, {}))
+    return ParameterSet(name, given, origin, own).with_values({})
+
+
+def _effects(place: str, table: object) -> dict[str, dict[str, float]]:
+    """The tables [effects.NAME]; whether there are such effects, the kernel knows."""
+    if not isinstance(table, Mapping) or not all(isinstance(t, Mapping) for t in table.values()):
+        raise ParameterError(f"{place}: {EFFECTS}: one table an effect, [{EFFECTS}.NAME]")
+    return {
+        name: {key: _number(place, f"{EFFECTS}.{name}.{key}", value) for key, value in own.items()}
+        for name, own in table.items()
+    }
 
 
 KEYS = {"symbol", "value", "unit", "kind", "source", "std", "standard_error"}

@@ -161,8 +161,9 @@ def _refuse_unsolved(run: Run, unsettled: float, out: Array) -> None:
 def values_of(
     parameters: ParameterSet, effects: Mapping[str, Mapping[str, float]] | None = None
 ) -> dict[str, float]:
-    """One flat mapping of all values, as `simulate` takes it."""
-    flat = {f"{e}_{key}": v for e, own in (effects or {}).items() for key, v in own.items()}
+    """One flat mapping of all values, as `simulate` takes it; the set's own effects first."""
+    both = {**parameters.effects, **(effects or {})}
+    flat = {f"{e}_{key}": v for e, own in both.items() for key, v in own.items()}
     return {**parameters.values(), **flat}
 
 

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 SETTLED = 1e-6
 # Sizes at which a signature is tried, in plausible sizes.
 SIZES = (0.03, 0.1, 0.3, 1.0, 2.0)
+# Steps of a fit that only has to show whether it is worth more.
+FEW = 8
 # A fit that is to be improved by starting again has to fall by more than this [chi squared].
 WORTH = 1.0
 
@@ -55,6 +57,11 @@ class Point:
     share: float
     errors: Mapping[str, float]
     converged: bool
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """The same for the same fit only."""
+        return (self.effects, self.cost, *self.values.values())
 
     @property
     def chi_squared(self) -> float:
@@ -87,11 +94,13 @@ def fit(
     runs: Sequence[int],
     values: Mapping[str, float],
     states: Sequence[Mapping[str, float]],
+    iterations: int | None = None,
 ) -> Point:
     """Joint fit of drift, states and these effects, from these values."""
     unknowns = started(template(model, effects, runs), values, states)
     residuals = [model.residual(k, effects) for k in runs]
-    return point(effects, estimate(unknowns, residuals, settled=SETTLED), len(runs))
+    found = estimate(unknowns, residuals, settled=SETTLED, iterations=iterations)
+    return point(effects, found, len(runs))
 
 
 def again(model: Model, effects: Sequence[str], runs: Sequence[int], start: Point) -> Point:
@@ -145,6 +154,7 @@ class Signature:
     norm : of the part that drift cannot imitate, at the plausible size
     raw : of the whole, at the plausible size
     gain : fall of the sum of squares that the linear picture expects at the best size
+    tangent_gain : the same at whatever size, from the signature of the smallest
     imitated_by : the parameter that follows it most
     direction : the part that drift cannot imitate over its norm, all runs and channels
     """
@@ -155,6 +165,7 @@ class Signature:
     norm: float
     raw: float
     gain: float
+    tangent_gain: float
     imitated_by: str
     direction: Array
 
@@ -213,9 +224,16 @@ def signature(
         norm=plausible.norm,
         raw=float(np.linalg.norm(plausible.change)),
         gain=best.gain,
+        tangent_gain=max(_tangent_gain(t, tangents) for t in trials if abs(t.size) == SIZES[0]),
         imitated_by=names[int(np.argmax(follows))],
         direction=plausible.rest / max(plausible.norm, 1e-12),
     )
+
+
+def _tangent_gain(trial: _Trial, tangents: Tangents) -> float:
+    """Fall of the sum of squares at the best multiple of a signature, 0 where that is negative."""
+    along = min(0.0, float(trial.rest @ tangents.residual))
+    return along**2 / max(trial.norm**2, 1e-12)
 
 
 def _lengths(found: Estimate) -> Array:
@@ -284,12 +302,14 @@ def bounded(unknown: Unknown, neutral: float, factor: float) -> float:
 
 
 def joint(model: Model, found: Signature, base: Point, runs: Sequence[int]) -> Point:
-    """Joint fit of one more effect, from its signature's start and from the drift as it is."""
+    """Joint fit of one more effect, a few steps only: from its signature's start, or, where that
+    leads nowhere, from the drift as it is.
+    """
     effects = (*base.effects, found.effect)
-    best = fit(model, effects, runs, found.start, found.states)
-    if found.gain > 0.0 and best.cost < base.cost:
+    best = fit(model, effects, runs, found.start, found.states, FEW)
+    if best.cost < base.cost - WORTH:
         return best
     own = {u.name: u.start for u in model.candidates[found.effect].states}
     states = [{**state, **own} for state in base.states]
     small = {**found.start, **base.values}
-    return min(best, fit(model, effects, runs, small, states), key=lambda p: p.cost)
+    return min(best, fit(model, effects, runs, small, states, FEW), key=lambda p: p.cost)

@@ -46,6 +46,10 @@ LEFT, LEFT_OF_MORE = 0.1, 0.04
 FURTHER = 0.04
 MOST_EFFECTS = 3
 RESTARTS = 3
+# Best of a round that are fitted to convergence.
+POLISHED = 5
+# Fall of the sum of squares that a signature has to promise to be fitted.
+HOPELESS = 4.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,18 +129,30 @@ def start(model: Model, runs: tuple[int, ...]) -> Point:
 
 
 def contend(model: Model, task: Task) -> Contender:
-    """One effect in the contest."""
-    tangents = Tangents(linearised(model, task.base, task.runs))
-    found = signature(model, task.effect, task.base, task.runs, tangents)
+    """One effect in the contest; not fitted where neither its signature nor its tangent helps."""
+    found = signature(model, task.effect, task.base, task.runs, _tangents(model, task))
     if found is None:
         return Contender(effect=task.effect, norm=0.0, raw=0.0, imitated_by="", point=None)
+    hopeless = max(found.gain, found.tangent_gain) < HOPELESS
     return Contender(
         effect=task.effect,
         norm=found.norm,
         raw=found.raw,
         imitated_by=found.imitated_by,
-        point=joint(model, found, task.base, task.runs),
+        point=None if hopeless else joint(model, found, task.base, task.runs),
     )
+
+
+# The tangents of the fit that this process was last asked about: every effect asks for the same.
+_last: dict[tuple[int, tuple[object, ...]], Tangents] = {}
+
+
+def _tangents(model: Model, task: Task) -> Tangents:
+    key = (id(model), task.base.key)
+    if key not in _last:
+        _last.clear()
+        _last[key] = Tangents(linearised(model, task.base, task.runs))
+    return _last[key]
 
 
 def refit(model: Model, task: Task) -> Point:
@@ -207,7 +223,16 @@ class Contest:
         for done, contender in enumerate(self._pool.map(contend, self._recipe, tasks)):
             self._tell(stage, (done + 1) / len(tasks))
             found.append(contender)
-        return found
+        return self._polished(found)
+
+    def _polished(self, contenders: Sequence[Contender]) -> list[Contender]:
+        """The best of a round fitted to convergence."""
+        order = sorted(contenders, key=lambda c: c.point.cost if c.point else float("inf"))
+        best = [c for c in order[:POLISHED] if c.point is not None]
+        tasks = [Task(base=c.point, runs=self._runs) for c in best if c.point is not None]
+        fitted = self._pool.map(refit, self._recipe, tasks)
+        done = {c.effect: replace(c, point=p) for c, p in zip(best, fitted, strict=True)}
+        return [done.get(c.effect, c) for c in contenders]
 
     def _restarted(self, base: Point, contenders: Sequence[Contender]) -> Point:
         """The best fit with the base's effects from the drift of the best contenders."""

@@ -33,12 +33,18 @@ SEED = 1
 
 @dataclass(frozen=True, kw_only=True)
 class Fold:
-    """Runs to fit, and runs to predict. start, where the fit begins: values and run states."""
+    """Runs to fit, and runs to predict.
+
+    start : where the fit begins, with the states of the fitted runs
+    refitted : False: the start's values are taken as they are
+    as_fitted : the predicted run is a later part of the fitted one, and starts as that does
+    """
 
     fitted: tuple[int, ...]
     predicted: tuple[int, ...]
     start: Point
     refitted: bool = True
+    as_fitted: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,25 +57,28 @@ class Prediction:
 
 def predict(model: Model, fold: Fold) -> Prediction:
     """Fit the fold's model on its runs, and predict the others."""
-    point = (
-        again(model, fold.start.effects, fold.fitted, fold.start) if fold.refitted else fold.start
-    )
-    residuals = tuple(_predicted(model, point, run) for run in fold.predicted)
+    point = fold.start
+    if fold.refitted:
+        point = again(model, point.effects, fold.fitted, point)
+    known = point.states[0] if fold.as_fitted else None
+    residuals = tuple(_predicted(model, point, run, known) for run in fold.predicted)
     return Prediction(residuals=residuals, converged=point.converged)
 
 
-def _predicted(model: Model, point: Point, run: int) -> Array:
-    """Residual of a run with all parameters kept, its own states fitted."""
+def _predicted(model: Model, point: Point, run: int, known: Mapping[str, float] | None) -> Array:
+    """Residual of a run with all parameters kept, its own states fitted unless known."""
     effects = point.effects
-    start = model.start_states(run, effects, point.values)
-    own = (*model.states, *(u for name in effects for u in model.candidates[name].states))
-    states = [replace(u, run=0, start=float(np.clip(start[u.name], u.lower, u.upper))) for u in own]
     residual = model.residual(run, effects)
 
     def of(found: Mapping[str, float]) -> Array:
         return residual({**point.values, **found})
 
-    return estimate(states, [of]).residuals[0] if states else of({})
+    own = (*model.states, *(u for name in effects for u in model.candidates[name].states))
+    if known is not None or not own:
+        return of(known or {})
+    start = model.start_states(run, effects, point.values)
+    states = [replace(u, run=0, start=float(np.clip(start[u.name], u.lower, u.upper))) for u in own]
+    return estimate(states, [of]).residuals[0]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from plant_emulator.diagnosis.explain import THRESHOLD, adequate
+from plant_emulator.diagnosis.explain import adequate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -113,32 +113,11 @@ def statement(
     return f"There is a gap whose cause is unknown: {verdict.reason}.{where}"
 
 
-def undetectable(
-    explained: Explanation, candidates: Mapping[str, Candidate], least: float
-) -> list[dict[str, str]]:
-    """Effects that these logs could not show at their plausible size, with the reason."""
-    found = []
-    for contender in explained.contenders:
-        if contender.norm >= least or contender.effect in explained.final.effects:
-            continue
-        if explained.evidence(contender) > THRESHOLD:
-            continue
-        hint = candidates[contender.effect].needs
-        if contender.raw < least:
-            reason = "too small in these channels and runs at its plausible size"
-        else:
-            reason = f"drift of {contender.imitated_by} would look the same"
-        found.append(
-            {"effect": contender.effect, "reason": f"{reason}; {hint}" if hint else reason}
-        )
-    return found
-
-
 def as_answer(
     verdict: Verdict,
     *,
     classes: Sequence[Sequence[str]],
-    confidence: float,
+    confidence: float | None,
     sentence: str,
     next_experiment: str | None,
 ) -> dict[str, Any]:

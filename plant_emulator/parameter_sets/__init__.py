@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from plant_emulator.errors import ParameterError
-from plant_emulator.parameters import ORIGIN, ParameterSet, parameter_set
+from plant_emulator.parameters import EFFECTS, ORIGIN, ParameterSet, parameter_set
 
 if TYPE_CHECKING:
     from plant_emulator.parameters import Parameter
@@ -47,6 +47,7 @@ def text(parameters: ParameterSet) -> str:
     tables = [_table(p.name, _entries(p)) for p in parameters]
     if parameters.origin is not None:
         tables.insert(0, _table(ORIGIN, dict(parameters.origin)))
+    tables += [_table(f"{EFFECTS}.{name}", dict(own)) for name, own in parameters.effects.items()]
     return "\n".join(tables)
 
 

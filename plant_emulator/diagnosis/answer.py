@@ -1,0 +1,142 @@
+"""The answer of a diagnosis, schema gap-diagnosis/1, from what its steps found."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from plant_emulator.diagnosis import shrink
+from plant_emulator.diagnosis.details import Step, Trace
+from plant_emulator.diagnosis.explain import DETECTABLE, THRESHOLD
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.diagnosis.explain import Contender, Explanation
+    from plant_emulator.diagnosis.model import Candidate, Run
+    from plant_emulator.diagnosis.shrink import Gap, Prediction
+    from plant_emulator.estimation import Array
+
+# Effects of no account that a ranking still shows.
+SHOWN = 5
+
+
+def ranged(gap: Gap | None, runs: Sequence[Run]) -> dict[str, float]:
+    """NRMSD of every channel; of the noise where there is no gap given.
+
+    The range of a channel and its noise are pooled over the runs, as its residual is.
+    """
+    names = dict.fromkeys(name for run in runs for name in run.channels)
+    found = {}
+    for name in names:
+        rows = [(run, run.channels.index(name)) for run in runs if name in run.channels]
+        span = float(np.ptp(np.concatenate([run.measured[k] for run, k in rows])))
+        noise = float(np.sqrt(np.mean([run.noise[k] ** 2 for run, k in rows])))
+        times = 1.0 if gap is None else float(gap.by_channel[gap.channels.index(name)])
+        found[name] = times * noise / span
+    return found
+
+
+def ranked(explained: Explanation) -> list[Contender]:
+    """Effects with evidence, and a few of those without, the best first."""
+    order = sorted(explained.contenders, key=explained.evidence, reverse=True)
+    counting = [c for c in order if explained.evidence(c) > THRESHOLD]
+    return order[: max(SHOWN, len(counting))]
+
+
+def rank(
+    contender: Contender,
+    explained: Explanation,
+    accepted: Sequence[str],
+    candidate: Candidate,
+    gain: float | None,
+) -> dict[str, Any]:
+    """One line of the ranking; sizes and errors of an accepted effect from the final fit."""
+    name = contender.effect
+    point = explained.final if name in accepted else contender.point
+    names = [u.name for u in (*candidate.sizes, *candidate.shapes)]
+    return {
+        "effect": name,
+        "subsystem": candidate.subsystem,
+        "evidence": explained.evidence(contender),
+        "held_out_gain": gain,
+        "parameters": [
+            {
+                "name": full.removeprefix(f"{name}_"),
+                "value": point.values[full],
+                "standard_error": point.errors[full],
+                "unit": candidate.units[full],
+            }
+            for full in names
+            if point is not None
+        ],
+        "accepted": name in accepted,
+    }
+
+
+def undetectable(
+    explained: Explanation, candidates: Mapping[str, Candidate]
+) -> list[dict[str, str]]:
+    """Effects that these logs could not show at their plausible size, with the reason."""
+    return [
+        {"effect": c.effect, "reason": hidden(c, candidates[c.effect])}
+        for c in explained.contenders
+        if c.norm < DETECTABLE
+        and c.effect not in explained.final.effects
+        and explained.evidence(c) <= THRESHOLD
+    ]
+
+
+def hidden(contender: Contender, candidate: Candidate) -> str:
+    """Why an effect does not show."""
+    if contender.raw < DETECTABLE:
+        reason = "too small in these channels and runs at its plausible size"
+    else:
+        reason = f"drift of {contender.imitated_by} looks the same"
+    return f"{reason}; {candidate.needs}" if candidate.needs else reason
+
+
+def waterfall(gaps: Mapping[tuple[str, ...], Gap], accepted: Sequence[str]) -> tuple[Step, ...]:
+    """The held-out gap as given, recalibrated, and with every accepted effect added in turn."""
+    labels = {("nominal",): "parameter set as given", (): "recalibrated"}
+    labels |= {
+        tuple(accepted[: k + 1]): f"with {name}" if k == 0 else f"and {name}"
+        for k, name in enumerate(accepted)
+    }
+    steps = []
+    for key, label in labels.items():
+        value, low, high = shrink.combined(gaps[key])
+        steps.append(Step(label=label, gap=value, low=low, high=high))
+    return (*steps, Step(label="noise floor", gap=1.0, low=1.0, high=1.0))
+
+
+def traces(
+    runs: Sequence[Run], before: Sequence[Prediction], after: Sequence[Prediction]
+) -> tuple[Trace, ...]:
+    """Measured and predicted channels of all held-out runs."""
+    pairs = zip(
+        runs,
+        [r for prediction in before for r in prediction.residuals],
+        [r for prediction in after for r in prediction.residuals],
+        strict=True,
+    )
+    return tuple(
+        Trace(
+            source=run.source,
+            channel=name,
+            unit=run.units[k],
+            time=run.time,
+            measured=run.measured[k],
+            recalibrated=_simulated(run, k, first),
+            explained=_simulated(run, k, second),
+            noise=float(run.noise[k]),
+        )
+        for run, first, second in pairs
+        for k, name in enumerate(run.channels)
+    )
+
+
+def _simulated(run: Run, channel: int, residual: Array) -> Array:
+    """The prediction behind a whitened residual; the measurement itself where it does not count."""
+    return np.asarray(run.measured[channel] - residual[channel] * run.noise[channel])
