@@ -1,0 +1,177 @@
+"""The answer of a diagnosis on one screen: statement, place, ranking, shrinkage, what is next.
+
+Plain text without colours, so that it reads the same in a terminal, a file and a mail. What does
+not fit is counted ("and 3 more"): the whole stands in the JSON answer and in the report.
+"""
+
+from __future__ import annotations
+
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any
+
+from plant_emulator.diagnosis.wording import (
+    KINDS,
+    UNITS,
+    closed,
+    indistinguishable,
+    logs_used,
+    number,
+    own_name,
+    percent,
+    place,
+    printable,
+    shifted,
+    size,
+    times_noise,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+# A screen has 24 lines; the last is the prompt's.
+HEIGHT = 23
+MOST_RANKED = 6
+NAME, CELL = 29, 9
+LABEL = 13
+GAPS = {
+    "nominal": "nominal",
+    "recalibrated": "recalibrated",
+    "explained": "explained",
+    "noise_floor": "noise floor",
+}
+
+
+def lines(answer: Mapping[str, Any], width: int = 80) -> list[str]:
+    """The answer for a terminal of this width and 24 lines."""
+    head = _verdict(answer, width)
+    shrinkage = _shrinkage(answer["gap"], width)
+    rest = _rest(answer, width)
+    room = HEIGHT - len(head) - len(shrinkage) - len(rest)
+    ranking = _ranking(answer["ranking"], indistinguishable(answer["verdict"]), room, width)
+    sections = [part for part in (head, ranking, shrinkage, rest) if part]
+    spaced = sum(map(len, sections)) + len(sections) - 1 <= HEIGHT
+    rows = [
+        row for part in sections for row in ([""] if spaced and part is not head else []) + part
+    ]
+    return [row[:width].rstrip() for row in rows]
+
+
+def _paragraph(text: str, width: int, most: int, label: str = "") -> list[str]:
+    """Text in at most so many lines behind a label, cut at a word with three dots."""
+    first = f"{label:9}" if label else ""
+    return wrap(
+        printable(text),
+        width,
+        initial_indent=first,
+        subsequent_indent=" " * len(first),
+        max_lines=most,
+        placeholder=" ...",
+    )
+
+
+def _listed(items: Sequence[str], width: int, most: int, label: str) -> list[str]:
+    """As many items as fit, and the number of those that do not."""
+    for shown in range(len(items), 0, -1):
+        more = f"; and {len(items) - shown} more" if shown < len(items) else ""
+        rows = _paragraph("; ".join(items[:shown]) + more, width, 99, label)
+        if len(rows) <= most:
+            return rows
+    return _paragraph("; ".join(items), width, most, label) if items else []
+
+
+def _verdict(answer: Mapping[str, Any], width: int) -> list[str]:
+    verdict = answer["verdict"]
+    parts = [KINDS[verdict["kind"]].upper()]
+    if verdict["confidence"] is not None:
+        parts.append(f"confidence {percent(verdict['confidence'])}")
+    parts.append(logs_used(answer["logs"]))
+    where = place(answer["location"], UNITS)
+    return [
+        ", ".join(parts),
+        *_paragraph(verdict["statement"], width, 3),
+        *(_paragraph(where, width, 2, "where") if where else []),
+    ]
+
+
+def _ranking(
+    ranking: Sequence[Mapping[str, Any]],
+    classes: Mapping[str, Sequence[str]],
+    room: int,
+    width: int,
+) -> list[str]:
+    """Accepted effects with what there is room for, then the runners-up, a line each."""
+    if not ranking:
+        return []
+    accepted = [r for r in ranking if r["accepted"]]
+    others = [r for r in ranking if not r["accepted"]]
+    room -= 1 + len(accepted)
+    rows = [f"{'  effect':{NAME}}{'evidence':>{CELL}}{'gain':>7}  size +- standard error"]
+    for entry in accepted:
+        beside = _beside(entry, classes.get(entry["effect"], ()), width)[: max(0, room)]
+        rows += [_row(entry), *beside]
+        room -= len(beside)
+    return rows + [_row(r) for r in others[: max(0, min(MOST_RANKED - len(accepted), room))]]
+
+
+def _row(entry: Mapping[str, Any]) -> str:
+    """Effect, evidence, share of the held-out gap that it closes alone, its first size."""
+    mark = "*" if entry["accepted"] else " "
+    gain = "" if entry["held_out_gain"] is None else percent(entry["held_out_gain"])
+    evidence = "" if entry["evidence"] is None else f"{entry['evidence']:.1f}"
+    first = size(entry["parameters"][0]) if entry["parameters"] else ""
+    name = printable(entry["effect"])[: NAME - 2]
+    return f"{mark} {name:{NAME - 2}}{evidence:>{CELL}}{gain:>7}  {first}"
+
+
+def _beside(entry: Mapping[str, Any], others: Sequence[str], width: int) -> list[str]:
+    """Further parameters of an accepted effect, and what cannot be told from it."""
+    more = [f"{own_name(p['name'], entry['effect'])} {size(p)}" for p in entry["parameters"][1:]]
+    alike = [f"not told from {others[0]}", *others[1:]] if others else []
+    return _listed(more, width, 1, "  with") + _listed(alike, width, 1, "  class")
+
+
+def _shrinkage(gap: Mapping[str, Any], width: int) -> list[str]:
+    """The held-out gap in the noise as bars, and in percent of every channel's range."""
+    floor = gap["noise_floor"] or {}
+    rows = {key: gap[key] for key in GAPS if gap[key]}
+    if rows.get("explained") == rows.get("recalibrated"):
+        rows.pop("explained", None)
+    times = {key: times_noise(row, floor) for key, row in rows.items()}
+    most = max((t for t in times.values() if t is not None), default=None)
+    if most is None:
+        return []
+    channels = list(floor)[:4]
+    bar = width - LABEL - 7 - CELL * len(channels)
+    title = "held-out gap over noise, % of range"
+    head = "".join(f"{name:>{CELL}}" for name in _short(channels))
+    drawn = [f"{title:{width - len(head)}}{head}"]
+    for key, row in rows.items():
+        ratio = times[key]
+        marks = "#" * max(1, round(bar * (ratio or 0.0) / most))
+        cells = "".join(f"{_range_share(row.get(c)):>{CELL}}" for c in channels)
+        drawn.append(f"{GAPS[key]:{LABEL}}{number(ratio):>5} {marks:{bar + 1}}{cells}")
+    share = closed(gap)
+    return drawn + ([f"closed: {share}"] if share else [])
+
+
+def _range_share(share: float | None) -> str:
+    return "" if share is None else f"{100.0 * share:.2f} %"
+
+
+def _short(channels: Sequence[str]) -> list[str]:
+    """One word a channel: its last, or its first where others end alike."""
+    last = [name.rpartition("_")[2] for name in channels]
+    return [
+        printable(end if last.count(end) == 1 else name.partition("_")[0])[: CELL - 1]
+        for name, end in zip(channels, last, strict=True)
+    ]
+
+
+def _rest(answer: Mapping[str, Any], width: int) -> list[str]:
+    """Parameters that moved, effects that these logs cannot show, the next experiment."""
+    verdict = answer["verdict"]
+    moved = [shifted(p) for p in verdict["parameters"]]
+    hidden = [f"{u['effect']} ({u['reason']})" for u in answer["undetectable"]]
+    rows = _listed(moved, width, 2 if verdict["kind"] == "parameter" else 1, "moved")
+    rows += _listed(hidden, width, 1 if len(verdict["effects"]) > 1 else 2, "unseen")
+    return rows + _paragraph(verdict["next_experiment"] or "", width, 2, "next")

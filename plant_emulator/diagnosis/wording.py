@@ -1,0 +1,150 @@
+"""Names and numbers of an answer as a person reads them, on a terminal and in a report."""
+
+from __future__ import annotations
+
+from math import floor, isfinite, log10
+from typing import TYPE_CHECKING, Any
+
+from register_maps.signals import LOG_COLUMNS
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+UNKNOWN = "not known"
+UNITS = {column.signal: column.unit for column in LOG_COLUMNS.values()}
+KINDS = {
+    "effect": "Effect found",
+    "parameter": "Same equations, other values",
+    "none": "No gap beyond the noise",
+    "unknown": "Cause unknown",
+}
+# Numbers of this size and more, or less, are written with an exponent.
+LARGE, SMALL = 1e6, 1e-4
+
+
+def printable(text: str) -> str:
+    """The text without control characters, half characters and marks that turn its direction."""
+    return "".join(c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in text)
+
+
+def spoken(name: str | None) -> str:
+    """A name of the vocabulary as words."""
+    return printable(name).replace("_", " ") if name else UNKNOWN
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A number with this many significant digits."""
+    if value is None or not isfinite(value):
+        return UNKNOWN
+    if value == 0.0:
+        return "0"
+    if not SMALL <= abs(value) < LARGE:
+        return f"{value:.{digits - 1}e}"
+    return f"{value:.{max(0, digits - 1 - _power(value, digits))}f}"
+
+
+def _power(value: float, digits: int) -> int:
+    """The power of ten of a number after it was rounded to its digits."""
+    return int(f"{value:.{digits - 1}e}".partition("e")[2])
+
+
+def with_error(value: float | None, standard_error: float | None, sign: str = "+-") -> str:
+    """A value and its standard error, both to the second digit of the error."""
+    if value is None or not isfinite(value):
+        return UNKNOWN
+    if standard_error is None or not isfinite(standard_error):
+        return f"{number(value, 4)} {sign} {UNKNOWN}"
+    if standard_error <= 0.0:
+        return f"{number(value, 4)} {sign} 0"
+    larger = max(abs(value), standard_error)
+    power = 0 if SMALL <= larger < LARGE else floor(log10(larger))
+    value, standard_error = value / 10.0**power, standard_error / 10.0**power
+    decimals = max(0, 1 - _power(standard_error, 2))
+    text = f"{value:.{decimals}f} {sign} {standard_error:.{decimals}f}"
+    return text if power == 0 else f"({text})e{power}"
+
+
+def percent(share: float | None) -> str:
+    """A share of 1 in percent; one decimal where it is small or nearly all."""
+    if share is None or not isfinite(share):
+        return UNKNOWN
+    decimals = 1 if 0.0 < abs(share) < 0.0095 or 0.995 <= share < 1.0 else 0
+    return f"{100.0 * share:.{decimals}f} %"
+
+
+def size(parameter: Mapping[str, Any], sign: str = "+-") -> str:
+    """A parameter of an effect: value, standard error and unit."""
+    text = with_error(parameter["value"], parameter["standard_error"], sign)
+    unit = parameter["unit"]
+    return text if unit in {"", "1"} else f"{text} {printable(unit)}"
+
+
+def quantity(value: float | None, unit: str | None, digits: int = 3) -> str:
+    """A number and its unit."""
+    text = number(value, digits)
+    return text if text == UNKNOWN or not unit else f"{text} {unit}"
+
+
+def own_name(parameter: str, effect: str) -> str:
+    """A parameter's name without the effect's in front of it."""
+    return printable(parameter.removeprefix(f"{effect}_"))
+
+
+def times_noise(
+    gap: Mapping[str, float | None] | None, noise_floor: Mapping[str, float]
+) -> float | None:
+    """Gap of all channels together in the noise: sqrt(mean((gap / floor)^2)) [1]."""
+    rows = [(g, noise_floor.get(c)) for c, g in (gap or {}).items()]
+    shares = [g / floor_ for g, floor_ in rows if g is not None and floor_]
+    return (sum(s * s for s in shares) / len(shares)) ** 0.5 if shares else None
+
+
+def logs_used(logs: Mapping[str, Sequence[str]]) -> str:
+    """How many logs were fitted, and how many held out; the same ones are held out in turn."""
+    if len(logs["estimation"]) > 1 and set(logs["estimation"]) == set(logs["held_out"]):
+        return f"{len(logs['estimation'])} logs, each held out in turn"
+    kinds = {"estimation": "fitted", "held_out": "held out"}
+    counts = [(len(logs[key]), words) for key, words in kinds.items()]
+    return ", ".join(f"{n} log{'' if n == 1 else 's'} {words}" for n, words in counts)
+
+
+def closed(gap: Mapping[str, Any]) -> str | None:
+    """The closed fraction with its interval, or None where the answer has none."""
+    if gap["closed_fraction"] is None:
+        return None
+    text, interval = percent(gap["closed_fraction"]), gap["closed_fraction_ci95"]
+    if not interval or None in interval:
+        return text
+    return f"{text} (95 % interval {percent(interval[0])} to {percent(interval[1])})"
+
+
+def place(location: Mapping[str, Any], units: Mapping[str, str]) -> str | None:
+    """Where the gap lies, in one line; None where there is none."""
+    if location["subsystem"] is None:
+        return None
+    shares = {s["name"]: s["share"] for s in location["subsystems"] or ()}
+    parts = [spoken(location["subsystem"])]
+    if location["subsystem"] in shares:
+        parts[0] += f" ({percent(shares[location['subsystem']])} of the residual)"
+    channel, phase = location["channel"], location["phase"]
+    if channel is None:
+        return parts[0]
+    parts.append(spoken(channel) + (f" in {spoken(phase)}" if phase else ""))
+    for cell in location["map"] or ():
+        if (cell["channel"], cell["phase"]) == (channel, phase):
+            unit = units.get(channel)
+            parts[1] += f": {quantity(cell['gap'], unit)}, noise {quantity(cell['noise'], unit, 2)}"
+    return ", ".join(parts)
+
+
+def shifted(parameter: Mapping[str, Any], sign: str = "+-") -> str:
+    """A parameter that is not what the set says: from, to, standard error, unit."""
+    value = {**parameter, "value": parameter["estimated"]}
+    return (
+        f"{printable(parameter['name'])} {number(parameter['nominal'], 4)} -> {size(value, sign)}"
+    )
+
+
+def indistinguishable(verdict: Mapping[str, Any]) -> dict[str, Sequence[str]]:
+    """By accepted effect: the others that these logs cannot tell from it."""
+    return {group[0]: group[1:] for group in verdict["class"] or () if group}
