@@ -1,0 +1,264 @@
+"""The tables of the report: gap by channel, residual map, ranking, parameters."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from plant_emulator.diagnosis.markup import Markup, join, tag
+from plant_emulator.diagnosis.report_traces import residuals, rms
+from plant_emulator.diagnosis.wording import (
+    number,
+    own_name,
+    percent,
+    quantity,
+    size,
+    spoken,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from plant_emulator.diagnosis.details import Trace
+
+PHASES = ("standstill", "breakaway", "acceleration", "cruise", "deceleration", "field_weakening")
+# From which multiple of the noise a cell of the map takes which tint.
+HEAT = ((10.0, "heat4"), (5.0, "heat3"), (2.0, "heat2"), (1.2, "heat1"))
+# Half width of a 95 % interval in standard errors.
+NORMAL_95 = 1.96
+PLUS_MINUS = "\N{PLUS-MINUS SIGN}"
+TIMES = "\N{MULTIPLICATION SIGN}"
+
+
+def table(
+    caption: str, heads: Iterable[str], rows: Iterable[Markup], look: str = "plain"
+) -> Markup:
+    """A table with its caption and the heads of its columns."""
+    head = tag("tr", *(h if isinstance(h, Markup) else tag("th", h, scope="col") for h in heads))
+    whole = tag(
+        "table",
+        tag("caption", caption),
+        tag("thead", head),
+        tag("tbody", *rows),
+        class_=look,
+    )
+    return scrolled(whole, caption)
+
+
+def scrolled(content: Markup, label: str) -> Markup:
+    """Content that can be scrolled where it is wider than the screen, also by keyboard."""
+    return tag("div", content, class_="wide", tabindex="0", role="region", aria_label=label)
+
+
+def right(head: str) -> Markup:
+    """A column's head over numbers."""
+    return tag("th", head, scope="col", class_="n")
+
+
+def cell(value: str) -> Markup:
+    """A number in a table."""
+    return tag("td", value, class_="n")
+
+
+def row_head(*content: str) -> Markup:
+    """What a row is about."""
+    return tag("th", *content, scope="row")
+
+
+def bar(value: str, share: float | None) -> Markup:
+    """A number over a bar of this share of the cell."""
+    long = 100.0 * min(1.0, max(0.0, share or 0.0))
+    return tag("td", value, class_="n bar", style=f"background-size: {long:.1f}% 1.3em")
+
+
+def code(name: str) -> Markup:
+    """A name as it is typed."""
+    return tag("code", name)
+
+
+def gap_by_channel(gap: Mapping[str, Any], traces: Sequence[Trace]) -> Markup:
+    """The held-out gap of every channel, in percent of its range and in its own unit."""
+    kinds = [k for k in ("nominal", "recalibrated", "explained", "noise_floor") if gap[k]]
+    both = any("after" in residuals(t) for t in traces)
+    rows = [
+        tag(
+            "tr",
+            row_head(spoken(channel)),
+            *(cell(_range_share(gap[k].get(channel))) for k in kinds),
+            *(cell(text) for text in _pooled([t for t in traces if t.channel == channel], both)),
+        )
+        for channel in gap["noise_floor"]
+    ]
+    rms_of = ["rms before", "rms after"] if both else ["rms"]
+    heads = [*(f"{spoken(k)} [%]" for k in kinds), *rms_of, "noise"]
+    return table(
+        "Held-out runs, all samples of a channel together. Gap in percent of the channel's "
+        "measured range; rms of the residual in the channel's unit.",
+        ["channel", *map(right, heads)],
+        rows,
+    )
+
+
+def _range_share(share: float | None) -> str:
+    return number(None) if share is None else f"{100.0 * share:.3f}"
+
+
+def _pooled(traces: Sequence[Trace], both: bool) -> list[str]:
+    """Rms before (and after), and the noise, of a channel over all its runs."""
+    if not traces:
+        return [""] * (2 + both)
+    found = [residuals(t) for t in traces]
+    kinds = [[r["before"] for r in found], [r.get("after", r["before"]) for r in found]]
+    noise = float(np.sqrt(np.mean([t.noise**2 for t in traces])))
+    unit = traces[0].unit
+    return [
+        *(quantity(rms(np.concatenate(kind)), unit) for kind in kinds[: 1 + both]),
+        quantity(noise, unit, 2),
+    ]
+
+
+def residual_map(location: Mapping[str, Any], units: Mapping[str, str]) -> Markup:
+    """Channel by phase: the gap over the noise, tinted, and the gap in the channel's unit."""
+    cells = {(c["channel"], c["phase"]): c for c in location["map"]}
+    channels = list(dict.fromkeys(c for c, _ in cells))
+    seen = dict.fromkeys(p for _, p in cells)
+    phases = [p for p in PHASES if p in seen] + [p for p in seen if p not in PHASES]
+    here = (location["channel"], location["phase"])
+    rows = [
+        tag(
+            "tr",
+            row_head(spoken(channel)),
+            *(
+                _map_cell(cells.get((channel, p)), units.get(channel), (channel, p) == here)
+                for p in phases
+            ),
+        )
+        for channel in channels
+    ]
+    return table(
+        "Residual by channel and phase of operation, in multiples of the noise, and in the "
+        "channel's unit. Darker tint: from 1.2, 2, 5 and 10 times the noise. Framed: the place "
+        "that the answer names.",
+        ["channel", *(right(spoken(p)) for p in phases)],
+        rows,
+        "map",
+    )
+
+
+def _map_cell(found: Mapping[str, Any] | None, unit: str | None, here: bool) -> Markup:
+    if found is None:
+        return tag("td", tag("span", "no samples", class_="soft small"))
+    gap, noise = found["gap"], found["noise"]
+    ratio = gap / noise if gap is not None and noise else None
+    look = next((name for least, name in HEAT if ratio is not None and ratio >= least), "heat0")
+    words = f"{ratio:.{0 if ratio >= 100.0 else 1}f} {TIMES}" if ratio is not None else number(None)
+    own = tag("span", quantity(gap, unit), class_="line soft small")
+    return tag("td", words, own, class_=f"{look} here" if here else look)
+
+
+def subsystems(location: Mapping[str, Any]) -> Markup:
+    """Every subsystem's share of the residual."""
+    rows = [
+        tag("tr", row_head(spoken(s["name"])), bar(percent(s["share"]), s["share"]))
+        for s in location["subsystems"]
+    ]
+    return table(
+        "Share of each subsystem in the residual, without any hypothesis about the cause.",
+        ["subsystem", right("share of the residual")],
+        rows,
+    )
+
+
+def ranking(entries: Sequence[Mapping[str, Any]]) -> Markup:
+    """The effects by evidence, each with its parameters and their 95 % intervals."""
+    most = max([1e-9, *(e["evidence"] or 0.0 for e in entries)])
+    return table(
+        "Evidence: fall of the penalised cost, corrected for autocorrelation. Held-out gain: "
+        "share of the gap that the effect closes alone on runs it was not fitted to.",
+        [
+            "effect",
+            "subsystem",
+            "accepted",
+            right("evidence"),
+            right("held-out gain"),
+            f"parameter: value {PLUS_MINUS} standard error (95 % interval)",
+        ],
+        [_ranked(entry, most) for entry in entries],
+    )
+
+
+def _ranked(entry: Mapping[str, Any], most: float) -> Markup:
+    evidence = entry["evidence"]
+    sizes = [
+        tag("span", f"{own_name(p['name'], entry['effect'])} ", *_estimate(p), class_="line")
+        for p in entry["parameters"]
+    ]
+    return tag(
+        "tr",
+        row_head(code(entry["effect"])),
+        tag("td", spoken(entry["subsystem"])),
+        tag("td", "yes" if entry["accepted"] else "no"),
+        bar(number(None) if evidence is None else f"{evidence:.1f}", (evidence or 0.0) / most),
+        cell(percent(entry["held_out_gain"])),
+        tag("td", *sizes),
+        class_="accepted" if entry["accepted"] else "other",
+    )
+
+
+def _estimate(parameter: Mapping[str, Any]) -> list[Markup]:
+    """Value with standard error, and the 95 % interval where there is one."""
+    value, error = parameter["value"], parameter["standard_error"]
+    found = [tag("span", size(parameter, PLUS_MINUS))]
+    if value is not None and error and np.isfinite(error):
+        low, high = (number(value + k * NORMAL_95 * error, 4) for k in (-1, 1))
+        found += [Markup(" "), tag("span", f"({low} to {high})", class_="soft")]
+    return found
+
+
+def parameters(shifted: Sequence[Mapping[str, Any]]) -> Markup:
+    """Parameters that the logs put more than 3 standard errors away from the set."""
+    rows = [
+        tag(
+            "tr",
+            row_head(code(p["name"])),
+            cell(quantity(p["nominal"], p["unit"], 4)),
+            cell(size({**p, "value": p["estimated"]}, PLUS_MINUS)),
+            cell(_change(p)),
+            cell(_distance(p)),
+        )
+        for p in shifted
+    ]
+    heads = ["set", f"estimated {PLUS_MINUS} standard error", "change", "standard errors"]
+    return table(
+        "Parameters that these logs put more than 3 standard errors away from the set.",
+        ["parameter", *map(right, heads)],
+        rows,
+    )
+
+
+def _change(p: Mapping[str, Any]) -> str:
+    return f"{100.0 * (p['estimated'] / p['nominal'] - 1.0):+.1f} %" if p["nominal"] else ""
+
+
+def _distance(p: Mapping[str, Any]) -> str:
+    error = p["standard_error"]
+    return number(abs(p["estimated"] - p["nominal"]) / error, 2) if error else number(None)
+
+
+def undetectable(entries: Sequence[Mapping[str, Any]]) -> Markup:
+    """Effects that may be there without these logs showing them."""
+    rows = [tag("tr", row_head(code(u["effect"])), tag("td", u["reason"])) for u in entries]
+    return table(
+        "Effects that these logs cannot show: that they are not named says nothing about them.",
+        ["effect", "why, and what would show it"],
+        rows,
+    )
+
+
+def named(entries: Mapping[str, str]) -> Markup:
+    """Names and what belongs to them."""
+    pairs = [
+        join(tag("dt", name), tag("dd", value, class_="hash")) for name, value in entries.items()
+    ]
+    return tag("dl", *pairs)
