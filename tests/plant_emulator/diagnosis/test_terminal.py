@@ -84,7 +84,8 @@ def test_unconverged_answer_shows_its_statement_and_no_confidence():
 
 def test_logs_held_out_in_turn_are_told_as_such():
     answer = answers.effect()
-    answer["logs"] = dict.fromkeys(("estimation", "held_out"), ["a.csv", "b.csv", "c.csv"])
+    logs = ["a.csv", "b.csv", "c.csv"]
+    answer["logs"] = {"estimation": logs, "held_out": logs}
     expected = "EFFECT FOUND, confidence 98 %, 3 logs, each held out in turn"
     assert lines(answer)[0] == expected
 
