@@ -9,7 +9,7 @@ repeated. The one of a real drive is another: its log shows A by the spread, not
 
 from __future__ import annotations
 
-from math import floor, sin
+from math import floor
 from typing import TYPE_CHECKING
 
 from plant_emulator.effects.declaration import EffectParameter
@@ -32,9 +32,12 @@ PARAMETERS = {
 
 
 def even(number: float) -> float:
-    """A number in [0, 1) that looks drawn: the last digits of a sine, times a large number."""
-    long = sin(12.9898 * number + 78.233) * 43758.5453
-    return long - floor(long)
+    """A number in [0, 1) that looks drawn: digits far behind the point of a polynomial in it."""
+    drawn = 0.7548776662 * number + 0.3
+    for _ in range(3):
+        drawn = drawn - floor(drawn)
+        drawn = (drawn + 17.13) * (drawn + 0.61) * 971.7
+    return drawn - floor(drawn)
 
 
 def dead_time(value: float, s: Record, p: Record) -> float:
