@@ -36,7 +36,7 @@ def command(name: str | None, json_file: str | None) -> None:
         if name:
             click.echo(_page(effect))
         else:
-            click.echo(f"{effect.name:26}{effect.subsystem:16}{effect.description.splitlines()[0]}")
+            click.echo(f"{effect.name:29}{effect.subsystem:15}{effect.description.splitlines()[0]}")
 
 
 def _entry(effect: Effect) -> dict[str, Any]:
