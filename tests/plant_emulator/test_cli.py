@@ -202,7 +202,7 @@ def test_effects_as_json_hold_every_parameter_with_its_unit(command: Command) ->
         (("validate", "ghost.csv"), "ghost.csv: no such file"),
         (("validate",), "LOG"),
         (("validate", PROGRAM1, "--start", "left"), "left"),
-        (("effects", "gear_ghost"), "effect gear_ghost: unknown; known: friction_asymmetry"),
+        (("effects", "gear_ghost"), "effect gear_ghost: unknown; known: armature_reaction"),
         (("simulate", "--program", "program1", "--json", "-"), "--json"),
     ],
 )  # fmt: skip
