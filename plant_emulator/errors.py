@@ -50,3 +50,7 @@ def place_in(files: Iterable[str], error: Exception) -> str | None:
             said = (text for text in str(error).splitlines() if not text.startswith("Failed in"))
             return f"{file}:{line}: {next(filter(None, said))}"
     return None
+
+
+class DiagnosisError(InputError):
+    """Logs that cannot be diagnosed as asked."""

@@ -233,7 +233,8 @@ def estimate(
     """Fit the unknowns from their starts.
 
     residuals : one function a run, from the values by name to the whitened residual
-    settled : relative fall of the cost that ends the fit; iterations : at most; None: MAX_ITERATIONS
+    settled : relative fall of the cost that ends the fit
+    iterations : at most so many; None: MAX_ITERATIONS
     progress : called with the sum of squares after every simulation of all runs
     """
     from scipy.optimize import least_squares

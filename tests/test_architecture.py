@@ -35,8 +35,10 @@ SHELL = {
     "gateway.recorder": "files, processes",
     "gateway.recording": "files",
     "gateway.replay_report": "files",
+    "plant_emulator.axis_log": "files",
     "plant_emulator.compiler": "files",
     "plant_emulator.control": "the running emulator",
+    "plant_emulator.diagnosis_session": "files, date",
     "plant_emulator.effects": "files",
     "plant_emulator.emulator": "clock",
     "plant_emulator.identification": "files, date, processor time",
@@ -47,6 +49,7 @@ SHELL = {
     "plant_emulator.logs.parquet": "files",
     "plant_emulator.pace": "clock",
     "plant_emulator.parameter_sets": "files",
+    "plant_emulator.planning": "files",
     "plant_emulator.plots": "files",
     "plant_emulator.process": "processes",
     "plant_emulator.road_log": "files",
@@ -54,6 +57,7 @@ SHELL = {
     "plant_emulator.server": "network",
     "plant_emulator.serving": "network",
     "plant_emulator.session": "files",
+    "plant_emulator.workers": "processes, network",
 }
 # Folders and entry points: no code of their own to judge.
 ENTRANCES = {

@@ -22,6 +22,7 @@ from plant_emulator.start_states import GAP, with_own
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from pathlib import Path
 
     from plant_emulator.effects import Effect
     from plant_emulator.estimation import Array, Residual
@@ -174,7 +175,7 @@ class BenchRecipe:
     recordings: tuple[Recording, ...]
     parameters: ParameterSet
     without: tuple[str, ...] = ()
-    own: tuple[str, ...] = ()
+    own: tuple[Path, ...] = ()
 
     def library(self) -> dict[str, Effect]:
         """The effects in the contest by name, of those that this process knows."""

@@ -32,8 +32,9 @@ if TYPE_CHECKING:
 SETTLED = 1e-6
 # Sizes at which a signature is tried, in plausible sizes.
 SIZES = (0.03, 0.1, 0.3, 1.0, 2.0)
-# Steps of a fit that only has to show whether it is worth more.
-FEW = 8
+# Steps of a fit that only has to show whether it is worth more: without and with states of its
+# own, which make a long curved valley of the cost.
+FEW, FEW_WITH_STATES = 8, 24
 # A fit that is to be improved by starting again has to fall by more than this [chi squared].
 WORTH = 1.0
 
@@ -156,6 +157,7 @@ class Signature:
     gain : fall of the sum of squares that the linear picture expects at the best size
     tangent_gain : the same at whatever size, from the signature of the smallest
     imitated_by : the parameter that follows it most
+    norms : of the part that drift cannot imitate, by size in plausible sizes, ascending
     direction : the part that drift cannot imitate over its norm, all runs and channels
     """
 
@@ -166,6 +168,7 @@ class Signature:
     raw: float
     gain: float
     tangent_gain: float
+    norms: tuple[tuple[float, float], ...]
     imitated_by: str
     direction: Array
 
@@ -225,6 +228,7 @@ def signature(
         raw=float(np.linalg.norm(plausible.change)),
         gain=best.gain,
         tangent_gain=max(_tangent_gain(t, tangents) for t in trials if abs(t.size) == SIZES[0]),
+        norms=tuple((t.size, t.norm) for t in trials if t.size > 0.0),
         imitated_by=names[int(np.argmax(follows))],
         direction=plausible.rest / max(plausible.norm, 1e-12),
     )
@@ -306,10 +310,11 @@ def joint(model: Model, found: Signature, base: Point, runs: Sequence[int]) -> P
     leads nowhere, from the drift as it is.
     """
     effects = (*base.effects, found.effect)
-    best = fit(model, effects, runs, found.start, found.states, FEW)
+    few = FEW_WITH_STATES if model.candidates[found.effect].states else FEW
+    best = fit(model, effects, runs, found.start, found.states, few)
     if best.cost < base.cost - WORTH:
         return best
     own = {u.name: u.start for u in model.candidates[found.effect].states}
     states = [{**state, **own} for state in base.states]
     small = {**found.start, **base.values}
-    return min(best, fit(model, effects, runs, small, states, FEW), key=lambda p: p.cost)
+    return min(best, fit(model, effects, runs, small, states, few), key=lambda p: p.cost)

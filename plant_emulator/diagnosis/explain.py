@@ -129,11 +129,16 @@ def start(model: Model, runs: tuple[int, ...]) -> Point:
 
 
 def contend(model: Model, task: Task) -> Contender:
-    """One effect in the contest; not fitted where neither its signature nor its tangent helps."""
+    """One effect in the contest; not fitted where neither its signature nor its tangent helps.
+
+    An effect with states of its own is always fitted: its signature is that of one start state, and
+    says little of others.
+    """
     found = signature(model, task.effect, task.base, task.runs, _tangents(model, task))
     if found is None:
         return Contender(effect=task.effect, norm=0.0, raw=0.0, imitated_by="", point=None)
-    hopeless = max(found.gain, found.tangent_gain) < HOPELESS
+    plain = not model.candidates[task.effect].states
+    hopeless = plain and max(found.gain, found.tangent_gain) < HOPELESS
     return Contender(
         effect=task.effect,
         norm=found.norm,

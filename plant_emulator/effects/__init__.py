@@ -19,7 +19,6 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import pkgutil
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from plant_emulator.effects.declaration import Effect, EffectParameter, Memory, effect_of
@@ -27,6 +26,7 @@ from plant_emulator.errors import ParameterError, place_in
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from pathlib import Path
     from types import ModuleType
 
 __all__ = ["Effect", "EffectParameter", "Memory", "from_file", "load", "names", "parse"]
@@ -45,9 +45,8 @@ def load(name: str) -> Effect:
     return effect_of(name, importlib.import_module(f"{__name__}.{name}"))
 
 
-def from_file(path: str | Path) -> Effect:
+def from_file(path: Path) -> Effect:
     """A user's own effect; its name is the file's. A fault in it is told by file and line."""
-    path = Path(path)
     spec = importlib.util.spec_from_file_location(path.stem, path)
     if spec is None or spec.loader is None or not path.is_file():
         raise ParameterError(f"{path}: no Python file with an effect")

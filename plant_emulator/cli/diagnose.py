@@ -1,0 +1,108 @@
+"""Say where a gap between model and bench lies, which effect causes it, how far it shrinks."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import sys
+from pathlib import Path
+
+import click
+
+from plant_emulator.cli import _options
+
+EXAMPLE = """
+\b
+Examples:
+  plant-emulator diagnose program1.csv.gz program2.csv.gz program3.csv.gz --report gap.html
+  plant-emulator diagnose run1.csv run2.csv --hold-out run3.csv --save bench.toml
+"""
+
+
+@click.command(epilog=EXAMPLE)
+@click.argument("logs", nargs=-1, required=True, metavar="LOG...")
+@click.option(
+    "--hold-out",
+    "held_out",
+    multiple=True,
+    metavar="LOG",
+    help="A run to predict; may be repeated. Without it every log is held out in turn.",
+)
+@_options.parameters
+@click.option(
+    "--without", multiple=True, metavar="EFFECT", help="Take an effect out of the library."
+)
+@click.option(
+    "--effects",
+    "own",
+    multiple=True,
+    metavar="FILE.py",
+    help="An effect of your own beside the library; may be repeated.",
+)
+@_options.reference
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    default=os.cpu_count() or 1,
+    show_default="all cores",
+    metavar="N",
+    help="Processes that fit side by side.",
+)
+@click.option("--scheduler", metavar="ADDRESS", help="A Dask scheduler instead, tcp://host:port.")
+@click.option("--save", metavar="SET", help="Write the parameter set with the accepted effects.")
+@click.option("--report", metavar="HTML", help="Write a self-contained report.")
+@_options.json_file
+def command(
+    logs: tuple[str, ...],
+    held_out: tuple[str, ...],
+    parameters: str,
+    without: tuple[str, ...],
+    own: tuple[str, ...],
+    reference: str | None,
+    workers: int,
+    scheduler: str | None,
+    save: str | None,
+    report: str | None,
+    json_file: str | None,
+) -> None:
+    """Diagnose the gap that LOGs show against the model.
+
+    The verdict is an effect, a class of effects that these logs cannot tell apart, other
+    parameters, nothing, or unknown; how far the gap shrinks is measured on runs not fitted.
+    """
+    from plant_emulator import parameter_sets
+    from plant_emulator.cli._progress import progress
+    from plant_emulator.diagnosis.diagnose import Diagnose
+    from plant_emulator.diagnosis.terminal import lines
+    from plant_emulator.diagnosis_session import calibration, loaded, parameter_set
+    from plant_emulator.workers import pool_of
+
+    given = parameter_sets.load(parameters)
+    run = loaded(logs, held_out, given, without=without, own=own, hold=reference)
+    settings = {"command": f"plant-emulator {shlex.join(sys.argv[1:])}", **run.settings}
+    pool = pool_of(workers, scheduler)
+    try:
+        with progress() as tell:
+            found = Diagnose(
+                pool,
+                run.recipe,
+                run.plan,
+                settings=settings,
+                cases=calibration(),
+                notes=run.notes,
+                progress=tell,
+            ).diagnose()
+    finally:
+        pool.close()
+    for note in run.notes:
+        click.echo(f"note: {note}", err=True)
+    if save:
+        parameter_sets.save(parameter_set(found, given), save)
+    if report:
+        from plant_emulator.diagnosis.report import html
+
+        Path(report).write_text(html(found.answer, found.details), encoding="utf-8")
+    if json_file:
+        _options.write_json(found.answer, json_file)
+    if json_file != "-":
+        click.echo("\n".join(lines(found.answer)))

@@ -1,0 +1,220 @@
+"""One diagnosis from the contest to the answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from plant_emulator.diagnosis import answer as parts
+from plant_emulator.diagnosis import place, shrink, verdict
+from plant_emulator.diagnosis.calibration import confidence
+from plant_emulator.diagnosis.details import Details
+from plant_emulator.diagnosis.explain import THRESHOLD, Contest
+from plant_emulator.diagnosis.pool import model_of
+from plant_emulator.diagnosis.shrink import Fold
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.diagnosis.calibration import Case
+    from plant_emulator.diagnosis.contest import Point
+    from plant_emulator.diagnosis.explain import Contender, Explanation, Progress
+    from plant_emulator.diagnosis.model import Model
+    from plant_emulator.diagnosis.pool import Pool, Recipe
+    from plant_emulator.diagnosis.shrink import Gap, Prediction
+    from plant_emulator.diagnosis.verdict import Verdict
+
+# Effects whose held-out gain is computed: the best ones only, each takes a fit a fold.
+TRIED = 3
+# The model "as given" among those that are compared by their effects.
+NOMINAL = ("nominal",)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """Which runs are fitted and which are predicted; indices of the model's runs.
+
+    folds : (fitted, predicted); with as_fitted the predicted run is a later part of the fitted one
+        and starts as that does
+    """
+
+    fitted: tuple[int, ...]
+    folds: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
+    as_fitted: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Diagnosis:
+    """The answer, what a report shows beside it, and the values to save.
+
+    fixed : of every accepted effect the values that were not fitted, by name in the effect
+    """
+
+    answer: dict[str, Any]
+    details: Details
+    final: Point
+    fixed: Mapping[str, Mapping[str, float]]
+
+
+class Diagnose:
+    """The steps from a plan to a diagnosis; cases : a blind trial's, for the confidence."""
+
+    def __init__(
+        self,
+        pool: Pool,
+        recipe: Recipe,
+        plan: Plan,
+        *,
+        settings: Mapping[str, str],
+        cases: Sequence[Case] = (),
+        notes: Sequence[str] = (),
+        progress: Progress | None = None,
+    ) -> None:
+        self.pool, self.recipe, self.plan = pool, recipe, plan
+        self.model: Model = model_of(recipe)
+        self.settings, self.notes, self.progress = settings, tuple(notes), progress
+        self.cases = tuple(cases)
+
+    def diagnose(self) -> Diagnosis:
+        """Contest, verdict, held-out runs, place."""
+        names = tuple(self.model.candidates)
+        contest = Contest(self.pool, self.recipe, names, self.plan.fitted, self.progress)
+        explained = contest.explain()
+        found = verdict.decide(self.model, explained)
+        predicted = self._predictions(explained, found)
+        return self._answered(explained, found, predicted)
+
+    def _predictions(
+        self, explained: Explanation, found: Verdict
+    ) -> dict[tuple[str, ...], list[Prediction]]:
+        """Held-out residuals of every model that is compared, by its effects.
+
+        ("nominal",) : the parameter set as given.
+        """
+        points: dict[tuple[str, ...], Point] = {(): explained.null}
+        for count in range(1, len(found.effects) + 1):
+            some = found.effects[:count]
+            points[some] = replace(explained.final, effects=some)
+        for contender in self._best(explained):
+            assert contender.point is not None
+            points.setdefault((contender.effect,), contender.point)
+        nominal = replace(explained.null, values={u.name: u.prior for u in self.model.parameters})
+        tasks, keys = [], []
+        for key, point in [(NOMINAL, nominal), *points.items()]:
+            for fitted, predicted in self.plan.folds:
+                keys.append(key)
+                tasks.append(self._fold(point, fitted, predicted, refitted=key != NOMINAL))
+        found_all: dict[tuple[str, ...], list[Prediction]] = {}
+        answers = self.pool.map(shrink.predict, self.recipe, tasks)
+        for done, (key, prediction) in enumerate(zip(keys, answers, strict=True)):
+            if self.progress is not None:
+                self.progress("held-out runs", (done + 1) / len(keys))
+            found_all.setdefault(key, []).append(prediction)
+        return found_all
+
+    def _fold(
+        self, point: Point, fitted: tuple[int, ...], predicted: tuple[int, ...], *, refitted: bool
+    ) -> Fold:
+        """A fold that begins where the fit to all runs has ended."""
+        states = tuple(point.states[self.plan.fitted.index(run)] for run in fitted)
+        return Fold(
+            fitted=fitted,
+            predicted=predicted,
+            start=replace(point, states=states),
+            refitted=refitted,
+            as_fitted=self.plan.as_fitted,
+        )
+
+    def _best(self, explained: Explanation) -> list[Contender]:
+        ranked = sorted(explained.contenders, key=explained.evidence, reverse=True)
+        return [c for c in ranked[:TRIED] if explained.evidence(c) > THRESHOLD]
+
+    def _answered(
+        self,
+        explained: Explanation,
+        found: Verdict,
+        predicted: Mapping[tuple[str, ...], list[Prediction]],
+    ) -> Diagnosis:
+        runs = [self.model.runs[run] for _, some in self.plan.folds for run in some]
+        lengths = shrink.block_lengths(predicted[()])
+        channels = [run.channels for run in runs]
+        gaps = {key: shrink.gap(channels, some, lengths) for key, some in predicted.items()}
+        location = self._location(explained, found)
+        closed, interval = self._closed(found, gaps)
+        answer = {
+            "schema": "gap-diagnosis/1",
+            "logs": {
+                "estimation": [self.model.runs[k].source for k in self.plan.fitted],
+                "held_out": list(dict.fromkeys(run.source for run in runs)),
+            },
+            "verdict": verdict.as_answer(
+                found,
+                classes=explained.classes(),
+                confidence=confidence(self.cases, found.kind, self._evidence(explained, found)),
+                sentence=verdict.statement(
+                    found, self.model.candidates, closed, location["subsystem"]
+                ),
+                next_experiment=None,
+            ),
+            "location": location,
+            "gap": {
+                "nominal": parts.ranged(gaps[NOMINAL], runs),
+                "recalibrated": parts.ranged(gaps[()], runs),
+                "explained": parts.ranged(gaps[found.effects], runs),
+                "noise_floor": parts.ranged(None, runs),
+                "closed_fraction": closed,
+                "closed_fraction_ci95": interval,
+            },
+            "ranking": [self._rank(c, explained, found, gaps) for c in parts.ranked(explained)],
+            "undetectable": parts.undetectable(explained, self.model.candidates),
+        }
+        details = Details(
+            traces=parts.traces(runs, predicted[()], predicted[found.effects]),
+            waterfall=parts.waterfall(gaps, found.effects),
+            settings=self.settings,
+            notes=self.notes,
+        )
+        return Diagnosis(
+            answer=answer,
+            details=details,
+            final=explained.final if found.effects else explained.null,
+            fixed={name: self._fixed(name) for name in found.effects},
+        )
+
+    def _fixed(self, name: str) -> dict[str, float]:
+        fixed = self.model.candidates[name].fixed
+        return {key.removeprefix(f"{name}_"): value for key, value in fixed.items()}
+
+    def _location(self, explained: Explanation, found: Verdict) -> dict[str, Any]:
+        shares = place.evidence_shares(explained, self.model.candidates)
+        where = place.subsystem(found, explained, self.model.candidates, shares)
+        return place.location(where, shares, ())
+
+    def _closed(
+        self, found: Verdict, gaps: Mapping[tuple[str, ...], Gap]
+    ) -> tuple[float | None, list[float] | None]:
+        """The closed fraction with its interval, where the verdict names a cause."""
+        if found.kind not in {"effect", "parameter"}:
+            return None, None
+        reference = gaps[NOMINAL] if found.kind == "parameter" else gaps[()]
+        interval = shrink.interval(reference, gaps[found.effects])
+        closed = shrink.closed_fraction(reference, gaps[found.effects])
+        return closed, None if interval is None else list(interval)
+
+    def _rank(
+        self,
+        contender: Contender,
+        explained: Explanation,
+        found: Verdict,
+        gaps: Mapping[tuple[str, ...], Gap],
+    ) -> dict[str, Any]:
+        alone = gaps.get((contender.effect,))
+        gain = None if alone is None else shrink.closed_fraction(gaps[()], alone)
+        candidate = self.model.candidates[contender.effect]
+        return parts.rank(contender, explained, found.effects, candidate, gain)
+
+    def _evidence(self, explained: Explanation, found: Verdict) -> float:
+        """Evidence of the weakest effect that is named; of the best one where none is."""
+        by_name = {c.effect: explained.evidence(c) for c in explained.contenders}
+        named = [by_name[name] for name in found.effects]
+        return min(named) if named else max(by_name.values(), default=0.0)

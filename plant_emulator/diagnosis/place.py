@@ -1,0 +1,66 @@
+"""Where the gap lies, as the answer tells it: the verdict's own place, or the gap's."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.diagnosis.explain import Explanation
+    from plant_emulator.diagnosis.model import Candidate
+    from plant_emulator.diagnosis.verdict import Verdict
+
+
+def evidence_shares(
+    explained: Explanation, candidates: Mapping[str, Candidate]
+) -> dict[str, float]:
+    """Share of each subsystem, by the best fall of the cost that one of its effects brings."""
+    best: dict[str, float] = {}
+    for contender in explained.contenders:
+        if contender.point is not None:
+            place = candidates[contender.effect].subsystem
+            fall = max(0.0, explained.null.cost - contender.point.cost)
+            best[place] = max(best.get(place, 0.0), fall)
+    total = sum(best.values())
+    return {place: fall / total for place, fall in best.items()} if total > 0.0 else {}
+
+
+def subsystem(
+    verdict: Verdict,
+    explained: Explanation,
+    candidates: Mapping[str, Candidate],
+    shares: Mapping[str, float],
+) -> str | None:
+    """The place of the strongest effect, of the most surprising parameter, or of the gap."""
+    if verdict.kind == "none":
+        return None
+    if verdict.kind == "parameter":
+        return verdict.shifts[0].subsystem
+    if verdict.kind == "effect":
+        alone = {c.effect: explained.evidence(c) for c in explained.contenders}
+        strongest = max(verdict.effects, key=lambda name: alone[name])
+        return candidates[strongest].subsystem
+    return max(shares, key=shares.__getitem__, default=None)
+
+
+def location(
+    place: str | None, shares: Mapping[str, float], entries: Sequence[Mapping[str, Any]]
+) -> dict[str, Any]:
+    """The part `location` of the answer.
+
+    entries : of the residual map; the one with the largest gap over its noise gives channel and
+        phase, unless there is no gap
+    """
+    widest = max(entries, key=lambda e: e["gap"] / e["noise"], default=None)
+    told = place is not None and widest is not None
+    return {
+        "subsystem": place,
+        "channel": widest["channel"] if told and widest else None,
+        "phase": widest["phase"] if told and widest else None,
+        "subsystems": [
+            {"name": name, "share": share}
+            for name, share in sorted(shares.items(), key=lambda pair: -pair[1])
+        ],
+        "map": [dict(entry) for entry in entries],
+    }

@@ -1,0 +1,160 @@
+"""From log files to a diagnosis: reading, preflight, which runs are held out, saving."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from plant_emulator import logs
+from plant_emulator.diagnosis.bench import BenchRecipe
+from plant_emulator.diagnosis.calibration import Case
+from plant_emulator.diagnosis.diagnose import Plan
+from plant_emulator.errors import DiagnosisError
+from plant_emulator.preflight import preflight
+from plant_emulator.recording import Recording, recording
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.diagnosis.diagnose import Diagnosis
+    from plant_emulator.log import Log
+    from plant_emulator.parameters import ParameterSet
+    from plant_emulator.simulate import Hold
+
+# Columns that tell the answer: a diagnosis must not see them.
+TELLING = ("label", "effect", "fault", "cause", "truth", "drift")
+# Of a single log this share is fitted, and the rest predicted.
+FITTED_SHARE = 0.6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loaded:
+    """Logs ready for a diagnosis, and what the preflight told of them."""
+
+    recipe: BenchRecipe
+    plan: Plan
+    notes: tuple[str, ...]
+    settings: Mapping[str, str]
+
+
+def loaded(
+    paths: Sequence[str],
+    held_out: Sequence[str],
+    parameters: ParameterSet,
+    *,
+    without: Sequence[str] = (),
+    own: Sequence[str] = (),
+    hold: str | None = None,
+) -> Loaded:
+    """The logs as a recipe and a plan; DiagnosisError or LogError says what cannot be used."""
+    hashes = _hashes([*paths, *held_out])
+    recordings: list[Recording] = []
+    notes: list[str] = []
+    for path in (*paths, *held_out):
+        log = logs.read(path)
+        _telling(log)
+        checked = preflight(log, parameters.value("gear_ratio"))
+        recordings.append(recording(log, cast("Hold | None", hold), checked.use))
+        notes += checked.notes
+    recordings, plan = planned(recordings, len(paths))
+    settings = {
+        "date": datetime.now(UTC).date().isoformat(),
+        "version": version("road-load-bench"),
+        "parameters": parameters.name,
+        "without": ", ".join(without) or "-",
+        "own effects": ", ".join(own) or "-",
+    }
+    settings |= {f"sha256 of {path}": digest for path, digest in hashes.items()}
+    files = tuple(Path(file) for file in own)
+    recipe = BenchRecipe(tuple(recordings), parameters, tuple(without), files)
+    return Loaded(recipe=recipe, plan=plan, notes=tuple(notes), settings=settings)
+
+
+def calibration() -> list[Case]:
+    """The cases of the blind trial that this version was calibrated with."""
+    with (Path(__file__).parent / "diagnosis" / "calibration.csv").open(newline="") as file:
+        return [
+            Case(kind=row["kind"], evidence=float(row["evidence"]), right=row["right"] == "True")
+            for row in csv.DictReader(file)
+        ]
+
+
+def planned(recordings: Sequence[Recording], count: int) -> tuple[list[Recording], Plan]:
+    """Which runs are fitted and which predicted; the first `count` are to be fitted.
+
+    With held-out runs those are predicted; of several logs each in turn; a single log is fitted on
+    its first part and predicted on the rest.
+    """
+    fitted = tuple(range(count))
+    if len(recordings) > count:
+        folds = ((fitted, tuple(range(count, len(recordings)))),)
+        return list(recordings), Plan(fitted=fitted, folds=folds)
+    if count > 1:
+        turns = tuple((tuple(k for k in fitted if k != run), (run,)) for run in fitted)
+        return list(recordings), Plan(fitted=fitted, folds=turns)
+    (whole,) = recordings
+    end = whole.log.time[0] + FITTED_SHARE * float(np.ptp(whole.log.time))
+    first = whole.log.time <= end
+    both = [replace(whole, use=whole.use & part) for part in (first, ~first)]
+    return both, Plan(fitted=(0,), folds=(((0,), (1,)),), as_fitted=True)
+
+
+def _telling(log: Log) -> None:
+    """Refuse a log that carries its own answer."""
+    for column in log.other:
+        if any(word in column.lower().split("_") for word in TELLING):
+            raise DiagnosisError(
+                f"{log.source}: line 1: column {column} looks like the answer; a diagnosis must "
+                "not see it: take it out"
+            )
+
+
+def _hashes(paths: Sequence[str]) -> dict[str, str]:
+    """SHA-256 of every file; DiagnosisError where two are the same run."""
+    found: dict[str, str] = {}
+    for path in paths:
+        if not Path(path).is_file():
+            logs.read(path)  # says what is wrong
+        digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()
+        for other, known in found.items():
+            if digest == known:
+                raise DiagnosisError(f"{path}: the same run as {other}; give every run once")
+        found[path] = digest
+    return found
+
+
+def parameter_set(diagnosis: Diagnosis, parameters: ParameterSet) -> ParameterSet:
+    """The set with the accepted effects in it; values of single runs as their mean."""
+    final, effects = diagnosis.final, diagnosis.answer["verdict"]["effects"]
+    own = {name: dict(diagnosis.fixed[name]) for name in effects}
+    for name in effects:
+        prefix = f"{name}_"
+        own[name] |= {
+            key.removeprefix(prefix): value
+            for key, value in final.values.items()
+            if key.startswith(prefix)
+        }
+        for key in {k for state in final.states for k in state if k.startswith(prefix)}:
+            mean = float(np.mean([state[key] for state in final.states]))
+            own[name][key.removeprefix(prefix)] = mean
+    changed = {n: v for n, v in final.values.items() if n in parameters.parameters}
+    new = parameters.with_values(changed)
+    kept = {
+        name: replace(p, standard_error=final.errors.get(name)) if name in changed else p
+        for name, p in new.parameters.items()
+    }
+    origin = {
+        "date": datetime.now(UTC).date().isoformat(),
+        "version": version("road-load-bench"),
+        "before": parameters.name,
+        "logs": diagnosis.answer["logs"]["estimation"],
+        "verdict": diagnosis.answer["verdict"]["statement"],
+    }
+    return replace(new, parameters=kept, origin=origin, effects={**parameters.effects, **own})

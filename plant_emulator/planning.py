@@ -1,0 +1,75 @@
+"""Runs that were recorded, or are only planned, ready for the question what they can show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from plant_emulator import logs
+from plant_emulator.diagnosis.bench import BenchModel, BenchRecipe
+from plant_emulator.diagnosis.contest import Point, null_fit
+from plant_emulator.log import COMPARED
+from plant_emulator.preflight import preflight
+from plant_emulator.programs import PROGRAMS
+from plant_emulator.recording import Recording, recording
+from plant_emulator.search import GAP_POSITION
+from plant_emulator.sensors import SENSORS
+from plant_emulator.session import simulated
+from plant_emulator.simulate import run_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from plant_emulator.parameters import ParameterSet
+    from plant_emulator.simulate import Hold
+
+
+def planned_run(name: str, parameters: ParameterSet) -> Recording:
+    """A drive program as it would be recorded, without noise but judged by the sensors' noise."""
+    log = simulated(name, parameters, {}, hold=None, start="middle")
+    return Recording(
+        log,
+        run_of(log),
+        COMPARED,
+        np.array([SENSORS[channel][0] for channel in COMPARED]),
+        np.ones((len(COMPARED), len(log.time)), bool),
+    )
+
+
+def prepared(
+    names: Sequence[str], parameters: ParameterSet, hold: str | None = None
+) -> tuple[BenchModel, Point]:
+    """A model of these logs and programs, and the fit at which they are judged.
+
+    Logs are fitted; programs are simulated at what the logs say, or at the set as given.
+    """
+    recorded = [name for name in names if name not in PROGRAMS or Path(name).is_file()]
+    recordings = []
+    for path in recorded:
+        log = logs.read(path)
+        use = preflight(log, parameters.value("gear_ratio")).use
+        recordings.append(recording(log, cast("Hold | None", hold), use))
+    values = parameters.values()
+    states: tuple[dict[str, float], ...] = ()
+    if recordings:
+        model = BenchRecipe(tuple(recordings), parameters).build()
+        fitted = null_fit(model, range(len(recordings)))
+        parameters = parameters.with_values(fitted.values)
+        values, states = parameters.values(), tuple(dict(s) for s in fitted.states)
+    planned = [name for name in names if name not in recorded]
+    recordings += [planned_run(name, parameters) for name in planned]
+    model = BenchRecipe(tuple(recordings), parameters).build()
+    point = Point(
+        effects=(),
+        values={u.name: values[u.name] for u in model.parameters},
+        states=(*states, *({GAP_POSITION: 0.0} for _ in planned)),
+        cost=0.0,
+        squares=0.0,
+        samples=1,
+        share=1.0,
+        errors={},
+        converged=True,
+    )
+    return model, point

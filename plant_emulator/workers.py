@@ -1,0 +1,77 @@
+"""The steps of a diagnosis on local processes, or on a Dask cluster."""
+
+from __future__ import annotations
+
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from plant_emulator.diagnosis.pool import Here, model_of
+from plant_emulator.errors import EmulatorError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from plant_emulator.diagnosis.model import Model
+    from plant_emulator.diagnosis.pool import Pool, Recipe
+
+Item = TypeVar("Item")
+Answer = TypeVar("Answer")
+
+
+def _step(function: Callable[[Model, Any], Any], recipe: Recipe, item: Any) -> Any:
+    return function(model_of(recipe), item)
+
+
+class Processes:
+    """On so many processes of this machine."""
+
+    def __init__(self, workers: int) -> None:
+        # spawned, not forked: a fork copies the locks of threads that it does not copy
+        self._executor = ProcessPoolExecutor(workers, get_context("spawn"))
+
+    def map(
+        self, function: Callable[[Model, Item], Answer], recipe: Recipe, items: Sequence[Item]
+    ) -> Iterator[Answer]:
+        """See `Pool`."""
+        count = len(items)
+        return self._executor.map(_step, [function] * count, [recipe] * count, items)
+
+    def close(self) -> None:
+        """End the processes."""
+        self._executor.shutdown(cancel_futures=True)
+
+
+class Cluster:
+    """On the workers of a Dask scheduler at that address."""
+
+    def __init__(self, address: str) -> None:
+        try:
+            import distributed
+        except ImportError as error:
+            raise EmulatorError(
+                f"--scheduler {address}: {error}; pip install 'road-load-bench[cluster]' brings it"
+            ) from error
+        try:
+            self._client: Any = distributed.Client(address, timeout=10)  # type: ignore[no-untyped-call]
+        except (OSError, ValueError) as error:
+            raise EmulatorError(f"--scheduler {address}: no scheduler answers ({error})") from error
+
+    def map(
+        self, function: Callable[[Model, Item], Answer], recipe: Recipe, items: Sequence[Item]
+    ) -> Iterator[Answer]:
+        """See `Pool`."""
+        shared = self._client.scatter(recipe, broadcast=True)
+        futures = [self._client.submit(_step, function, shared, item, pure=False) for item in items]
+        return (future.result() for future in futures)
+
+    def close(self) -> None:
+        """Leave the cluster."""
+        self._client.close()
+
+
+def pool_of(workers: int, scheduler: str | None = None) -> Pool:
+    """The pool that the options --workers and --scheduler ask for."""
+    if scheduler is not None:
+        return Cluster(scheduler)
+    return Processes(workers) if workers > 1 else Here()
