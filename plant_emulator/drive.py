@@ -26,10 +26,10 @@ def flux_slope(k_phi: float, s: Record, p: Record) -> float:
 
     Base speed is that of the nominal field: an effect that weakens the flux does not move it.
     """
-    per_speed = 1.0 / (p.flux_constant_2 + abs(s.motor_speed))
-    if p.flux_constant_1 * per_speed >= p.flux_constant:
+    divisor = p.flux_constant_2 + abs(s.motor_speed)
+    if p.flux_constant_1 / divisor >= p.flux_constant:
         return 0.0
-    slope = k_phi * per_speed
+    slope = k_phi / divisor
     return -slope if s.motor_speed > 0.0 else slope
 
 
