@@ -2,7 +2,7 @@
 
     T_meas = T + r t
 
-Source: JCGM 200, International Vocabulary of Metrology, 4.21 (instrumental drift). t is the time
+Source: JCGM 200, International Vocabulary of Metrology, on instrumental drift. t is the time
 since the start of the run: the sensor was set to zero there.
 """
 

@@ -2,8 +2,8 @@
 
     T_meas = T + T_0
 
-Source: JCGM 200, International Vocabulary of Metrology, 4.20 (instrumental bias) and 4.28 (zero
-error). T_0 is the same at every torque and time.
+Source: JCGM 200, International Vocabulary of Metrology, on instrumental bias and zero error. T_0 is
+the same at every torque and time.
 """
 
 from __future__ import annotations
