@@ -36,6 +36,9 @@ SHELL = {
     "gateway.recording": "files",
     "gateway.replay_report": "files",
     "plant_emulator.axis_log": "files",
+    "plant_emulator.blind.examiner": "files, processes",
+    "plant_emulator.blind.folder": "files",
+    "plant_emulator.blind.trial": "clock, threads",
     "plant_emulator.compiler": "files",
     "plant_emulator.control": "the running emulator",
     "plant_emulator.diagnosis_session": "files, date",
@@ -62,7 +65,7 @@ SHELL = {
 # Folders and entry points: no code of their own to judge.
 ENTRANCES = {
     f"{package}{part}" for package in PACKAGES for part in ("", ".__main__", ".cli", ".regulators")
-}
+} | {"plant_emulator.blind"}
 CONTRACTS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"][
     "contracts"
 ]

@@ -1,0 +1,93 @@
+"""What may be hidden: every effect of the library with the law it is simulated by, and some more.
+
+The law is another one than the library's wherever nature offers one. A sensor's constant or
+proportional error and the weight of an imbalance have one law only; there the library's is used.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    Range = tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entry:
+    """An effect that may be hidden.
+
+    programs : that it needs besides programs 1 to 3
+    sizes : of those that are not drawn around the plausible size [SI]
+    starts : of the values of a run's own [SI]
+    """
+
+    effect: str
+    law: str
+    programs: tuple[str, ...] = ()
+    sizes: Mapping[str, Range] = field(default_factory=dict)
+    starts: Mapping[str, Range] = field(default_factory=dict)
+
+
+ANY_ANGLE = (-3.14, 3.14)
+# A bench in a hall: its oil and its shell at the start of a run [K].
+OIL = {"start_temperature": (287.0, 306.0), "shell_temperature": (288.0, 303.0)}
+
+INSIDE = (
+    Entry(effect="reference_ramp_limit", law="soft_landing_ramp"),
+    Entry(effect="reference_filter", law="three_lag_reference"),
+    Entry(effect="delay_jitter", law="two_valued_delay"),
+    # A limit that the programs reach, and with which the bench still goes.
+    Entry(
+        effect="current_limit",
+        law="knee_current_limit",
+        programs=("program4",),
+        sizes={"reduction": (44.0, 54.0)},
+    ),
+    Entry(effect="voltage_sag", law="lagging_voltage_sag", programs=("program4",)),
+    Entry(effect="converter_dead_time", law="tanh_converter"),
+    Entry(
+        effect="integrator_windup",
+        law="fading_windup",
+        programs=("program4",),
+        sizes={"share": (0.5, 1.0)},
+    ),
+    Entry(effect="motor_friction", law="palmgren_motor"),
+    Entry(effect="armature_reaction", law="quadratic_armature_reaction", programs=("program4",)),
+    Entry(effect="field_lag", law="field_lag_with_eddies"),
+    Entry(
+        effect="armature_resistance_heating",
+        law="two_body_heating",
+        starts={"start_rise": (-10.0, 60.0)},
+    ),
+    Entry(effect="shaft_damping", law="rubber_coupling"),
+    Entry(effect="gear_oil_temperature", law="vogel_oil", starts=OIL),
+    Entry(effect="stribeck", law="lorentzian_stribeck"),
+    Entry(effect="presliding", law="elastoplastic_presliding"),
+    Entry(effect="load_dependent_gear_loss", law="two_efficiencies", programs=("program6",)),
+    Entry(effect="gear_eccentricity", law="runout_two_harmonics", starts={"phase": ANY_ANGLE}),
+    Entry(effect="friction_asymmetry", law="coulomb_asymmetry"),
+    Entry(effect="drum_bearing_friction", law="palmgren_drum"),
+    Entry(effect="drum_imbalance", law="drum_imbalance", starts={"start_angle": ANY_ANGLE}),
+    Entry(effect="torque_sensor_offset", law="torque_sensor_offset"),
+    Entry(effect="torque_sensor_gain", law="torque_sensor_gain"),
+    Entry(effect="torque_sensor_lag", law="two_lag_torque_sensor"),
+    Entry(effect="torque_sensor_drift", law="settling_torque_drift"),
+    Entry(effect="drum_speed_scale", law="drum_speed_scale"),
+    Entry(effect="drum_speed_lag", law="two_lag_drum_speed"),
+    Entry(effect="drum_speed_slip", law="saturating_wheel_slip"),
+    Entry(effect="motor_speed_scale", law="motor_speed_scale"),
+    Entry(effect="wheel_slip", law="progressive_tyre_slip", programs=("program6",)),
+    Entry(effect="tyre_rolling_loss", law="rising_rolling_loss", programs=("program6",)),
+)
+OUTSIDE = (
+    Entry(effect="torque_ripple", law="torque_ripple", starts={"phase": ANY_ANGLE}),
+    Entry(effect="mesh_ripple", law="mesh_ripple", starts={"phase": ANY_ANGLE}),
+    Entry(effect="hysteretic_torque_sensor", law="hysteretic_torque_sensor"),
+    Entry(effect="widening_backlash", law="widening_backlash"),
+    Entry(effect="oval_measuring_wheel", law="oval_measuring_wheel", starts={"phase": ANY_ANGLE}),
+    Entry(effect="two_mass_drum", law="two_mass_drum"),
+    Entry(effect="coarse_reference", law="coarse_reference"),
+)

@@ -1,0 +1,79 @@
+"""How large a hidden effect is in the logs, after drift has done what it can to imitate it.
+
+The norm of the whitened change that the true law makes at its hidden size, less what parameters and
+start states can follow (their tangents at the truth, with their priors).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.diagnosis.contest import Tangents
+from plant_emulator.estimation import at
+from plant_emulator.identify import free_parameters, unknowns
+from plant_emulator.log import COMPARED
+from plant_emulator.search import GAP_POSITION
+from plant_emulator.sensors import SENSORS
+from plant_emulator.simulate import run_of, simulate, values_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.blind.case import Case, Hidden
+    from plant_emulator.estimation import Array, Residual
+    from plant_emulator.log import Log
+    from plant_emulator.parameters import ParameterSet
+
+# Norm above which an effect counts as detectable.
+DETECTABLE = 7.0
+
+
+def noise_levels(channels: Sequence[str]) -> Array:
+    """Standard deviation of noise and quantisation of each channel [SI]."""
+    pairs = [SENSORS[name] for name in channels]
+    return np.array([np.hypot(deviation, step / np.sqrt(12.0)) for deviation, step in pairs])
+
+
+def norms(case: Case, logs: Sequence[Log], parameters: ParameterSet) -> dict[str, float]:
+    """The norm of every hidden effect by its name, the others in place; logs : the true ones."""
+    return {hidden.effect: _norm(case, hidden, logs, parameters) for hidden in case.hidden}
+
+
+def _norm(case: Case, hidden: Hidden, logs: Sequence[Log], parameters: ParameterSet) -> float:
+    others = [h for h in case.hidden if h is not hidden]
+    bench = parameters.with_values(case.parameters).values()
+    free = free_parameters(parameters)
+    wanted = unknowns(parameters, free, bench, case.gaps)
+    without = [_simulation(case, k, log, parameters, others) for k, log in enumerate(logs)]
+    complete = [_simulation(case, k, log, parameters, case.hidden) for k, log in enumerate(logs)]
+    truth = {name: bench[name] for name in free}
+    starts = [{**truth, GAP_POSITION: gap} for gap in case.gaps]
+    base = [part(start) for part, start in zip(without, starts, strict=True)]
+    whole = [run(start) for run, start in zip(complete, starts, strict=True)]
+    change = [after - before for after, before in zip(whole, base, strict=True)]
+    tangents = Tangents(at(wanted, [_less(p, b) for p, b in zip(without, base, strict=True)]))
+    return float(np.linalg.norm(tangents.rest(np.concatenate([c.ravel() for c in change]))))
+
+
+def _less(simulated: Residual, base: Array) -> Residual:
+    """The change of a simulation from what it was."""
+    return lambda found: simulated(found) - base
+
+
+def _simulation(
+    case: Case, run: int, log: Log, parameters: ParameterSet, hidden: Sequence[Hidden]
+) -> Residual:
+    """A run by parameters and start in the gap, whitened, shape (channels, samples)."""
+    inputs = run_of(log)
+    levels = noise_levels(COMPARED)[:, None]
+    effects = {h.law: h.in_run(run) for h in hidden}
+    fixed = values_of(parameters.with_values(case.parameters), effects)
+
+    def simulated(found: Mapping[str, float]) -> Array:
+        values = {**fixed, **found}
+        out = simulate(inputs, values, gap_position=values.pop(GAP_POSITION))
+        return np.stack([out[name] for name in COMPARED]) / levels
+
+    return simulated

@@ -1,0 +1,44 @@
+"""From a case to its logs, by fixed fine steps, with the sensors' noise and quantisation."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from plant_emulator.log import Log
+from plant_emulator.programs import SpeedProgram, program
+from plant_emulator.sensors import noisy
+from plant_emulator.simulate import run_of, simulate, values_of
+from plant_emulator.travel import travel
+
+if TYPE_CHECKING:
+    from plant_emulator.blind.case import Case
+    from plant_emulator.parameters import ParameterSet
+
+# A fiftieth of a sample [s]; the diagnosis simulates with adapted steps up to a whole one.
+STEP = 2e-4
+# The bench of the thesis does not log it.
+NOT_LOGGED = "armature_voltage"
+
+
+def true_logs(case: Case, parameters: ParameterSet) -> list[Log]:
+    """The noise-free log of every run; parameters : the nominal set."""
+    return [_true_log(case, run, parameters) for run in range(len(case.programs))]
+
+
+def _true_log(case: Case, run: int, parameters: ParameterSet) -> Log:
+    bench = parameters.with_values(case.parameters)
+    effects = {hidden.law: hidden.in_run(run) for hidden in case.hidden}
+    known = program(case.programs[run])
+    if isinstance(known, SpeedProgram):
+        time, reference = known.reference()
+        inputs = run_of(Log(time, {"speed_reference": reference}, known.name))
+        log = simulate(inputs, values_of(bench, effects), gap_position=case.gaps[run], step=STEP)
+    else:
+        log = travel(known, bench, effects, gap_position=case.gaps[run])
+    signals = {name: signal for name, signal in log.signals.items() if name != NOT_LOGGED}
+    return Log(log.time, signals, known.name)
+
+
+def measured(case: Case, log: Log, run: int) -> Log:
+    """The log as the sensors show it."""
+    return noisy(log, case.noise + run)

@@ -1,0 +1,30 @@
+"""The drive reads its speed reference through a coarse converter.
+
+    omega_r = q round(reference / q)
+
+Source: B. Widrow, I. Kollar, Quantization Noise (2008), the uniform quantiser. q = 0: the reference
+itself.
+"""
+
+from __future__ import annotations
+
+from math import floor
+from typing import TYPE_CHECKING
+
+from plant_emulator.effects.declaration import EffectParameter
+
+if TYPE_CHECKING:
+    from plant_emulator.kernel_types import Record
+
+SUBSYSTEM = "drive"
+PARAMETERS = {
+    "step": EffectParameter(
+        neutral=0.0, lower=0.0, upper=20.0, plausible=1.5, unit="rad/s", meaning="q"
+    ),
+}
+
+
+def reference(value: float, s: Record, p: Record) -> float:
+    """Reference that was read [rad/s]."""
+    step = p.coarse_reference_step
+    return value if step == 0.0 else step * floor(value / step + 0.5)

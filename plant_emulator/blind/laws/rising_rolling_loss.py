@@ -1,0 +1,37 @@
+"""The truck's tyre takes a rolling loss from the drum that rises with the speed.
+
+    T_d = ... - r_d F (1 + |v| / v_0) sgn omega_d,   v = r_d omega_d
+
+Source: H. B. Pacejka, Tyre and Vehicle Dynamics, on rolling resistance against speed. F = 0: no
+loss. Only with a truck.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from plant_emulator.effects.declaration import EffectParameter
+
+if TYPE_CHECKING:
+    from plant_emulator.kernel_types import Record
+
+SUBSYSTEM = "wheel_contact"
+PARAMETERS = {
+    "force": EffectParameter(
+        neutral=0.0, lower=0.0, upper=2e3, plausible=150.0, unit="N", meaning="F"
+    ),
+    "speed_of_double": EffectParameter(
+        neutral=15.0, lower=1.0, upper=1e3, plausible=15.0, unit="m/s", meaning="v_0"
+    ),
+}
+
+
+def drum_coulomb_friction(value: float, s: Record, p: Record) -> float:
+    """Coulomb friction on the drum [N m]."""
+    return value + s.truck * p.drum_radius * p.rising_rolling_loss_force
+
+
+def drum_viscous_friction(value: float, s: Record, p: Record) -> float:
+    """Speed-proportional friction on the drum [N m s/rad]."""
+    per_speed = p.drum_radius * p.drum_radius / p.rising_rolling_loss_speed_of_double
+    return value + s.truck * p.rising_rolling_loss_force * per_speed

@@ -1,0 +1,51 @@
+"""The torque sensor shows the shaft's torque through two equal lags.
+
+    (tau/2 d/dt + 1)^2 T_meas = T
+
+Source: K. Ogata, Modern Control Engineering, on critically damped second-order systems. tau is the
+delay of a slow change. tau = 0: the torque itself.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from plant_emulator.effects.declaration import EffectParameter, Memory
+
+if TYPE_CHECKING:
+    from plant_emulator.kernel_types import Record
+
+SUBSYSTEM = "torque_sensor"
+PARAMETERS = {
+    "time_constant": EffectParameter(
+        neutral=0.0, lower=0.0, upper=1.0, plausible=0.05, unit="s", meaning="tau"
+    ),
+}
+
+
+def start(p: Record) -> float:
+    """The bench starts at rest [N m]."""
+    return 0.0
+
+
+def advance(base: float, a: float, value: float, s: Record, p: Record) -> float:
+    """Behind the first lag, at the end of an implicit stage of size a [N m]."""
+    lag = 0.5 * p.two_lag_torque_sensor_time_constant
+    return base if lag == 0.0 else value + (base - value) * (lag / (lag + a))
+
+
+def advance_second(base: float, a: float, s: Record, p: Record) -> float:
+    """Behind the second lag [N m]."""
+    lag, value = 0.5 * p.two_lag_torque_sensor_time_constant, s.two_lag_torque_sensor_first
+    return base if lag == 0.0 else value + (base - value) * (lag / (lag + a))
+
+
+MEMORIES = {
+    "first": Memory(start, advance, follows="measured_shaft_torque"),
+    "second": Memory(start, advance_second),
+}
+
+
+def measured_shaft_torque(value: float, s: Record, p: Record) -> float:
+    """What is shown [N m]."""
+    return value if p.two_lag_torque_sensor_time_constant == 0.0 else s.two_lag_torque_sensor_second

@@ -1,0 +1,41 @@
+"""The dead time of the reference is long in some scans and short in the others.
+
+    b_k = b + A or b - A, as a fieldbus telegram just misses a scan of length T_s or not
+
+Source: J. Nilsson, Real-Time Control Systems with Delays, thesis, Lund 1998 (delays that jump
+between a few values). Which it is follows from the scan's number: the fractional part of its
+square times the golden ratio. A = 0: the constant dead time.
+"""
+
+from __future__ import annotations
+
+from math import floor
+from typing import TYPE_CHECKING
+
+from plant_emulator.effects.declaration import EffectParameter
+
+if TYPE_CHECKING:
+    from plant_emulator.kernel_types import Record
+
+SUBSYSTEM = "drive"
+PARAMETERS = {
+    "amplitude": EffectParameter(
+        neutral=0.0, lower=0.0, upper=0.05, plausible=0.005, unit="s", meaning="A"
+    ),
+    "scan_period": EffectParameter(
+        neutral=0.01, lower=0.001, upper=0.1, plausible=0.01, unit="s", meaning="T_s"
+    ),
+}
+
+GOLDEN = 0.6180339887498949
+
+
+def dead_time(value: float, s: Record, p: Record) -> float:
+    """Dead time in the scan that runs [s]."""
+    amplitude = p.two_valued_delay_amplitude
+    if amplitude == 0.0:
+        return value
+    scan = floor(s.time / p.two_valued_delay_scan_period + 1e-6)
+    turns = GOLDEN * scan * scan
+    drawn = turns - floor(turns)
+    return max(0.0, value + (amplitude if drawn < 0.5 else -amplitude))

@@ -1,0 +1,46 @@
+"""The library and the trial's own laws in one kernel, for these tests only."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from plant_emulator import kernel as kernels
+from plant_emulator.blind import laws
+from plant_emulator.blind.case import Case, Hidden
+from plant_emulator.effects import Effect
+
+
+@pytest.fixture(scope="package", autouse=True)
+def known() -> Iterator[dict[str, Effect]]:
+    """Effects of the library and laws of the trial, known to this process meanwhile."""
+    kernels.know(*(laws.load(name) for name in laws.names()))
+    yield dict(kernels.kernel().effects)
+    kernels.know()
+
+
+def case_with(*hidden: Hidden, kind: str = "effect", runs: int = 1) -> Case:
+    """A case of program 1 that hides these."""
+    return Case(
+        number=0,
+        kind=kind,  # type: ignore[arg-type]
+        programs=("program1",) * runs,
+        hidden=hidden,
+        parameters={},
+        gaps=(0.3,) * runs,
+        noise=1,
+    )
+
+
+def hidden(effect: str, subsystem: str, *, outside: bool = False, **values: float) -> Hidden:
+    """A hidden effect with the library's own law."""
+    return Hidden(
+        effect=effect, law=effect, subsystem=subsystem, outside=outside, values=values,
+        states=({},),
+    )  # fmt: skip
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder for a trial."""
+    return tmp_path / "trial"

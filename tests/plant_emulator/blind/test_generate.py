@@ -1,0 +1,55 @@
+"""The logs of a case."""
+
+import numpy as np
+import pytest
+
+from plant_emulator.blind.detectable import norms
+from plant_emulator.blind.generate import measured, true_logs
+from plant_emulator.log import COMPARED
+from plant_emulator.parameters import ParameterSet
+from plant_emulator.sensors import SENSORS
+from plant_emulator.simulate import run_of, simulate
+from tests.plant_emulator.blind.conftest import case_with, hidden
+
+
+def test_truth_has_the_start_in_the_gap_and_the_drift_of_its_case(nominal: ParameterSet) -> None:
+    """Fixed fine steps against adapted ones: the same bench within half a noise."""
+    (log,) = true_logs(case_with(kind="none"), nominal)
+    found = simulate(run_of(log), nominal.values(), gap_position=0.3)
+    other = simulate(run_of(log), nominal.values(), gap_position=-0.3)
+    errors = [np.abs(log[c] - found[c]).max() / SENSORS[c][0] for c in COMPARED]
+    assert 0.0 < max(errors) < 0.5
+    assert max(np.abs(log[c] - other[c]).max() / SENSORS[c][0] for c in COMPARED) > 5.0
+
+
+def test_measured_log_is_quantised_and_noisy(nominal: ParameterSet) -> None:
+    case = case_with(kind="none")
+    (true,) = true_logs(case, nominal)
+    seen = measured(case, true, 0)
+    deviation, step = SENSORS["armature_current"]
+    counts = seen["armature_current"] / step
+    np.testing.assert_allclose(counts, np.round(counts), atol=1e-6)
+    assert np.std(seen["armature_current"] - true["armature_current"]) == pytest.approx(
+        deviation, rel=0.1
+    )
+    np.testing.assert_array_equal(seen["speed_reference"], true["speed_reference"])
+
+
+def test_log_has_the_columns_of_the_bench_and_no_voltage(nominal: ParameterSet) -> None:
+    (log,) = true_logs(case_with(kind="none"), nominal)
+    assert set(log.signals) == {"speed_reference", *COMPARED, "shell_temperature"}
+
+
+def test_offset_of_a_sensor_has_the_norm_of_its_samples(nominal: ParameterSet) -> None:
+    """No parameter moves the torque alone: nearly offset / noise x sqrt(samples) is left."""
+    case = case_with(hidden("torque_sensor_offset", "torque_sensor", offset=0.5))
+    found = norms(case, true_logs(case, nominal), nominal)
+    level = np.hypot(0.25, 100 / 4096 / np.sqrt(12))
+    whole = 0.5 / level * np.sqrt(1851)
+    assert 0.5 * whole < found["torque_sensor_offset"] < whole
+
+
+def test_effect_that_drift_imitates_is_not_detectable(nominal: ParameterSet) -> None:
+    """A bench that only goes forwards: an asymmetry is another Coulomb friction."""
+    case = case_with(hidden("friction_asymmetry", "gear", asymmetry=0.02))
+    assert norms(case, true_logs(case, nominal), nominal)["friction_asymmetry"] < 7.0

@@ -1,0 +1,183 @@
+"""The trial as a whole: the diagnosis sees logs only, and an interrupted trial goes on."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from plant_emulator import logs
+from plant_emulator.blind.examiner import Examiner
+from plant_emulator.blind.folder import ROOT, program_hash
+from plant_emulator.blind.trial import Trial
+from plant_emulator.cli import main
+from plant_emulator.log import Log
+from plant_emulator.parameters import ParameterSet
+from plant_emulator.sensors import noisy
+from plant_emulator.simulate import run_of, simulate
+from tests.plant_emulator.runs import linear
+
+# Tells every file that a process opens and every module that it has in the end.
+WITNESS = """
+import atexit, sys
+out = open({out!r}, "w")
+def told(event, arguments):
+    if event in ("open", "os.listdir", "os.scandir"):
+        out.write(f"{{event}} {{arguments[0]}}\\n")
+sys.addaudithook(told)
+atexit.register(lambda: (out.write("\\n".join(f"module {{m}}" for m in sys.modules)), out.close()))
+"""
+
+
+@pytest.fixture
+def short_log(tmp_path: Path, nominal: ParameterSet) -> Path:
+    """A log of a few seconds of the nominal bench."""
+    run = linear((0.2, 0.0), (2.0, 230.0), (2.5, 230.0), (4.0, 60.0), duration=5.0)
+    found = simulate(run_of(run), nominal.values())
+    signals = {k: v for k, v in found.signals.items() if k != "armature_voltage"}
+    file = tmp_path / "given" / "program1.csv.gz"
+    file.parent.mkdir()
+    logs.write(noisy(Log(found.time, signals), 1), file)
+    return file
+
+
+@pytest.mark.slow
+def test_diagnosis_opens_no_answer_and_knows_no_law_of_the_trial(
+    tmp_path: Path, short_log: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trial = Trial(folder, 1, 2)
+    trial.seal()
+    witness = tmp_path / "witness"
+    witness.mkdir()
+    record = witness / "record.txt"
+    (witness / "sitecustomize.py").write_text(WITNESS.format(out=str(record)))
+    monkeypatch.setenv("PYTHONPATH", str(witness))
+    found = Examiner().diagnose([short_log])
+    assert found.error == ""
+    assert found.answer is not None
+    assert found.answer["schema"] == "gap-diagnosis/1"
+    told = record.read_text().splitlines()
+    assert "module plant_emulator.diagnosis.contest" in told
+    assert any(line.startswith("open ") and "program1.csv.gz" in line for line in told)
+    assert not [line for line in told if str(folder) in line or "sealed" in line]
+    assert not [line for line in told if "plant_emulator/blind" in line]
+    assert not [line for line in told if "plant_emulator.blind" in line]
+
+
+def test_witness_would_tell_of_an_opened_answer(tmp_path: Path, folder: Path) -> None:
+    import subprocess
+
+    Trial(folder, 1, 1).seal()
+    record = tmp_path / "record.txt"
+    answer = folder / "sealed" / "case_001.json"
+    program = f"{WITNESS.format(out=str(record))}\nopen({str(answer)!r})"
+    subprocess.run([sys.executable, "-c", program], check=True)
+    assert f"open {answer}" in record.read_text()
+
+
+def test_refused_log_is_told_by_its_one_line(tmp_path: Path, nominal: ParameterSet) -> None:
+    still = simulate(run_of(linear((0.0, 0.0), duration=1.0)), nominal.values())
+    file = tmp_path / "program1.csv.gz"
+    logs.write(still, file)
+    found = Examiner().diagnose([file])
+    assert found.answer is None
+    assert found.error.startswith("error: program1.csv.gz: motor_speed_rad_s moves by 0.0 rad/s")
+
+
+def test_stopped_examiner_starts_nothing(short_log: Path) -> None:
+    examiner = Examiner()
+    examiner.stop()
+    assert examiner.diagnose([short_log]).error == "stopped"
+
+
+def result(number: int, right: bool) -> dict[str, Any]:
+    """A case that is done."""
+    detail = {
+        "case": number + 1, "kind": "none", "truth": "none", "hidden": [], "programs": [],
+        "detectable": False, "verdict": "none" if right else "unknown", "effects": [],
+        "class": [], "answered": "none", "evidence": 3.0, "confidence": None, "right": right,
+        "top1": False, "false_alarm": not right, "subsystem": None, "located": False,
+        "closed_fraction": None, "closed_fraction_ci95": None, "closed_fraction_true": None,
+        "sizes": [], "seconds": 1.0, "error": "",
+    }  # fmt: skip
+    return {"detail": detail, "answer": None}
+
+
+def done(folder: Path, *right: bool) -> Trial:
+    """A trial all of whose cases are done."""
+    trial = Trial(folder, 1, len(right))
+    trial.seal()
+    for number, one in enumerate(right):
+        trial.folder.keep(number, result(number, one))
+    return trial
+
+
+def test_what_is_done_is_not_done_again(folder: Path) -> None:
+    done(folder, True, False)
+    again = Trial(folder, 1, 2)
+    again.seal()
+    found = again.answer(again.run(1))
+    assert (found["cases"], found["correct"], found["false_alarms"]) == (2, 1, 1)
+    assert len((folder / "cases.csv").read_text().splitlines()) == 3
+    assert (folder / "evidence.csv").read_text() == (
+        "kind,evidence,right\nnone,3.0,True\nunknown,3.0,False\n"
+    )
+
+
+def test_command_shows_the_table_and_writes_the_answer(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    done(folder, True, True)
+    target = folder.parent / "answer.json"
+    with pytest.raises(SystemExit) as stop:
+        main(["blind-trial", "--cases", "2", "--out", str(folder), "--json", str(target)])
+    assert stop.value.code == 0
+    shown = capsys.readouterr()
+    assert "Every case is right." in shown.out
+    assert "2 answers sealed, SHA-256 of the manifest" in shown.err
+    found = json.loads(target.read_text())
+    assert found["schema"] == "blind-trial/1"
+    assert found["confusion"] == {"none": {"none": 2}}
+
+
+def test_command_refuses_a_folder_of_another_seed(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    done(folder, True)
+    with pytest.raises(SystemExit) as stop:
+        main(["blind-trial", "--cases", "1", "--seed", "2", "--out", str(folder)])
+    assert stop.value.code == 2
+    assert capsys.readouterr().err.startswith("error: ")
+
+
+def test_program_hash_follows_the_source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from plant_emulator.blind import folder as module
+
+    assert (ROOT / "plant_emulator" / "kernel.py").is_file()
+    for package in ("plant_emulator", "register_maps"):
+        (tmp_path / package).mkdir()
+    source = tmp_path / "plant_emulator" / "laws.py"
+    source.write_text("a = 1")
+    monkeypatch.setattr(module, "ROOT", tmp_path)
+    before = program_hash()
+    source.write_text("a = 2")
+    assert program_hash() != before
+
+
+@pytest.mark.slow
+def test_a_bench_without_effect_is_diagnosed_unsealed_and_scored(
+    folder: Path, nominal: ParameterSet
+) -> None:
+    """One whole case, chosen by its truth from the cases of a seed."""
+    trial = Trial(folder, 2, 20)
+    trial.seal()
+    [number] = [k for k in range(20) if trial.folder.unseal(k).kind == "none"][:1]
+    for other in set(range(20)) - {number}:
+        trial.folder.keep(other, result(other, True))
+    details = trial.run(1)
+    assert details[number]["error"] == ""
+    assert details[number]["verdict"] in {"none", "parameter"}
+    assert not details[number]["false_alarm"]
+    assert np.isfinite(details[number]["evidence"])
