@@ -10,8 +10,7 @@ import numpy as np
 
 from plant_emulator.errors import EmulatorError, UnsettledError
 from plant_emulator.integrate import CHANNELS
-from plant_emulator.kernel import Kernel, vector
-from plant_emulator.kernel import kernel as default_kernel
+from plant_emulator.kernel import Kernel, kernel_for, vector
 from plant_emulator.simulate import values_of
 
 if TYPE_CHECKING:
@@ -70,8 +69,9 @@ class Bench:
         step: float = STEP,
         kernel: Kernel | None = None,
     ) -> None:
-        self._kernel = kernel or default_kernel()
-        self._p = self._kernel.parameter_record(values_of(parameters, effects))
+        values: Mapping[str, float] = values_of(parameters, effects)
+        self._kernel, values = (kernel, values) if kernel is not None else kernel_for(values)
+        self._p = self._kernel.parameter_record(values)
         self._stage = self._kernel.stage_record()
         self._stage.truck = float(truck)
         self._x = self._kernel.state(self._p, gap_position * self._p.backlash_half_gap)

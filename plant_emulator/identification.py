@@ -14,7 +14,6 @@ from plant_emulator import identification_report, logs
 from plant_emulator.errors import IdentificationError
 from plant_emulator.experiments import experiments
 from plant_emulator.identify import identify
-from plant_emulator.kernel import kernel
 from plant_emulator.preflight import preflight
 from plant_emulator.recording import recording
 from plant_emulator.search import GAP_POSITION
@@ -93,11 +92,12 @@ def identified(
     hold : as the option --reference; effects : those that the bench is known to have
     """
     hashes = _hashes([*paths, *held_out])
-    kernel()  # compiling is not part of the fit's time
     estimation, notes = _load(paths, parameters, hold)
     prediction, more = _load(held_out, parameters, hold)
     estimation = [with_own(r, effects) for r in estimation]
     prediction = [with_own(r, effects) for r in prediction]
+    given = values_of(parameters, effects)
+    simulate(estimation[0].run, given)  # compiling is not part of the fit's time
     begin = process_time()
     found = identify(estimation, parameters, free, effects=effects, progress=progress)
     spent = process_time() - begin

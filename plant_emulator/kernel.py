@@ -127,6 +127,27 @@ def _kernel(own: tuple[Effect, ...]) -> Kernel:
     return build({**shipped(), **{effect.name: effect for effect in own}})
 
 
+@cache
+def plain_kernel() -> Kernel:
+    """The kernel without effects: half the time where none of them is there."""
+    return build({})
+
+
+def kernel_for(values: Mapping[str, float]) -> tuple[Kernel, Mapping[str, float]]:
+    """The kernel that these values need, and those of them that it takes.
+
+    Where every effect is at its neutral value that is the one without effects: both give the same
+    there, bit for bit.
+    """
+    others = [name for name in values if name not in UNITS]
+    if others:
+        known = kernel()
+        neutral = effects.neutral(known.effects)
+        if any(values[name] != neutral.get(name) for name in others):
+            return known, values
+    return plain_kernel(), {name: value for name, value in values.items() if name in UNITS}
+
+
 def glue(known: Mapping[str, Effect]) -> str:
     """Source of the functions that only the list of effects determines."""
     lines: list[str] = []

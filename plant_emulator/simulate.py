@@ -15,14 +15,14 @@ import numpy as np
 
 from plant_emulator.errors import UnsettledError
 from plant_emulator.integrate import CHANNELS
-from plant_emulator.kernel import Kernel
-from plant_emulator.kernel import kernel as default_kernel
+from plant_emulator.kernel import kernel_for
 from plant_emulator.log import COMPARED, Array, Log
 from plant_emulator.sensors import SENSORS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from plant_emulator.kernel import Kernel
     from plant_emulator.parameters import ParameterSet
 
 Hold = Literal["linear", "staircase"]
@@ -113,7 +113,7 @@ def simulate(
         bench without effects
     step : a fixed step [s] instead of adapted ones
     """
-    model = kernel or default_kernel()
+    model, values = (kernel, values) if kernel is not None else kernel_for(values)
     out = np.zeros((len(run.time), len(CHANNELS)))
     p = model.parameter_record(values)
     x = model.state(p, gap_position * values["backlash_half_gap"])

@@ -90,7 +90,7 @@ def compared(
     theirs, their_error = study.fastest(solve)
     label = f"{peer}, rtol {theirs:g}"
     ways = {
-        name: study.raw(kernel.kernel(), tolerance),
+        name: study.raw(kernel.plain_kernel(), tolerance),
         f"{name}_simulate": lambda: study.simulated(tolerance),
     }
     for key, action in ways.items():
@@ -133,7 +133,7 @@ def cvodes(study: Study) -> Rows:
 def realtime(study: Study) -> Rows:
     """Simulated over CPU time, adaptive and with fixed steps."""
     tolerance, error = study.ours
-    model = kernel.kernel()
+    model = kernel.plain_kernel()
     adaptive = alone(study.raw(model, tolerance))
     yield row("realtime_adaptive", adaptive, "real time", study.duration, 1e4, ours_error=error)
     landing = alone(study.raw(model, tolerance, LARGEST_STEP))

@@ -207,7 +207,7 @@ class Contest:
         """Whether one more effect earns its place."""
         fall = base.cost - best.cost
         share = max(best.share, base.share)
-        further = fall > FURTHER * excess(null)
+        further = excess(null) > THRESHOLD and fall > FURTHER * excess(null)
         if base.effects:
             return fall > THRESHOLD and further
         # What an inadequate model leaves is correlated: then a fall is judged by the gap instead.

@@ -3,6 +3,7 @@
 An effect is a module with
 
     SUBSYSTEM    where it sits: drive, motor, motor_shaft, gear, ...
+    NEEDS        the sensor or manoeuvre without which a log hardly shows it, if there is one
     PARAMETERS   name -> EffectParameter; all at their neutral values = the effect is not there
     MEMORIES     name -> Memory, if it remembers anything (a lag, a temperature)
     and one function for each law of `plant_emulator.laws` that it changes, of the law's name:

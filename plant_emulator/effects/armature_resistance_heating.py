@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from plant_emulator.kernel_types import Record
 
 SUBSYSTEM = "motor"
+NEEDS = "log armature_voltage_V: the current loop hides the resistance"
 PARAMETERS = {
     "temperature_coefficient": EffectParameter(
         neutral=0.0, lower=0.0, upper=0.01, plausible=0.0039, unit="1/K", meaning="alpha"

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from plant_emulator.kernel_types import Record
 
 SUBSYSTEM = "drive"
+NEEDS = "log armature_voltage_V: the current loop hides what the converter loses"
 PARAMETERS = {
     "pause": EffectParameter(
         neutral=0.0, lower=0.0, upper=0.1, plausible=0.0066, unit="s", meaning="t_0"

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from plant_emulator.kernel_types import Record
 
 SUBSYSTEM = "gear"
+NEEDS = "a run in the other direction"
 PARAMETERS = {
     "asymmetry": EffectParameter(
         neutral=0.0, lower=-0.9, upper=0.9, plausible=0.1, unit="1", meaning="a"

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from plant_emulator.kernel_types import Record
 
 SUBSYSTEM = "gear"
+NEEDS = "a cold start, and a run of some minutes"
 PARAMETERS = {
     "viscosity_coefficient": EffectParameter(
         neutral=0.0, lower=0.0, upper=0.1, plausible=0.02, unit="1/K", meaning="beta"

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from plant_emulator.kernel_types import Record
 
 SUBSYSTEM = "drive"
+NEEDS = "a run that drives the current or the voltage into its limit for some time"
 PARAMETERS = {
     "share": EffectParameter(
         neutral=0.0, lower=0.0, upper=1.0, plausible=1.0, unit="1", meaning="k"

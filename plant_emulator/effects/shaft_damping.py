@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from plant_emulator.kernel_types import Record
 
 SUBSYSTEM = "motor_shaft"
+NEEDS = "torque sampled at some kHz: the shaft rings far above the log"
 PARAMETERS = {
     "damping": EffectParameter(
         neutral=0.0, lower=0.0, upper=1e3, plausible=10.0, unit="N m s/rad", meaning="d"

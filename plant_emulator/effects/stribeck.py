@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from plant_emulator.kernel_types import Record
 
 SUBSYSTEM = "gear"
+NEEDS = "long stretches below 0.5 rad/s of the drum"
 PARAMETERS = {
     "rise": EffectParameter(
         neutral=0.0, lower=0.0, upper=500.0, plausible=60.0, unit="N m", meaning="dT"

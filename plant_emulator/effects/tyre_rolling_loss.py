@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from plant_emulator.kernel_types import Record
 
 SUBSYSTEM = "wheel_contact"
+NEEDS = "a run with a truck on the drum"
 PARAMETERS = {
     "force": EffectParameter(
         neutral=0.0, lower=0.0, upper=2e3, plausible=150.0, unit="N", meaning="F"

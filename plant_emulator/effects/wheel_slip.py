@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from plant_emulator.kernel_types import Record
 
 SUBSYSTEM = "wheel_contact"
+NEEDS = "a run with a truck on the drum"
 PARAMETERS = {
     "slip_per_force": EffectParameter(
         neutral=0.0, lower=0.0, upper=1e-3, plausible=1e-5, unit="1/N", meaning="c"

@@ -206,7 +206,8 @@ def test_experiment_that_would_determine_the_flux_is_named(
     both = identify([*logs, recording(noisy(made, seed=1))], nominal)
     flux = next(p for p in both.parameters if p.name == "flux_constant_2")
     assert flux.identifiable
-    assert flux.data_error == pytest.approx(advice.standard_error, rel=0.25)
+    # the spread of a standard error that rests on where the drum meets the gear in the new run
+    assert 0.5 < flux.data_error / advice.standard_error < 2.0
 
 
 def test_samples_left_out_do_not_count(nominal: ParameterSet, bench_log: Reader) -> None:

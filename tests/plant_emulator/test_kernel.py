@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from plant_emulator import compiler, effects, laws, stage
-from plant_emulator.kernel import Kernel, build, glue, kernel
+from plant_emulator.errors import ParameterError
+from plant_emulator.kernel import Kernel, build, glue, kernel, kernel_for, plain_kernel
 from plant_emulator.log import COMPARED
 from plant_emulator.parameters import ParameterSet
 from plant_emulator.simulate import values_of
@@ -66,7 +67,7 @@ def test_all_effects_at_their_neutral_values_leave_the_run_bit_for_bit(
     nominal: ParameterSet,
 ) -> None:
     bare = simulate(INPUTS, nominal.values(), kernel=build({}))
-    composed = simulate(INPUTS, nominal.values())
+    composed = simulate(INPUTS, nominal.values(), kernel=kernel())
     assert len(kernel().effects) == len(effects.names()) >= 2
     for name in bare.signals:
         np.testing.assert_array_equal(bare[name], composed[name])
@@ -74,7 +75,7 @@ def test_all_effects_at_their_neutral_values_leave_the_run_bit_for_bit(
 
 @needs_compiler
 def test_switching_an_effect_on_compiles_nothing(nominal: ParameterSet) -> None:
-    simulate(INPUTS, nominal.values())
+    simulate(INPUTS, nominal.values(), kernel=kernel())
     before = len(kernel().run.__wrapped__.signatures)  # type: ignore[attr-defined]
     for name in effects.names():
         plausible = {name: effects.load(name).plausible()}
@@ -84,6 +85,21 @@ def test_switching_an_effect_on_compiles_nothing(nominal: ParameterSet) -> None:
 
 def test_kernel_is_built_once_a_process() -> None:
     assert kernel() is kernel()
+
+
+def test_effects_that_are_not_there_cost_nothing(nominal: ParameterSet) -> None:
+    """The kernel without effects, for which the nominal run is the same bit for bit."""
+    assert kernel_for(nominal.values())[0] is plain_kernel()
+    lag = {"torque_sensor_lag_time_constant": 0.0}
+    model, values = kernel_for({**nominal.values(), **lag})
+    assert model is plain_kernel()
+    assert values == nominal.values()
+    assert kernel_for({**nominal.values(), **dict.fromkeys(lag, 0.1)})[0] is kernel()
+
+
+def test_value_of_no_effect_is_refused(nominal: ParameterSet) -> None:
+    with pytest.raises(ParameterError, match="nonsense: neither a parameter"):
+        simulate(INPUTS, {**nominal.values(), "nonsense": 1.0})
 
 
 def test_effects_are_chained_in_the_order_of_the_list() -> None:

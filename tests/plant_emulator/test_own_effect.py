@@ -69,7 +69,7 @@ def test_own_effect_acts_beside_the_shipped_ones(own: effects.Effect, process: s
     answer = subprocess.run(
         [sys.executable, "-c", SIMULATED, own.file],
         env={**os.environ, "PYTHONPATH": str(ROOT)}, cwd=ROOT,
-        capture_output=True, text=True, check=True, timeout=120,
+        capture_output=True, text=True, check=True, timeout=500,
     )  # fmt: skip
     names, _, torque = answer.stdout.rpartition(" ")
     assert names == str(sorted([*effects.names(), "oil_drag"]))

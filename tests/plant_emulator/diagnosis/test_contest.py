@@ -1,0 +1,217 @@
+"""The contest on a machine so small that it can be checked by hand."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from plant_emulator.diagnosis import explain as engine
+from plant_emulator.diagnosis.contest import Point, Tangents, linearised, null_fit, signature
+from plant_emulator.diagnosis.explain import Contest, Explanation, adequate, excess
+from plant_emulator.diagnosis.model import Candidate, Run
+from plant_emulator.diagnosis.pool import Here
+from plant_emulator.estimation import Array, Unknown
+
+TIME = np.linspace(-1.0, 1.0, 2000)
+
+
+def linear(name: str, start: float = 1.0, **more: float) -> Unknown:
+    """An unknown on a linear scale."""
+    return Unknown(name=name, start=start, lower=-50.0, upper=50.0, logarithmic=False, **more)  # type: ignore[arg-type]
+
+
+def effect(name: str, size: float = 1.0) -> Candidate:
+    """An effect with one size."""
+    return Candidate(
+        name=name,
+        subsystem=f"part of {name}",
+        sizes=(linear(f"{name}_size", size, scale=size),),
+        shapes=(),
+        states=(),
+        neutral={f"{name}_size": 0.0},
+        fixed={},
+        units={f"{name}_size": "1"},
+        title=f"The {name}",
+    )
+
+
+SHAPES: dict[str, Callable[[Array], Array]] = {
+    "cube": lambda x: x**3,
+    "wave": lambda x: np.sin(20.0 * x),
+    "kink": np.abs,
+    "near kink": lambda x: np.abs(x) + 1e-3 * np.sin(9.0 * x),
+}
+
+
+class Line:
+    """y = a + b x + effects, noise 1: linear, so that every step has a closed form."""
+
+    parameters = (linear("a", 0.0, std=10.0), linear("b", 0.0, std=10.0))
+    units: Mapping[str, str] = {"a": "1", "b": "1"}
+    subsystems: Mapping[str, str] = {"a": "level", "b": "slope"}
+    states: tuple[Unknown, ...] = ()
+
+    def __init__(self, measured: Sequence[Array], names: Sequence[str] = tuple(SHAPES)) -> None:
+        self.measured = list(measured)
+        self.candidates = {name: effect(name) for name in names}
+        self.runs = [
+            Run(
+                source=f"run {k}",
+                channels=("y",),
+                units=("1",),
+                time=TIME,
+                measured=y[None, :],
+                noise=np.ones(1),
+            )
+            for k, y in enumerate(measured)
+        ]
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+
+        def residual(v: Mapping[str, float]) -> Array:
+            y = v["a"] + v["b"] * TIME
+            for name in effects:
+                y = y + v[f"{name}_size"] * SHAPES[name](TIME)
+            return (self.measured[run] - y)[None, :]
+
+        return residual
+
+    def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
+        """See `Model`."""
+        return {"a": 0.0, "b": 0.0}, [{} for _ in runs]
+
+    def start_states(
+        self, run: int, effects: Sequence[str], values: Mapping[str, float]
+    ) -> dict[str, float]:
+        """See `Model`."""
+        return {}
+
+
+class Given:
+    """A recipe of a model that is there already."""
+
+    def __init__(self, model: Line) -> None:
+        self.model = model
+
+    def build(self) -> Line:
+        """The model."""
+        return self.model
+
+    def digest(self) -> str:
+        """Its identity."""
+        return str(id(self.model))
+
+
+def noisy(y: Array, seed: int = 0) -> Array:
+    """With noise of 1."""
+    return y + np.random.default_rng(seed).standard_normal(len(TIME))
+
+
+def explained(model: Line) -> Explanation:
+    """The contest over all runs."""
+    return Contest(Here(), Given(model), tuple(model.candidates), range(len(model.runs))).explain()
+
+
+def test_signature_is_what_a_line_cannot_follow() -> None:
+    """By hand: x^3 minus its best line 3/5 x has the norm sqrt(n (1/7 - 3 (1/5)^2))."""
+    model = Line([noisy(2.0 + 3.0 * TIME)])
+    base = null_fit(model, [0])
+    found = signature(model, "cube", base, [0], Tangents(linearised(model, base, [0])))
+    assert found is not None
+    assert found.norm == pytest.approx(np.sqrt(2000 * (1 / 7 - 3 / 25)), rel=0.01)
+    assert found.raw == pytest.approx(np.sqrt(2000 / 7), rel=0.01)
+    assert found.imitated_by == "b"
+
+
+def test_prior_keeps_drift_from_imitating() -> None:
+    model = Line([noisy(2.0 + 3.0 * TIME)])
+    free = signature_norm(model)
+    model.parameters = (linear("a", 0.0, std=10.0), linear("b", 3.0, prior=3.0, std=1e-4))
+    assert signature_norm(model) == pytest.approx(np.sqrt(2000 / 7), rel=0.01)
+    assert free < 0.5 * np.sqrt(2000 / 7)
+
+
+def signature_norm(model: Line) -> float:
+    """Norm of the cube's drift-free signature."""
+    base = null_fit(model, [0])
+    found = signature(model, "cube", base, [0], Tangents(linearised(model, base, [0])))
+    assert found is not None
+    return found.norm
+
+
+def test_planted_effect_is_named_with_its_size() -> None:
+    found = explained(Line([noisy(2.0 + 3.0 * TIME + 0.8 * np.sin(20.0 * TIME))]))
+    assert found.final.effects == ("wave",)
+    assert found.final.values["wave_size"] == pytest.approx(0.8, abs=0.1)
+    # by hand: the fall of the cost is size^2 n / 2
+    wave = next(c for c in found.contenders if c.effect == "wave")
+    assert found.evidence(wave) == pytest.approx(0.8**2 * 1000, rel=0.15)
+    assert found.classes() == [["wave"]]
+
+
+def test_both_of_two_effects_are_named() -> None:
+    y = 2.0 + 3.0 * TIME + 0.8 * np.sin(20.0 * TIME) - 3.0 * TIME**3
+    found = explained(Line([noisy(y)]))
+    assert set(found.final.effects) == {"wave", "cube"}
+    assert adequate(found.final, found.null)
+
+
+def test_nothing_is_named_where_only_the_line_has_drifted() -> None:
+    for seed in range(20):
+        found = explained(Line([noisy(5.0 - 4.0 * TIME, seed)]))
+        assert found.final.effects == (), seed
+
+
+def test_effects_that_look_the_same_are_a_class() -> None:
+    found = explained(Line([noisy(2.0 + 3.0 * TIME + 2.0 * np.abs(TIME))]))
+    assert len(found.final.effects) == 1
+    (names,) = found.classes()
+    assert set(names) == {"kink", "near kink"}
+
+
+def test_what_no_effect_explains_stays_unexplained() -> None:
+    y = 2.0 + 3.0 * TIME + 2.0 * np.sign(np.sin(7.0 * TIME))
+    found = explained(Line([noisy(y)], names=("wave", "cube")))
+    assert not adequate(found.final, found.null)
+
+
+def test_excess_is_what_the_noise_does_not_explain() -> None:
+    point = Point(
+        effects=(),
+        values={},
+        states=(),
+        cost=0.0,
+        squares=1500.0,
+        samples=1000,
+        share=1.0,
+        errors={},
+        converged=True,
+    )
+    assert excess(point) == pytest.approx(1500 - 1020)
+    assert excess(replace(point, squares=900.0)) == 0.0
+
+
+def test_correlated_residual_takes_evidence_away() -> None:
+    """Noise with a memory of 20 samples: shapes fit it by chance, and must hardly be named.
+
+    With white-noise evidence 16 of these 30 would name one.
+    """
+    random, named = np.random.default_rng(4), 0
+    for _ in range(30):
+        white = random.standard_normal(len(TIME) + 100)
+        slow = np.convolve(white, np.ones(20) / np.sqrt(20.0), mode="valid")[: len(TIME)]
+        found = explained(Line([slow]))
+        named += bool(found.final.effects) and adequate(found.final, found.null)
+    assert named <= 3
+
+
+def test_contest_is_the_same_whoever_runs_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Restarts and polishing do not depend on the order in which answers come."""
+    model = Line([noisy(2.0 + 0.8 * np.sin(20.0 * TIME))])
+    forward = explained(model)
+    model.candidates = dict(reversed(model.candidates.items()))
+    assert explained(model).final.effects == forward.final.effects
+    monkeypatch.setattr(engine, "POLISHED", 1)
+    assert explained(model).final.effects == forward.final.effects
