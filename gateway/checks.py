@@ -13,14 +13,23 @@ OF_SILENCE = Alarm.COMMUNICATION | Alarm.SETPOINT_REJECTED
 """Alarms that stand until they are acknowledged; before a run they tell of the last one."""
 APART_AT_REST, APART_RUNNING = 0.5, 3.0
 """[rad/s] that motor / ratio and drum may differ: in the backlash the drum runs ahead by 1.3."""
+QUIET = 1.0
+"""[s] for which no other master may have written."""
 
 
 def check(
-    config: Config, measurement: Measurement, *, state: State, overruns: int, echo_age: float
+    config: Config,
+    measurement: Measurement,
+    *,
+    state: State,
+    overruns: int,
+    echo_age: float,
+    other_age: float,
 ) -> Reason | None:
     """The first check that does not hold, None: all hold.
 
     overruns : deadlines missed in a row; echo_age : since the PLC last took a command over [s]
+    other_age : since it last took over one that is not ours [s]
     """
     running = state is State.RUN
     problem = (
@@ -30,6 +39,8 @@ def check(
     )
     if problem is not None:
         return problem
+    if other_age <= QUIET:
+        return Reason.OTHER_MASTER
     if running:
         return _running(config, overruns, echo_age)
     return None if Status.READY in measurement.status else Reason.PLC_NOT_READY

@@ -17,6 +17,13 @@ from register_maps.signals import Control, Measurement, Mode, Setpoint, Status
 
 WRITING = frozenset({State.ARMED, State.RUN, State.RAMPDOWN, State.SAFE})
 ENABLING = frozenset({State.RUN, State.RAMPDOWN})
+NOT_BY_WAITING = LINK_IS_DOWN | {Reason.NOT_ENCODABLE}
+"""Faults that the next write will meet as well."""
+RECENT, JITTER = 0.25, 0.1
+"""[s] Age of a command that somebody still writes: the slowest gateway does so every 0.2 s; and by
+how much it has to be younger than our last one."""
+MICRO, NUMBERS = 1e6, 30011
+"""Parts of a second, and how many first numbers there are: a prime, so that no period shows."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,27 +31,57 @@ class Command:
     """What was last written: number of the block, setpoint [rad/s], when [s]; and the PLC's echo.
 
     number : None: nothing written yet
+    sent : when a block was last written [s]; unanswered : how many since the one echoed last
     echo_moved : when the echo last changed, or the run began [s]
+    other_wrote : when the PLC last took over a block that is not ours [s]
     got_through : when the last block was written that is known to have arrived [s]
-    fault : of the first write since then that failed; down : of the last, and the link is gone
+    fault : of the first write since then that failed; down : the last, and waiting does not help
     """
 
     number: int | None = None
     speed: float = 0.0
     written: float = 0.0
+    sent: float = -inf
+    unanswered: int = 0
     echo: int | None = None
     echo_moved: float = -inf
+    other_wrote: float = -inf
     got_through: float = -inf
     fault: Reason | None = None
     down: bool = False
 
 
-def echoed(command: Command, newest: Measurement | None, now: float) -> Command:
-    """Note whether the PLC has taken a command over."""
-    echo = None if newest is None else newest.command_sequence_echo
-    if echo is None or echo == command.echo:
+def echoed(
+    register_map: RegisterMap, command: Command, sample: Measurement | None, now: float
+) -> Command:
+    """Note which command the PLC has taken over by a new sample, and whether it was one of ours."""
+    if sample is None:
         return command
-    return replace(command, echo=echo, echo_moved=now)
+    if _is_fed(command, sample.command_age, now):
+        command = replace(command, other_wrote=now)
+    echo, before = sample.command_sequence_echo, command.echo
+    if echo is None or echo == before:
+        return command
+    moved = replace(command, echo=echo, echo_moved=now)
+    since = _since(register_map, command, echo)
+    if since is not None:
+        return replace(moved, unanswered=since)
+    return moved if before is None else replace(moved, other_wrote=now)
+
+
+def _is_fed(command: Command, age: float | None, now: float) -> bool:
+    """Whether the PLC has taken a command over after our last one, of `age` [s] now."""
+    return age is not None and age < RECENT and now - command.sent > age + JITTER
+
+
+def _since(register_map: RegisterMap, command: Command, echo: int) -> int | None:
+    """How many blocks have been written after the one that is echoed; None: it is not ours."""
+    if command.number is None:
+        return None
+    since = command.number - echo
+    if span := register_map.modulus("command_sequence"):
+        since %= int(span)
+    return since if since in range(command.unanswered) else None
 
 
 def answered(command: Command, measurement: Measurement | None, fault: Reason | None) -> Command:
@@ -56,7 +93,7 @@ def answered(command: Command, measurement: Measurement | None, fault: Reason | 
         return command
     if fault is None:
         return replace(command, got_through=command.written, fault=None, down=False)
-    return replace(command, fault=command.fault or fault, down=fault in LINK_IS_DOWN)
+    return replace(command, fault=command.fault or fault, down=fault in NOT_BY_WAITING)
 
 
 def complaint(command: Command, now: float, stale: float) -> Reason | None:
@@ -71,12 +108,24 @@ def nothing(command: Command, now: float) -> Command:
 
 
 def following(register_map: RegisterMap, command: Command, limited: Limited, now: float) -> Command:
-    """The next block: one number up, the first one up from the echo, as the PLC ignores repeats."""
-    last = command.echo if command.number is None else command.number
-    number = (last or 0) + 1
+    """The next block: one number up. The first is that of the moment, but not the echo's.
+
+    The PLC ignores repeats; and of two gateways that begin together each knows its numbers.
+    """
+    if command.number is None:
+        number = (command.echo or 0) + 1 + int(now * MICRO) % NUMBERS
+    else:
+        number = command.number + 1
     if span := register_map.modulus("command_sequence"):
         number %= int(span)
-    return replace(command, number=number, speed=limited.speed, written=now)
+    return replace(
+        command,
+        number=number,
+        speed=limited.speed,
+        written=now,
+        sent=now,
+        unanswered=command.unanswered + 1,
+    )
 
 
 def driven(config: Config) -> Mode:

@@ -125,12 +125,14 @@ def step(
     """One tick."""
     now = observation.now
     read = samples.take(state.samples, observation.measurement, observation.fault, now)
+    read = samples.weighed(config, register_map, read)
     sent = command.answered(state.command, observation.measurement, observation.fault)
-    state = replace(state, samples=read, command=command.echoed(sent, read.newest, now))
+    sent = command.echoed(register_map, sent, read.newest if read.is_new else None, now)
+    state = replace(state, samples=read, command=sent)
     supervisor = advance(state.supervisor, _facts(config, state, observation))
     if supervisor.state is State.RUN and state.supervisor.state is not State.RUN:
         state = _bumpless(state, now)
-    state = _regulated(config, register_map, replace(state, supervisor=supervisor), now)
+    state = _regulated(config, replace(state, supervisor=supervisor), now)
     limited = _limited(config, state, now)
     state = _followed(config, state, limited, now)
     state, setpoint = _written(config, register_map, state, limited, now)
@@ -159,6 +161,7 @@ def _facts(config: Config, state: CycleState, observation: Observation) -> Facts
             state=before,
             overruns=observation.overruns,
             echo_age=0.0 if state.command.echo is None else now - state.command.echo_moved,
+            other_age=now - state.command.other_wrote,
         ),
         remote=Status.REMOTE in status,
         confirmed=command.confirmed(config, status),
@@ -177,10 +180,8 @@ def _bumpless(state: CycleState, now: float) -> CycleState:
     return replace(state, command=started)
 
 
-def _regulated(
-    config: Config, register_map: RegisterMap, state: CycleState, now: float
-) -> CycleState:
-    """State after the regulator has seen this tick's sample, if there is a new one."""
+def _regulated(config: Config, state: CycleState, now: float) -> CycleState:
+    """State after the regulator has seen this tick's window, if there is one."""
     newest, supervisor = state.samples.newest, state.supervisor
     if newest is None or supervisor.state in UNLINKED:
         return replace(state, regulator=None, demand=None)
@@ -190,10 +191,9 @@ def _regulated(
         seeded = regulator.seed(state.params, newest.motor_speed, newest.drum_speed)
         measured = Demand(speed=max(newest.motor_speed, 0.0))
         return replace(state, regulator=seeded, demand=measured, demanded=now)
-    window = samples.window(config, register_map, state.samples)
-    if window is None:
+    if state.samples.window is None:
         return state
-    after, demand = regulator.update(state.params, state.regulator, window)
+    after, demand = regulator.update(state.params, state.regulator, state.samples.window)
     if config.regulator.torque == "instantaneous":
         demand = replace(demand, rate=0.0)  # the thesis's staircase, kept to show what it does
     return replace(state, regulator=after, demand=demand, demanded=now)

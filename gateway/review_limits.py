@@ -6,8 +6,9 @@ from math import pi
 from gateway.config import Config
 from gateway.finding import Finding
 from gateway.friction import friction_torque
-from gateway.review_loop import SCAN, rho_of
+from gateway.review_loop import rho_of
 from gateway.road_load import road_load
+from gateway.samples import SCAN
 from gateway.stability import DRIVE
 
 RESPONSE = 0.1

@@ -10,10 +10,9 @@ from dataclasses import replace
 
 from gateway.config import Config
 from gateway.finding import Finding
+from gateway.samples import SCAN
 from gateway.stability import Loop, smallest_mass, spectral_radius
 
-SCAN = 0.01
-"""[s] over which the PLC's mean is taken (its fast task hands it on every scan)."""
 RHO_REFUSED, RHO_WARNED = 0.9, 0.5
 
 
@@ -37,7 +36,8 @@ def loop_of(config: Config) -> Loop:
     )
 
 
-def _lead(config: Config) -> float:
+def lead_of(config: Config) -> float:
+    """Lead that the regulator takes [s]; the thesis's takes none."""
     return 0.0 if config.regulator.name == "thesis" else config.regulator.lead
 
 
@@ -54,7 +54,7 @@ def _filters_match(config: Config) -> bool:
 def gain(config: Config) -> Iterator[Finding]:
     """rho, and whether what a high one takes is there."""
     rho = rho_of(config)
-    safe = _same_window(config) and _filters_match(config) and _lead(config) == 0.0
+    safe = _same_window(config) and _filters_match(config) and lead_of(config) == 0.0
     severity = "info"
     if rho > RHO_WARNED:
         severity = "warning" if rho <= RHO_REFUSED or safe else "error"
@@ -87,8 +87,8 @@ def stability(config: Config) -> Iterator[Finding]:
         value=round(least),
         allowed=f"<= {mass:g}",
     )
-    radius = spectral_radius(replace(loop, lead=_lead(config)), rho)
-    if _lead(config) > 0.0:
+    radius = spectral_radius(replace(loop, lead=lead_of(config)), rho)
+    if lead_of(config) > 0.0:
         yield Finding(
             severity="info" if radius <= 1.0 + 1e-7 else "warning",
             where="regulator.lead_s",

@@ -1,6 +1,7 @@
 """What keeps from arming and what ends a run: each check at its edge, and which is named first."""
 
 from dataclasses import replace
+from math import inf
 
 import pytest
 
@@ -34,8 +35,15 @@ GOOD = Measurement(
 BEFORE = (State.CONNECT, State.SHADOW, State.ARMED)
 
 
-def found(measurement=GOOD, state=State.RUN, *, overruns=0, echo_age=0.0):
-    return check(CONFIG, measurement, state=state, overruns=overruns, echo_age=echo_age)
+def found(measurement=GOOD, state=State.RUN, *, overruns=0, echo_age=0.0, other_age=inf):
+    return check(
+        CONFIG,
+        measurement,
+        state=state,
+        overruns=overruns,
+        echo_age=echo_age,
+        other_age=other_age,
+    )
 
 
 def without(status):
@@ -155,6 +163,13 @@ def test_commands_that_are_not_taken_over_for_100_ms_end_a_run():
     assert found(echo_age=0.101) is Reason.NOT_ECHOED
 
 
+@pytest.mark.parametrize("state", State)
+def test_another_master_counts_in_every_state_for_a_second(state):
+    assert found(state=state, other_age=0.0) is Reason.OTHER_MASTER
+    assert found(state=state, other_age=1.0) is Reason.OTHER_MASTER
+    assert found(state=state, other_age=1.01) is None
+
+
 @pytest.mark.parametrize("state", BEFORE)
 def test_deadlines_and_echo_keep_from_nothing_before_a_run(state):
     assert found(state=state, overruns=1000, echo_age=10.0) is None
@@ -165,5 +180,6 @@ def test_the_bench_is_named_before_its_alarm_and_that_before_the_speeds():
     assert found(worst) is Reason.EMERGENCY_STOP
     assert found(replace(worst, interlock=CLOSED)) is Reason.PLC_ALARM
     assert found(replace(worst, interlock=CLOSED, alarm=None)) is Reason.IMPLAUSIBLE
-    assert found(replace(GOOD, drum_speed=-9.0), overruns=99) is Reason.IMPLAUSIBLE
+    assert found(replace(GOOD, drum_speed=-9.0), other_age=0.0) is Reason.IMPLAUSIBLE
+    assert found(overruns=99, other_age=0.0) is Reason.OTHER_MASTER
     assert found(overruns=99, echo_age=9.0) is Reason.OVERRUN

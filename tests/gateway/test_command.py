@@ -34,6 +34,7 @@ def test_before_the_first_tick_nothing_is_written_nor_known():
     assert (begin.number, begin.echo, begin.fault) == (None, None, None)
     assert (begin.speed, begin.written) == (0.0, 0.0)
     assert (begin.echo_moved, begin.got_through) == (-inf, -inf)
+    assert (begin.sent, begin.other_wrote, begin.unanswered) == (-inf, -inf, 0)
     assert not begin.down
 
 
@@ -42,15 +43,24 @@ def test_writing_begins_in_armed_and_enables_from_run_to_the_end_of_the_rampdown
     assert {State.RUN, State.RAMPDOWN} == command.ENABLING
 
 
-def test_the_first_number_is_one_up_from_the_echo_and_the_next_from_the_last():
-    seen = command.echoed(Command(), READING, 5.0)
-    first = command.following(MAP, seen, PASSED, 5.0)
-    assert first.number == 42
-    assert command.following(MAP, first, PASSED, 5.01).number == 43
+@pytest.mark.parametrize(
+    ("now", "number"),
+    [(0.0, 42), (0.000001, 43), (0.03001, 42 + 30010), (0.030011, 42), (1.0, 42 + 9637)],
+)
+def test_the_first_number_is_of_the_moment_and_up_from_the_echo(now, number):
+    """One up and the microseconds modulo 30011; so it is never the echo's."""
+    seen = command.echoed(MAP, Command(), READING, now)
+    first = command.following(MAP, seen, PASSED, now)
+    assert first.number == number
+    assert command.following(MAP, first, PASSED, now + 0.01).number == number + 1
 
 
-def test_without_an_echo_the_first_number_is_one():
-    assert command.following(MAP, Command(), PASSED, 5.0).number == 1
+def test_without_an_echo_the_first_number_counts_from_one():
+    assert command.following(MAP, Command(), PASSED, 0.0).number == 1
+
+
+def test_a_first_number_wraps_too():
+    assert command.following(MAP, Command(echo=65530), PASSED, 0.00001).number == 5
 
 
 def test_number_zero_counts_as_one_that_was_written():
@@ -72,22 +82,91 @@ def test_a_map_without_the_number_does_not_wrap_it():
 
 def test_what_was_written_is_kept_with_its_time():
     after = command.following(MAP, Command(), PASSED, 5.0)
-    assert (after.speed, after.written) == (120.0, 5.0)
+    assert (after.speed, after.written, after.sent, after.unanswered) == (120.0, 5.0, 5.0, 1)
     stopped = command.nothing(after, 6.0)
-    assert (stopped.speed, stopped.written, stopped.number) == (0.0, 6.0, 1)
+    assert (stopped.speed, stopped.written, stopped.sent) == (0.0, 6.0, 5.0)
+    assert stopped.number == after.number
 
 
 def test_the_echo_moves_when_it_changes():
-    seen = command.echoed(Command(), READING, 5.0)
+    seen = command.echoed(MAP, Command(), READING, 5.0)
     assert (seen.echo, seen.echo_moved) == (41, 5.0)
-    assert command.echoed(seen, READING, 6.0) == seen
-    later = command.echoed(seen, replace(READING, command_sequence_echo=42), 6.0)
+    assert command.echoed(MAP, seen, READING, 6.0) == seen
+    later = command.echoed(MAP, seen, replace(READING, command_sequence_echo=42), 6.0)
     assert (later.echo, later.echo_moved) == (42, 6.0)
 
 
 @pytest.mark.parametrize("reading", [None, replace(READING, command_sequence_echo=None)])
 def test_no_echo_is_no_news(reading):
-    assert command.echoed(Command(), reading, 5.0) == Command()
+    assert command.echoed(MAP, Command(), reading, 5.0) == Command()
+
+
+def echo_of(number, *, written, last, unanswered, register_map=MAP):
+    """What becomes of a command when the PLC echoes this number after another."""
+    begin = Command(number=written, echo=last, unanswered=unanswered, sent=9.99)
+    return command.echoed(register_map, begin, replace(READING, command_sequence_echo=number), 10.0)
+
+
+@pytest.mark.parametrize(
+    ("number", "unanswered"), [(48, 2), (50, 0), (46, 4)], ids=["two left", "newest", "oldest"]
+)
+def test_an_echo_of_what_was_written_since_the_last_echo_is_ours(number, unanswered):
+    after = echo_of(number, written=50, last=45, unanswered=5)
+    assert (after.other_wrote, after.unanswered) == (-inf, unanswered)
+    assert (after.echo, after.echo_moved) == (number, 10.0)
+
+
+@pytest.mark.parametrize("number", [44, 51, 20000])
+def test_an_echo_of_any_other_number_is_another_masters(number):
+    after = echo_of(number, written=50, last=45, unanswered=5)
+    assert (after.other_wrote, after.unanswered) == (10.0, 5)
+    assert (after.echo, after.echo_moved) == (number, 10.0)
+
+
+def test_our_numbers_are_ours_across_the_end_of_the_register():
+    assert echo_of(65535, written=1, last=65533, unanswered=4).other_wrote == -inf
+    assert echo_of(0, written=1, last=65533, unanswered=4).unanswered == 1
+    assert echo_of(2, written=1, last=65533, unanswered=4).other_wrote == 10.0
+
+
+def test_numbers_that_do_not_wrap_are_told_apart_as_well():
+    kept = tuple(one for one in MAP.registers if one.signal != "command_sequence")
+    bare = replace(MAP, registers=kept)
+    assert echo_of(48, written=50, last=45, unanswered=5, register_map=bare).unanswered == 2
+    assert echo_of(51, written=50, last=45, unanswered=5, register_map=bare).other_wrote == 10.0
+
+
+def test_an_echo_that_moves_before_anything_was_written_is_another_masters():
+    seen = command.echoed(MAP, Command(), READING, 9.0)
+    assert seen.other_wrote == -inf
+    later = command.echoed(MAP, seen, replace(READING, command_sequence_echo=42), 10.0)
+    assert later.other_wrote == 10.0
+    zero = command.echoed(MAP, seen, replace(READING, command_sequence_echo=0), 10.0)
+    assert zero.other_wrote == 10.0
+
+
+@pytest.mark.parametrize(
+    ("sent", "age", "seen"),
+    [
+        (-inf, 0.0, True),
+        (-inf, 0.24, True),
+        (-inf, 0.25, False),
+        (9.99, 0.0, False),
+        (9.875, 0.0, True),
+        (9.75, 0.125, True),
+        (9.75, 0.2, False),
+    ],
+)
+def test_a_command_younger_than_our_last_one_is_another_masters(sent, age, seen):
+    """Its age by the PLC; ours was written at `sent`, 10 s is now; 0.1 s may lie between."""
+    reading = replace(READING, command_age=age)
+    after = command.echoed(MAP, Command(echo=41, sent=sent), reading, 10.0)
+    assert after.other_wrote == (10.0 if seen else -inf)
+
+
+def test_a_command_exactly_as_late_as_may_be_is_ours():
+    reading = replace(READING, command_age=0.0)
+    assert command.echoed(MAP, Command(echo=41, sent=0.0), reading, 0.1).other_wrote == -inf
 
 
 SENT = Command(number=3, written=5.0, got_through=4.99)
@@ -118,9 +197,12 @@ def test_writes_are_complained_of_when_none_got_through_in_time():
     assert command.complaint(failed, 5.126, 0.125) is Reason.TIMEOUT
 
 
-def test_a_lost_link_is_complained_of_at_once():
-    failed = command.answered(SENT, READING, Reason.CONNECTION_LOST)
-    assert command.complaint(failed, 5.0, 0.1) is Reason.CONNECTION_LOST
+@pytest.mark.parametrize(
+    "fault", [Reason.CONNECTION_LOST, Reason.NOT_CONNECTED, Reason.NOT_ENCODABLE]
+)
+def test_what_no_waiting_cures_is_complained_of_at_once(fault):
+    failed = command.answered(SENT, READING, fault)
+    assert command.complaint(failed, 5.0, 0.1) is fault
 
 
 def test_without_a_fault_there_is_no_complaint_however_long_nothing_was_written():

@@ -12,6 +12,7 @@ from gateway.reasons import Reason
 from gateway.supervisor import State
 from plant_emulator.truck import Forklift, road_speed
 from register_maps import load
+from register_maps.codec import encode_setpoint
 from register_maps.signals import Alarm, Control, Interlock, Measurement, Mode, Status
 from tests.gateway.closed_loop import SCAN, ClosedLoop
 
@@ -85,22 +86,23 @@ def test_every_write_has_the_next_number_and_heartbeat(idle):
     idle.run(0.2)
     numbers = [out.setpoint.command_sequence for out in idle.outputs if out.setpoint]
     beats = [out.setpoint.gateway_heartbeat for out in idle.outputs if out.setpoint]
-    assert numbers == list(range(1, len(numbers) + 1)) == beats
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers))) == beats
 
 
 def test_numbers_wrap_with_the_register(idle):
     idle.run(0.1)
-    before = replace(idle.state.command, number=65535)
+    before = replace(idle.state.command, number=65535, unanswered=65536)
     idle.state = replace(idle.state, command=before)
     idle.run(SCAN)
     assert idle.last.setpoint.command_sequence == 0
 
 
-def test_the_first_number_follows_what_the_plc_has_last_seen(idle):
+def test_the_first_number_follows_the_last_one_that_the_plc_has_seen_and_the_moment(idle):
+    """ARMED is the third tick, at 33 ms: 41 + 1 + 33000 mod 30011."""
     idle.disturb = lambda _, reading: replace(reading, command_sequence_echo=41)
     idle.run(0.1)
     first = next(output.setpoint for output in idle.outputs if output.setpoint)
-    assert first.command_sequence == 42
+    assert first.command_sequence == 3031
 
 
 @pytest.mark.parametrize("measured", [0.0, 12.5, 200.0])
@@ -195,6 +197,32 @@ def no_echo(loop, reading):
     return replace(reading, command_sequence_echo=held)
 
 
+def clock_stands(loop, reading):
+    held = loop.__dict__.setdefault("_time", reading.plc_time)
+    return replace(reading, plc_time=held)
+
+
+def clock_backwards(loop, reading):
+    return replace(reading, plc_time=1000.0 - reading.plc_time)
+
+
+def clock_at(factor):
+    return lambda _, reading: replace(reading, plc_time=factor * reading.plc_time)
+
+
+def torque_grows(loop, reading):
+    """10 N m s more at every sample of 10 ms are 1000 N m."""
+    more = 10.0 * loop.plc.scans
+    return replace(reading, shaft_torque_integral=reading.shaft_torque_integral + more)
+
+
+def other_echo(loop, reading):
+    """The block of another master, taken over now and then between ours."""
+    if loop.plc.scans % 4:
+        return reading
+    return replace(reading, command_sequence_echo=(reading.command_sequence_echo + 20000) % 65536)
+
+
 LINK = [
     Reason.NOT_CONNECTED,
     Reason.CONNECTION_LOST,
@@ -226,6 +254,10 @@ FAULTS = [
     (lambda _, reading: replace(reading, motor_speed=531.0), Reason.OVERSPEED),
     (lambda _, reading: replace(reading, drum_speed=-3.0), Reason.IMPLAUSIBLE),
     (no_echo, Reason.NOT_ECHOED),
+    (clock_stands, Reason.PLC_CLOCK),
+    (clock_backwards, Reason.PLC_CLOCK),
+    (torque_grows, Reason.TORQUE_IMPLAUSIBLE),
+    (other_echo, Reason.OTHER_MASTER),
 ]
 
 
@@ -239,6 +271,99 @@ def test_each_fault_leaves_run_in_time_with_its_reason(running, disturb, reason)
     assert running.last.reason is reason
     running.run(3.0)
     assert (running.last.state, running.last.reason) == (State.SAFE, reason)
+
+
+@pytest.mark.parametrize("factor", [0.1, 0.4, 2.0, 10.0])
+def test_a_clock_that_is_far_too_fast_or_slow_ends_a_run(running, factor):
+    running.disturb = clock_at(factor)
+    left_run_after(running, within=2.5)
+    assert running.last.reason in (Reason.PLC_CLOCK, Reason.TORQUE_IMPLAUSIBLE)
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.1])
+def test_a_clock_that_is_a_little_off_ends_none(running, factor):
+    running.disturb = clock_at(factor)
+    running.run(3.0)
+    assert running.last.state is State.RUN
+
+
+@pytest.mark.parametrize("disturb", [clock_stands, clock_backwards, torque_grows])
+def test_nothing_is_armed_without_a_window_that_can_be_used(idle, disturb):
+    idle.disturb = disturb
+    idle.run(0.5)
+    assert {output.state for output in idle.outputs} == {State.CONNECT}
+    assert idle.last.reason in (Reason.PLC_CLOCK, Reason.TORQUE_IMPLAUSIBLE)
+
+
+def test_a_clock_that_stops_in_armed_takes_the_readiness_away(idle):
+    idle.run(0.2)
+    idle.disturb = clock_stands
+    idle.run(0.2)
+    idle.operate(remote=True)
+    idle.run(0.2)
+    assert (idle.last.state, idle.last.reason) == (State.CONNECT, Reason.PLC_CLOCK)
+
+
+def test_another_master_takes_the_readiness_away(idle):
+    idle.run(0.2)
+    idle.disturb = other_echo
+    idle.run(4 * SCAN)
+    assert (idle.last.state, idle.last.reason) == (State.SHADOW, Reason.OTHER_MASTER)
+
+
+@pytest.mark.parametrize(
+    ("signal", "value"), [("plc_time", 3600.0), ("shaft_torque_integral", 300.0)]
+)
+@pytest.mark.parametrize("samples", [1, 1000])
+def test_one_jump_of_clock_or_integral_is_left_out_and_moves_nothing(
+    running, signal, value, samples
+):
+    """300 N m s over 10 ms would be 30 kN m; the truck of 3640 kg speeds up by a few rad/s^2."""
+    begin, left = running.last.setpoint.speed_setpoint, samples
+
+    def jumped(_, reading):
+        nonlocal left
+        left -= 1
+        return replace(reading, **{signal: getattr(reading, signal) + value * (left >= 0)})
+
+    running.disturb = jumped
+    for number in range(1, 11):
+        running.run(SCAN)
+        moved = running.last.setpoint.speed_setpoint - begin
+        assert -1.0 < moved < 100.0 * SCAN * number
+    assert running.last.state is State.RUN
+
+
+def test_a_second_gateway_does_not_arm_while_the_first_one_runs(running):
+    second, seen = cycle.initial(CONFIG, running.map), set()
+    for _ in range(200):
+        running.run(SCAN)
+        second, output = cycle.step(CONFIG, running.map, second, running.observations[-1])
+        seen.add(output.state)
+        assert output.setpoint is None
+    assert seen == {State.CONNECT, State.SHADOW}
+    assert output.reason is Reason.OTHER_MASTER
+    assert running.last.state is State.RUN
+
+
+def test_of_two_gateways_that_begin_together_none_runs_unnoticed():
+    """Both arm at once and write in turn: each sees the other's numbers."""
+    first, second = ClosedLoop(CONFIG), cycle.initial(CONFIG, load("bench_int16"))
+    numbers, states = set(), []
+    for _ in range(30):
+        first.run(SCAN)
+        seen = replace(first.observations[-1], now=first.now + 0.002)
+        second, output = cycle.step(CONFIG, first.map, second, seen)
+        states.append((first.last.state, output.state))
+        if output.setpoint is not None:
+            numbers.add(output.setpoint.command_sequence)
+            first.words = encode_setpoint(first.map, output.setpoint)
+    own = {one.setpoint.command_sequence for one in first.outputs if one.setpoint}
+    assert own
+    assert numbers
+    assert not own & numbers
+    assert State.SHADOW in states[-1]
+    assert (first.last.reason, output.reason).count(Reason.OTHER_MASTER) >= 1
 
 
 def without_echo():
@@ -406,8 +531,13 @@ def test_a_regulator_is_told_once_of_a_demand_that_was_not_passed(kind, request)
     assert loop.state.regulator == told
 
 
+def lose_number(loop):
+    lost = replace(loop.state.regulator, integral=np.nan)
+    loop.state = replace(loop.state, regulator=lost)
+
+
 def test_a_regulator_that_has_lost_its_number_begins_at_the_measured_speed(thesis):
-    thesis.disturb = lambda _, reading: replace(reading, shaft_torque_integral=np.nan)
+    lose_number(thesis)
     thesis.run(SCAN)
     assert not np.isfinite(thesis.last.demand)
     measured = thesis.observations[-1].measurement.motor_speed
@@ -417,9 +547,9 @@ def test_a_regulator_that_has_lost_its_number_begins_at_the_measured_speed(thesi
 def test_a_regulator_is_told_of_no_limit_outside_a_run():
     """In shadow a standing setpoint is far below what the regulator of a turning bench wants."""
     loop = ClosedLoop(CONFIG.with_values({"regulator.name": "thesis"}), shadow=True)
-    loop.disturb = lambda _, reading: replace(
-        reading, motor_speed=200.0, drum_speed=200.0 / 62.6, shaft_torque_integral=np.nan
-    )
+    loop.disturb = lambda _, reading: replace(reading, motor_speed=200.0, drum_speed=200.0 / 62.6)
+    loop.run(0.1)
+    lose_number(loop)
     loop.run(0.1)
     assert not np.isfinite(loop.state.regulator.integral)
 

@@ -20,6 +20,8 @@ CODES = {
     "TEST_WORD": 21,
     "NOT_AVAILABLE": 22,
     "STALE": 23,
+    "PLC_CLOCK": 24,
+    "TORQUE_IMPLAUSIBLE": 25,
     "PLC_NOT_READY": 30,
     "PLC_FAULT": 31,
     "EMERGENCY_STOP": 32,
@@ -31,7 +33,9 @@ CODES = {
     "NOT_ECHOED": 38,
     "PLC_LEFT": 39,
     "IMPLAUSIBLE": 40,
+    "OTHER_MASTER": 41,
     "OVERRUN": 50,
+    "NOT_ENCODABLE": 51,
 } | {f"EXCEPTION_{code}": 100 + code for code in range(1, 12)}
 
 

@@ -33,7 +33,7 @@ MAP = register_maps.load("bench_int16")
 STANDING = Status.READY | Status.WARM | Status.WATCHDOG_OK | Status.EMERGENCY_STOP_OK
 
 
-def measurement(number: int, state: State) -> Measurement:
+def measurement(number: int, state: State, echo: int) -> Measurement:
     """A PLC that does as it is told, its bench turning faster and faster."""
     running = state in (State.RUN, State.RAMPDOWN)
     status = STANDING | (Status.REMOTE if number > 20 else 0)
@@ -61,8 +61,8 @@ def measurement(number: int, state: State) -> Measurement:
         field_current=0.0,
         drum_count=0,
         motor_count=0,
-        command_sequence_echo=number - 1 if number else 0,
-        command_age=0.01,
+        command_sequence_echo=echo,
+        command_age=0.01 if echo else 60.0,
         scan_time_max=0.001,
         test_int16=-12345,
         test_uint32=0x12345678,
@@ -74,14 +74,15 @@ def recorded(path: Path, ticks: int = 120) -> Path:
     config, layout = Config(), Layout.of(MAP)
     content = encode_header(header(config, MAP, started=0.0, shadow=False, real_time="no"))
     state: CycleState = initial(config, MAP)
-    mode = State.OFF
+    mode, echo = State.OFF, 0
     for number in range(ticks):
-        words = encode_measurement(MAP, measurement(number, mode))
+        words = encode_measurement(MAP, measurement(number, mode, echo))
         seen = Observation(
             now=0.01 * number, measurement=decode_measurement(MAP, words), shadow=False
         )
         state, output = step(config, MAP, state, seen)
         mode = output.state
+        echo = output.setpoint.command_sequence if output.setpoint else echo
         made: dict[str, Any] = {
             "tick": number,
             "now": seen.now,

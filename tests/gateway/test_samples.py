@@ -1,7 +1,7 @@
 """Which readings are news, and what lies between two of them. Numbers by hand."""
 
 from dataclasses import replace
-from math import inf
+from math import inf, nan
 
 import pytest
 
@@ -13,6 +13,7 @@ from register_maps import load
 from register_maps.signals import Measurement, Status
 
 MAP = load("bench_int16")
+CONFIG = Config()
 FIRST = Measurement(
     sequence_start=7,
     sequence_end=7,
@@ -36,17 +37,18 @@ LATER = replace(
 )
 
 
-def after(*readings, begin=100.0):
+def after(*readings, begin=100.0, config=CONFIG, every=0.01):
     seen = Samples()
     for number, reading in enumerate(readings):
         fault = None if isinstance(reading, Measurement) else reading
-        seen = samples.take(seen, None if fault else reading, fault, begin + 0.01 * number)
+        seen = samples.take(seen, None if fault else reading, fault, begin + every * number)
+        seen = samples.weighed(config, MAP, seen)
     return seen
 
 
 def between(before, now, **values):
-    config = Config().with_values({f"regulator.{key}": value for key, value in values.items()})
-    return samples.window(config, MAP, after(before, now))
+    config = CONFIG.with_values({f"regulator.{key}": value for key, value in values.items()})
+    return after(before, now, config=config).window
 
 
 def test_a_window_spans_lost_samples_by_the_clock_of_the_plc():
@@ -88,8 +90,9 @@ def test_a_clock_that_does_not_advance_makes_no_window(plc_time):
 
 def test_the_same_sample_again_is_no_window_but_keeps_the_next_one_whole():
     assert between(FIRST, FIRST) is None
-    window = samples.window(Config(), MAP, after(FIRST, FIRST, LATER))
-    assert window.duration == pytest.approx(0.03)
+    seen = after(FIRST, FIRST, LATER)
+    assert seen.window.duration == pytest.approx(0.03)
+    assert (seen.before_came, seen.used) == (100.0, 100.02)
 
 
 @pytest.mark.parametrize(
@@ -105,16 +108,22 @@ def test_before_the_first_sample_there_is_nothing():
     assert (Samples().heartbeat_moved, Samples().sequence_moved) == (-inf, -inf)
     assert Samples().age(0.0) == inf
     assert not Samples().is_new
-    assert samples.window(Config(), MAP, after(FIRST)) is None
+    assert not Samples().down
+    assert (Samples().used, Samples().before_came, Samples().ahead) == (-inf, -inf, 0.0)
+    assert after(FIRST).window is None
+
+
+def test_one_sample_alone_is_none_that_could_be_used():
+    assert samples.complaint(after(FIRST), 100.0, 0.1) is Reason.STALE
 
 
 def test_a_lost_link_is_told_at_once_and_a_lost_poll_only_when_stale():
-    assert samples.complaint(after(FIRST, Reason.CONNECTION_LOST), 100.01, 0.1) is (
+    assert samples.complaint(after(FIRST, LATER, Reason.CONNECTION_LOST), 100.02, 0.1) is (
         Reason.CONNECTION_LOST
     )
-    lost = after(FIRST, Reason.TIMEOUT)
-    assert samples.complaint(lost, 100.1, 0.1) is None
-    assert samples.complaint(lost, 100.11, 0.1) is Reason.TIMEOUT
+    lost = after(FIRST, LATER, Reason.TIMEOUT)
+    assert samples.complaint(lost, 100.105, 0.1) is None
+    assert samples.complaint(lost, 100.115, 0.1) is Reason.TIMEOUT
 
 
 def test_a_good_sample_forgets_the_faults_before_it():
@@ -143,7 +152,7 @@ def test_it_is_told_which_of_heartbeat_and_sequence_stands_still(moving, reason)
 
 
 def test_a_sample_of_exactly_the_stale_age_is_still_fresh():
-    seen = after(FIRST, begin=0.0)
+    seen = after(FIRST, LATER, begin=0.0, every=0.0)
     assert samples.complaint(seen, 0.1, 0.1) is None
 
 
@@ -158,8 +167,144 @@ TORN = replace(LATER, sequence_end=9)
 def test_a_lost_or_torn_reading_is_no_news(reading):
     seen = after(FIRST, LATER, reading)
     assert not seen.is_new
-    assert samples.window(Config(), MAP, seen) is None
+    assert seen.window is None
 
 
 def test_a_torn_image_shows_that_the_link_is_back():
     assert not after(FIRST, Reason.CONNECTION_LOST, TORN).down
+
+
+def later(number, *, duration=0.01, torque=-8.0, mean=-8.0):
+    """The sample of that number after FIRST, with a steady clock and torque."""
+    return replace(
+        FIRST,
+        sequence_start=7 + number,
+        sequence_end=7 + number,
+        plc_heartbeat=7 + number,
+        plc_time=1.0 + duration * number,
+        shaft_torque_mean=mean,
+        shaft_torque_integral=50.0 + torque * duration * number,
+    )
+
+
+@pytest.mark.parametrize(
+    ("duration", "every", "reason"),
+    [
+        (0.11, 0.01, None),
+        (0.13, 0.01, Reason.PLC_CLOCK),
+        (3600.0, 0.01, Reason.PLC_CLOCK),
+        (0.001, 0.01, None),
+        (0.01, 0.11, None),
+        (0.01, 0.13, Reason.PLC_CLOCK),
+        (1.0, 1.0, None),
+        (0.5, 0.3, None),
+        (1.0, 2.2, Reason.PLC_CLOCK),
+        (0.0, 0.01, Reason.PLC_CLOCK),
+        (-0.001, 0.01, Reason.PLC_CLOCK),
+    ],
+)
+def test_a_window_may_differ_from_our_clock_by_half_of_the_longer_and_50_ms(
+    duration, every, reason
+):
+    seen = after(FIRST, later(1, duration=duration), every=every)
+    assert (seen.window is None) is (reason is not None)
+    assert seen.doubt is (reason or Reason.STALE)
+
+
+def test_a_window_exactly_as_far_from_our_clock_as_may_be_is_used():
+    """Half of 0.25 s and 0.05 s are 0.175 s; the difference of 0.25 s and 0.075 s."""
+    assert samples._in_step(0.25, 0.25 - (0.5 * 0.25 + 0.05))
+    assert not samples._in_step(0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("rate", "used"), [(0.45, False), (0.55, True), (1.0, True), (1.45, True), (1.55, False)]
+)
+def test_a_clock_is_refused_when_it_is_off_by_half_for_long(rate, used):
+    """Ten seconds at 100 Hz: what is ahead goes to half of (rate - 1) s, which is remembered."""
+    seen = after(FIRST, *(later(number, duration=0.01 * rate) for number in range(1, 1001)))
+    assert (seen.window is not None) is used
+    assert seen.ahead == pytest.approx(0.5 * (rate - 1.0), rel=0.02)
+
+
+def test_what_a_clock_is_ahead_is_forgotten_to_the_13_5_hundredths_in_a_second():
+    """exp(-2) = 0.1353353."""
+    begin = replace(after(FIRST), ahead=0.5)
+    seen = samples.take(begin, replace(LATER, plc_time=2.0), None, 101.0)
+    assert samples.weighed(CONFIG, MAP, seen).ahead == pytest.approx(0.06766764)
+
+
+@pytest.mark.parametrize(("ahead", "used"), [(0.25, True), (-0.25, True), (0.251, False)])
+def test_a_quarter_of_a_second_ahead_is_just_not_too_much(ahead, used):
+    """No time passes for us, a quarter of a millisecond for the PLC."""
+    begin = replace(after(FIRST), ahead=ahead - 2.0**-12)
+    now = replace(LATER, plc_time=1.0 + 2.0**-12, shaft_torque_integral=None)
+    seen = samples.weighed(CONFIG, MAP, samples.take(begin, now, None, 100.0))
+    assert seen.ahead == pytest.approx(ahead, abs=1e-12)
+    assert (seen.window is not None) is used
+
+
+def test_a_step_of_the_clock_is_left_out_and_the_next_window_used():
+    steps = [replace(later(n), plc_time=later(n).plc_time + 3600.0) for n in (2, 3)]
+    first = after(FIRST, later(1), steps[0])
+    assert (first.window, first.doubt, first.used) == (None, Reason.PLC_CLOCK, 100.01)
+    assert after(FIRST, later(1), *steps).window.duration == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize(("torque", "used"), [(327.6, True), (327.7, False)])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_mean_that_the_sensor_cannot_show_is_no_torque(torque, used, sign):
+    """The register holds 327.67 N m either way."""
+    seen = after(FIRST, later(1, torque=sign * torque, mean=None))
+    assert (seen.window is not None) is used
+    assert seen.doubt is (Reason.STALE if used else Reason.TORQUE_IMPLAUSIBLE)
+
+
+def test_the_sensors_range_itself_is_inside():
+    assert samples._is_possible(MAP, 327.67, None, 0.01)
+    assert samples._is_possible(MAP, -327.67, None, 0.01)
+
+
+def test_no_number_is_no_torque():
+    assert after(FIRST, replace(LATER, shaft_torque_integral=nan)).window is None
+
+
+def test_a_map_without_a_torque_leaves_its_range_open():
+    kept = tuple(one for one in MAP.registers if one.signal != "shaft_torque")
+    bare = replace(MAP, registers=kept)
+    assert samples._is_possible(bare, 1000.0, None, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("duration", "apart", "used"),
+    [
+        (0.01, 20.0, True),
+        (0.01, 20.1, False),
+        (0.01, -20.0, True),
+        (0.01, -20.1, False),
+        (0.005, 20.0, True),
+        (0.005, 20.1, False),
+        (0.02, 120.0, True),
+        (0.02, 120.1, False),
+        (0.04, 169.0, True),
+        (0.04, 171.0, False),
+    ],
+)
+def test_a_mean_may_differ_from_that_of_the_last_scan_as_the_rest_of_the_window_allows(
+    duration, apart, used
+):
+    """20 N m, and 200 N m times the share of the window that lies before the last scan."""
+    assert samples._is_possible(MAP, 10.0 + apart, 10.0, duration) is used
+
+
+def test_windows_that_cannot_be_used_make_stale_what_is_fresh():
+    still = [replace(later(n), plc_time=1.01) for n in range(2, 13)]
+    seen = after(FIRST, later(1), *still)
+    assert seen.age(100.12) == 0.0
+    assert samples.complaint(seen, 100.1, 0.1) is None
+    assert samples.complaint(seen, 100.12, 0.1) is Reason.PLC_CLOCK
+
+
+def test_a_window_of_exactly_the_stale_age_is_still_of_use():
+    seen = replace(after(FIRST, LATER, begin=0.0, every=0.0), heartbeat_moved=0.1)
+    assert samples.complaint(replace(seen, sequence_moved=0.1), 0.1, 0.1) is None
