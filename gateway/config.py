@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, get_type_hints
 
+from gateway import regulators
 from gateway.config_sections import (
     RPM,
     SECTIONS,
@@ -105,6 +106,7 @@ def from_document(document: Mapping[str, Any], *, place: Place = _set_place) -> 
     for name, section in SECTIONS.items():
         sections[name] = _section(name, section, written[name], place)
     _form_of_road_load(document, place)
+    _known_regulator(sections["regulator"], place)
     return Config(**sections, document=written)
 
 
@@ -135,6 +137,17 @@ def _form_of_road_load(document: Mapping[str, Any], place: Place) -> None:
             place=place("truck", given[0]),
             value=truck[given[0]],
             expected="f0_N beside it",
+        )
+
+
+def _known_regulator(section: RegulatorConfig, place: Place) -> None:
+    """A regulator is one of the files there are; a name from elsewhere would be a path."""
+    if section.name not in regulators.names():
+        raise ConfigError(
+            "unknown regulator",
+            place=place("regulator", "name"),
+            value=section.name,
+            expected=" or ".join(regulators.names()),
         )
 
 

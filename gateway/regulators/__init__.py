@@ -13,15 +13,17 @@ All are pure. `test_every_regulator.py` holds whatever module it finds here to t
 from functools import lru_cache
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
-from gateway.config import Config
 from gateway.errors import ConfigError
-from gateway.regulators.window import Demand, Window
+
+if TYPE_CHECKING:
+    from gateway.config import Config
+    from gateway.regulators.window import Demand, Window
 
 
 class _Params(Protocol):
-    def of(self, config: Config) -> Any:
+    def of(self, config: "Config") -> Any:
         """Parameters out of the configuration."""
 
 
@@ -33,7 +35,7 @@ class Regulator(Protocol):
     def seed(self, params: Any, motor_speed: float, drum_speed: float) -> Any:
         """State whose demand is the measured motor speed."""
 
-    def update(self, params: Any, state: Any, window: Window) -> tuple[Any, Demand]:
+    def update(self, params: Any, state: Any, window: "Window") -> "tuple[Any, Demand]":
         """State and demand after one new sample."""
 
     def follow(self, params: Any, state: Any, demand: float, setpoint: float) -> Any:
