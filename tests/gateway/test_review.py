@@ -1,11 +1,12 @@
 """What `check` says of a configuration: every rule at its edge."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
 from gateway.cli import main
-from gateway.config import Config
+from gateway.config import Config, from_document
 from gateway.config_file import load
 from gateway.device import Device
 from gateway.finding import holds
@@ -157,6 +158,121 @@ def test_torque_limit_below_base_speed_is_that_of_e24():
 
 def test_a_braking_that_the_motor_cannot_hold_is_warned_of():
     assert found("truck.braking_m_s2", truck__braking_m_s2=2.5) == ["warning"]
+
+
+@pytest.mark.parametrize(
+    ("where", "values", "severity"),
+    [
+        ("limits.overspeed_rpm", {"limits__overspeed_rpm": 4830}, ["error"]),
+        ("limits.overspeed_rpm", {"limits__overspeed_rpm": 4831}, ["warning"]),
+        ("limits.overspeed_rpm", {"limits__overspeed_rpm": 4879}, []),
+        ("limits.deviation_rpm", {"limits__deviation_rpm": 1207}, []),
+        ("limits.deviation_rpm", {"limits__deviation_rpm": 1208}, ["warning"]),
+        ("limits.deviation_rpm", {"limits__deviation_rpm": 2414}, ["warning"]),
+        ("limits.deviation_rpm", {"limits__deviation_rpm": 2416}, ["error"]),
+        ("limits.deviation_rpm", {"limits__deviation_rpm": 4830}, ["error"]),
+        ("limits.rate_up_rpm_s", {"limits__rate_up_rpm_s": 15900}, []),
+        ("limits.rate_up_rpm_s", {"limits__rate_up_rpm_s": 16000}, ["warning"]),
+        ("limits.rate_up_rpm_s", {"limits__rate_up_rpm_s": 24000}, ["error"]),
+        ("limits.rate_down_rpm_s", {"limits__rate_down_rpm_s": 15900}, []),
+        ("limits.rate_down_rpm_s", {"limits__rate_down_rpm_s": 30000}, ["warning"]),
+        ("loop.overruns", {"loop__overruns": 20}, []),
+        ("loop.overruns", {"loop__overruns": 21}, ["warning"]),
+        ("loop.overruns", {"loop__overruns": 100}, ["warning"]),
+        ("loop.overruns", {"loop__overruns": 101}, ["error"]),
+        ("loop.overruns", {"loop__overruns": 15, "loop__period_ms": 20}, ["warning"]),
+        ("bench.drum_inertia_kg_m2", {"bench__drum_inertia_kg_m2": 20}, ["warning"]),
+        ("bench.drum_inertia_kg_m2", {"bench__drum_inertia_kg_m2": 21}, []),
+        ("bench.drum_inertia_kg_m2", {"bench__drum_inertia_kg_m2": 9000}, ["warning"]),
+    ],
+)
+def test_limits_have_to_fit_each_other_and_the_bench(where, values, severity):
+    """4830 rpm and 1 % are 4878; 62.6^2 x 1.8506 x 72 / 312.71 rad/s2 are 15945 rpm/s at most;
+    the watchdog is 200 ms; 50 kg and 20 t at the rim of 0.645 m are 20.8 and 8321 kg m2."""
+    held = "against the limit"
+    findings = review(
+        Config().with_values({k.replace("__", "."): str(v) for k, v in values.items()}), MAP
+    )
+    assert [
+        one.severity for one in findings if one.where == where and held not in one.what
+    ] == severity
+
+
+@pytest.mark.parametrize(
+    ("lead", "severity"), [(0.132, []), (0.134, ["warning"]), (0.27, ["error"]), (1.0, ["error"])]
+)
+def test_lead_may_not_go_far_beyond_the_delay(lead, severity):
+    """The delay is 88.5 ms: 133 ms are warned of, 265 ms refused."""
+    assert found("regulator.lead_s", "delay", regulator__lead_s=lead) == severity
+    thesis = {"regulator__lead_s": lead, "regulator__name": "thesis"}
+    assert found("regulator.lead_s", "delay", **thesis) == []
+
+
+def with_range(signal, low, high, **changes):
+    """The shipped map with another range of one register."""
+    return replace(
+        MAP,
+        registers=tuple(
+            replace(one, range=(low, high), **changes) if one.signal == signal else one
+            for one in MAP.registers
+        ),
+    )
+
+
+@pytest.mark.parametrize(
+    ("signal", "low", "high", "needs", "key"),
+    [
+        ("speed_setpoint", 0, 1000, "4830 rpm", "limits.speed_max_rpm"),
+        ("speed_setpoint", 10, 4830, "0 rpm", "limits.speed_max_rpm"),
+        ("speed_rate", -3000, 2999, "3000 rpm/s", "limits.rate_up_rpm_s"),
+        ("speed_rate", 0, 3000, "-3000 rpm/s", "limits.rate_down_rpm_s"),
+        ("ramp_limit", 1, 2000, "3000 rpm/s", "rates"),
+        ("current_limit", 0, 50, "72 A", "limits.current_limit_A"),
+        ("watchdog_timeout", 50, 150, "200 ms", "limits.watchdog_ms"),
+        ("mode", 1, 3, "4 1", "the run"),
+        ("control", 0, 0, "1 1", "the start"),
+        ("map_version", 2, 3, "1", "version"),
+        ("gateway_heartbeat", 0, 1000, "65535", "count of commands"),
+    ],
+)
+def test_a_map_that_cannot_hold_what_the_limits_allow_is_refused(signal, low, high, needs, key):
+    findings = [
+        one for one in review(Config(), with_range(signal, low, high)) if one.severity == "error"
+    ]
+    assert findings
+    assert {one.where for one in findings} == {"plc.map"}
+    assert needs in [one.value for one in findings]
+    assert MAP.register(signal).name in findings[0].what
+    assert key in findings[0].what
+    assert f"{low:g}" in findings[0].allowed
+    assert f"{high:g}" in findings[0].allowed
+
+
+def test_a_count_of_commands_that_ends_is_refused():
+    findings = review(Config(), with_range("command_sequence", 0, 65535, wraps=False))
+    assert ["CMD_SEQ" in one.what for one in findings if one.severity == "error"] == [True]
+
+
+def test_a_narrow_map_holds_for_narrow_limits():
+    slow = {
+        "limits.speed_max_rpm": "1000",
+        "limits.deviation_rpm": "200",
+        "limits.overspeed_rpm": "1100",
+        "truck.top_speed_km_h": "3",
+    }
+    assert holds(review(Config().with_values(slow), with_range("speed_setpoint", 0, 1000)))
+
+
+def test_a_map_without_a_register_is_asked_nothing_of_it():
+    kept = tuple(one for one in MAP.registers if one.signal != "speed_rate")
+    assert holds(review(Config(), replace(MAP, registers=kept)))
+
+
+def test_a_sweep_needs_the_mode_of_speed():
+    sweep = from_document({"sweep": {"speeds_rpm": [1000.0], "hold_s": 5.0, "rate_rpm_s": 200.0}})
+    only_road_load = with_range("mode", 4, 5)
+    values = [one.value for one in review(sweep, only_road_load) if one.where == "plc.map"]
+    assert values == ["1 1", "3 1"]
 
 
 def answer(capsys, *arguments):
