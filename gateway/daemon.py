@@ -29,6 +29,8 @@ from gateway.supervisor import State
 from register_maps.register_map import RegisterMap
 
 BY_OPERATOR: Final = frozenset({Reason.STOP_REQUESTED, Reason.REMOTE_OFF})
+AT_FAULT: Final = frozenset({State.CONNECT, State.ARMED, State.RAMPDOWN, State.SAFE})
+"""States whose reason is the peer's; ARMED has one when what is written does not get through."""
 APART: Final = 1.0
 """[s] A second signal sooner than this is the first once more: some send to process and group."""
 
@@ -127,13 +129,17 @@ def _signals(stop: _Stop) -> Iterator[None]:
             signal.signal(number, handler)
 
 
+def fault_of(before: Output | None) -> Reason | None:
+    """Whose fault the end was, by the last output before a stop; None: the operator's wish."""
+    if before is None or before.state not in AT_FAULT or before.reason in BY_OPERATOR:
+        return None
+    return before.reason
+
+
 def _ended(loop: Loop, recorder: Recorder, real: str) -> Ended:
-    before = loop.before_stop
-    peer = before is not None and before.state in (State.CONNECT, State.RAMPDOWN, State.SAFE)
-    reason = before.reason if before is not None and peer else None
     return Ended(
         recording=recorder.path,
-        reason=None if reason in BY_OPERATOR else reason,
+        reason=fault_of(loop.before_stop),
         cycles=loop.cycles,
         missed=loop.missed,
         dropped=recorder.dropped,

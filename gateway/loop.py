@@ -188,7 +188,10 @@ class Loop:
         """Send what the limits passed, unless nothing is to be written."""
         if output.setpoint is None or self._shadow:
             return Writing()
-        words = encode_setpoint(self._map, output.setpoint)
+        try:
+            words = encode_setpoint(self._map, output.setpoint)
+        except CodecError:
+            return Writing(fault=Reason.NOT_ENCODABLE)
         try:
             self._link.write(self._map.command.start, words)
         except LinkError as error:

@@ -1,6 +1,7 @@
 """The clock of the gateway. Time is the test's; the PLC is the emulator, scanned as time passes."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from gateway.reasons import Reason
 from gateway.recording import Recording, encode_header, read
 from gateway.supervisor import State
 from plant_emulator.process import EmulatorProcess
+from register_maps.register_map import RegisterMap
 
 pytestmark = pytest.mark.slow
 
@@ -62,7 +64,14 @@ class Sink:
 class Run:
     """A loop on a bench that is stepped tick by tick."""
 
-    def __init__(self, emulator: EmulatorProcess, path: Path, *, shadow: bool = False) -> None:
+    def __init__(
+        self,
+        emulator: EmulatorProcess,
+        path: Path,
+        *,
+        shadow: bool = False,
+        register_map: RegisterMap = MAP,
+    ) -> None:
         self.bench = Bench(emulator)
         self.config = Config().with_values({"plc.port": str(emulator.port)})
         self.sink = Sink(self.config, path)
@@ -70,7 +79,7 @@ class Run:
         self.ticks = 0
         self.loop = Loop(
             config=self.config,
-            register_map=MAP,
+            register_map=register_map,
             link=self.link,
             sink=self.sink,
             clock=self.bench,
@@ -151,6 +160,31 @@ def test_a_lying_plc_ends_the_run_within_150_ms(run: Run, fault: str, reason: Re
     run.bench.emulator.set_faults(fault)
     assert run.into(State.RAMPDOWN, 15) <= 15
     assert run.output.reason is reason
+
+
+def test_a_setpoint_that_the_map_cannot_hold_is_ramped_down_from(
+    emulator: EmulatorProcess, tmp_path: Path
+) -> None:
+    """The register ends at 200 rpm; the truck goes on to 3604 rpm."""
+    narrow = [
+        replace(one, range=(0.0, 200.0)) if one.signal == "speed_setpoint" else one
+        for one in MAP.registers
+    ]
+    run = Run(
+        emulator,
+        tmp_path / "run.rlrec",
+        register_map=replace(MAP, registers=tuple(narrow)),
+    )
+    run.into(State.ARMED, 100)
+    emulator.set_remote(on=True)
+    run.into(State.RUN, 20)
+    run.into(State.RAMPDOWN, 600)
+    assert run.output.reason is Reason.NOT_ENCODABLE
+    assert 15.0 < emulator.status()["speed_reference"] < 21.5
+    run.into(State.SAFE, 50)
+    run.for_ticks(10)
+    assert emulator.status()["speed_reference"] == 0.0
+    run.link.close()
 
 
 def test_shadow_writes_nothing(emulator: EmulatorProcess, tmp_path: Path) -> None:

@@ -10,7 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from gateway.cycle import Output
+from gateway.daemon import fault_of
+from gateway.reasons import Reason
 from gateway.recording import Recording, read
+from gateway.supervisor import State
 from plant_emulator.process import EmulatorProcess
 
 pytestmark = pytest.mark.slow
@@ -192,3 +196,49 @@ def test_shadow_only_warns_of_what_check_refuses(tmp_path: Path) -> None:
     assert "warning: bench.toml: truck.mass_kg" in ended.stderr
     assert "error:" not in ended.stderr
     assert list((tmp_path / "recordings").glob("*.rlrec"))
+
+
+@pytest.mark.parametrize(
+    ("state", "reason", "fault"),
+    [
+        (State.CONNECT, Reason.NOT_CONNECTED, Reason.NOT_CONNECTED),
+        (State.SHADOW, Reason.PLC_NOT_READY, None),
+        (State.ARMED, None, None),
+        (State.ARMED, Reason.EXCEPTION_4, Reason.EXCEPTION_4),
+        (State.RUN, None, None),
+        (State.RAMPDOWN, Reason.TIMEOUT, Reason.TIMEOUT),
+        (State.SAFE, Reason.OTHER_MASTER, Reason.OTHER_MASTER),
+        (State.SAFE, Reason.REMOTE_OFF, None),
+        (State.SAFE, Reason.STOP_REQUESTED, None),
+    ],
+)
+def test_the_end_is_the_peers_fault_unless_the_operator_wished_it(
+    state: State, reason: Reason | None, fault: Reason | None
+) -> None:
+    """In ARMED a reason says that no write gets through."""
+    before = Output(setpoint=None, demand=None, state=state, reason=reason, age=None)
+    assert fault_of(before) is fault
+
+
+def test_a_stop_before_the_first_tick_is_nobodys_fault() -> None:
+    assert fault_of(None) is None
+
+
+@pytest.mark.parametrize("name", ["../thesis", "", "window", "thesis.py"])
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_a_regulator_that_there_is_not_is_one_line_and_exit_code_2(
+    tmp_path: Path, name: str, command: str
+) -> None:
+    (tmp_path / "bench.toml").write_text(f'[regulator]\nname = "{name}"\n')
+    ended = subprocess.run(
+        [sys.executable, "-m", "gateway", command, "-c", "bench.toml"],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        check=False,
+        timeout=60,
+    )
+    assert ended.returncode == 2
+    assert ended.stderr.count("\n") == 1
+    assert "bench.toml:2: [regulator] name: unknown regulator" in ended.stderr
+    assert "compensated or thesis" in ended.stderr
