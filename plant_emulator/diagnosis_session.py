@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from plant_emulator import logs
+from plant_emulator import axis_log, logs
+from plant_emulator.diagnosis.axis import AxisRecipe
 from plant_emulator.diagnosis.bench import BenchRecipe
 from plant_emulator.diagnosis.calibration import Case
 from plant_emulator.diagnosis.diagnose import Plan
@@ -23,7 +24,9 @@ from plant_emulator.recording import Recording, recording
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from plant_emulator.diagnosis.axis_signals import AxisLog
     from plant_emulator.diagnosis.diagnose import Diagnosis
+    from plant_emulator.diagnosis.pool import Recipe
     from plant_emulator.log import Log
     from plant_emulator.parameters import ParameterSet
     from plant_emulator.simulate import Hold
@@ -38,7 +41,7 @@ FITTED_SHARE = 0.6
 class Loaded:
     """Logs ready for a diagnosis, and what the preflight told of them."""
 
-    recipe: BenchRecipe
+    recipe: Recipe
     plan: Plan
     notes: tuple[str, ...]
     settings: Mapping[str, str]
@@ -86,19 +89,47 @@ def calibration() -> list[Case]:
         ]
 
 
+def axis_loaded(
+    paths: Sequence[str], held_out: Sequence[str], *, without: Sequence[str] = ()
+) -> Loaded:
+    """Logs of a single axis as a recipe and a plan."""
+    hashes = _hashes([*paths, *held_out])
+    axis_logs = [axis_log.read(path) for path in (*paths, *held_out)]
+    for log in axis_logs:
+        _telling(log)
+    if len(axis_logs) < 2:
+        raise DiagnosisError(
+            f"{paths[0]}: one run of an axis cannot be held out; give another with --hold-out"
+        )
+    plan = plan_of(len(axis_logs), len(paths))
+    settings = {
+        "date": datetime.now(UTC).date().isoformat(),
+        "version": version("road-load-bench"),
+        "model": "axis",
+        "without": ", ".join(without) or "-",
+    }
+    settings |= {f"sha256 of {path}": digest for path, digest in hashes.items()}
+    recipe = AxisRecipe(tuple(axis_logs), fitted=plan.fitted, without=tuple(without))
+    return Loaded(recipe=recipe, plan=plan, notes=(), settings=settings)
+
+
+def plan_of(runs: int, count: int) -> Plan:
+    """Held-out runs are predicted; without such each of several runs in turn."""
+    fitted = tuple(range(count))
+    if runs > count:
+        return Plan(fitted=fitted, folds=((fitted, tuple(range(count, runs))),))
+    turns = tuple((tuple(k for k in fitted if k != run), (run,)) for run in fitted)
+    return Plan(fitted=fitted, folds=turns)
+
+
 def planned(recordings: Sequence[Recording], count: int) -> tuple[list[Recording], Plan]:
     """Which runs are fitted and which predicted; the first `count` are to be fitted.
 
     With held-out runs those are predicted; of several logs each in turn; a single log is fitted on
     its first part and predicted on the rest.
     """
-    fitted = tuple(range(count))
-    if len(recordings) > count:
-        folds = ((fitted, tuple(range(count, len(recordings)))),)
-        return list(recordings), Plan(fitted=fitted, folds=folds)
-    if count > 1:
-        turns = tuple((tuple(k for k in fitted if k != run), (run,)) for run in fitted)
-        return list(recordings), Plan(fitted=fitted, folds=turns)
+    if len(recordings) > 1:
+        return list(recordings), plan_of(len(recordings), count)
     (whole,) = recordings
     end = whole.log.time[0] + FITTED_SHARE * float(np.ptp(whole.log.time))
     first = whole.log.time <= end
@@ -106,7 +137,7 @@ def planned(recordings: Sequence[Recording], count: int) -> tuple[list[Recording
     return both, Plan(fitted=(0,), folds=(((0,), (1,)),), as_fitted=True)
 
 
-def _telling(log: Log) -> None:
+def _telling(log: Log | AxisLog) -> None:
     """Refuse a log that carries its own answer."""
     for column in log.other:
         if any(word in column.lower().split("_") for word in TELLING):

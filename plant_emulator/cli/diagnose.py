@@ -16,6 +16,7 @@ EXAMPLE = """
 Examples:
   plant-emulator diagnose program1.csv.gz program2.csv.gz program3.csv.gz --report gap.html
   plant-emulator diagnose run1.csv run2.csv --hold-out run3.csv --save bench.toml
+  plant-emulator diagnose --model axis estimation.mat --hold-out validation.mat
 """
 
 
@@ -29,6 +30,13 @@ Examples:
     help="A run to predict; may be repeated. Without it every log is held out in turn.",
 )
 @_options.parameters
+@click.option(
+    "--model",
+    type=click.Choice(["bench", "axis"]),
+    default="bench",
+    show_default=True,
+    help="The machine: this bench, or a single motor-driven axis (CSV or MATLAB logs).",
+)
 @click.option(
     "--without", multiple=True, metavar="EFFECT", help="Take an effect out of the library."
 )
@@ -56,6 +64,7 @@ def command(
     logs: tuple[str, ...],
     held_out: tuple[str, ...],
     parameters: str,
+    model: str,
     without: tuple[str, ...],
     own: tuple[str, ...],
     reference: str | None,
@@ -74,11 +83,16 @@ def command(
     from plant_emulator.cli._progress import progress
     from plant_emulator.diagnosis.diagnose import Diagnose
     from plant_emulator.diagnosis.terminal import lines
-    from plant_emulator.diagnosis_session import calibration, loaded, parameter_set
+    from plant_emulator.diagnosis_session import axis_loaded, calibration, loaded, parameter_set
     from plant_emulator.workers import pool_of
 
     given = parameter_sets.load(parameters)
-    run = loaded(logs, held_out, given, without=without, own=own, hold=reference)
+    if model == "axis":
+        if save or own:
+            raise click.UsageError("--save and --effects belong to --model bench")
+        run = axis_loaded(logs, held_out, without=without)
+    else:
+        run = loaded(logs, held_out, given, without=without, own=own, hold=reference)
     settings = {"command": f"plant-emulator {shlex.join(sys.argv[1:])}", **run.settings}
     pool = pool_of(workers, scheduler)
     try:

@@ -57,6 +57,7 @@ class AxisModel:
     """
 
     subsystems = SUBSYSTEMS
+    reaches_noise = False
 
     def __init__(
         self,

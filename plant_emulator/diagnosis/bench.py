@@ -98,6 +98,7 @@ class BenchModel:
     """The bench and its logs; see `Model`."""
 
     states = (GAP,)
+    reaches_noise = True
 
     def __init__(
         self,

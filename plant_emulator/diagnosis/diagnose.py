@@ -78,7 +78,14 @@ class Diagnose:
     def diagnose(self) -> Diagnosis:
         """Contest, verdict, held-out runs, place."""
         names = tuple(self.model.candidates)
-        contest = Contest(self.pool, self.recipe, names, self.plan.fitted, self.progress)
+        contest = Contest(
+            self.pool,
+            self.recipe,
+            names,
+            self.plan.fitted,
+            self.progress,
+            reaches_noise=self.model.reaches_noise,
+        )
         explained = contest.explain()
         found = verdict.decide(self.model, explained)
         predicted = self._predictions(explained, found)
@@ -152,7 +159,11 @@ class Diagnose:
                 classes=explained.classes(),
                 confidence=confidence(self.cases, found.kind, self._evidence(explained, found)),
                 sentence=verdict.statement(
-                    found, self.model.candidates, closed, location["subsystem"]
+                    found,
+                    self.model.candidates,
+                    closed,
+                    location["subsystem"],
+                    complete=self.model.reaches_noise,
                 ),
                 next_experiment=None,
             ),

@@ -4,8 +4,10 @@ Forward: the effect whose joint fit lowers the cost most comes in, as long as it
 and the gap is not closed. After every addition each earlier effect has to stand the contest again,
 with all others in its place; and at the end each has to be missed when it is taken out.
 
-Evidence is the fall of the penalised sum of squares times the share of independent samples of the
-fullest model: what an inadequate model leaves is correlated, and would make everything count.
+Evidence is the fall of the penalised sum of squares, over the mean square that the better model
+leaves (at least 1, the noise), times the share of its samples that are independent. A model that
+leaves much more than the noise leaves something correlated, which makes wrong effects count; its
+share is then taken no larger than that of the fit without effects.
 """
 
 from __future__ import annotations
@@ -44,6 +46,8 @@ NOISE_KNOWN = 0.02
 LEFT, LEFT_OF_MORE = 0.1, 0.04
 # Share of the gap that a further effect has to close to be named.
 FURTHER = 0.04
+# Mean square from which on a model leaves more than what the noise explains.
+MISFIT = 1.5
 MOST_EFFECTS = 3
 RESTARTS = 3
 # Best of a round that are fitted to convergence.
@@ -87,8 +91,8 @@ class Explanation:
         """Evidence of an effect alone."""
         if contender.point is None:
             return 0.0
-        share = max(self.final.share, contender.point.share)
-        return max(0.0, (self.null.cost - contender.point.cost) * share)
+        best = min(self.final, contender.point, key=lambda p: p.chi_squared)
+        return weighed(self.null.cost - contender.point.cost, best, self.null)
 
     def classes(self) -> list[list[str]]:
         """For every accepted effect those that these logs cannot tell from it, itself first."""
@@ -97,10 +101,18 @@ class Explanation:
             near = [
                 other
                 for other, cost in sorted(costs.items(), key=lambda pair: pair[1])
-                if (cost - self.final.cost) * self.final.share < MARGIN and other != name
+                if other != name and weighed(cost - self.final.cost, self.final, self.null) < MARGIN
             ]
             found.append([name, *near])
         return found
+
+
+def weighed(fall: float, better: Point, null: Point) -> float:
+    """Evidence of a fall of the cost, see the module's text."""
+    share = better.share
+    if better.chi_squared > MISFIT:
+        share = min(share, null.share)
+    return max(0.0, fall) / max(1.0, better.chi_squared) * share
 
 
 def excess(point: Point) -> float:
@@ -175,7 +187,10 @@ class Contest:
         names: Sequence[str],
         runs: Sequence[int],
         progress: Progress | None = None,
+        *,
+        reaches_noise: bool = True,
     ) -> None:
+        self._reaches_noise = reaches_noise
         self._pool, self._recipe, self._names = pool, recipe, tuple(names)
         self._runs, self._progress = tuple(runs), progress
 
@@ -206,12 +221,14 @@ class Contest:
     def _counts(self, best: Point, base: Point, null: Point) -> bool:
         """Whether one more effect earns its place."""
         fall = base.cost - best.cost
-        share = max(best.share, base.share)
+        counts = weighed(fall, best, null) > THRESHOLD
+        if not self._reaches_noise:
+            return counts
         further = excess(null) > THRESHOLD and fall > FURTHER * excess(null)
         if base.effects:
             return fall > THRESHOLD and further
-        # What an inadequate model leaves is correlated: then a fall is judged by the gap instead.
-        return fall > THRESHOLD and (fall * share > THRESHOLD or further)
+        # The first of several effects leaves a correlated rest: it is judged by the gap as well.
+        return counts or (fall > THRESHOLD and further)
 
     def _round(self, base: Point, stage: str) -> tuple[Point, list[Contender]]:
         """All effects on top of a fit; the fit itself started again from the best of them."""

@@ -75,6 +75,14 @@ class Model(Protocol):
         """Where each parameter belongs, by name."""
 
     @property
+    def reaches_noise(self) -> bool:
+        """Whether with the right effects nothing but the noise is left.
+
+        A machine modelled down to its sensors does; one modelled in outline leaves a rest, and a
+        cause is then known by its evidence alone.
+        """
+
+    @property
     def states(self) -> tuple[Unknown, ...]:
         """States of a run, without those of effects."""
 

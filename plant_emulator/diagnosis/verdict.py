@@ -73,10 +73,10 @@ def decide(model: Model, explained: Explanation) -> Verdict:
     moved = shifts(model, final)
     if explained.unconverged:
         return Verdict(kind="unknown", effects=(), shifts=moved, reason=explained.unconverged)
-    if final.effects and adequate(final, null):
+    if final.effects and (adequate(final, null) or not model.reaches_noise):
         return Verdict(kind="effect", effects=final.effects, shifts=moved, reason="")
     moved = shifts(model, null)
-    if not final.effects and null.chi_squared <= NOISE_ONLY:
+    if not final.effects and (null.chi_squared <= NOISE_ONLY or not model.reaches_noise):
         kind: Kind = "parameter" if moved else "none"
         return Verdict(kind=kind, effects=(), shifts=moved, reason="")
     return Verdict(
@@ -88,16 +88,25 @@ def decide(model: Model, explained: Explanation) -> Verdict:
 
 
 def statement(
-    verdict: Verdict, candidates: Mapping[str, Candidate], closed: float | None, place: str | None
+    verdict: Verdict,
+    candidates: Mapping[str, Candidate],
+    closed: float | None,
+    place: str | None,
+    *,
+    complete: bool = True,
 ) -> str:
-    """The verdict in one sentence."""
+    """The verdict in one sentence.
+
+    complete : whether what the named effects leave is only the noise
+    """
     if verdict.kind == "effect":
         names = " and ".join(
             f"{name} ({candidates[name].title[:1].lower()}{candidates[name].title[1:]})"
             for name in verdict.effects
         )
         share = "" if closed is None else f"; with it the held-out gap closes by {closed:.0%}"
-        return f"The bench has what the model lacks: {names}{share}."
+        rest = "" if complete else ", and the rest is unknown"
+        return f"The machine has what the model lacks: {names}{share}{rest}."
     if verdict.kind == "parameter":
         first = verdict.shifts[0]
         change = 100.0 * (first.estimated / first.nominal - 1.0)

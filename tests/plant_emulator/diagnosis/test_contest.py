@@ -51,6 +51,7 @@ class Line:
     units: Mapping[str, str] = {"a": "1", "b": "1"}
     subsystems: Mapping[str, str] = {"a": "level", "b": "slope"}
     states: tuple[Unknown, ...] = ()
+    reaches_noise = True
 
     def __init__(self, measured: Sequence[Array], names: Sequence[str] = tuple(SHAPES)) -> None:
         self.measured = list(measured)
