@@ -60,7 +60,7 @@ def commands(config: Config, register_map: RegisterMap) -> Iterator[Finding]:
                     severity="error",
                     where="plc.map",
                     what=f"register {register.name} of {register_map.name} cannot hold what "
-                    f"{why} asks of it, and the register's range is what is allowed",
+                    f"{why} asks of it",
                     value=str(error.value),
                     allowed=error.allowed,
                 )
