@@ -146,13 +146,13 @@ def step(
 
 
 def _facts(config: Config, state: CycleState, observation: Observation) -> Facts:
-    now, newest = observation.now, state.samples.newest
+    now, newest, sent = observation.now, state.samples.newest, state.command
     status = Status(0) if newest is None else newest.status
     before = state.supervisor.state
     return Facts(
         now=now,
         link=samples.complaint(state.samples, now, config.loop.stale),
-        write=command.complaint(state.command, now, config.loop.stale),
+        write=command.complaint(sent, now, config.loop.stale),
         check=None
         if newest is None
         else check(
@@ -160,8 +160,8 @@ def _facts(config: Config, state: CycleState, observation: Observation) -> Facts
             newest,
             state=before,
             overruns=observation.overruns,
-            echo_age=0.0 if state.command.echo is None else now - state.command.echo_moved,
-            other_age=now - state.command.other_wrote,
+            echo_age=0.0 if sent.echo is None else state.samples.sequence_moved - sent.echo_moved,
+            other_age=now - sent.other_wrote,
         ),
         remote=Status.REMOTE in status,
         confirmed=command.confirmed(config, status),

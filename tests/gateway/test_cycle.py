@@ -444,6 +444,15 @@ def test_the_first_fault_of_a_series_is_the_reason(running):
     assert running.last.reason is Reason.TIMEOUT
 
 
+def test_an_echo_that_no_reading_could_show_is_not_the_reason(running):
+    """The last readings had the same echo: by the clock it has stood still for longer than they."""
+    running.disturb = no_echo
+    running.run(5 * SCAN)
+    running.disturb = fault(Reason.EXCEPTION_6)
+    left_run_after(running)
+    assert running.last.reason is Reason.EXCEPTION_6
+
+
 def test_recovery_needs_remote_off_and_on_to_acknowledge_and_again_to_start(running):
     running.disturb = fault(Reason.TIMEOUT)
     running.run(4.0)
