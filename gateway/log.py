@@ -8,7 +8,7 @@ import numpy as np
 
 from gateway.errors import ConfigError
 from register_maps import csv_log, mdf4_log, parquet_log
-from register_maps.log_table import LogTableError
+from register_maps.log_table import LogTableError, check_sampling
 from register_maps.signals import LOG_COLUMNS
 
 Column = np.ndarray[Any, np.dtype[np.float64]]
@@ -41,6 +41,7 @@ def read(path: Path) -> Log:
         data = path.read_bytes()
         binary = (form for form in (parquet_log, mdf4_log) if form.recognises(data))
         found = next(binary, csv_log).parse(data)
+        check_sampling(found.signals["time"])
     except LogTableError as error:
         raise LogError(str(error), file=path) from error
     except OSError as error:

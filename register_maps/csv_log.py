@@ -41,6 +41,7 @@ def parse(data: bytes, columns: Mapping[str, LogColumn] = LOG_COLUMNS) -> LogTab
     check_samples(
         table,
         TIME,
+        {name: columns[name].unit for name in table},
         lambda row: f"line {rows[row][0]}",
         lambda row, name: rows[row][1][known[name]].strip(),
     )

@@ -11,7 +11,8 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import isfinite
+from math import inf, isfinite
+from statistics import median
 from typing import Any, Final
 
 from register_maps.signals import LOG_COLUMNS, LogColumn
@@ -21,6 +22,10 @@ WITH_METADATA: Final = {f"{c.signal} [{c.unit}]": c for c in LOG_COLUMNS.values(
 """The log's columns as files call them that hold the unit as metadata."""
 SAME_UNIT: Final = {"Nm": "N m", "N*m": "N m", "N\u00b7m": "N m", "\u00b0C": "degC"}
 """Other spellings of the same units, as other programs write them."""
+LARGEST: Final = {"s": 1e10, "rad/s": 1e4, "N m": 1e6, "A": 1e5, "V": 1e5, "degC": 1e4, "m/s": 1e3}
+"""By unit, far more than any bench or truck shows: a value beyond it is a fault of the log."""
+FASTEST, SLOWEST = 1e-4, 10.0
+"""[s] Between two samples of a bench; a logger's clock may be 1 % off."""
 UNIT: Final = re.compile(
     r"(_?(s|ms|us|min|h|rpm|1_min|min_1|rev_s|rad_s|deg_s|rad|deg|m|mm|m_s|km_h|kmh|Hz|m?Nm|kNm|N|lbft"
     r"|[mk]?A|[mk]?V|degC|degF|[CFK]))?( \[.*\])?"
@@ -72,21 +77,27 @@ def check_count(samples: int) -> None:
 def check_samples(
     columns: Mapping[str, Sequence[float]],
     time: str,
+    units: Mapping[str, str],
     place: Callable[[int], str],
     shown: Callable[[int, str], object],
 ) -> None:
-    """Refuse values that are not finite, and a time that does not increase.
+    """Refuse values that are not finite or that nothing shows, and a time that does not increase.
 
-    time : name of its column; place, shown : what an error calls a row, and a value by row and name
+    time : name of its column; units : of each column, by name
+    place, shown : what an error calls a row, and a value by row and name
     """
+    largest = {name: LARGEST.get(units[name], inf) for name in columns}
     later = all(a < b for a, b in pairwise(columns[time]))
-    if later and all(all(map(isfinite, values)) for values in columns.values()):
+    if later and all(_within(values, largest[name]) for name, values in columns.items()):
         return
     for row, values in enumerate(zip(*columns.values(), strict=True)):
         for name, value in zip(columns, values, strict=True):
+            where = f"{place(row)}, column {name}: "
             if not isfinite(value):
+                raise LogTableError(f"{where}{shown(row, name)!r}; expected a finite number")
+            if abs(value) > largest[name]:
                 raise LogTableError(
-                    f"{place(row)}, column {name}: {shown(row, name)!r}; expected a finite number"
+                    f"{where}{shown(row, name)}; expected {-largest[name]:g} .. {largest[name]:g}"
                 )
         before, now = columns[time][max(row - 1, 0)], columns[time][row]
         if row and now <= before:
@@ -94,6 +105,26 @@ def check_samples(
                 f"{place(row)}, column {time}: {shown(row, time)} after {before:g}; "
                 "time must increase strictly"
             )
+
+
+def _within(values: Sequence[float], largest: float) -> bool:
+    return all(map(isfinite, values)) and -largest <= min(values) and max(values) <= largest
+
+
+def check_sampling(times: Sequence[float]) -> None:
+    """Refuse a log of the bench that is sampled as no bench is, or that has a long hole [s]."""
+    steps = [later - before for before, later in pairwise(times)]
+    interval = median(steps)
+    if not 0.99 * FASTEST <= interval <= SLOWEST:
+        raise LogTableError(
+            f"a sample every {interval:g} s; expected one every {FASTEST:g} .. {SLOWEST:g} s"
+        )
+    widest = max(range(len(steps)), key=steps.__getitem__)
+    if steps[widest] > SLOWEST:
+        raise LogTableError(
+            f"no sample from {times[widest]:g} s to {times[widest + 1]:g} s; "
+            f"expected one every {SLOWEST:g} s or faster"
+        )
 
 
 def si(column: LogColumn, values: Sequence[float]) -> list[float]:
@@ -118,6 +149,7 @@ def table(names: Sequence[str], numbers: Callable[[int], list[float]]) -> LogTab
     check_samples(
         columns,
         with_metadata("time_s", ""),
+        {name: WITH_METADATA[name].unit for name in columns},
         lambda row: f"row {row + 1}",
         lambda row, name: columns[name][row],
     )

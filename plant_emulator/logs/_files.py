@@ -8,7 +8,7 @@ import numpy as np
 
 from plant_emulator.errors import LogError
 from plant_emulator.log import Array, Log
-from register_maps.log_table import Column, LogTable, LogTableError
+from register_maps.log_table import Column, LogTable, LogTableError, check_sampling
 from register_maps.signals import LOG_COLUMNS, LogColumn
 from register_maps.units import UNITS
 
@@ -21,6 +21,7 @@ def read(path: Path, parse: Callable[[bytes], LogTable]) -> Log:
     """The log in that file; LogError names file, place and column."""
     try:
         found = parse(path.read_bytes())
+        check_sampling(found.signals["time"])
     except LogTableError as error:
         raise LogError(f"{path}: {error}") from error
     signals = {signal: np.array(values) for signal, values in found.signals.items()}

@@ -45,6 +45,31 @@ GOOD = {
 }
 BAD = {
     "no byte": (b"", ""),
+    "speed of no machine": (
+        PLAIN.replace("2.5", "1e308").encode(),
+        "line 3, column motor_speed_rad_s: 1e308; expected -10000 .. 10000",
+    ),
+    "torque of no machine": (
+        PLAIN.replace("-4.0", "-1.1e6").encode(),
+        "line 2, column shaft_torque_Nm: -1.1e6; expected -1e+06 .. 1e+06",
+    ),
+    "current of no machine": (
+        with_column("armature_current_A", "1", "100001").encode(),
+        "line 3, column armature_current_A: 100001; expected -100000 .. 100000",
+    ),
+    "time of no clock": (PLAIN.replace("0.01,", "1e300,").encode(), "line 3, column time_s: 1e300"),
+    "sampled too fast for any bench": (
+        PLAIN.replace("0.01,", "1e-11,").encode(),
+        "a sample every 1e-11 s; expected one every 0.0001 .. 10 s",
+    ),
+    "sampled too slowly for any bench": (
+        PLAIN.replace("0.01,", "1e7,").encode(),
+        "a sample every 1e+07 s; expected one every 0.0001 .. 10 s",
+    ),
+    "hole": (
+        (PLAIN + "0.02,1.0,2.0,0.03,-4.0\n10.03,1.0,2.0,0.03,-4.0\n").encode(),
+        "no sample from 0.02 s to 10.03 s",
+    ),
     "header only": (f"{HEADER}\n".encode(), "0 samples; at least 2"),
     "one sample": (PLAIN[: PLAIN.index("0.01")].encode(), "1 samples; at least 2"),
     "semicolons": (PLAIN.replace(",", ";").encode(), ""),
@@ -117,3 +142,19 @@ def test_temperature_is_read_in_kelvin_by_both(tmp_path: Path) -> None:
     wanted = pytest.approx([305.15, 0.0])
     assert gateway_log.read(path).columns["shell_temperature"] == wanted
     assert emulator_logs.read(path)["shell_temperature"] == wanted
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("0.01,", "0.0001,"),
+        ("0.01,", "10.0,"),
+        ("2.5", "1e4"),
+        ("-4.0", "-1e6"),
+        ("\n0.0", "\n1795251661.0"),
+    ],
+)
+def test_a_log_at_the_end_of_what_may_be_is_read(tmp_path: Path, before: str, after: str) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text(PLAIN.replace(before, after))
+    assert len(gateway_log.read(path).time) == len(emulator_logs.read(path).time) == 2
