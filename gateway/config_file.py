@@ -2,26 +2,34 @@
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from gateway.config import Config, changed, from_document
 from gateway.errors import ConfigError
 from gateway.friction import friction_of_file
+from gateway.keys import check_text
 
 
 def load(path: str | Path) -> Config:
     """The configuration in a file; a friction file is looked for beside it."""
     file = Path(path)
     text = _text(file)
-    document = _with_friction(_toml(file, text), file.parent)
-    return from_document(document, place=lambda section, key: _place(file, text, section, key))
+
+    def place(section: str, key: str) -> str:
+        return _place(file, text, section, key)
+
+    return from_document(_with_friction(_toml(file, text), file.parent, place), place=place)
 
 
 def with_values(config: Config, values: Mapping[str, str]) -> Config:
     """`Config.with_values` where `regulator.friction` may also be the path of a friction file."""
-    return from_document(_with_friction(changed(config.document, values), Path()))
+    try:
+        document = changed(config.document, values)
+    except (ValueError, RecursionError) as error:
+        raise ConfigError(_why(error), place="--set", expected="KEY=VALUE as in TOML") from error
+    return from_document(_with_friction(document, Path(), "{}.{}".format))
 
 
 def load_friction(path: str | Path) -> dict[str, Any]:
@@ -29,10 +37,13 @@ def load_friction(path: str | Path) -> dict[str, Any]:
     return friction_of_file(_toml(Path(path), _text(Path(path))), path)
 
 
-def _with_friction(document: dict[str, Any], directory: Path) -> dict[str, Any]:
+def _with_friction(
+    document: dict[str, Any], directory: Path, place: Callable[[str, str], str]
+) -> dict[str, Any]:
     regulator = document.get("regulator")
     if not isinstance(regulator, Mapping) or not isinstance(regulator.get("friction"), str):
         return document
+    check_text(regulator["friction"], place("regulator", "friction"))
     table = load_friction(directory / regulator["friction"])
     return document | {"regulator": {**regulator, "friction": table}}
 
@@ -48,8 +59,18 @@ def _text(path: Path) -> str:
 def _toml(path: Path, text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(str(error), file=path, expected="TOML") from error
+    except (ValueError, RecursionError) as error:
+        raise ConfigError(_why(error), file=path, expected="TOML") from error
+
+
+def _why(error: ValueError | RecursionError) -> str:
+    """What the TOML reader met, in our words where its own speak to programmers."""
+    match error:
+        case tomllib.TOMLDecodeError():
+            return str(error)
+        case RecursionError():
+            return "arrays or tables nested too deep"
+    return "a number of too many digits"
 
 
 def _place(path: Path, text: str, section: str, key: str) -> str:

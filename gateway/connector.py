@@ -90,9 +90,9 @@ def resolve(host: str, port: int) -> tuple[socket.AddressFamily, tuple[str, int]
     """Address family and numeric address of a peer."""
     try:
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-    except OSError as error:
+    except (OSError, ValueError) as error:  # a ValueError for what cannot be a name at all
         raise ConfigError(
-            error.strerror or str(error),
+            getattr(error, "strerror", None) or "cannot be a name",
             place="[plc] host",
             value=host,
             expected="an address, or a name that is known here",

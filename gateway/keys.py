@@ -1,10 +1,14 @@
 """One key of a configuration file: declared once beside the field it fills, and checked by that."""
 
 import math
+import re
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, Final
 
 from gateway.errors import ConfigError
+
+CONTROL: Final = re.compile(r"[\x00-\x1f\x7f]")
+"""What no value on one line holds."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +54,8 @@ def checked(key: Key, kind: Any, value: Any, where: str) -> Any:
     if type(value) is not wanted and not numeric:
         name = {str: "text", bool: "true or false", int: "a whole number", float: "a number"}
         raise ConfigError("wrong type", place=where, value=value, expected=name[wanted])
+    if wanted is str:
+        check_text(value, where)
     if key.choices and value not in key.choices:
         raise ConfigError(
             "unknown choice", place=where, value=value, expected=" or ".join(key.choices)
@@ -58,3 +64,10 @@ def checked(key: Key, kind: Any, value: Any, where: str) -> Any:
         expected = f"{key.lower:g} .. {key.upper:g}"
         raise ConfigError("out of range", place=where, value=value, expected=expected)
     return si(key, float(value) if numeric else value)
+
+
+def check_text(value: str, where: str) -> None:
+    """Refuse a text that names nothing: an empty one, or one that no line can hold."""
+    if not value.strip() or CONTROL.search(value):
+        what = "control character" if value.strip() else "empty"
+        raise ConfigError(what, place=where, value=value, expected="a text on one line")

@@ -25,13 +25,15 @@ def names() -> tuple[str, ...]:
 
 def load(name_or_path: str | Path) -> RegisterMap:
     """The shipped map of that name, or the map in that file; raises `MapError`."""
+    if not str(name_or_path).strip():
+        raise _unreadable("''", 1, "an empty name", _expected())
     shipped = _HERE / f"{name_or_path}.toml"
     path = shipped if str(name_or_path) in names() else Path(name_or_path)
     content = _content(path)
     text = _text(path, content)
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # also a number too long, or tables too deep
         at = re.search(r"line (\d+)", str(error))
         line = int(at[1]) if at else text.count("\n") + 1
         raise _unreadable(path, line, str(error), "TOML") from None
@@ -42,9 +44,9 @@ def load(name_or_path: str | Path) -> RegisterMap:
 def _content(path: Path) -> bytes:
     try:
         return path.read_bytes()
-    except OSError as error:
-        expected = f"a readable file, or one of {', '.join(names())}"
-        raise _unreadable(path, 1, error.strerror or str(error), expected) from None
+    except (OSError, ValueError) as error:  # a ValueError for what cannot be a name at all
+        why = getattr(error, "strerror", None) or str(error)
+        raise _unreadable(path, 1, why, _expected()) from None
 
 
 def _text(path: Path, content: bytes) -> str:
@@ -55,5 +57,9 @@ def _text(path: Path, content: bytes) -> str:
         raise _unreadable(path, line, "not UTF-8", "TOML in UTF-8") from None
 
 
-def _unreadable(path: Path, line: int, why: str, expected: str) -> MapError:
+def _expected() -> str:
+    return f"a readable file, or one of {', '.join(names())}"
+
+
+def _unreadable(path: Path | str, line: int, why: str, expected: str) -> MapError:
     return MapError(file=str(path), line=line, place="file", value=why, expected=expected)

@@ -32,7 +32,7 @@ def load(name: str = DEFAULT) -> ParameterSet:
         )
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # no TOML or UTF-8, or a number too long
         raise ParameterError(f"{path}: {error}") from error
     return parameter_set(name, table)
 

@@ -74,6 +74,13 @@ def test_units_of_the_file_become_si(tmp_path):
         ("[regulator]\nfriction = 3", [":2: [regulator] friction", "no friction table"]),
         ("[regulator]\nfriction = 'none.toml'", ["none.toml", "No such file"]),
         ("[truck", ["bench.toml", "expected TOML"]),
+        (f"[truck]\nmass_kg = {5000 * '9'}", ["bench.toml: a number of too many digits"]),
+        (f"[truck]\nmass_kg = {5000 * '['}", ["bench.toml: arrays or tables nested too deep"]),
+        ('[plc]\nmap = "a\\u0000b"', [":2: [plc] map: control character", "'a\\x00b'"]),
+        ('[plc]\nmap = "a\\nb"', [":2: [plc] map: control character", "'a\\nb'"]),
+        ("[plc]\nmap = ''", [":2: [plc] map: empty", "a text on one line"]),
+        ('[recording]\ndir = "a\\u0000b"', [":2: [recording] dir: control character"]),
+        ('[regulator]\nfriction = "a\\u0000b"', [":2: [regulator] friction: control character"]),
     ],
 )
 def test_a_mistake_is_named_with_file_place_value_and_what_would_be_right(tmp_path, text, said):
