@@ -11,10 +11,12 @@ import fcntl
 import multiprocessing
 import os
 import signal
+import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
+from io import FileIO
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Final
@@ -73,8 +75,13 @@ class Recorder:
         """End the recording; returns when it is on the disk."""
         self._sender.close()
         self._process.join()
-        if self._process.exitcode:
-            raise GatewayError(f"{self.path}: the recorder ended early; expected room on the disk")
+        code = self._process.exitcode
+        if code:
+            # 1 is an error of ours, a negative one a signal; the others are what a write met.
+            why = os.strerror(code) if code > 1 else f"exit code {code}"
+            raise GatewayError(
+                f"{self.path}: the recorder ended early: {why}; expected room on the disk"
+            )
 
 
 @contextmanager
@@ -92,15 +99,31 @@ def record(receiver: Connection, job: Job) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     view = View(job.header, job.layout) if job.view else nullcontext(_show_nothing)
-    with job.path.open("ab", buffering=0) as file, view as show:
+    with view as show:
+        try:
+            _append(receiver, job, show)
+        except OSError as error:
+            # The loop learns it by its broken pipe, ramps down, and tells the number as words.
+            sys.exit(error.errno)
+
+
+def _append(receiver: Connection, job: Job, show: Callable[[bytes], None]) -> None:
+    with job.path.open("ab", buffering=0) as file:
         synced = time.monotonic()
         for batch in _batches(receiver.fileno(), job.layout.size):
-            file.write(batch)
+            _write(file, batch)
             show(batch)
             if time.monotonic() - synced > SYNC:
                 os.fdatasync(file.fileno())
                 synced = time.monotonic()
         os.fsync(file.fileno())
+
+
+def _write(file: FileIO, batch: bytes) -> None:
+    """All of it: a disk that fills up takes a part first, and says so only the next time."""
+    left = memoryview(batch)
+    while left:
+        left = left[file.write(left) :]
 
 
 def _batches(source: int, size: int) -> Iterator[bytes]:

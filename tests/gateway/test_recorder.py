@@ -2,6 +2,7 @@
 
 import math
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gateway.errors import GatewayError
 from gateway.record import COMMANDED, MEASURED, NOTHING, Layout, Tick
 from gateway.recorder import Job, Recorder
 from gateway.recording import RecordingError, encode_header, is_recording, read
@@ -189,6 +191,28 @@ def test_a_full_pipe_drops_the_record_and_counts_it(tmp_path: Path) -> None:
         pushed += 1
     recorder.close()
     assert len(read(tmp_path / "a.rlrec")) == pushed - recorder.dropped
+
+
+def test_a_full_disk_is_told_in_one_line_and_keeps_every_whole_record(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The limit on a file's size, inherited by the recorder, stands for the disk's end."""
+    path, record = tmp_path / "a.rlrec", LAYOUT.pack(tick(0))
+    room = len(encode_header(HEADER)) + 3 * LAYOUT.size + 5
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, before[1]))
+    try:
+        recorder = Recorder(Job(path=path, header=HEADER, layout=LAYOUT))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    while not recorder.failed:  # what has no room ends the recorder, and its end the pipe
+        recorder.push(record)
+    with pytest.raises(GatewayError, match="ended early: File too large; expected room"):
+        recorder.close()
+    assert capfd.readouterr() == ("", "")
+    found = read(path)
+    assert path.stat().st_size == room
+    assert (len(found), "5 bytes of an unfinished" in found.note) == (3, True)
 
 
 GATEWAY_THAT_IS_KILLED = """
