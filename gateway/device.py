@@ -1,5 +1,6 @@
 """A device as the operator meets it: connect, read all registers of a map, twice, and hang up."""
 
+import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,9 +10,9 @@ from typing import Final
 from gateway.errors import ConfigError
 from gateway.inspection import Reading, Words, mbpoll
 from gateway.plc import READ_HOLDING, READ_INPUT, LinkError, TcpLink
-from register_maps.codec import CodecError, encode_value
+from register_maps.codec import CodecError, decode_value, encode_value, scaled
 from register_maps.register_map import Block, Register, RegisterMap
-from register_maps.signals import RESERVED
+from register_maps.signals import RESERVED, SIGNALS
 from register_maps.units import UNITS
 
 POLL: Final = 0.002
@@ -135,9 +136,21 @@ def writable(register_map: RegisterMap, name: str) -> Register:
 def encoded(register: Register, scaled_value: float) -> Words:
     """Words of a value in the register's unit, if the map's range has it."""
     value = UNITS[register.unit].to_si(scaled_value)
+    if SIGNALS[register.signal].type is not float and not value.is_integer():
+        raise ConfigError(
+            "not whole", place=register.name, value=scaled_value, expected="a whole number"
+        )
     try:
         return encode_value(register, int(value) if value.is_integer() else value)
     except CodecError as error:
         raise ConfigError(
             error.kind, place=register.name, value=scaled_value, expected=error.allowed
         ) from error
+
+
+def is_exact(register: Register, words: Words, scaled_value: float) -> bool:
+    """Whether the words are this value, not only the nearest one that the register can hold."""
+    value = decode_value(register, words)
+    return value is not None and math.isclose(
+        scaled(register, value), scaled_value, rel_tol=1e-9, abs_tol=1e-9
+    )

@@ -52,6 +52,10 @@ class LossesError(GatewayError):
     exit_code = 2
 
 
+class SignError(LossesError):
+    """The commissioning check: the torque has the wrong sign where the motor must drive."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Trace:
     """A run in SI, by name: shape (n,) each. `shaft_torque`: mean up to each sample, if known."""
@@ -218,7 +222,7 @@ def _refuse_sign(sections: list[Section]) -> None:
     if not wrong:
         return
     worst = max(wrong, key=lambda one: one.shaft_torque)
-    raise LossesError(
+    raise SignError(
         f"the sign of the shaft torque is wrong, or a truck pushes the drum: at steady forward "
         f"speed the sensor shows {worst.shaft_torque:+.2f} N m ({worst.start:.1f} .. "
         f"{worst.end:.1f} s, {worst.motor_speed * 30.0 / np.pi:.0f} rpm; {len(wrong)} of "

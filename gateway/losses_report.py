@@ -235,4 +235,4 @@ def draw(path: Path, losses: Losses) -> None:
     below.set_xlabel("speed of the drum's rim [km/h]")
     for axes in (above, below):
         axes.grid(color="#e6e6e6", linewidth=0.6)
-    figure.savefig(path, dpi=130)
+    figure.savefig(path, dpi=130, format=path.suffix.removeprefix(".") or "png")

@@ -101,4 +101,4 @@ def draw(path: Path, compared: Compared) -> None:
     for axes in (speed, error):
         axes.grid(color="#e6e6e6", linewidth=0.6)
         axes.margins(x=0.0)
-    figure.savefig(path, dpi=130)
+    figure.savefig(path, dpi=130, format=path.suffix.removeprefix(".") or "png")

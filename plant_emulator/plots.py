@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from plant_emulator.log import COMPARED, Log
@@ -41,7 +42,7 @@ def draw_validation(pairs: Sequence[tuple[Log, Log]], path: str) -> None:
                 _draw(axes[2 * row][column], axes[2 * row + 1][column], log, simulation, name)
         axes[-1][column].set_xlabel("time [s]")
     axes[0][0].legend(loc="upper right")
-    figure.savefig(path, dpi=120)
+    figure.savefig(path, dpi=120, format=Path(path).suffix.removeprefix(".") or "png")
 
 
 def _draw(upper: Axes, lower: Axes, log: Log, simulation: Log, name: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from plant_emulator.plots import MEASURED, RESIDUAL, SIMULATED
@@ -32,4 +33,4 @@ def draw(fit: RoadFit, path: str) -> None:
     lower.axhline(values.torque_offset, color="#999999", linewidth=0.5)
     lower.set_ylabel("motor torque [N m]")
     lower.set_xlabel("time of the velocity log [s]")
-    figure.savefig(path, dpi=120)
+    figure.savefig(path, dpi=120, format=Path(path).suffix.removeprefix(".") or "png")

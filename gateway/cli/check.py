@@ -9,6 +9,7 @@ import click
 import register_maps
 from gateway import device, inspection, review
 from gateway.cli._settings import assignments
+from gateway.cli._types import Command, OutputFile
 from gateway.config import Config
 from gateway.config_file import load, with_values
 from gateway.finding import Finding, holds
@@ -26,11 +27,13 @@ Examples:
 """
 
 
-@click.command(epilog=EXAMPLE)
+@click.command(cls=Command, epilog=EXAMPLE)
 @click.option("-c", "--config", type=click.Path(path_type=Path), required=True, help="TOML file")
 @click.option("--live", is_flag=True, help="also compare the register map with the device")
 @click.option("--set", "values", multiple=True, metavar="KEY=VALUE", help="instead of the file's")
-@click.option("--json", "target", metavar="FILE", help="machine-readable answer, - = stdout")
+@click.option(
+    "--json", "target", type=OutputFile(dash=True), help="machine-readable answer, - = stdout"
+)
 def command(config: Path, *, live: bool, values: tuple[str, ...], target: str | None) -> int:
     """Say what the configuration lets expect of the bench.
 

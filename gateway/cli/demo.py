@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gateway.cli._types import Command, Number, OutputFile
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -19,11 +21,11 @@ Examples:
 """
 
 
-@click.command(epilog=EXAMPLE)
+@click.command(cls=Command, epilog=EXAMPLE)
 @click.option(
     "--load",
     "load_mass",
-    type=click.FloatRange(0.0, 10000.0),
+    type=Number(0.0, 10000.0),
     metavar="KG",
     help="Load on the 3640 kg truck; default: a run without and a run with 1600 kg.",
 )
@@ -44,7 +46,7 @@ Examples:
 )
 @click.option(
     "--period",
-    type=click.FloatRange(10.0, 200.0),
+    type=Number(10.0, 200.0),
     default=10.0,
     show_default=True,
     metavar="MS",
@@ -65,7 +67,7 @@ Examples:
 )
 @click.option(
     "--duration",
-    type=click.FloatRange(1.0, 600.0),
+    type=Number(1.0, 600.0),
     default=30.0,
     show_default=True,
     metavar="S",
@@ -80,7 +82,9 @@ Examples:
     metavar="DIR",
     help="Where log, picture and summary go.",
 )
-@click.option("--json", "json_file", metavar="FILE", help="Summary; - is standard output.")
+@click.option(
+    "--json", "json_file", type=OutputFile(dash=True), help="Summary; - is standard output."
+)
 def command(
     *,
     load_mass: float | None,

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from gateway import export, recording
+from gateway.cli._types import Command, OutputFile
 from gateway.header import map_of
 
 EXAMPLE = """
@@ -14,12 +15,12 @@ Example:
 """
 
 
-@click.command(epilog=EXAMPLE)
+@click.command(cls=Command, epilog=EXAMPLE)
 @click.argument("file", metavar="RECORDING", type=click.Path(path_type=Path))
 @click.option(
     "--to",
     "target",
-    type=click.Path(path_type=Path),
+    type=OutputFile(path_type=Path),
     required=True,
     help="FILE.csv, .csv.gz, .parquet or .mf4",
 )

@@ -1,6 +1,7 @@
 """The bench's own friction at steady speeds: the map that the gateway compensates by."""
 
 import json
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -8,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gateway.cli._settings import assignments
+from gateway.cli._types import PICTURES, Command, Number, OutputFile
 
 if TYPE_CHECKING:
     from gateway.config import Config
@@ -19,6 +21,7 @@ Examples:
   gateway losses -c bench.toml --save friction_map.toml
   gateway losses program2.csv.gz --save friction_map.toml --csv losses.csv --plot losses.png
 """
+PICTURE = OutputFile(endings=PICTURES, path_type=Path)
 CONCERNS = ("loop.", "plc.", "limits.watchdog", "regulator.torque")
 """What of `gateway check` also holds for a run without a truck."""
 
@@ -33,21 +36,31 @@ class Speeds(click.ParamType[list[float]]):
     ) -> list[float]:
         """The numbers in the text."""
         try:
-            return [float(part) for part in value.split(",")]
+            found = [float(part) for part in value.split(",")]
         except ValueError:
+            found = [math.nan]
+        if not all(map(math.isfinite, found)):
             self.fail(f"{value!r}: expected numbers separated by commas", param, ctx)
+        return found
 
 
-@click.command(epilog=EXAMPLE)
+@click.command(cls=Command, epilog=EXAMPLE)
 @click.argument("files", metavar="[LOG|RECORDING]...", type=click.Path(path_type=Path), nargs=-1)
 @click.option("-c", "--config", type=click.Path(path_type=Path), help="TOML file")
 @click.option("--speeds", type=Speeds(), help="motor speeds of the sweep; default: 200 .. 4500")
-@click.option("--hold", type=float, metavar="S", help="each of them for so long; default: 8")
+@click.option(
+    "--hold",
+    type=Number(0.0, min_open=True),
+    metavar="S",
+    help="each of them for so long; default: 8",
+)
 @click.option("--set", "values", multiple=True, metavar="KEY=VALUE", help="instead of the file's")
-@click.option("--save", type=click.Path(path_type=Path), help="write the friction map (TOML)")
-@click.option("--csv", "table", type=click.Path(path_type=Path), help="write the steady stretches")
-@click.option("--plot", type=click.Path(path_type=Path), help="draw friction over speed (PNG)")
-@click.option("--json", "json_file", metavar="FILE", help="losses/1; - = standard output")
+@click.option("--save", type=OutputFile(path_type=Path), help="write the friction map (TOML)")
+@click.option("--csv", "table", type=OutputFile(path_type=Path), help="write the steady stretches")
+@click.option("--plot", type=PICTURE, help="draw friction over speed (PNG)")
+@click.option(
+    "--json", "json_file", type=OutputFile(dash=True), help="losses/1; - = standard output"
+)
 def command(
     files: tuple[Path, ...],
     config: Path | None,

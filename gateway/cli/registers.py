@@ -2,21 +2,29 @@
 
 import json
 import time
-from collections.abc import Callable, Sequence
-from typing import Any, Final
+from collections.abc import Callable
+from typing import Any
 
 import click
 
 import register_maps
-from gateway.device import Device, encoded, read_all, two_readings, writable, write_value
+from gateway.cli._register_rows import FOUND, LIVE, PAPER, compared, in_hex, live, paper, table
+from gateway.cli._types import LONGEST, Command, Number, OutputFile
+from gateway.device import (
+    Device,
+    encoded,
+    is_exact,
+    read_all,
+    two_readings,
+    writable,
+    write_value,
+)
+from gateway.errors import PlcError
 from gateway.inspection import (
     Reading,
     Row,
     Words,
-    constant_words,
-    in_other_order,
     shown,
-    swapped,
     verify,
 )
 from register_maps.register_map import Register, RegisterMap
@@ -38,9 +46,23 @@ def command() -> None:
 
 def _on_a_device(wrapped: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
-        click.option("--timeout", default=1.0, show_default=True, help="for each request [s]"),
-        click.option("--unit", default=1, show_default=True, help="unit id"),
-        click.option("--port", default=5020, show_default=True, help="TCP port"),
+        click.option(
+            "--timeout",
+            type=Number(0.0, LONGEST, min_open=True),
+            default=1.0,
+            show_default=True,
+            help="for each request [s]",
+        ),
+        click.option(
+            "--unit", type=click.IntRange(0, 255), default=1, show_default=True, help="unit id"
+        ),
+        click.option(
+            "--port",
+            type=click.IntRange(1, 65535),
+            default=5020,
+            show_default=True,
+            help="TCP port",
+        ),
         click.option("--host", default="127.0.0.1", show_default=True, help="address or name"),
         click.argument("name", metavar="MAP"),
     ):
@@ -52,81 +74,38 @@ def _on_a_device(wrapped: Callable[..., Any]) -> Callable[..., Any]:
 @click.argument("name", metavar="MAP")
 def list_registers(name: str) -> None:
     """Print the map: addresses in both forms, types, orders, units, ranges."""
-    rows = [_paper(register) for register in register_maps.load(name).registers]
-    _table(
-        ("name", "signal", "address", "form", "type", "order", "raw to", "range", "access"), rows
-    )
-
-
-def _paper(register: Register) -> tuple[str, ...]:
-    low, high = register.range
-    constant = "" if register.constant is None else f" = {register.constant:.10g} {_both(register)}"
-    return (
-        register.name,
-        register.signal,
-        f"{register.table} {register.address}",
-        str(register.reference),
-        register.type,
-        register.word_order if register.raw.words > 1 else register.word_order[:2],
-        f"{register.scale:g} {register.unit}"
-        + (f" {register.offset:+g}" if register.offset else ""),
-        f"{low:.10g} .. {high:.10g}{constant}",
-        register.access,
-    )
-
-
-def _both(register: Register) -> str:
-    """Words of a constant in its own order and with the words exchanged."""
-    if register.raw.words == 1:
-        return ""
-    orders = (register.word_order, swapped(register.word_order))
-    return ", ".join(f"{order} {_hex(constant_words(register, order))}" for order in orders)
+    rows = [paper(register) for register in register_maps.load(name).registers]
+    table(PAPER, rows)
 
 
 @command.command()
 @_on_a_device
 def read(name: str, **where: Any) -> None:
-    """Read every register once."""
+    """Read every register once; exit code 1 when not one answered."""
     register_map, device = register_maps.load(name), Device(**where)
     with device.link() as link:
         reading = read_all(link, register_map)
         begun = time.monotonic()
     rows = [
-        _live(register, reading[register.name], time.monotonic() - begun, device)
+        live(register, reading[register.name], time.monotonic() - begun, device)
         for register in _meaning(register_map)
     ]
-    _table(LIVE, rows)
-
-
-LIVE: Final = (
-    "name",
-    "address",
-    "raw",
-    "value",
-    "other order",
-    "unit",
-    "age",
-    "the same with mbpoll",
-)
-
-
-def _live(register: Register, found: Words | str, age: float, device: Device) -> tuple[str, ...]:
-    words = () if isinstance(found, str) else found
-    return (
-        register.name,
-        f"{register.address} ({register.reference})",
-        _hex(words),
-        found if isinstance(found, str) else shown(register, found),
-        in_other_order(register, words) if words else "",
-        register.unit,
-        f"{age * 1e3:.0f} ms",
-        device.mbpoll(register),
-    )
+    table(LIVE, rows)
+    if all(isinstance(found, str) for found in reading.values()):
+        raise PlcError(
+            f"{device.host}:{device.port}, unit {device.unit}: not one register of {name} answered"
+        )
 
 
 @command.command()
-@click.option("--interval", default=0.5, show_default=True, help="between two readings [s]")
-@click.option("--count", type=int, help="end after so many readings")
+@click.option(
+    "--interval",
+    type=Number(0.0, LONGEST),
+    default=0.5,
+    show_default=True,
+    help="between two readings [s]",
+)
+@click.option("--count", type=click.IntRange(1), help="end after so many readings")
 @_on_a_device
 def watch(name: str, interval: float, count: int | None, **where: Any) -> None:
     """Print each register when it changes, with the time that it had been unchanged."""
@@ -151,42 +130,26 @@ def _changes(
         before, since = seen.get(register.name, (None, now))
         if found != before:
             seen[register.name] = (found, now)
-            rows.append(_live(register, found, now - since, device))
-    _table(LIVE, rows)
+            rows.append(live(register, found, now - since, device))
+    table(LIVE, rows)
 
 
-@command.command("verify")
-@click.option("--json", "json_file", type=click.File("w"), help="register-map/1; - = stdout")
+@command.command("verify", cls=Command)
+@click.option("--json", "json_file", type=OutputFile(dash=True), help="register-map/1; - = stdout")
 @_on_a_device
-def verify_device(name: str, json_file: Any, **where: Any) -> int:
+def verify_device(name: str, json_file: str | None, **where: Any) -> int:
     """Compare the map with the device; exit code 1 when it does not hold."""
     register_map, device = register_maps.load(name), Device(**where)
     rows = verify(register_map, two_readings(device, register_map))
     holds = all(row.holds for row in rows)
     if json_file is not None:
         answer = {"schema": "register-map/1", "holds": holds, "registers": list(map(_entry, rows))}
-        click.echo(json.dumps(answer), file=json_file)
-    if json_file is None or json_file.name != "<stdout>":
-        _table(FOUND, [_found(row, device) for row in rows])
+        with click.open_file(json_file, "w", encoding="utf-8") as target:
+            target.write(json.dumps(answer) + "\n")
+    if json_file != "-":
+        table(FOUND, [compared(row, device) for row in rows])
         click.echo("the map holds" if holds else "the map does not hold")
     return 0 if holds else 1
-
-
-FOUND: Final = (
-    "name",
-    "address",
-    "raw",
-    "value",
-    "other order",
-    "unit",
-    "finding",
-    "the same with mbpoll",
-)
-
-
-def _found(row: Row, device: Device) -> tuple[str, ...]:
-    line = _live(row.register, row.words or row.finding, 0.0, device)
-    return (*line[:6], ("" if row.holds else "! ") + row.finding, line[7])
 
 
 def _entry(row: Row) -> dict[str, Any]:
@@ -210,29 +173,17 @@ def write(name: str, register_name: str, value: float, *, yes: bool, **where: An
     register_map, device = register_maps.load(name), Device(**where)
     register = writable(register_map, register_name)
     words = encoded(register, value)
-    click.echo(f"{register.name} = {value:g} {register.unit}: {_hex(words)} to {register.address}")
+    what = f"{register.name} = {shown(register, words)} {register.unit}".rstrip()
+    near = "" if is_exact(register, words, value) else f", nearest to {value:.10g}"
+    click.echo(f"{what}{near}: {in_hex(words)} to {register.address}")
     click.echo(device.mbpoll(register, words))
     if not yes:
         click.confirm("write it", abort=True)
     with device.link() as link:
         back = write_value(link, register, words)
-    click.echo(f"reads back {_hex(back)} = {shown(register, back)} {register.unit}")
+    click.echo(f"reads back {in_hex(back)} = {shown(register, back)} {register.unit}")
 
 
 def _meaning(register_map: RegisterMap) -> list[Register]:
     """Registers that mean something."""
     return [found for found in register_map.registers if found.signal != RESERVED]
-
-
-def _hex(words: Sequence[int]) -> str:
-    return " ".join(f"{word:04X}" for word in words)
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print columns as wide as their widest entry; never wrapped, so that a line can be copied."""
-    if not rows:
-        return
-    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
-    for row in (head, *rows):
-        cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-        click.echo("  ".join(cells).rstrip())

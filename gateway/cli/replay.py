@@ -9,8 +9,9 @@ import click
 import numpy as np
 
 import register_maps
-from gateway import config_file, log, recording, replay, replay_log
+from gateway import config_file, log, losses, losses_source, recording, replay, replay_log
 from gateway.cli._settings import assignments
+from gateway.cli._types import PICTURES, Command, OutputFile
 from gateway.config import Config
 from gateway.cycle import Output
 from gateway.evaluation import cruise, road_speed, traction_energy
@@ -25,15 +26,16 @@ Examples:
   gateway replay recordings/20261121T061045.260875Z.rlrec
   gateway replay program6.csv.gz --set regulator.name=thesis --plot replay.png
 """
+PICTURE = OutputFile(endings=PICTURES, path_type=Path)
 
 
-@click.command(epilog=EXAMPLE)
+@click.command(cls=Command, epilog=EXAMPLE)
 @click.argument("file", metavar="LOG|RECORDING", type=click.Path(path_type=Path))
 @click.option("-c", "--config", type=click.Path(path_type=Path), help="TOML file")
 @click.option("--set", "values", multiple=True, metavar="KEY=VALUE", help="another parameter")
-@click.option("--out", type=click.Path(path_type=Path), help="write both setpoints to a CSV file")
-@click.option("--plot", type=click.Path(path_type=Path), help="draw both setpoints (PNG)")
-@click.option("--json", "json_file", type=click.File("w"), help="run/1; - = stdout")
+@click.option("--out", type=OutputFile(path_type=Path), help="write both setpoints to a CSV file")
+@click.option("--plot", type=PICTURE, help="draw both setpoints (PNG)")
+@click.option("--json", "json_file", type=OutputFile(dash=True), help="run/1; - = stdout")
 def command(
     file: Path,
     config: Path | None,
@@ -41,7 +43,7 @@ def command(
     values: tuple[str, ...],
     out: Path | None,
     plot: Path | None,
-    json_file: Any,
+    json_file: str | None,
 ) -> int:
     """Feed what was measured to the same regulator, supervisor and limits.
 
@@ -56,14 +58,18 @@ def command(
         result = _recording(found, config_file.with_values(settings, changed), exact=exact)
     else:
         settings = config_file.load(config) if config else Config()
-        result = _log(log.read(file), config_file.with_values(settings, changed))
+        logged, settings = log.read(file), config_file.with_values(settings, changed)
+        if warning := _wrong_sign(logged, settings):
+            click.echo(f"warning: {file}: {warning}", err=True)
+        result = _log(logged, settings)
     if out is not None:
         write_csv(out, result.compared)
     if plot is not None:
         draw(plot, result.compared)
     if json_file is not None:
-        click.echo(json.dumps(result.entry), file=json_file)
-    if json_file is None or json_file.name != "<stdout>":
+        with click.open_file(json_file, "w", encoding="utf-8") as target:
+            target.write(json.dumps(result.entry) + "\n")
+    if json_file != "-":
         click.echo("\n".join(result.lines))
     return 0 if result.holds else 1
 
@@ -109,6 +115,27 @@ def _told(found: recording.Recording, left: list[replay.Difference], ticks: int)
         f"{found.path}: {len(left)} of {ticks} ticks differ, the first is tick {first.tick} at "
         f"{when:.3f} s: {first.what} recorded {first.recorded}, replayed {first.replayed}"
     )
+
+
+def _wrong_sign(found: log.Log, config: Config) -> str:
+    """What the commissioning check says against the torque; empty: nothing, or a truck drives."""
+    columns = found.columns
+    if np.any(np.abs(columns.get("wheel_torque", 0.0)) > losses_source.TRUCK):
+        return ""
+    trace = losses.Trace(
+        name=found.path.name,
+        time=found.time,
+        motor_speed=columns["motor_speed"],
+        drum_speed=columns["drum_speed"],
+        shaft_torque=columns["shaft_torque"],
+    )
+    try:
+        losses.steady(trace, config.bench, config.regulator.torque_offset)
+    except losses.SignError as error:
+        return str(error)
+    except losses.LossesError:
+        return ""  # too coarse to tell, as such a log may be
+    return ""
 
 
 def _log(found: log.Log, config: Config) -> Result:

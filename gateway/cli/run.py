@@ -10,6 +10,7 @@ import click
 import register_maps
 from gateway import daemon
 from gateway.cli._settings import assignments
+from gateway.cli._types import Command, Number
 from gateway.config_file import load, with_values
 
 if TYPE_CHECKING:
@@ -24,10 +25,10 @@ Examples:
 """
 
 
-@click.command(epilog=EXAMPLE)
+@click.command(cls=Command, epilog=EXAMPLE)
 @click.option("-c", "--config", type=click.Path(path_type=Path), required=True, help="TOML file")
 @click.option("--shadow", is_flag=True, help="read and compute, write nothing")
-@click.option("--duration", type=click.FloatRange(min=0.0), help="stop by itself after so long [s]")
+@click.option("--duration", type=Number(min=0.0), help="stop by itself after so long [s]")
 @click.option("--set", "values", multiple=True, metavar="KEY=VALUE", help="instead of the file's")
 def command(config: Path, *, shadow: bool, duration: float | None, values: tuple[str, ...]) -> int:
     """Run until Ctrl-C or SIGTERM: ramp down, hang up, keep the recording.

@@ -8,6 +8,8 @@ from typing import Any
 
 import click
 
+from plant_emulator.cli._types import PICTURES, OutputFile
+
 parameters = click.option(
     "--parameters",
     default="thesis_table_3_1",
@@ -34,10 +36,14 @@ start = click.option(
     show_default=True,
     help="Start position in the backlash gap.",
 )
+table = click.option("--table", type=OutputFile(), help="Write a CSV file for a spreadsheet.")
+plot = click.option(
+    "--plot", type=OutputFile(endings=PICTURES), help="Draw measured, simulated and residual (PNG)."
+)
 json_file = click.option(
     "--json",
     "json_file",
-    metavar="FILE",
+    type=OutputFile(dash=True),
     help="Write the machine-readable answer; - is standard output.",
 )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from plant_emulator.cli import _options
+from plant_emulator.cli._types import Command
 
 EXAMPLE = """
 \b
@@ -14,7 +15,7 @@ Examples:
 """
 
 
-@click.command(epilog=EXAMPLE)
+@click.command(cls=Command, epilog=EXAMPLE)
 @click.argument("runs", nargs=-1, required=True, metavar="LOG|PROGRAM...")
 @_options.parameters
 @_options.reference

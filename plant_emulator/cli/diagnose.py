@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from plant_emulator.cli import _options
+from plant_emulator.cli._types import Command, OutputFile
 
 EXAMPLE = """
 \b
@@ -20,7 +21,7 @@ Examples:
 """
 
 
-@click.command(epilog=EXAMPLE)
+@click.command(cls=Command, epilog=EXAMPLE)
 @click.argument("logs", nargs=-1, required=True, metavar="LOG...")
 @click.option(
     "--hold-out",
@@ -57,8 +58,10 @@ Examples:
     help="Processes that fit side by side.",
 )
 @click.option("--scheduler", metavar="ADDRESS", help="A Dask scheduler instead, tcp://host:port.")
-@click.option("--save", metavar="SET", help="Write the parameter set with the accepted effects.")
-@click.option("--report", metavar="HTML", help="Write a self-contained report.")
+@click.option(
+    "--save", type=OutputFile(), help="Write the parameter set with the accepted effects."
+)
+@click.option("--report", type=OutputFile(), help="Write a self-contained report.")
 @_options.json_file
 def command(
     logs: tuple[str, ...],

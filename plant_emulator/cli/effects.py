@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from plant_emulator.cli import _options
+from plant_emulator.cli._types import Command
 
 if TYPE_CHECKING:
     from plant_emulator.effects import Effect
@@ -18,7 +19,7 @@ Example:
 """
 
 
-@click.command(epilog=EXAMPLE)
+@click.command(cls=Command, epilog=EXAMPLE)
 @click.argument("name", required=False)
 @_options.json_file
 def command(name: str | None, json_file: str | None) -> None:

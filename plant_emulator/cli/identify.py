@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from plant_emulator.cli import _options
+from plant_emulator.cli._types import Command, OutputFile
 
 EXAMPLE = """
 \b
@@ -17,7 +18,7 @@ Examples:
 """
 
 
-@click.command(epilog=EXAMPLE)
+@click.command(cls=Command, epilog=EXAMPLE)
 @click.argument("logs", nargs=-1, required=True, metavar="LOG...")
 @_options.parameters
 @click.option("--free", multiple=True, metavar="NAME", help="Estimate only these; may be repeated.")
@@ -30,9 +31,9 @@ Examples:
 )
 @_options.effect
 @_options.reference
-@click.option("--save", metavar="SET", help="Write the fitted parameter set (TOML).")
-@click.option("--table", metavar="CSV", help="Write the parameters for a spreadsheet.")
-@click.option("--plot", metavar="PNG", help="Draw measured, simulated and residual of all logs.")
+@click.option("--save", type=OutputFile(), help="Write the fitted parameter set (TOML).")
+@_options.table
+@_options.plot
 @_options.json_file
 def command(
     logs: tuple[str, ...],

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from plant_emulator.cli import _options
+from plant_emulator.cli._types import Command, Number, OutputFile
 
 if TYPE_CHECKING:
     from plant_emulator.road_answer import RoadAnswer
@@ -20,30 +20,19 @@ Example:
 """
 
 
-class Size(click.FloatRange):
-    """A finite number within a range."""
-
-    name = "number"
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> float:
-        """Refuse what is no number, or none at all."""
-        found: float = super().convert(value, param, ctx)
-        if not math.isfinite(found):
-            self.fail(f"{value}: a finite number is expected.", param, ctx)
-        return found
-
-
-@click.command(epilog=EXAMPLE)
+@click.command(cls=Command, epilog=EXAMPLE)
 @click.argument("torque")
 @click.argument("velocity")
-@click.option("--mass", type=Size(50, 1e5), required=True, metavar="KG", help="With its load.")
+@click.option("--mass", type=Number(50, 1e5), required=True, metavar="KG", help="With its load.")
 @click.option(
-    "--ratio", type=Size(1, 1000), default=14.0, show_default=True, help="Motor to wheel."
+    "--ratio", type=Number(1, 1000), default=14.0, show_default=True, help="Motor to wheel."
 )
-@click.option("--wheel-radius", type=Size(0.02, 2), default=0.1715, show_default=True, metavar="M")
+@click.option(
+    "--wheel-radius", type=Number(0.02, 2), default=0.1715, show_default=True, metavar="M"
+)
 @click.option(
     "--drum-radius",
-    type=Size(0.05, 5),
+    type=Number(0.05, 5),
     default=0.645,
     show_default=True,
     metavar="M",
@@ -51,14 +40,16 @@ class Size(click.FloatRange):
 )
 @click.option(
     "--gain-uncertainty",
-    type=Size(1e-6, 1),
+    type=Number(1e-6, 1),
     default=0.02,
     show_default=True,
     metavar="FRACTION",
     help="Standard deviation of the load cell's gain from 1, by its calibration.",
 )
-@click.option("--save", metavar="FILE", help="Write the [truck] table of a gateway configuration.")
-@click.option("--plot", metavar="PNG", help="Draw measured, simulated, residual and torque.")
+@click.option(
+    "--save", type=OutputFile(), help="Write the [truck] table of a gateway configuration."
+)
+@_options.plot
 @_options.json_file
 def command(
     torque: str,

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import click
 
+from plant_emulator.cli._types import Command, Number, OutputFile
+
 MASS_HELP = "Mass of the truck on the drum [kg], or none. Its driver sets off in road-load."
 
 
@@ -40,7 +42,7 @@ Examples:
 """
 
 
-@click.command(epilog=EXAMPLE)
+@click.command(cls=Command, epilog=EXAMPLE)
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
 @click.option(
     "--port",
@@ -54,7 +56,7 @@ Examples:
     "--speed",
     default=1.0,
     show_default=True,
-    type=click.FloatRange(0.01, 1000.0),
+    type=Number(0.01, 1000.0),
     help="Emulated seconds in one second.",
 )
 @click.option("--parameters", default="thesis_table_3_1", show_default=True, metavar="SET")
@@ -69,15 +71,9 @@ Examples:
     help="pi holds the speed of the cycle, none replays the torque of the cycle.",
 )
 @click.option("--remote/--local", default=False, help="Operator's switch at the start.")
-@click.option(
-    "--remote-after", type=click.FloatRange(0.0), metavar="S", help="Switch to remote then."
-)
-@click.option(
-    "--log", type=click.Path(path_type=Path, dir_okay=False), help="Log written at the end."
-)
-@click.option(
-    "--duration", type=click.FloatRange(0.0), metavar="S", help="Emulated time to stop at."
-)
+@click.option("--remote-after", type=Number(0.0), metavar="S", help="Switch to remote then.")
+@click.option("--log", type=OutputFile(path_type=Path), help="Log written at the end.")
+@click.option("--duration", type=Number(0.0), metavar="S", help="Emulated time to stop at.")
 @click.option("--control", is_flag=True, hidden=True, help="JSON requests on standard input.")
 @click.option("--stepped", is_flag=True, hidden=True, help="Scan only on request.")
 def command(

@@ -7,6 +7,7 @@ import sys
 import click
 
 from plant_emulator.cli import _options
+from plant_emulator.cli._types import Command, OutputFile
 
 EXAMPLE = """
 \b
@@ -17,14 +18,18 @@ Examples:
 """
 
 
-@click.command(epilog=EXAMPLE)
+@click.command(cls=Command, epilog=EXAMPLE)
 @click.option("--program", required=True, metavar="NAME|LOG", help="A program, or a log to follow.")
 @_options.parameters
 @_options.effect
-@click.option("--seed", type=int, help="Add the sensors' noise and quantisation, from this seed.")
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    help="Add the sensors' noise and quantisation, from this seed.",
+)
 @_options.reference
 @_options.start
-@click.option("--out", metavar="CSV", help="The log to write; default: standard output.")
+@click.option("--out", type=OutputFile(), help="The log to write; default: standard output.")
 def command(
     program: str,
     parameters: str,

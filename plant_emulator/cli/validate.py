@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from plant_emulator.cli import _options
+from plant_emulator.cli._types import Command, Number
 
 EXAMPLE = """
 \b
@@ -16,7 +17,7 @@ Example:
 """
 
 
-@click.command(epilog=EXAMPLE)
+@click.command(cls=Command, epilog=EXAMPLE)
 @click.argument("logs", nargs=-1, required=True, metavar="LOG...")
 @_options.parameters
 @_options.effect
@@ -25,12 +26,12 @@ Example:
 @click.option(
     "--filter",
     "cutoff",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=Number(min=0.0, min_open=True),
     metavar="HZ",
     help="Low-pass both with the same zero-phase filter first and drop the edges; default: none.",
 )
-@click.option("--table", metavar="CSV", help="Write the measures for a spreadsheet.")
-@click.option("--plot", metavar="PNG", help="Draw measured, simulated and residual.")
+@_options.table
+@_options.plot
 @_options.json_file
 def command(
     logs: tuple[str, ...],

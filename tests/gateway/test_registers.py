@@ -67,6 +67,13 @@ def test_write_asks_first_and_writes_after_yes(emulator: EmulatorProcess) -> Non
     assert "reads back 00FA = 250 ms" in done.output
 
 
+def test_write_tells_the_value_that_the_register_can_hold(emulator: EmulatorProcess) -> None:
+    done = call(emulator, "write", "bench_int16", "WD_TIMEOUT", "250.4", "--yes")
+    assert "WD_TIMEOUT = 250 ms, nearest to 250.4: 00FA" in done.output
+    exact = call(emulator, "write", "bench_int16", "WD_TIMEOUT", "250", "--yes")
+    assert "WD_TIMEOUT = 250 ms: 00FA" in exact.output
+
+
 def test_watch_prints_what_moves(emulator: EmulatorProcess) -> None:
     lines = call(emulator, "watch", "bench_int16", "--count", "2", "--interval", "0.05").output
     assert sum(line.startswith("HB_PLC") for line in lines.splitlines()) == 2

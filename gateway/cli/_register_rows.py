@@ -1,0 +1,98 @@
+"""The tables of `gateway registers`: what a row of each holds, and how one is printed."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import click
+
+from gateway.device import Device
+from gateway.inspection import Row, Words, constant_words, in_other_order, shown, swapped
+from register_maps.register_map import Register
+
+PAPER: Final = ("name", "signal", "address", "form", "type", "order", "raw to", "range", "access")
+
+
+def paper(register: Register) -> tuple[str, ...]:
+    """A register as the map has it."""
+    low, high = register.range
+    constant = "" if register.constant is None else f" = {register.constant:.10g} {_both(register)}"
+    return (
+        register.name,
+        register.signal,
+        f"{register.table} {register.address}",
+        str(register.reference),
+        register.type,
+        register.word_order if register.raw.words > 1 else register.word_order[:2],
+        f"{register.scale:g} {register.unit}"
+        + (f" {register.offset:+g}" if register.offset else ""),
+        f"{low:.10g} .. {high:.10g}{constant}",
+        register.access,
+    )
+
+
+def _both(register: Register) -> str:
+    """Words of a constant in its own order and with the words exchanged."""
+    if register.raw.words == 1:
+        return ""
+    orders = (register.word_order, swapped(register.word_order))
+    return ", ".join(f"{order} {in_hex(constant_words(register, order))}" for order in orders)
+
+
+LIVE: Final = (
+    "name",
+    "address",
+    "raw",
+    "value",
+    "other order",
+    "unit",
+    "age",
+    "the same with mbpoll",
+)
+
+
+def live(register: Register, found: Words | str, age: float, device: Device) -> tuple[str, ...]:
+    """A register as the device shows it. age : of what was found [s]"""
+    words = () if isinstance(found, str) else found
+    return (
+        register.name,
+        f"{register.address} ({register.reference})",
+        in_hex(words),
+        found if isinstance(found, str) else shown(register, found),
+        in_other_order(register, words) if words else "",
+        register.unit,
+        f"{age * 1e3:.0f} ms",
+        device.mbpoll(register),
+    )
+
+
+FOUND: Final = (
+    "name",
+    "address",
+    "raw",
+    "value",
+    "other order",
+    "unit",
+    "finding",
+    "the same with mbpoll",
+)
+
+
+def compared(row: Row, device: Device) -> tuple[str, ...]:
+    """A register as the device shows it, and what speaks against it."""
+    line = live(row.register, row.words or row.finding, 0.0, device)
+    return (*line[:6], ("" if row.holds else "! ") + row.finding, line[7])
+
+
+def in_hex(words: Sequence[int]) -> str:
+    """The words as four hexadecimal digits each."""
+    return " ".join(f"{word:04X}" for word in words)
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print columns as wide as their widest entry; never wrapped, so that a line can be copied."""
+    if not rows:
+        return
+    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
+    for row in (head, *rows):
+        cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+        click.echo("  ".join(cells).rstrip())
