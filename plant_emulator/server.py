@@ -9,6 +9,8 @@ function; tests/plant_emulator/test_server.py pins these deviations.
 """
 
 import asyncio
+import errno
+import os
 from typing import Any
 
 from pymodbus.constants import ExcCodes
@@ -30,6 +32,17 @@ class PortError(EmulatorError):
     """The port cannot be listened on."""
 
     exit_code = 2
+
+
+def refusal(error: OSError | UnicodeError, host: str, port: int) -> str:
+    """Why nobody can listen there, and which of the two options to change."""
+    code = getattr(error, "errno", None)
+    if code in (errno.EADDRINUSE, errno.EACCES):
+        why, right = os.strerror(code), "another --port (0 = any free one)"
+    else:
+        why = "cannot be a name" if isinstance(error, UnicodeError) else str(error.strerror)
+        right = "a --host that is an address or a name of this machine"
+    return f"cannot listen on {host}:{port}: {why}; take {right}"
 
 
 class PlcServer:
@@ -59,12 +72,7 @@ class PlcServer:
     async def start(self) -> None:
         """Listen; afterwards `port` is the real one."""
         listener = _Listener(self)
-        try:
-            await listener.serve_forever(background=True)
-        except RuntimeError as error:
-            raise PortError(
-                f"cannot listen on {self.host}:{self.port}; take another --port (0 = any free one)"
-            ) from error
+        await listener.serve_forever(background=True)
         self._listener = listener
         self.port = listener.bound_port
 
@@ -134,6 +142,14 @@ class _Listener(ModbusTcpServer):
     def __init__(self, plc: PlcServer) -> None:
         super().__init__(_devices(plc), address=(plc.host, plc.port))
         self.plc = plc
+        self._listen, self.call_create = self.call_create, self._listens
+
+    async def _listens(self) -> Any:
+        """Listen; what stops it becomes ours, since pymodbus prints an OSError and drops it."""
+        try:
+            return await self._listen()
+        except (OSError, UnicodeError) as error:
+            raise PortError(refusal(error, self.plc.host, self.plc.port)) from error
 
     @property
     def bound_port(self) -> int:

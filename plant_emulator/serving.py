@@ -12,6 +12,7 @@ import signal
 import sys
 from collections.abc import Callable
 
+from plant_emulator import logs
 from plant_emulator.control import Control
 from plant_emulator.emulator import Emulator, Options, build
 from plant_emulator.pace import Pace
@@ -77,6 +78,8 @@ async def serve(options: Options, announce: Callable[[str], None], *, control: b
         run.loop.add_signal_handler(number, run.stopping.set)
     # One scan before anybody can look: there is no image without one.
     emulator.scan()
+    if options.log is not None:
+        logs.rehearse(emulator.log(), options.log)
     await emulator.server.start()
     gc.collect()
     gc.freeze()

@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from plant_emulator.errors import LogError
@@ -53,3 +54,16 @@ def write(log: Log, path: str | Path) -> None:
             return
     known = ", ".join(suffix for module in formats() for suffix in module.SUFFIXES)
     raise LogError(f"{path}: no log format of that name; known: {known}")
+
+
+def rehearse(log: Log, path: str | Path) -> None:
+    """Write the log somewhere else and forget it: LogError where it could not be written at `path`.
+
+    For a log that is written at the end of a long run, which is too late to learn it.
+    """
+    with TemporaryDirectory() as folder:
+        trial = Path(folder) / Path(path).name
+        try:
+            write(log, trial)
+        except LogError as error:
+            raise LogError(str(error).replace(str(trial), str(path))) from error

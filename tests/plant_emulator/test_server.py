@@ -170,11 +170,20 @@ def test_no_reply_is_torn_while_the_image_is_replaced(served):
         thread.join()
 
 
-def test_taken_port_is_named(served):
+def test_taken_port_is_named_in_our_words_only(served, capfd):
     second = PlcServer(INT16, "127.0.0.1", served.plc.port)
     with pytest.raises(PortError, match=f"127.0.0.1:{served.plc.port}") as refused:
         served.do(second.start())
     assert refused.value.exit_code == 2
+    assert "Address already in use; take another --port" in str(refused.value)
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("host", ["nowhere.invalid", "a..b", "192.0.2.1"])
+def test_host_that_is_none_of_this_machine_is_told_from_a_busy_port(served, host):
+    with pytest.raises(PortError, match=f"{host}.*a --host that is an address") as refused:
+        served.do(PlcServer(INT16, host, 0).start())
+    assert "--port" not in str(refused.value)
 
 
 def test_refused_connection_cuts_the_old_ones_and_comes_back_on_the_same_port(served):

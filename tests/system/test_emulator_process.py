@@ -55,6 +55,20 @@ def test_emulator_that_cannot_start_says_why():
         pass
 
 
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [("no/run.csv", "No such file or directory"), ("run.xlsx", "no log format of that name")],
+)
+def test_log_that_could_not_be_written_is_refused_at_the_start(tmp_path, name, why):
+    emulator = started("--duration", "600", "--log", str(tmp_path / name))
+    out, err = emulator.communicate(timeout=60.0)
+    assert (emulator.returncode, out) == (2, "")
+    (line,) = err.splitlines()
+    assert str(tmp_path / name) in line
+    assert why in line
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.slow
 def test_real_time_is_held_and_reported():
     with EmulatorProcess(speed=10.0, truck_mass=None) as emulator:
