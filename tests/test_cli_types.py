@@ -71,7 +71,7 @@ def test_every_number_of_a_command_is_finite_and_every_output_is_tried(
         name = option.opts[0]
         if isinstance(option.type, click.types.FloatParamType) and option.name != "value":
             assert isinstance(option.type, types.Number), name
-        folder = isinstance(option.type, click.Path) and not option.type.file_okay
+        folder = isinstance(option, click.Option) and option.metavar == "DIR"
         writes = name in OUTPUTS and not folder
         assert writes == isinstance(option.type, types.OutputFile), name
         if writes:

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from plant_emulator.cli import _options
+from plant_emulator.cli._types import Command
 
 EXAMPLE = """
 \b
@@ -17,7 +18,7 @@ Examples:
 """
 
 
-@click.command(epilog=EXAMPLE)
+@click.command(cls=Command, epilog=EXAMPLE)
 @click.option(
     "--cases", type=click.IntRange(min=1), default=80, show_default=True, help="How many benches."
 )
