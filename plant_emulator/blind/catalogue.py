@@ -20,17 +20,19 @@ class Entry:
     """An effect that may be hidden.
 
     programs : that it needs besides programs 1 to 3
-    sizes : of those that are not drawn around the plausible size [SI]
+    ranges : of values that are not drawn around the plausible one [SI]
     starts : of the values of a run's own [SI]
     """
 
     effect: str
     law: str
     programs: tuple[str, ...] = ()
-    sizes: Mapping[str, Range] = field(default_factory=dict)
+    ranges: Mapping[str, Range] = field(default_factory=dict)
     starts: Mapping[str, Range] = field(default_factory=dict)
 
 
+# Temperature that the nominal friction belongs to: a gear that has run for a while [K].
+WARM_OIL = {"nominal_temperature": (303.15, 323.15)}
 ANY_ANGLE = (-3.14, 3.14)
 # A bench in a hall: its oil and its shell at the start of a run [K].
 OIL = {"start_temperature": (287.0, 306.0), "shell_temperature": (288.0, 303.0)}
@@ -44,15 +46,15 @@ INSIDE = (
         effect="current_limit",
         law="knee_current_limit",
         programs=("program4",),
-        sizes={"reduction": (44.0, 54.0)},
+        ranges={"reduction": (44.0, 54.0)},
     ),
     Entry(effect="voltage_sag", law="lagging_voltage_sag", programs=("program4",)),
-    Entry(effect="converter_dead_time", law="tanh_converter"),
+    Entry(effect="converter_dead_time", law="tanh_converter", ranges={"mains": (49.95, 50.05)}),
     Entry(
         effect="integrator_windup",
         law="fading_windup",
         programs=("program4",),
-        sizes={"share": (0.5, 1.0)},
+        ranges={"share": (0.5, 1.0)},
     ),
     Entry(effect="motor_friction", law="palmgren_motor"),
     Entry(effect="armature_reaction", law="quadratic_armature_reaction", programs=("program4",)),
@@ -63,7 +65,7 @@ INSIDE = (
         starts={"start_rise": (-10.0, 60.0)},
     ),
     Entry(effect="shaft_damping", law="rubber_coupling"),
-    Entry(effect="gear_oil_temperature", law="vogel_oil", starts=OIL),
+    Entry(effect="gear_oil_temperature", law="vogel_oil", ranges=WARM_OIL, starts=OIL),
     Entry(effect="stribeck", law="lorentzian_stribeck"),
     Entry(effect="presliding", law="elastoplastic_presliding"),
     Entry(effect="load_dependent_gear_loss", law="two_efficiencies", programs=("program6",)),

@@ -17,6 +17,7 @@ from plant_emulator.blind.catalogue import INSIDE, OUTSIDE, Entry
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from plant_emulator.blind.catalogue import Range
     from plant_emulator.effects import Effect, EffectParameter
     from plant_emulator.parameters import ParameterSet
 
@@ -102,7 +103,7 @@ def _hidden(
     law = known[entry.law]
     declared = law.parameters
     values = {
-        key: _value(one, entry.sizes.get(key), random)
+        key: _value(one, entry.ranges.get(key), random)
         for key, one in declared.items()
         if not one.per_run
     }
@@ -125,13 +126,13 @@ def _hidden(
 
 
 def _value(
-    declared: EffectParameter, size: tuple[float, float] | None, random: np.random.Generator
+    declared: EffectParameter, drawn_from: Range | None, random: np.random.Generator
 ) -> float:
     """A size around the plausible one, evenly on a logarithmic scale, or a shape constant [SI]."""
-    if declared.neutral == declared.plausible:
+    if drawn_from is not None:
+        drawn = random.uniform(*drawn_from)
+    elif declared.neutral == declared.plausible:
         drawn = declared.plausible * random.uniform(*SHAPES)
-    elif size is not None:
-        drawn = random.uniform(*size)
     else:
         factor = float(np.exp(random.uniform(*np.log(SIZES))))
         sign = 1.0 if declared.lower >= 0.0 or random.random() < 0.5 else -1.0

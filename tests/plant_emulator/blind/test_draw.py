@@ -47,7 +47,7 @@ def test_case_survives_json(cases: list[Case]) -> None:
 
 
 def test_sizes_are_half_to_twice_the_plausible(cases: list[Case], known: dict[str, Effect]) -> None:
-    own = {(entry.law, key) for entry in INSIDE for key in entry.sizes}
+    own = {(entry.law, key) for entry in INSIDE for key in entry.ranges}
     for hidden in (h for case in cases for h in case.hidden):
         for key, value in hidden.values.items():
             declared = known[hidden.law].parameters[key]
