@@ -1,0 +1,102 @@
+"""What drifting parameters do to the relations of the blocks, so that drift is not called a fault.
+
+Derivatives of the relations by each free parameter, in standard deviations of its prior (thesis,
+eq. 3.7, 3.16, 3.27, 3.34). They are taken at simulated and smoothed signals: a column with the
+noise of a relation in it would explain that noise.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.diagnosis.laws import acting
+from plant_emulator.diagnosis.relations import (
+    DRIVE,
+    GEAR,
+    MOTOR,
+    Measured,
+    delayed_reference,
+    flux,
+    middle,
+    told_reference,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.diagnosis.laws import Inside
+    from plant_emulator.estimation import Array
+    from plant_emulator.parameters import ParameterSet
+
+# Dead times that are tried, over that of the set, and their prior standard deviation.
+DEAD_TIMES = np.linspace(0.7, 1.3, 61)
+
+Slope = tuple[int, "Array"]
+
+
+def slopes(m: Measured, q: Inside, p: Mapping[str, float]) -> dict[str, Slope]:
+    """Relation and derivative by parameter, shape (n - 1,) [relation over parameter]."""
+    xi, speed = p["gear_ratio"], np.abs(q.speed) / p["gear_ratio"]
+    k = flux(q.speed, p)
+    weak = np.where(k < p["flux_constant"], q.current, 0.0)
+    power = q.moving * speed ** p["gear_friction_exponent"]
+    growth = p["gear_viscous_friction"] * power * np.log(np.maximum(speed, 1e-9))
+    drum = (q.load + q.wheel_torque * p["drum_radius"] / p["wheel_radius"]) / p["drum_inertia"]
+    return {
+        "flux_constant": (MOTOR, np.where(k < p["flux_constant"], 0.0, q.current)),
+        "flux_constant_1": (MOTOR, weak * k / p["flux_constant_1"]),
+        "flux_constant_2": (MOTOR, weak * k / (p["flux_constant_2"] + np.abs(q.speed))),
+        "motor_inertia": (MOTOR, q.acceleration),
+        "gear_coulomb_friction": (GEAR, q.moving / xi),
+        "gear_viscous_friction": (GEAR, power / xi),
+        "gear_friction_exponent": (GEAR, growth / xi),
+        "drum_inertia": (GEAR, drum / xi),
+        "dead_time": (DRIVE, middle(np.gradient(delayed_reference(m, p["dead_time"]), m.time))),
+    }
+
+
+def columns(m: Measured, q: Inside, p: Mapping[str, float], stds: Mapping[str, float]) -> Array:
+    """One column a free parameter of the relations, in its standard deviation, (3, n - 1, k).
+
+    stds : prior standard deviations of the free parameters by name
+    """
+    known = slopes(m, q, p)
+    drifting = [acting({known[n][0]: std}, known[n][1][:, None]) for n, std in stds.items()]
+    return np.concatenate(drifting, axis=-1)
+
+
+def priors(parameters: ParameterSet, free: Sequence[str]) -> dict[str, float]:
+    """Standard deviations of those free parameters that the relations hold; no prior: a half."""
+    wanted = (
+        "flux_constant",
+        "flux_constant_1",
+        "flux_constant_2",
+        "motor_inertia",
+        "gear_coulomb_friction",
+        "gear_viscous_friction",
+        "gear_friction_exponent",
+        "drum_inertia",
+        "dead_time",
+    )
+    return {
+        name: parameters[name].std or 0.5 * parameters.value(name)
+        for name in wanted
+        if name in free
+    }
+
+
+def dead_time(runs: Sequence[Measured], p: Mapping[str, float], std: float) -> float:
+    """Dead time [s] that the drive's relation tells of; outliers count by their logarithm."""
+    told = [told_reference(m, p, delayed_reference(m, p["dead_time"]))[0] for m in runs]
+
+    def loss(factor: float) -> float:
+        trial = factor * p["dead_time"]
+        away = 0.5 * ((trial - p["dead_time"]) / std) ** 2
+        return away + sum(
+            float(np.log1p(((t - delayed_reference(m, trial)) / m.noise[0]) ** 2).sum())
+            for t, m in zip(told, runs, strict=True)
+        )
+
+    return float(min(DEAD_TIMES, key=loss) * p["dead_time"])

@@ -1,0 +1,204 @@
+"""Gap, shaft and drum alone, driven by the measured motor speed: what the drum's speed should be.
+
+The bench is simulated with a drive and motor so stiff that they follow the measured motor speed.
+Whatever ails drive, motor, gear friction or torque sensor leaves this simulation untouched; the
+drum's speed then tells of gap, shaft, drum and its own sensor only. What the noise of the smoothed
+motor speed does to it, the drum's flight through the gap above all, is sampled.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.diagnosis.relations import NOISES, smoothed_speed
+from plant_emulator.errors import UnsettledError
+from plant_emulator.estimation import Unknown, at, estimate
+from plant_emulator.recording import IMPOSSIBLE
+from plant_emulator.search import GAP_POSITION, SCAN_TOLERANCE
+from plant_emulator.simulate import simulate
+from plant_emulator.start_states import GAP
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.diagnosis.relations import Measured
+    from plant_emulator.estimation import Array, Estimate, Residual
+    from plant_emulator.log import Log
+    from plant_emulator.parameters import ParameterSet
+    from plant_emulator.recording import Recording
+    from plant_emulator.simulate import Run
+
+# A drive that holds the motor speed within 0.1 rad/s of its reference at any torque of this bench.
+STIFF = {
+    "speed_gain": 1e4,
+    "current_gain": 1e5,
+    "speed_integral_time": 1e6,
+    "current_integral_time": 1e6,
+    "armature_current_limit": 1e9,
+    "voltage_limit": 1e9,
+    "speed_limit": 1e9,
+    "dead_time": 1e-6,
+}
+# What of the bench shapes the drum's speed; the drum's inertia only together with the damping.
+FREE = ("backlash_half_gap", "drum_shaft_damping")
+GAPS = 17
+DRAWS = 10
+# Mean square in the noise above which the set's own values are tried as a start too.
+ASTRAY = 1.5
+SETTLED = 1e-4
+# Constant torques that a fit starts from [10 N m]; laws of the angle, which are the last ones.
+TORQUE_STARTS = (0.0, 1.0, 3.0, 8.0, 20.0)
+BY_ANGLE = 2
+
+
+@dataclass(frozen=True)
+class DrumSide:
+    """Recordings with their smoothed motor speeds; values : of all parameters [SI].
+
+    laws : of an unknown torque on the drum, shape (n, k) [N m] a run; none: k = 0
+    """
+
+    recordings: Sequence[Recording]
+    signals: Sequence[Measured]
+    parameters: ParameterSet
+    values: Mapping[str, float]
+    laws: Sequence[Array]
+
+    def simulated(
+        self,
+        run: int,
+        found: Mapping[str, float],
+        speed: Array | None = None,
+    ) -> Log:
+        """The run with the motor speed as measured.
+
+        found : values that differ, the gap's position, sizes of the unknown torque as torque_k
+        """
+        changed = {name: found[name] for name in FREE}
+        sizes = [found.get(f"torque_{k}", 0.0) for k in range(self.laws[run].shape[1])]
+        inputs = prescribed(
+            self.recordings[run].run,
+            self.signals[run].speed if speed is None else speed,
+            self.laws[run] @ np.array(sizes),
+            self.values,
+        )
+        return simulate(
+            inputs,
+            {**self.values, **changed, **STIFF},
+            gap_position=found[GAP_POSITION],
+            tolerance=SCAN_TOLERANCE,
+        )
+
+    def residual(self, run: int, found: Mapping[str, float], speed: Array | None = None) -> Array:
+        """The drum's speed, measured minus simulated over its noise, shape (n,)."""
+        m = self.signals[run]
+        try:
+            drum = self.simulated(run, found, speed)["drum_speed"]
+        except UnsettledError:
+            return np.full(len(m.time), IMPOSSIBLE)
+        return np.asarray((m.drum_speed - drum) / m.noise[NOISES.index("drum_speed")])
+
+    def scan(self, found: Mapping[str, float]) -> tuple[float, list[float]]:
+        """Loss, and the start in the gap of every run, the best of a few."""
+        total, gaps = 0.0, []
+        for k in range(len(self.recordings)):
+            positions = np.linspace(-1.0, 1.0, GAPS)
+            losses = [
+                float(np.log1p(self.residual(k, {**found, GAP_POSITION: g}) ** 2).sum())
+                for g in positions
+            ]
+            gaps.append(float(positions[int(np.argmin(losses))]))
+            total += min(losses)
+        return total, gaps
+
+    def unknowns(self, start: Mapping[str, float], gaps: Sequence[float]) -> list[Unknown]:
+        """Gap, damping, sizes of the unknown torque that `start` has, starts of the runs."""
+        wide = [
+            Unknown(
+                name=name,
+                start=start[name],
+                lower=self.parameters.value(name) / 5.0,
+                upper=self.parameters.value(name) * 5.0,
+                prior=self.parameters.value(name),
+                std=self.parameters[name].std,
+            )
+            for name in FREE
+        ]
+        torque = [
+            Unknown(name=name, start=size, lower=-1e3, upper=1e3, logarithmic=False)
+            for name, size in start.items()
+            if name.startswith("torque_")
+        ]
+        return [*wide, *torque, *(replace(GAP, start=g, run=k) for k, g in enumerate(gaps))]
+
+    def fit(self, start: Mapping[str, float], gaps: Sequence[float]) -> Estimate:
+        """Least squares from these values."""
+        return estimate(self.unknowns(start, gaps), self._functions(), settled=SETTLED)
+
+    def at(self, start: Mapping[str, float], gaps: Sequence[float]) -> Estimate:
+        """The same, not fitted: residuals and Jacobians there."""
+        return at(self.unknowns(start, gaps), self._functions())
+
+    def _functions(self) -> list[Residual]:
+        return [self._function(k) for k in range(len(self.recordings))]
+
+    def _function(self, run: int) -> Residual:
+        return lambda found: self.residual(run, found)[None]
+
+    def null(self, start: Mapping[str, float], gaps: Sequence[float]) -> Estimate:
+        """The fit without any unknown torque, from a joint fit's end, else from scans of the gap.
+
+        start, gaps : where the joint fit has come to; the set's own values where it lacks them
+        """
+        own = {name: self.parameters.value(name) for name in FREE}
+        near = {name: start.get(name, own[name]) for name in FREE}
+        fits = [self.fit(near, gaps)]
+        for values in (near, own):
+            if fits[-1].cost <= ASTRAY * fits[-1].samples:
+                break
+            fits.append(self.fit(values, self.scan(values)[1]))
+        return min(fits, key=lambda f: f.cost + f.penalty)
+
+    def torques(self, size: float) -> dict[str, float]:
+        """Sizes of an unknown torque that is the same at all speeds and angles [10 N m]."""
+        count = self.laws[0].shape[1]
+        return {f"torque_{k}": size if k < count - BY_ANGLE else 0.0 for k in range(count)}
+
+    def far(self, start: Mapping[str, float]) -> Estimate:
+        """The fit with an unknown torque that may be far from none, from the best of some sizes."""
+        trials = [{**start, **self.torques(size)} for size in TORQUE_STARTS]
+        scans = [self.scan(trial) for trial in trials]
+        best = int(np.argmin([loss for loss, _ in scans]))
+        return self.fit(trials[best], scans[best][1])
+
+    def spread(self, run: int, found: Mapping[str, float], seed: int = 0) -> Array:
+        """What noise of the smoothed motor speed does to the residual, shape (n, DRAWS).
+
+        Columns for a covariance: their sum of squares is the variance.
+        """
+        random, m = np.random.default_rng((seed, run)), self.signals[run]
+        base = self.residual(run, found)
+        columns = []
+        for _ in range(DRAWS):
+            w, i, torque = (
+                signal + level * random.standard_normal(len(m.time))
+                for signal, level in zip(
+                    (m.motor_speed, m.current, m.torque), m.noise[[0, 2, 3]], strict=True
+                )
+            )
+            speed = smoothed_speed(
+                m.time, w, i, torque, m.noise, self.values, use_current=not m.missing_current
+            )
+            columns.append(self.residual(run, found, speed) - base)
+        return np.asarray(np.stack(columns, axis=-1) / np.sqrt(DRAWS))
+
+
+def prescribed(run: Run, speed: Array, torque: Array, p: Mapping[str, float]) -> Run:
+    """A run whose reference is a motor speed [rad/s], with a further torque on the drum [N m]."""
+    slope = np.zeros_like(speed)
+    slope[:-1] = np.diff(speed) / np.diff(run.time)
+    wheel = run.wheel_torque + torque * p["wheel_radius"] / p["drum_radius"]
+    return replace(run, reference=speed, slope=slope, corners=np.zeros(0), wheel_torque=wheel)

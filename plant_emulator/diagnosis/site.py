@@ -1,0 +1,245 @@
+"""All that measured signals tell of the blocks, as one linear model with a group of laws a block.
+
+Rows: the whitened relations of every run, then the drum's speed of every run over its noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.diagnosis import drift, drum_laws, laws
+from plant_emulator.diagnosis.drum_side import DrumSide
+from plant_emulator.diagnosis.evidence import Evidence, Linear, unrest
+from plant_emulator.diagnosis.relations import (
+    DRIVE,
+    GEAR,
+    ROWS,
+    Relations,
+    measured,
+    middle,
+    values,
+)
+from plant_emulator.diagnosis.table import Table
+from plant_emulator.diagnosis.whiten import relations
+from plant_emulator.errors import UnsettledError
+from plant_emulator.search import GAP_POSITION
+from plant_emulator.simulate import simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from plant_emulator.diagnosis.contest import Point
+    from plant_emulator.estimation import Array, Estimate
+    from plant_emulator.parameters import ParameterSet
+    from plant_emulator.recording import Recording
+
+# Blocks that only the drum's speed can show.
+BESIDE = ("drum", "speed_sensor", "backlash_shaft")
+# Prior standard deviation of an unknown torque on the drum [10 N m].
+TORQUE = 5.0
+# Variance that the draws of the smoothing's noise do not span, over what they do, next to impacts.
+UNSPANNED = 3.0
+# Deviations of a sum of squares that are no chance.
+ASTRAY = 3.0
+
+
+class Site:
+    """The blocks of a bench with the measured signals at their borders."""
+
+    def __init__(
+        self, recordings: Sequence[Recording], parameters: ParameterSet, null: Point
+    ) -> None:
+        self.recordings, self.parameters, self.null = recordings, parameters, null
+        self.fitted = {**parameters.values(), **null.values}
+        self.base_speed = (
+            self.fitted["flux_constant_1"] / self.fitted["flux_constant"]
+            - self.fitted["flux_constant_2"]
+        )
+        p = parameters.values()
+        self.signals = [measured(r, p) for r in recordings]
+        self.stds = drift.priors(parameters, list(null.values))
+        if "dead_time" in self.stds:
+            p = {**p, "dead_time": drift.dead_time(self.signals, p, self.stds["dead_time"])}
+        self.values = p
+        top = max(float(np.max(np.abs(m.speed))) for m in self.signals)
+        unknown = [drum_laws.torque(m, p["gear_ratio"], top) for m in self.signals]
+        self.side = DrumSide(recordings, self.signals, parameters, p, unknown)
+        self.plain = self.side.null(null.values, [s[GAP_POSITION] for s in null.states])
+        self.relations = [self._relations(k) for k in range(len(recordings))]
+        self.blocks = tuple(
+            name
+            for name in (*laws.BLOCKS, *BESIDE)
+            if name != "wheel_contact" or any(m.truck for m in self.signals)
+        )
+
+    @cached_property
+    def residuals(self) -> list[Array]:
+        """Of the fit without effects, shape (channels, samples) a run."""
+        return [
+            r.residual(self.fitted, state[GAP_POSITION])
+            for r, state in zip(self.recordings, self.null.states, strict=True)
+        ]
+
+    def _relations(self, run: int) -> Relations:
+        return relations(self.signals[run], self.values, self._discretisation(run))
+
+    def _discretisation(self, run: int) -> Array | None:
+        """What the fit without effects leaves of the relations: their error between samples."""
+        recording, gap = self.recordings[run], self.null.states[run][GAP_POSITION]
+        try:
+            log = simulate(recording.run, self.fitted, gap_position=gap)
+        except UnsettledError:
+            return None
+        m = measured(replace(recording, log=log), self.fitted)
+        left, limited = values(replace(m, speed=m.motor_speed), self.fitted)
+        left[-1, limited] = 0.0
+        return left
+
+    @cached_property
+    def inside(self) -> list[laws.Inside]:
+        """Quantities inside the blocks of every run."""
+        found = self.plain.parameters()
+        return [
+            laws.inside(
+                m,
+                self.side.simulated(k, {**found, **self.plain.states(k)})["drum_speed"],
+                self.values,
+            )
+            for k, m in enumerate(self.signals)
+        ]
+
+    @cached_property
+    def spread(self) -> list[Array]:
+        """Noise of the smoothed motor speed in the drum's speed, see `DrumSide.spread`."""
+        found = self.plain.parameters()
+        return [
+            self.side.spread(k, {**found, **self.plain.states(k)}) for k in range(len(self.signals))
+        ]
+
+    @cached_property
+    def weights(self) -> list[Array]:
+        """Of the drum's speed; few draws span little of the noise of a flight through the gap."""
+        from scipy.ndimage import maximum_filter1d
+
+        return [
+            1.0 / np.sqrt(1.0 + UNSPANNED * maximum_filter1d((s**2).sum(-1), 11))
+            for s in self.spread
+        ]
+
+    @cached_property
+    def table(self) -> Table:
+        """Where columns stand in the rows of all runs."""
+        return Table(self.relations, self.weights)
+
+    def linear(self, fitted: Estimate) -> Linear:
+        """Data and drift, the drum's speed linearised at a fit of the drum's side."""
+        runs = range(len(self.signals))
+        none = [None] * len(self.signals)
+        speed = []
+        for k in runs:
+            sizes = np.where(_is_torque(fitted), fitted.z, 0.0)
+            speed.append(fitted.residuals[k][0] - fitted.jacobians[k][0] @ sizes)
+        y = self.table.shared(
+            [r.value[..., None] for r in self.relations], [s[:, None] for s in speed]
+        )
+        drifting = [
+            drift.columns(m, q, self.values, self.stds)
+            for m, q in zip(self.signals, self.inside, strict=True)
+        ]
+        scale = np.array([min(u.scaled_std, 1.0) for u in fitted.unknowns])
+        bent = [(fitted.jacobians[k][0] * scale)[:, ~_is_torque(fitted)] for k in runs]
+        nuisance = [
+            self.table.shared(drifting, none),
+            self.table.shared(none, bent),
+            self.table.own_speed(self.spread),
+        ]
+        return Linear(y[:, 0], np.concatenate(nuisance, axis=1))
+
+    @cached_property
+    def data(self) -> Linear:
+        """Linearised without an unknown torque on the drum."""
+        return self.linear(self.plain)
+
+    @cached_property
+    def groups(self) -> dict[str, list[Array]]:
+        """Columns of the laws of every block."""
+        top = laws.largest(self.inside)
+        own = {name: self._block(law, top) for name, law in laws.BLOCKS.items()}
+        return own | {"speed_sensor": self._speed_sensor(), "backlash_shaft": self._backlash()}
+
+    def _block(
+        self,
+        block: Callable[[laws.Inside, Mapping[str, float]], list[laws.Law]],
+        top: Mapping[str, float],
+    ) -> list[Array]:
+        none = [None] * len(self.signals)
+        runs = [block(q, top) for q in self.inside]
+        return [
+            self.table.own_relations([law.rows for law in group])
+            if group[0].own
+            else self.table.shared([law.rows for law in group], none)
+            for group in zip(*runs, strict=True)
+        ]
+
+    def _speed_sensor(self) -> list[Array]:
+        """Errors of the measuring wheel."""
+        none = [None] * len(self.signals)
+        laws_of = [drum_laws.speed_sensor(m, self.values["gear_ratio"]) for m in self.signals]
+        *shared, own = zip(*laws_of, strict=True)
+        return [*(self.table.shared(none, group) for group in shared), self.table.own_speed(own)]
+
+    def _backlash(self) -> list[Array]:
+        """Gap and damping that differ from one contact to the next."""
+        laws_of = [
+            drum_laws.backlash(m, self.plain.jacobians[k][0]) for k, m in enumerate(self.signals)
+        ]
+        return [self.table.own_speed(group) for group in zip(*laws_of, strict=True)]
+
+    def _drum(self, fitted: Estimate) -> list[Array]:
+        """An unknown torque on the drum, in the gear's relation and in the drum's speed."""
+        xi = self.values["gear_ratio"]
+        torque = [laws.acting({GEAR: -1.0 / xi}, middle(law)) for law in self.side.laws]
+        speed = [-fitted.jacobians[k][0][:, _is_torque(fitted)] for k in range(len(self.signals))]
+        return [self.table.shared(torque, speed) * TORQUE]
+
+    @cached_property
+    def with_torque(self) -> list[tuple[Linear, list[Array]]]:
+        """Data and laws of the drum, linearised at no torque, and at the best if that is far."""
+        start = {**self.plain.parameters(), **self.side.torques(0.0)}
+        gaps = [self.plain.states(k)[GAP_POSITION] for k in range(len(self.signals))]
+        near = self.side.at(start, gaps)
+        fits = [near]
+        count = sum(len(m.time) for m in self.signals)
+        if self.data.left(slice(-count, None)) > count + ASTRAY * np.sqrt(2.0 * count):
+            fits.append(self.side.far(self.plain.parameters()))
+        return [(self.linear(f), self._drum(f)) for f in fits]
+
+    def evidence(self, blocks: Sequence[str]) -> Evidence:
+        """The evidence with unknown laws in these blocks."""
+        groups = [g for name in blocks if name != "drum" for g in self.groups[name]]
+        if "drum" not in blocks:
+            return self.data.evidence(groups)
+        found = [data.evidence([*groups, *drum]) for data, drum in self.with_torque]
+        return max(found, key=lambda e: e.log)
+
+    def log_evidence(self, blocks: Sequence[str]) -> float:
+        """Log probability of all measurements with unknown laws in these blocks.
+
+        The drive's dead time may also vary from scan to scan.
+        """
+        found = self.evidence(blocks)
+        if "drive" not in blocks:
+            return found.log
+        count = ROWS * sum(len(m.intervals) for m in self.signals)
+        slope = np.concatenate([q.demand_rate for q in self.inside])
+        return found.log + unrest(found.left[DRIVE:count:ROWS], slope)
+
+
+def _is_torque(fitted: Estimate) -> NDArray[np.bool_]:
+    return np.array([u.name.startswith("torque_") for u in fitted.unknowns])
