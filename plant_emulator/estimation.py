@@ -9,14 +9,7 @@ count. The unknowns are parameters, shared by all runs, and states, each of one 
 by scipy's trust-region method. The Jacobian is made of forward differences so small that the
 simulation keeps its sequence of steps; a state costs a simulation of its own run only.
 
-Standard errors do not believe that residuals are white. With the autocovariance g(k) of each
-channel's residual the estimate's covariance is the sandwich
-
-    H^-1 (sum J' G J + P) H^-1,   H = J' J + P,   G[t, s] = g(t - s),   P = prior precision
-
-(Newey and West, Econometrica 55 (1987) 703, for stationary residuals; tapered by a trapezoid,
-Politis and Romano, J. Time Series Analysis 16 (1995) 67), enlarged by n/(n - p) for the unknowns
-that the residuals have already followed. White residuals of variance 1 give H^-1, as usual.
+Standard errors come from the residuals themselves, see `covariance`.
 """
 
 from __future__ import annotations
@@ -26,6 +19,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+from plant_emulator.covariance import data_errors, sandwich
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -126,30 +121,30 @@ class Estimate:
 
     @property
     def data_errors(self) -> Array:
-        """Standard errors of z that these data would give without any prior; may be infinite."""
-        return data_errors(self.information)
+        """Standard errors of z that these data give without any prior; may be infinite.
+
+        As much larger than white residuals of variance 1 would make them as those with prior are.
+        """
+        precision = np.diag([u.scaled_std**-2.0 for u in self.unknowns])
+        white = data_errors(self.information + precision)
+        known = np.isfinite(white)
+        larger = np.where(known, self.standard_errors, 1.0) / np.where(known, white, 1.0)
+        return data_errors(self.information) * np.maximum(1.0, larger)
 
     @property
     def correlation(self) -> Array:
         """Correlation matrix of z."""
         error = self.standard_errors
-        return self.covariance / np.outer(error, error)
+        known = np.isfinite(error) & (error > 0.0)
+        covariance = np.where(np.outer(known, known), self.covariance, 0.0)
+        safe = np.where(known, error, 1.0)
+        return np.where(np.eye(len(error)) > 0.0, 1.0, covariance / np.outer(safe, safe))
 
     @property
     def condition_number(self) -> float:
         """Condition number of the Jacobian on the scale of the estimation."""
         singular = np.sqrt(np.clip(np.linalg.eigvalsh(self.information), 0.0, None))
         return float(singular[-1] / singular[0]) if singular[0] > 0.0 else float("inf")
-
-
-def data_errors(information: Array) -> Array:
-    """Standard errors of z from an information matrix, infinite in directions without any."""
-    scale = np.sqrt(np.diag(information))
-    safe = np.where(scale > 0.0, scale, 1.0)
-    values, vectors = np.linalg.eigh(information / np.outer(safe, safe))
-    weight = np.where(values > 1e-14 * values[-1], values, 1e-300)
-    variance = (vectors**2 / weight).sum(axis=1) / safe**2
-    return np.where(scale > 0.0, np.sqrt(variance), np.inf)
 
 
 @dataclass
@@ -283,7 +278,7 @@ def _estimate(problem: _Problem, z: Array, converged: bool, message: str) -> Est
         z=z,
         residuals=tuple(residuals),
         jacobians=tuple(jacobians),
-        covariance=_covariance(residuals, jacobians, information, precision),
+        covariance=sandwich(residuals, jacobians, information, precision),
         information=information,
         cost=sum(float(np.sum(r**2)) for r in residuals),
         penalty=float(np.sum(problem.rows(z)[-len(z) :] ** 2)),
@@ -292,71 +287,3 @@ def _estimate(problem: _Problem, z: Array, converged: bool, message: str) -> Est
         converged=converged,
         message=message,
     )
-
-
-def _covariance(
-    residuals: Sequence[Array], jacobians: Sequence[Array], information: Array, precision: Array
-) -> Array:
-    """The sandwich of the module's text."""
-    samples = sum(int(np.count_nonzero(r)) for r in residuals)
-    freedom = samples / max(1, samples - len(precision))
-    middle = precision.copy()
-    for residual, jacobian in zip(residuals, jacobians, strict=True):
-        for channel in range(len(residual)):
-            slopes = jacobian[channel]
-            middle += freedom * slopes.T @ coloured(slopes, autocovariance(residual[channel]))
-    hessian = information + precision
-    scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
-    inverse = np.linalg.pinv(hessian / np.outer(scale, scale), rcond=1e-15, hermitian=True)
-    inverse /= np.outer(scale, scale)
-    covariance = inverse @ middle @ inverse
-    return 0.5 * (covariance + covariance.T)
-
-
-def autocovariance(residual: Array) -> Array:
-    """Autocovariance of a residual at the lags 0, 1, ..., tapered to 0; shape (lags,).
-
-    Lags count in full until the correlation first falls under twice its standard error in white
-    noise, and fall off over as many more. Samples of exactly 0 do not count.
-    """
-    counted = residual != 0.0
-    n = int(counted.sum())
-    if n < 2:
-        return np.zeros(1)
-    size = 1 << (2 * len(residual) - 1).bit_length()
-    product = np.fft.irfft(np.abs(np.fft.rfft(residual, size)) ** 2, size)
-    pairs = np.fft.irfft(np.abs(np.fft.rfft(counted.astype(float), size)) ** 2, size)
-    longest = max(1, len(residual) // 4)
-    covariance = product[:longest] / np.maximum(np.round(pairs[:longest]), 1.0)
-    small = covariance < 2.0 / np.sqrt(n) * covariance[0]
-    first = int(np.argmax(small)) if small.any() else longest
-    if first <= 1:
-        return np.asarray(covariance[:1])
-    reach = min(2 * first, longest)
-    taper = np.minimum(1.0, 2.0 * (1.0 - np.arange(reach) / reach))
-    return _with_spectrum(covariance[:reach] * taper)
-
-
-def _with_spectrum(covariance: Array) -> Array:
-    """The autocovariance with what of its spectrum came out negative set to 0."""
-    both = np.concatenate([covariance, covariance[:0:-1]])
-    spectrum = np.maximum(np.fft.rfft(both).real, 0.0)
-    return np.asarray(np.fft.irfft(spectrum, len(both))[: len(covariance)])
-
-
-def coloured(slopes: Array, covariance: Array) -> Array:
-    """G J: each column of the Jacobian multiplied by the residual's covariance matrix."""
-    if len(covariance) == 1:
-        return np.asarray(slopes * covariance[0])
-    from scipy.signal import oaconvolve
-
-    both = np.concatenate([covariance[:0:-1], covariance])
-    return np.asarray(oaconvolve(slopes, both[:, None], mode="same", axes=0))
-
-
-def correlation_time(residual: Array) -> float:
-    """Samples that one independent sample is worth: 1 + 2 sum of the correlations, at least 1."""
-    covariance = autocovariance(residual)
-    if covariance[0] <= 0.0:
-        return 1.0
-    return max(1.0, float(2.0 * covariance.sum() / covariance[0] - 1.0))

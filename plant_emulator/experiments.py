@@ -7,12 +7,15 @@ every run has its own.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from plant_emulator import estimation
+from plant_emulator.covariance import data_errors
+from plant_emulator.errors import UnsettledError
 from plant_emulator.log import COMPARED, Log
 from plant_emulator.programs import PROGRAMS, SpeedProgram
 from plant_emulator.search import GAP_POSITION
@@ -49,11 +52,15 @@ def experiments(
     count = len(found.parameters)
     known = without_states(found.estimate.information, count)
     noise = _noise(recordings)
-    errors = {
-        name: estimation.data_errors(known + _information(program, found, values, noise))
-        for name, program in PROGRAMS.items()
-        if isinstance(program, SpeedProgram)
-    }
+    errors = {}
+    for drive in PROGRAMS.values():
+        if isinstance(drive, SpeedProgram):
+            # A program that the model cannot be driven through at these values gives no advice.
+            with suppress(UnsettledError):
+                more = _information(drive, found, values, noise)
+                errors[drive.name] = data_errors(known + more)
+    if not errors:
+        return []
     answers = []
     for k in open_ones:
         parameter = found.parameters[k]

@@ -94,6 +94,7 @@ def identified(
     hashes = _hashes([*paths, *held_out])
     estimation, notes = _load(paths, parameters, hold)
     prediction, more = _load(held_out, parameters, hold)
+    _different([*estimation, *prediction])
     estimation = [with_own(r, effects) for r in estimation]
     prediction = [with_own(r, effects) for r in prediction]
     given = values_of(parameters, effects)
@@ -137,6 +138,18 @@ def _hashes(paths: Sequence[str]) -> dict[str, str]:
                 raise IdentificationError(f"{path}: the same run as {other}; give every run once")
         found[path] = digest
     return found
+
+
+def _different(recordings: Sequence[Recording]) -> None:
+    """Refuse the same run in two forms: its samples tell, whatever file holds them."""
+    seen: dict[bytes, str] = {}
+    for log in (r.log for r in recordings):
+        key = log.time.tobytes() + log["motor_speed"].tobytes()
+        if key in seen:
+            raise IdentificationError(
+                f"{log.source}: the same run as {seen[key]}; give every run once"
+            )
+        seen[key] = log.source
 
 
 def _load(

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 # Pairs of parameters worth a word: their values can hardly be told apart.
 CORRELATED = 0.95
+# A standard error or condition number that says nothing but "not at all".
+BEYOND = 1e15
 
 
 def answer(
@@ -67,8 +69,8 @@ def answer(
 
 
 def finite(value: float) -> float | None:
-    """The number, or null where it is infinite: JSON knows no infinity."""
-    return value if value < float("inf") else None
+    """The number, or null where it is no information: JSON knows no infinity."""
+    return value if value < BEYOND else None
 
 
 def measures(fits: Fits) -> dict[str, dict[str, dict[str, float]]]:
@@ -119,6 +121,8 @@ def lines(
 def _row(p: Parameter) -> str:
     change = 100.0 * (p.value / p.nominal - 1.0)
     row = f"{p.name:24}{p.value:12.5g}{p.standard_error:12.3g}{change:+8.2f}%  {p.unit}"
+    if p.at_bound:
+        return f"{row}  AT THE END of its range: check units and signs"
     return row if p.identifiable else f"{row}  NOT DETERMINED by these logs"
 
 

@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 NOT_FREE = frozenset({"gear_inertia"})
 # A parameter may leave its value in the set by this factor either way.
 BOUND_FACTOR = 5.0
-# The last fit: a step more or less in the simulation then changes the cost by less than the cost
-# changes over a thousandth of a standard error.
+# The last fit, but for a truck, whose staircase of references takes ten times as long: a step more
+# or less in the simulation then changes the cost by less than a thousandth of a standard error.
 FINAL_TOLERANCE = 1e-8
 # Share of the prior deviation (or of the value) under which a standard error is information.
 INFORMED = 0.5
@@ -67,10 +67,12 @@ class Parameter:
     nominal: float
     unit: str
 
+    at_bound: bool
+
     @property
     def identifiable(self) -> bool:
         """Whether the data determine it, see the module's text."""
-        return self.data_error <= self.enough
+        return self.data_error <= self.enough and not self.at_bound
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +121,7 @@ def unknowns(
 
 
 def free_parameters(parameters: ParameterSet, names: Sequence[str] = ()) -> tuple[str, ...]:
-    """The names given, or all that the set calls estimated but those of NOT_FREE."""
+    """The names given, or all that the set calls estimated but those of NOT_FREE and zeros."""
     for name in names:
         if name not in parameters.values():
             known = ", ".join(parameters.values())
@@ -133,7 +135,11 @@ def free_parameters(parameters: ParameterSet, names: Sequence[str] = ()) -> tupl
                 f"--free {name}: it is calculated from others; give it a value of its own, "
                 'kind = "estimated", in a parameter set'
             )
-    estimated = [p.name for p in parameters if p.kind == "estimated" and p.name not in NOT_FREE]
+    estimated = [
+        p.name
+        for p in parameters
+        if p.kind == "estimated" and p.name not in NOT_FREE and p.value > 0.0
+    ]
     return tuple(dict.fromkeys(names)) or tuple(estimated)
 
 
@@ -182,7 +188,9 @@ def least_squares(
 ) -> Estimate:
     """Least squares from where a search has come to; priors that the data outdo are given up."""
     coarse = residual_functions(recordings, search.values, free)
-    fine = residual_functions(recordings, search.values, free, FINAL_TOLERANCE)
+    truck = any(recording.run.truck for recording in recordings)
+    tolerance = TOLERANCE if truck else FINAL_TOLERANCE
+    fine = residual_functions(recordings, search.values, free, tolerance)
     counted = sum(int(r.use.sum()) for r in recordings)
 
     def tell(cost: float) -> None:
@@ -269,4 +277,5 @@ def _parameter(found: Estimate, k: int, parameters: ParameterSet) -> Parameter:
         nominal=parameters.value(unknown.name),
         enough=INFORMED_WITHOUT_PRIOR * value if std is None else INFORMED * std,
         unit=parameters[unknown.name].unit,
+        at_bound=not 1.001 * unknown.lower < value < unknown.upper / 1.001,
     )

@@ -20,7 +20,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.estimation import Estimate, at, correlation_time, estimate
+from plant_emulator.covariance import correlation_time
+from plant_emulator.estimation import Estimate, at, estimate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

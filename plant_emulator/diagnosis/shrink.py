@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.covariance import correlation_time
 from plant_emulator.diagnosis.contest import Point, again
-from plant_emulator.estimation import correlation_time, estimate
+from plant_emulator.estimation import estimate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

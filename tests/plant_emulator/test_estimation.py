@@ -5,15 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from plant_emulator.estimation import (
-    Array,
-    Unknown,
-    at,
-    autocovariance,
-    correlation_time,
-    data_errors,
-    estimate,
-)
+from plant_emulator.covariance import Array, autocovariance, correlation_time, data_errors
+from plant_emulator.estimation import Unknown, at, estimate
 
 
 def number(name: str, start: float, **more: object) -> Unknown:
@@ -164,3 +157,10 @@ def test_bound_holds() -> None:
 def test_information_is_that_of_the_starts_where_nothing_is_fitted() -> None:
     found = at([number("a", 2.0)], [lambda v: np.full((1, 25), v["a"] ** 2)])
     assert found.information[0, 0] == pytest.approx(25 * (2 * 2.0) ** 2, rel=1e-4)
+
+
+def test_what_neither_data_nor_prior_know_has_no_finite_error() -> None:
+    found = at([number("seen", 1.0), number("unseen", 1.0)], [lambda v: np.full((1, 9), v["seen"])])
+    assert found.standard_errors[1] == np.inf
+    assert found.data_errors[1] == np.inf
+    assert found.correlation[0, 1] == 0.0

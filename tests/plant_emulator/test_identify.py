@@ -13,6 +13,7 @@ from plant_emulator.experiments import experiments
 from plant_emulator.identify import Identification, free_parameters, identify
 from plant_emulator.log import COMPARED, Log
 from plant_emulator.parameters import ParameterSet
+from plant_emulator.preflight import preflight
 from plant_emulator.programs import PROGRAMS
 from plant_emulator.recording import Recording, recording
 from plant_emulator.sensors import SENSORS, noisy
@@ -283,6 +284,37 @@ def test_temperature_at_the_start_belongs_to_its_run(nominal: ParameterSet) -> N
     temperatures = [s["gear_oil_temperature_start_temperature"] for s in found.states]
     assert temperatures == pytest.approx([285.0, 300.0], abs=0.5)
     assert found.chi_squared == pytest.approx(1.0, abs=0.05)
+
+
+def test_held_channel_has_its_own_noise(nominal: ParameterSet, bench_log: Reader) -> None:
+    """A torque that comes at 20 Hz and is held: left out where stale, weighed by its noise."""
+    log = bench_log("bench_practice/practice_002/program1")
+    held = log["shaft_torque"][np.arange(len(log.time)) // 5 * 5]
+    slow = Log(log.time, {**log.signals, "shaft_torque": held}, log.source)
+    use = preflight(slow, 62.6).use
+    found = identify([recording(slow, use=use)], nominal)
+    assert found.chi_squared == pytest.approx(1.0, abs=0.06)
+    true = truth(nominal, "practice_002")
+    for p in found.parameters:
+        assert abs(p.value - true[p.name]) <= 3.5 * p.standard_error, p.name
+
+
+def test_parameter_that_is_zero_in_the_set_is_not_free(nominal: ParameterSet) -> None:
+    frictionless = nominal.with_values({"gear_coulomb_friction": 0.0})
+    assert "gear_coulomb_friction" not in free_parameters(frictionless)
+    with pytest.raises(IdentificationError, match="a fit needs a value above 0"):
+        free_parameters(frictionless, ("gear_coulomb_friction",))
+
+
+def test_current_in_milliampere_ends_at_the_end_of_a_range_and_says_so(
+    nominal: ParameterSet, bench_log: Reader
+) -> None:
+    log = bench_log("bench_practice/practice_008/program1")
+    wrong = {**log.signals, "armature_current": 1000.0 * log["armature_current"]}
+    found = identify([recording(Log(log.time, wrong, log.source))], nominal)
+    at_the_end = [p for p in found.parameters if p.at_bound]
+    assert at_the_end
+    assert not any(p.identifiable for p in at_the_end)
 
 
 def repeats(nominal: ParameterSet, log: Log, count: int) -> Sequence[np.ndarray]:

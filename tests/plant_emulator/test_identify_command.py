@@ -122,6 +122,27 @@ def test_same_run_twice_is_refused(identify: Command, tmp_path: Path) -> None:
     )
 
 
+def test_same_run_in_another_form_is_refused(identify: Command, tmp_path: Path) -> None:
+    plain = tmp_path / "plain.csv"
+    plain.write_bytes(gzip.decompress(Path(NOMINAL[0]).read_bytes()))
+    assert refusal(identify(NOMINAL[0], "--hold-out", plain)) == (
+        f"{plain}: the same run as {NOMINAL[0]}; give every run once"
+    )
+
+
+def test_fit_is_answered_where_no_program_can_give_advice(
+    identify: Command, tmp_path: Path
+) -> None:
+    """A current of the wrong sign: values so far out that the drive programs cannot be run."""
+    log = logs.read(RUNS[0])
+    flipped = tmp_path / "flipped.csv"
+    current = {**log.signals, "armature_current": -log["armature_current"]}
+    logs.write(Log(log.time, current, "flipped"), flipped)
+    result = identify(flipped, "--json", tmp_path / "a.json")
+    assert result.exit_code in {0, 1}
+    assert json.loads((tmp_path / "a.json").read_text())["chi_squared"] > 2.0
+
+
 def test_unknown_parameter_is_refused(identify: Command) -> None:
     assert refusal(identify(NOMINAL[0], "--free", "mass")).startswith("--free mass: no parameter")
 

@@ -50,3 +50,11 @@ def test_noise_of_the_independent_logs_is_found(
 ) -> None:
     log = bench_log(f"bench_practice/practice_004/program{program}")
     assert noise(log[channel]) == pytest.approx(level, rel=0.07)
+
+
+def test_noise_of_a_channel_slower_than_its_log_is_that_of_its_fresh_samples() -> None:
+    random = np.random.default_rng(6)
+    smooth = np.sin(0.2 * TIME)
+    held = (smooth + 0.25 * random.standard_normal(len(TIME)))[np.arange(len(TIME)) // 5 * 5]
+    fresh = np.arange(len(TIME)) % 5 == 0
+    assert noise(held, fresh) == pytest.approx(0.25, rel=0.08)

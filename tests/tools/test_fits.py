@@ -38,7 +38,7 @@ def ours(fits: Any) -> Identification:
 def test_another_solver_finds_the_same_cost_at_our_optimum(fits: Any, ours: Identification) -> None:
     values = {p.name: p.value for p in ours.parameters}
     residual = fits.residual(values, ours.gap_positions[0])
-    assert np.sum(residual**2) == pytest.approx(ours.estimate.cost, rel=1e-5)
+    assert np.sum(residual**2) == pytest.approx(ours.estimate.cost, rel=2e-4)
 
 
 @pytest.mark.parametrize("apart", [0.002, 0.03])
