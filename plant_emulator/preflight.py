@@ -51,8 +51,10 @@ SLOWEST = 0.025
 AT_REST, LEAST_MOTION = 3.0, 20.0
 # Steady forward: motor speed [rad/s], acceleration [rad/s^2], shortest stretch [s].
 STEADY_SPEED, STEADY_RATE, STEADY_TIME = 30.0, 10.0, 0.5
-# The torque there is negative by some N m; what is certainly not [N m].
+# The torque there is negative by some N m, the current positive by some A; what is not [N m, A].
 WRONG_SIGN = 0.5
+# Current that no bench of this kind needs at steady speed [A].
+LARGEST_CURRENT = 200.0
 # Ratio of motor to drum speed over the gear ratio that scales, slip and noise cannot explain.
 RATIO_WITHIN = 0.2
 
@@ -74,7 +76,7 @@ def preflight(measured: Log, gear_ratio: float) -> Preflight:
     _starts_at_rest(measured)
     _moves(measured)
     _one_gear(measured, gear_ratio)
-    _sign_of_torque(measured, interval)
+    _signs(measured, interval)
     if "armature_current" not in measured:
         notes.append(
             f"{measured.source}: without {NAMES['armature_current']} the flux (K_1, K_2) shows in "
@@ -144,7 +146,7 @@ def _one_gear(measured: Log, gear_ratio: float) -> None:
         )
 
 
-def _sign_of_torque(measured: Log, interval: float) -> None:
+def _signs(measured: Log, interval: float) -> None:
     """The commissioning check: without a truck the motor drives at steady forward speed."""
     if "wheel_torque" in measured:
         return
@@ -160,6 +162,15 @@ def _sign_of_torque(measured: Log, interval: float) -> None:
         raise LogError(
             f"{measured.source}: {NAMES['shaft_torque']} is {torque:+.1f} while the motor drives "
             "at steady forward speed; it must be negative there: change its sign"
+        )
+    if "armature_current" not in measured:
+        return
+    current = float(np.median(measured["armature_current"][steady]))
+    if not -WRONG_SIGN < current < LARGEST_CURRENT:
+        raise LogError(
+            f"{measured.source}: {NAMES['armature_current']} is {current:+.4g} while the motor "
+            f"drives at steady forward speed; 0 to {LARGEST_CURRENT:g} is possible there: check "
+            "its sign and unit"
         )
 
 

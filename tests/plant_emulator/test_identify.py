@@ -306,15 +306,14 @@ def test_parameter_that_is_zero_in_the_set_is_not_free(nominal: ParameterSet) ->
         free_parameters(frictionless, ("gear_coulomb_friction",))
 
 
-def test_current_in_milliampere_ends_at_the_end_of_a_range_and_says_so(
-    nominal: ParameterSet, bench_log: Reader
+def test_parameter_at_the_end_of_its_range_is_told(
+    nominal: ParameterSet, recordings: Callable[..., list[Recording]]
 ) -> None:
-    log = bench_log("bench_practice/practice_008/program1")
-    wrong = {**log.signals, "armature_current": 1000.0 * log["armature_current"]}
-    found = identify([recording(Log(log.time, wrong, log.source))], nominal)
-    at_the_end = [p for p in found.parameters if p.at_bound]
-    assert at_the_end
-    assert not any(p.identifiable for p in at_the_end)
+    """A set ten times too heavy: the drum of the log lies beyond a fifth of it."""
+    heavy = nominal.with_values({"drum_inertia": 10.0 * nominal.value("drum_inertia")})
+    (inertia,) = identify(recordings("practice_008", 1), heavy, ("drum_inertia",)).parameters
+    assert inertia.at_bound
+    assert not inertia.identifiable
 
 
 def repeats(nominal: ParameterSet, log: Log, count: int) -> Sequence[np.ndarray]:

@@ -57,6 +57,12 @@ def test_torque_of_the_wrong_sign_is_told(good: Log) -> None:
     assert refusal(flipped).startswith("run.csv: shaft_torque_Nm is +12.9 while the motor drives")
 
 
+@pytest.mark.parametrize("factor", [-1.0, 1000.0])
+def test_current_of_the_wrong_sign_or_unit_is_told(good: Log, factor: float) -> None:
+    wrong = with_channel(good, "armature_current", factor * good["armature_current"])
+    assert "check its sign and unit" in refusal(wrong)
+
+
 def test_drum_speed_in_rpm_is_told(good: Log) -> None:
     rpm = with_channel(good, "drum_speed", good["drum_speed"] * 60 / (2 * np.pi))
     assert "drum_speed_rad_s is 9.57 times motor_speed_rad_s / 62.6" in refusal(rpm)
