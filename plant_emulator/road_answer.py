@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from plant_emulator.road_fit import LOWER, UPPER
-from plant_emulator.road_prior import NAMES, vector
+from plant_emulator.road_prior import NAMES, OFFSET, vector
 from plant_emulator.validate import Fit
 from plant_emulator.validate import fit as measures
 
@@ -213,6 +213,10 @@ def not_separable(
     return tuple(found)
 
 
+# Zero of the load cell that differs so much between standstills [N m] is 2 % of the road load.
+ZERO_MOVED = 0.1
+
+
 def problems(fit: RoadFit, quality: Fit) -> list[str]:
     """Reasons why the numbers must not be used."""
     found = [] if fit.settled else ["the search ended before it settled"]
@@ -230,6 +234,12 @@ def problems(fit: RoadFit, quality: Fit) -> list[str]:
         found.append(
             f"the residual is no noise, its long-run variance is {variance:.1f} times what noise "
             "leaves: level road, no foot brake, both logs of one run?"
+        )
+    drift = float(fit.prior.deviation[NAMES.index("torque_offset")])
+    if ZERO_MOVED < drift < OFFSET:
+        found.append(
+            f"the load cell's zero moves from standstill to standstill, by {drift:.2f} N m "
+            "(standard deviation): cut the log where it moved"
         )
     gain = NAMES.index("torque_gain")
     distance = abs(values[gain] - 1.0) / fit.prior.deviation[gain]

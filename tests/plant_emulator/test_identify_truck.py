@@ -197,6 +197,14 @@ def test_another_mass_than_the_load_cell_allows_fails_and_saves_nothing(tmp_path
     assert not saved.exists()
 
 
+def test_zero_of_the_load_cell_that_moves_fails(write: Callable[..., tuple[str, str]]) -> None:
+    """0.5 N m from the middle of the log on; believed, they would be 9 % of C_rr."""
+    torque = table(TORQUE)
+    torque[len(torque) // 2 :, 1] += 0.5
+    line = refusal(call(*write(torque=torque)), 1)
+    assert "the load cell's zero moves from standstill to standstill" in line
+
+
 @pytest.mark.parametrize("other", ["road_2", "road_3"])
 def test_velocity_of_another_run_fails(other: str) -> None:
     result = call(DATA / TORQUE, DATA / f"{other}_velocity.csv.gz")
