@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.axis_effects import AxisEffect
     from plant_emulator.diagnosis.axis_signals import AxisLog, Motion
+    from plant_emulator.diagnosis.contest import Point
     from plant_emulator.estimation import Array, Residual
 
 NAMES = ("inertia", "viscous_friction", "coulomb_friction", "offset")
@@ -125,6 +126,10 @@ class AxisModel:
     ) -> dict[str, float]:
         """See `Model`."""
         return self._level()
+
+    def located(self, where: Point, runs: Sequence[int]) -> None:  # noqa: ARG002
+        """See `Model`: one channel has no blocks to tell apart."""
+        return
 
     def _level(self) -> dict[str, float]:
         return {u.name: u.start for u in self.states}

@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import pickle
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from plant_emulator.diagnosis.locate import locate
 from plant_emulator.diagnosis.model import Candidate, Run
 from plant_emulator.effects import from_file
 from plant_emulator.equation_error import start_values
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
+    from plant_emulator.diagnosis.contest import Point
     from plant_emulator.effects import Effect
     from plant_emulator.estimation import Array, Residual
     from plant_emulator.parameters import ParameterSet
@@ -164,6 +166,10 @@ class BenchModel:
         search = Search([self._recordings[run]], everything, ())
         search.scan_gaps(GAPS)
         return {GAP_POSITION: search.gaps[0], **own}
+
+    def located(self, where: Point, runs: Sequence[int]) -> Mapping[str, Any] | None:
+        """See `Model`."""
+        return locate([self._recordings[k] for k in runs], self._set, where).as_answer()
 
 
 @dataclass(frozen=True)

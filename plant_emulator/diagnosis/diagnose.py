@@ -9,7 +9,7 @@ from plant_emulator.diagnosis import answer as parts
 from plant_emulator.diagnosis import place, shrink, verdict
 from plant_emulator.diagnosis.calibration import confidence
 from plant_emulator.diagnosis.details import Details
-from plant_emulator.diagnosis.explain import THRESHOLD, Contest
+from plant_emulator.diagnosis.explain import THRESHOLD, Contest, Task
 from plant_emulator.diagnosis.pool import model_of
 from plant_emulator.diagnosis.shrink import Fold
 
@@ -197,9 +197,13 @@ class Diagnose:
         return {key.removeprefix(f"{name}_"): value for key, value in fixed.items()}
 
     def _location(self, explained: Explanation, found: Verdict) -> dict[str, Any]:
+        task = Task(base=explained.null, runs=self.plan.fitted)
+        (located,) = self.pool.map(place.site, self.recipe, [task])
         shares = place.evidence_shares(explained, self.model.candidates)
+        if located is not None:
+            shares = {entry["name"]: entry["share"] for entry in located["subsystems"]}
         where = place.subsystem(found, explained, self.model.candidates, shares)
-        return place.location(where, shares, ())
+        return place.location(where, shares, located)
 
     def _closed(
         self, found: Verdict, gaps: Mapping[tuple[str, ...], Gap]

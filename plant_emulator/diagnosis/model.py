@@ -6,11 +6,12 @@ The bench is one such machine, a single motor-driven axis another; nothing else 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from plant_emulator.diagnosis.contest import Point
     from plant_emulator.estimation import Array, Residual, Unknown
 
 
@@ -103,3 +104,9 @@ class Model(Protocol):
         self, run: int, effects: Sequence[str], values: Mapping[str, float]
     ) -> dict[str, float]:
         """States of a run near the best at these values of everything else."""
+
+    def located(self, where: Point, runs: Sequence[int]) -> Mapping[str, Any] | None:
+        """Where the gap of a fit without effects lies, without any hypothesis of its cause.
+
+        In the form of the answer's `location`; None: this machine has no blocks to tell apart.
+        """

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
-    from plant_emulator.diagnosis.explain import Explanation
-    from plant_emulator.diagnosis.model import Candidate
+    from plant_emulator.diagnosis.explain import Explanation, Task
+    from plant_emulator.diagnosis.model import Candidate, Model
     from plant_emulator.diagnosis.verdict import Verdict
 
 
@@ -44,23 +44,27 @@ def subsystem(
     return max(shares, key=shares.__getitem__, default=None)
 
 
+def site(model: Model, task: Task) -> Mapping[str, Any] | None:
+    """Step of a diagnosis: the block that the gap of a fit lies in."""
+    return model.located(task.base, task.runs)
+
+
 def location(
-    place: str | None, shares: Mapping[str, float], entries: Sequence[Mapping[str, Any]]
+    place: str | None, shares: Mapping[str, float], located: Mapping[str, Any] | None
 ) -> dict[str, Any]:
     """The part `location` of the answer.
 
-    entries : of the residual map; the one with the largest gap over its noise gives channel and
-        phase, unless there is no gap
+    place : the verdict's; None: there is no gap
+    located : what the machine's blocks say; None: the shares are those of the evidence
     """
-    widest = max(entries, key=lambda e: e["gap"] / e["noise"], default=None)
-    told = place is not None and widest is not None
+    if located is None:
+        by_share = sorted(shares.items(), key=lambda pair: -pair[1])
+        blocks: Any = [{"name": name, "share": share} for name, share in by_share]
+        located = {"channel": None, "phase": None, "subsystems": blocks, "map": []}
     return {
         "subsystem": place,
-        "channel": widest["channel"] if told and widest else None,
-        "phase": widest["phase"] if told and widest else None,
-        "subsystems": [
-            {"name": name, "share": share}
-            for name, share in sorted(shares.items(), key=lambda pair: -pair[1])
-        ],
-        "map": [dict(entry) for entry in entries],
+        "channel": None if place is None else located["channel"],
+        "phase": None if place is None else located["phase"],
+        "subsystems": located["subsystems"],
+        "map": located["map"],
     }

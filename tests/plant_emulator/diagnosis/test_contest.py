@@ -89,6 +89,9 @@ class Line:
         """See `Model`."""
         return {}
 
+    def located(self, where: Point, runs: Sequence[int]) -> None:
+        """See `Model`."""
+
 
 class Given:
     """A recipe of a model that is there already."""
