@@ -240,5 +240,6 @@ def test_a_regulator_that_there_is_not_is_one_line_and_exit_code_2(
     )
     assert ended.returncode == 2
     assert ended.stderr.count("\n") == 1
-    assert "bench.toml:2: [regulator] name: unknown regulator" in ended.stderr
+    why = "unknown regulator" if name else "empty"
+    assert f"bench.toml:2: [regulator] name: {why}" in ended.stderr
     assert "compensated or thesis" in ended.stderr
