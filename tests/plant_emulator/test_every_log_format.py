@@ -254,7 +254,7 @@ def finite(size: float) -> st.SearchStrategy[float]:
 def test_what_is_written_is_read_again(
     tmp_path: Path, suffix: str, data: st.DataObject, count: int
 ) -> None:
-    steps = data.draw(st.lists(st.floats(1e-3, 10.0), min_size=count, max_size=count))
+    steps = data.draw(st.lists(st.floats(1e-3, 9.9), min_size=count, max_size=count))
     signals = {
         signal: np.array(data.draw(st.lists(finite(500.0), min_size=count, max_size=count)))
         for _, signal, needed in KNOWN[1:]
