@@ -1,8 +1,8 @@
 """What drifting parameters do to the relations of the blocks, so that drift is not called a fault.
 
-Derivatives of the relations by each free parameter, in standard deviations of its prior (thesis,
-eq. 3.7, 3.16, 3.27, 3.34). They are taken at simulated and smoothed signals: a column with the
-noise of a relation in it would explain that noise.
+What is left of the relations when a free parameter is larger than assumed, by its derivative and
+in standard deviations of its prior (thesis, eq. 3.7, 3.16, 3.27, 3.34). The derivatives are taken
+at simulated and smoothed signals: a column with a relation's own noise in it would explain that.
 """
 
 from __future__ import annotations
@@ -28,8 +28,10 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.laws import Inside
     from plant_emulator.estimation import Array
-    from plant_emulator.parameters import ParameterSet
+    from plant_emulator.parameters import Parameter, ParameterSet
 
+# Prior standard deviations that a fit without effects is believed within.
+WIDE = 2.0
 # Dead times that are tried, over that of the set, and their prior standard deviation.
 DEAD_TIMES = np.linspace(0.7, 1.3, 61)
 
@@ -48,12 +50,12 @@ def slopes(m: Measured, q: Inside, p: Mapping[str, float]) -> dict[str, Slope]:
         "flux_constant": (MOTOR, np.where(k < p["flux_constant"], 0.0, q.current)),
         "flux_constant_1": (MOTOR, weak * k / p["flux_constant_1"]),
         "flux_constant_2": (MOTOR, weak * k / (p["flux_constant_2"] + np.abs(q.speed))),
-        "motor_inertia": (MOTOR, q.acceleration),
-        "gear_coulomb_friction": (GEAR, q.moving / xi),
-        "gear_viscous_friction": (GEAR, power / xi),
-        "gear_friction_exponent": (GEAR, growth / xi),
-        "drum_inertia": (GEAR, drum / xi),
-        "dead_time": (DRIVE, middle(np.gradient(delayed_reference(m, p["dead_time"]), m.time))),
+        "motor_inertia": (MOTOR, -q.acceleration),
+        "gear_coulomb_friction": (GEAR, -q.moving / xi),
+        "gear_viscous_friction": (GEAR, -power / xi),
+        "gear_friction_exponent": (GEAR, -growth / xi),
+        "drum_inertia": (GEAR, -drum / xi),
+        "dead_time": (DRIVE, -middle(np.gradient(delayed_reference(m, p["dead_time"]), m.time))),
     }
 
 
@@ -87,16 +89,39 @@ def priors(parameters: ParameterSet, free: Sequence[str]) -> dict[str, float]:
     }
 
 
-def dead_time(runs: Sequence[Measured], p: Mapping[str, float], std: float) -> float:
-    """Dead time [s] that the drive's relation tells of; outliers count by their logarithm."""
+def assumed(
+    parameters: ParameterSet, fitted: Mapping[str, float], stds: Mapping[str, float]
+) -> dict[str, float]:
+    """Values to take the relations at: fitted ones, as far as their priors find them likely."""
+    nominal = parameters.values()
+    likely = {
+        name: float(np.clip(fitted[name], nominal[name] - WIDE * std, nominal[name] + WIDE * std))
+        for name, std in stds.items()
+    }
+    return {**nominal, **likely}
+
+
+def prior(
+    parameters: ParameterSet, values: Mapping[str, float], stds: Mapping[str, float]
+) -> Array:
+    """How far the priors' means lie from these values, in standard deviations."""
+    return np.array([(parameters.value(n) - values[n]) / std for n, std in stds.items()])
+
+
+def dead_time(runs: Sequence[Measured], p: Mapping[str, float], known: Parameter) -> float:
+    """Dead time [s] that the drive's relation tells of; outliers count by their logarithm.
+
+    known : what is known of it beforehand
+    """
+    nominal, std = known.value, known.std or 0.5 * known.value
     told = [told_reference(m, p, delayed_reference(m, p["dead_time"]))[0] for m in runs]
 
     def loss(factor: float) -> float:
-        trial = factor * p["dead_time"]
-        away = 0.5 * ((trial - p["dead_time"]) / std) ** 2
+        trial = factor * nominal
+        away = 0.5 * ((trial - nominal) / std) ** 2
         return away + sum(
             float(np.log1p(((t - delayed_reference(m, trial)) / m.noise[0]) ** 2).sum())
             for t, m in zip(told, runs, strict=True)
         )
 
-    return float(min(DEAD_TIMES, key=loss) * p["dead_time"])
+    return float(min(DEAD_TIMES, key=loss) * nominal)

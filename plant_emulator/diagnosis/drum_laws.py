@@ -8,7 +8,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.hats import hats, of_time
 from plant_emulator.diagnosis.phases import smooth
-from plant_emulator.diagnosis.relations import NOISES, Measured, drum_angle
+from plant_emulator.diagnosis.relations import NOISES, Measured, turned
 
 if TYPE_CHECKING:
     from plant_emulator.estimation import Array
@@ -26,7 +26,7 @@ def torque(m: Measured, ratio: float, largest: float) -> Array:
 
     largest : speed of the motor in all runs [rad/s]
     """
-    speed, angle = smooth(m.time, m.speed, WINDOW) / ratio, drum_angle(m, ratio)
+    speed, angle = smooth(m.time, m.speed, WINDOW) / ratio, turned(m.time, m.drum_speed)
     moving = np.tanh(speed / MOVING)[:, None]
     by_speed = -moving * hats(np.abs(speed), np.linspace(0.0, largest / ratio, 4))
     return np.asarray(TORQUE * np.column_stack([by_speed, np.sin(angle), np.cos(angle)]))

@@ -49,6 +49,8 @@ DRAWS = 10
 # Mean square in the noise above which the set's own values are tried as a start too.
 ASTRAY = 1.5
 SETTLED = 1e-4
+# Prior standard deviation of an unknown torque on the drum [10 N m].
+TORQUE = 5.0
 # Constant torques that a fit starts from [10 N m]; laws of the angle, which are the last ones.
 TORQUE_STARTS = (0.0, 1.0, 3.0, 8.0, 20.0)
 BY_ANGLE = 2
@@ -101,18 +103,18 @@ class DrumSide:
             return np.full(len(m.time), IMPOSSIBLE)
         return np.asarray((m.drum_speed - drum) / m.noise[NOISES.index("drum_speed")])
 
-    def scan(self, found: Mapping[str, float]) -> tuple[float, list[float]]:
-        """Loss, and the start in the gap of every run, the best of a few."""
-        total, gaps = 0.0, []
-        for k in range(len(self.recordings)):
-            positions = np.linspace(-1.0, 1.0, GAPS)
-            losses = [
-                float(np.log1p(self.residual(k, {**found, GAP_POSITION: g}) ** 2).sum())
-                for g in positions
-            ]
-            gaps.append(float(positions[int(np.argmin(losses))]))
-            total += min(losses)
-        return total, gaps
+    def loss(self, run: int, found: Mapping[str, float]) -> float:
+        """Sum of log(1 + r^2): what lies far off counts, but little more than near."""
+        return float(np.log1p(self.residual(run, found) ** 2).sum())
+
+    def scan(self, found: Mapping[str, float]) -> list[float]:
+        """Start in the gap of every run, the best of a few."""
+        positions = np.linspace(-1.0, 1.0, GAPS)
+        losses = [
+            [self.loss(k, {**found, GAP_POSITION: float(g)}) for g in positions]
+            for k in range(len(self.recordings))
+        ]
+        return [float(positions[int(np.argmin(own))]) for own in losses]
 
     def unknowns(self, start: Mapping[str, float], gaps: Sequence[float]) -> list[Unknown]:
         """Gap, damping, sizes of the unknown torque that `start` has, starts of the runs."""
@@ -128,7 +130,7 @@ class DrumSide:
             for name in FREE
         ]
         torque = [
-            Unknown(name=name, start=size, lower=-1e3, upper=1e3, logarithmic=False)
+            Unknown(name=name, start=size, lower=-1e3, upper=1e3, logarithmic=False, std=TORQUE)
             for name, size in start.items()
             if name.startswith("torque_")
         ]
@@ -159,7 +161,7 @@ class DrumSide:
         for values in (near, own):
             if fits[-1].cost <= ASTRAY * fits[-1].samples:
                 break
-            fits.append(self.fit(values, self.scan(values)[1]))
+            fits.append(self.fit(values, self.scan(values)))
         return min(fits, key=lambda f: f.cost + f.penalty)
 
     def torques(self, size: float) -> dict[str, float]:
@@ -167,12 +169,19 @@ class DrumSide:
         count = self.laws[0].shape[1]
         return {f"torque_{k}": size if k < count - BY_ANGLE else 0.0 for k in range(count)}
 
-    def far(self, start: Mapping[str, float]) -> Estimate:
-        """The fit with an unknown torque that may be far from none, from the best of some sizes."""
+    def far(self, start: Mapping[str, float], gaps: Sequence[float], told: Array) -> Estimate:
+        """The fit with an unknown torque that may be far from none, from the best of some sizes.
+
+        told : sizes that something else tells of
+        """
         trials = [{**start, **self.torques(size)} for size in TORQUE_STARTS]
-        scans = [self.scan(trial) for trial in trials]
-        best = int(np.argmin([loss for loss, _ in scans]))
-        return self.fit(trials[best], scans[best][1])
+        trials.append({**start, **{f"torque_{k}": float(size) for k, size in enumerate(told)}})
+        losses = [
+            sum(self.loss(k, {**trial, GAP_POSITION: gap}) for k, gap in enumerate(gaps))
+            for trial in trials
+        ]
+        best = trials[int(np.argmin(losses))]
+        return self.fit(best, self.scan(best))
 
     def spread(self, run: int, found: Mapping[str, float], seed: int = 0) -> Array:
         """What noise of the smoothed motor speed does to the residual, shape (n, DRAWS).

@@ -23,10 +23,10 @@ from plant_emulator.diagnosis.relations import (
     ROWS,
     STILL,
     delayed_reference,
-    drum_angle,
     flux,
     friction,
     middle,
+    turned,
 )
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ def inside(m: Measured, drum_speed: Array, p: Mapping[str, float]) -> Inside:
         "torque_rate": smooth(t, torque, WINDOW, 1),
         "torque_curvature": smooth(t, torque, WINDOW, 2),
         "load": load,
-        "angle": drum_angle(m, xi),
+        "angle": turned(t, m.speed / xi),
         "demand": demand,
         "demand_rate": smooth(t, demand, WINDOW, 1),
         "demand_curvature": smooth(t, demand, WINDOW, 2),

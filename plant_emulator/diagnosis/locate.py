@@ -27,6 +27,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.residual_map import Cell, residual_map
 from plant_emulator.diagnosis.site import Site
+from plant_emulator.search import GAP_POSITION
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -87,7 +88,11 @@ def locate(recordings: Sequence[Recording], parameters: ParameterSet, null: Poin
     """
     site = Site(recordings, parameters, null)
     shares, gain = divide(site)
-    cells = residual_map(recordings, site.residuals, site.base_speed)
+    residuals = [
+        recording.residual(site.fitted, state[GAP_POSITION])
+        for recording, state in zip(recordings, null.states, strict=True)
+    ]
+    cells = residual_map(recordings, residuals, site.base_speed)
     widest = max((c for c in cells if c.axis == "phase"), key=lambda c: c.gap / c.noise)
     return Location(
         subsystem=max(shares, key=shares.__getitem__),

@@ -57,6 +57,11 @@ def flux(speed: Array, p: Mapping[str, float]) -> Array:
     return np.asarray(np.minimum(p["flux_constant"], weakened))
 
 
+def base_speed(p: Mapping[str, float]) -> float:
+    """Speed above which the field is weakened [rad/s] (thesis, eq. 3.18)."""
+    return p["flux_constant_1"] / p["flux_constant"] - p["flux_constant_2"]
+
+
 def friction(speed: Array, p: Mapping[str, float]) -> Array:
     """Friction of the gear [N m] at its output's speed [rad/s] (thesis, eq. 3.27)."""
     rest = p["gear_viscous_friction"] * np.abs(speed) ** p["gear_friction_exponent"]
@@ -161,10 +166,9 @@ def smoothed_speed(
     return np.asarray(solveh_banded(banded, right))
 
 
-def drum_angle(m: Measured, ratio: float) -> Array:
-    """Angle that the gear's output has turned [rad], at the samples."""
-    steps = np.diff(m.time, prepend=m.time[0])
-    return np.asarray(np.cumsum(steps * m.speed / ratio))
+def turned(time: Array, speed: Array) -> Array:
+    """Angle that something has turned since the start [rad], at the samples."""
+    return np.asarray(np.cumsum(np.diff(time, prepend=time[0]) * speed))
 
 
 def delayed_reference(m: Measured, dead_time: float) -> Array:

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis import drift, drum_laws, laws
-from plant_emulator.diagnosis.drum_side import DrumSide
+from plant_emulator.diagnosis.drum_side import TORQUE, DrumSide
 from plant_emulator.diagnosis.evidence import Evidence, Linear, unrest
 from plant_emulator.diagnosis.relations import (
     DRIVE,
     GEAR,
     ROWS,
     Relations,
+    base_speed,
     measured,
     middle,
     values,
@@ -41,8 +42,6 @@ if TYPE_CHECKING:
 
 # Blocks that only the drum's speed can show.
 BESIDE = ("drum", "speed_sensor", "backlash_shaft")
-# Prior standard deviation of an unknown torque on the drum [10 N m].
-TORQUE = 5.0
 # Variance that the draws of the smoothing's noise do not span, over what they do, next to impacts.
 UNSPANNED = 3.0
 # Deviations of a sum of squares that are no chance.
@@ -57,15 +56,13 @@ class Site:
     ) -> None:
         self.recordings, self.parameters, self.null = recordings, parameters, null
         self.fitted = {**parameters.values(), **null.values}
-        self.base_speed = (
-            self.fitted["flux_constant_1"] / self.fitted["flux_constant"]
-            - self.fitted["flux_constant_2"]
-        )
-        p = parameters.values()
-        self.signals = [measured(r, p) for r in recordings]
+        self.base_speed = base_speed(self.fitted)
         self.stds = drift.priors(parameters, list(null.values))
+        p = drift.assumed(parameters, null.values, self.stds)
+        self.signals = [measured(r, p) for r in recordings]
         if "dead_time" in self.stds:
-            p = {**p, "dead_time": drift.dead_time(self.signals, p, self.stds["dead_time"])}
+            p["dead_time"] = drift.dead_time(self.signals, p, parameters["dead_time"])
+        self.prior = drift.prior(parameters, p, self.stds)
         self.values = p
         top = max(float(np.max(np.abs(m.speed))) for m in self.signals)
         unknown = [drum_laws.torque(m, p["gear_ratio"], top) for m in self.signals]
@@ -77,14 +74,6 @@ class Site:
             for name in (*laws.BLOCKS, *BESIDE)
             if name != "wheel_contact" or any(m.truck for m in self.signals)
         )
-
-    @cached_property
-    def residuals(self) -> list[Array]:
-        """Of the fit without effects, shape (channels, samples) a run."""
-        return [
-            r.residual(self.fitted, state[GAP_POSITION])
-            for r, state in zip(self.recordings, self.null.states, strict=True)
-        ]
 
     def _relations(self, run: int) -> Relations:
         return relations(self.signals[run], self.values, self._discretisation(run))
@@ -141,17 +130,17 @@ class Site:
         """Data and drift, the drum's speed linearised at a fit of the drum's side."""
         runs = range(len(self.signals))
         none = [None] * len(self.signals)
-        speed = []
-        for k in runs:
-            sizes = np.where(_is_torque(fitted), fitted.z, 0.0)
-            speed.append(fitted.residuals[k][0] - fitted.jacobians[k][0] @ sizes)
-        y = self.table.shared(
-            [r.value[..., None] for r in self.relations], [s[:, None] for s in speed]
-        )
+        away = fitted.z - expected(fitted)
+        speed = [fitted.residuals[k][0] - fitted.jacobians[k][0] @ away for k in runs]
         drifting = [
             drift.columns(m, q, self.values, self.stds)
             for m, q in zip(self.signals, self.inside, strict=True)
         ]
+        relation = [
+            (r.value - d @ self.prior)[..., None]
+            for r, d in zip(self.relations, drifting, strict=True)
+        ]
+        y = self.table.shared(relation, [s[:, None] for s in speed])
         scale = np.array([min(u.scaled_std, 1.0) for u in fitted.unknowns])
         bent = [(fitted.jacobians[k][0] * scale)[:, ~_is_torque(fitted)] for k in runs]
         nuisance = [
@@ -203,10 +192,8 @@ class Site:
 
     def _drum(self, fitted: Estimate) -> list[Array]:
         """An unknown torque on the drum, in the gear's relation and in the drum's speed."""
-        xi = self.values["gear_ratio"]
-        torque = [laws.acting({GEAR: -1.0 / xi}, middle(law)) for law in self.side.laws]
         speed = [-fitted.jacobians[k][0][:, _is_torque(fitted)] for k in range(len(self.signals))]
-        return [self.table.shared(torque, speed) * TORQUE]
+        return [self.table.shared(self._on_gear(), speed) * TORQUE]
 
     @cached_property
     def with_torque(self) -> list[tuple[Linear, list[Array]]]:
@@ -217,8 +204,18 @@ class Site:
         fits = [near]
         count = sum(len(m.time) for m in self.signals)
         if self.data.left(slice(-count, None)) > count + ASTRAY * np.sqrt(2.0 * count):
-            fits.append(self.side.far(self.plain.parameters()))
+            fits.append(self.side.far(self.plain.parameters(), gaps, self._told_torque()))
         return [(self.linear(f), self._drum(f)) for f in fits]
+
+    def _on_gear(self) -> list[Array]:
+        """The unknown torque on the drum in the gear's relation."""
+        xi = self.values["gear_ratio"]
+        return [laws.acting({GEAR: 1.0 / xi}, middle(law)) for law in self.side.laws]
+
+    def _told_torque(self) -> Array:
+        """Sizes of the torque on the drum that the gear's relation tells of, all else silent."""
+        group = TORQUE * self.table.shared(self._on_gear(), [None] * len(self.signals))
+        return np.asarray(TORQUE * self.data.evidence([group]).mean[-group.shape[1] :])
 
     def evidence(self, blocks: Sequence[str]) -> Evidence:
         """The evidence with unknown laws in these blocks."""
@@ -243,3 +240,9 @@ class Site:
 
 def _is_torque(fitted: Estimate) -> NDArray[np.bool_]:
     return np.array([u.name.startswith("torque_") for u in fitted.unknowns])
+
+
+def expected(fitted: Estimate) -> Array:
+    """Where the unknowns of a fit lie by their priors; those without one stay where they are."""
+    pairs = zip(fitted.unknowns, fitted.z, strict=True)
+    return np.array([float(z) if u.std is None else u.scaled(u.prior) for u, z in pairs])

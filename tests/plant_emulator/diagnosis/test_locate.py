@@ -76,14 +76,7 @@ def test_the_independent_bench_s_faults_are_placed_where_its_label_says(
         ("motor_friction", {}, "motor"),
         ("reference_filter", {}, "drive"),
         ("drum_speed_scale", {}, "speed_sensor"),
-        pytest.param(
-            "drum_bearing_friction",
-            {},
-            "drum",
-            marks=pytest.mark.xfail(
-                reason="a fit in a wrong valley is placed in the drum's sensor"
-            ),
-        ),
+        ("drum_bearing_friction", {}, "drum"),
     ],
 )
 def test_an_effect_is_placed_without_knowing_of_it(
