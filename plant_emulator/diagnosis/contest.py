@@ -6,7 +6,10 @@
     their tangents: Basseville and Nikiforov, INRIA RR-4438, 2002).
  3. A joint fit of drift and effect, started from the size whose signature explains most, the drift
     moved by what the linear picture says.
- 4. The fit without effects starts again from every joint fit's drift: should it get as low, there
+ 4. Where the fit without effects leaves much, it may lie in a wrong valley, and mislead both the
+    signature and the start: the joint fit then starts once more from the nominal parameters and
+    the size that fits these best.
+ 5. The fit without effects starts again from every joint fit's drift: should it get as low, there
     was no effect, only a better valley.
 
 Every step is a function of a model and plain data, so that steps run side by side on other
@@ -36,6 +39,10 @@ SIZES = (0.03, 0.1, 0.3, 1.0, 2.0)
 # Steps of a fit that only has to show whether it is worth more: without and with states of its
 # own, which make a long curved valley of the cost.
 FEW, FEW_WITH_STATES = 8, 24
+# Sizes that a start from the nominal parameters is tried at, in plausible sizes.
+FAR_SIZES = (0.4, 1.0, 2.0)
+# Mean square from which on a fit may lie in a wrong valley.
+ASTRAY = 1.5
 # A fit that is to be improved by starting again has to fall by more than this [chi squared].
 WORTH = 1.0
 
@@ -143,9 +150,15 @@ def independent_share(found: Estimate) -> float:
 
 
 def null_fit(model: Model, runs: Sequence[int]) -> Point:
-    """The fit without effects, from the model's own search."""
-    values, states = model.search(runs)
-    return fit(model, (), runs, values, states)
+    """The fit without effects, from the model's own search; where that leaves much, from the
+    nominal parameters as well.
+    """
+    found = fit(model, (), runs, *model.search(runs))
+    if found.chi_squared <= ASTRAY:
+        return found
+    nominal = {u.name: u.prior for u in model.parameters}
+    states = [model.start_states(k, (), nominal) for k in runs]
+    return min(found, fit(model, (), runs, nominal, states), key=lambda p: p.cost)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -261,8 +274,7 @@ def _trial(
 ) -> _Trial:
     """The effect at one size, in plausible sizes."""
     candidate = model.candidates[name]
-    sizes = {u.name: bounded(u, candidate.neutral[u.name], size) for u in candidate.sizes}
-    sizes |= {u.name: u.start for u in candidate.shapes}
+    sizes = _sized(candidate, size)
     changed = _residual(model, candidate, where, runs, sizes)
     change = changed - tangents.residual
     rest = tangents.rest(change)
@@ -295,6 +307,12 @@ def _residual(
     )
 
 
+def _sized(candidate: Candidate, size: float) -> dict[str, float]:
+    """Sizes, in plausible sizes from neutral, and shapes of an effect."""
+    sizes = {u.name: bounded(u, candidate.neutral[u.name], size) for u in candidate.sizes}
+    return sizes | {u.name: u.start for u in candidate.shapes}
+
+
 def signs(sizes: Sequence[Unknown]) -> tuple[float, ...]:
     """Both directions where the bounds allow an effect in both."""
     return (1.0, -1.0) if any(u.lower < 0.0 < u.upper for u in sizes) else (1.0,)
@@ -319,3 +337,35 @@ def joint(model: Model, found: Signature, base: Point, runs: Sequence[int]) -> P
     states = [{**state, **own} for state in base.states]
     small = {**found.start, **base.values}
     return min(best, fit(model, effects, runs, small, states, few), key=lambda p: p.cost)
+
+
+def from_nominal(model: Model, effect: str, base: Point, runs: Sequence[int]) -> Point:
+    """Joint fit of one more effect, a few steps only: the drift from its nominal values, the effect
+    from the size that fits them best.
+    """
+    effects = (*base.effects, effect)
+    candidate = model.candidates[effect]
+    nominal = {**base.values, **{u.name: u.prior for u in model.parameters}}
+    starts = []
+    for size in FAR_SIZES:
+        for sign in signs(candidate.sizes):
+            values = {**nominal, **_sized(candidate, sign * size)}
+            states = [model.start_states(k, effects, values) for k in runs]
+            starts.append((_loss(model, effects, runs, values, states), values, states))
+    _, values, states = min(starts, key=lambda start: start[0])
+    few = FEW_WITH_STATES if candidate.states else FEW
+    return fit(model, effects, runs, values, states, few)
+
+
+def _loss(
+    model: Model,
+    effects: Sequence[str],
+    runs: Sequence[int],
+    values: Mapping[str, float],
+    states: Sequence[Mapping[str, float]],
+) -> float:
+    """Sum of log(1 + r^2): what lies far off counts, but little more than near."""
+    return sum(
+        float(np.sum(np.log1p(model.residual(k, effects)({**values, **state}) ** 2)))
+        for k, state in zip(runs, states, strict=True)
+    )

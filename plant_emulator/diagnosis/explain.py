@@ -13,13 +13,17 @@ share is then taken no larger than that of the fit without effects.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
 
 from plant_emulator.diagnosis.contest import (
+    ASTRAY,
     WORTH,
     Point,
     Tangents,
     again,
+    from_nominal,
     joint,
     linearised,
     null_fit,
@@ -34,6 +38,8 @@ if TYPE_CHECKING:
 
     Progress = Callable[[str, float], None]
 
+Found = TypeVar("Found")
+
 # Evidence from which on an effect counts.
 THRESHOLD = 25.0
 # Effects whose evidence differs by less cannot be told apart: odds of 150 to 1.
@@ -46,6 +52,10 @@ NOISE_KNOWN = 0.02
 LEFT, LEFT_OF_MORE = 0.1, 0.04
 # Share of the gap that a further effect has to close to be named.
 FURTHER = 0.04
+# Mean square up to which a model leaves nothing but noise.
+NOISE_LEFT = 1.05
+# Share of the gap that a better fit without effects closes when it has moved to another valley.
+MOVED = 0.1
 # Mean square from which on a model leaves more than what the noise explains.
 MISFIT = 1.5
 MOST_EFFECTS = 3
@@ -160,6 +170,11 @@ def contend(model: Model, task: Task) -> Contender:
     )
 
 
+def once_more(model: Model, task: Task) -> Point:
+    """The joint fit of an effect from the nominal parameters."""
+    return from_nominal(model, task.effect, task.base, task.runs)
+
+
 # The tangents of the fit that this process was last asked about: every effect asks for the same.
 _last: dict[tuple[int, tuple[object, ...]], Tangents] = {}
 
@@ -231,20 +246,35 @@ class Contest:
         return counts or (fall > THRESHOLD and further)
 
     def _round(self, base: Point, stage: str) -> tuple[Point, list[Contender]]:
-        """All effects on top of a fit; the fit itself started again from the best of them."""
+        """All effects on top of a fit; the fit itself started again from the best of them.
+
+        Unless one of them leaves nothing but noise, all are tried again where that fit has moved to
+        another valley, and all start once more from the nominal parameters where it leaves much.
+        """
         contenders = self._contend(base, stage)
         better = self._restarted(base, contenders)
-        if better.cost < base.cost - THRESHOLD:
-            contenders = self._contend(better, stage)
+        if _explained(contenders):
+            return better, contenders
+        if base.cost - better.cost > max(THRESHOLD, MOVED * excess(base)):
+            contenders = _better(contenders, self._contend(better, stage))
+        if better.chi_squared > ASTRAY and not _explained(contenders):
+            contenders = _better(contenders, self._from_nominal(better, contenders, stage))
+            better = self._restarted(better, contenders)
         return better, contenders
+
+    def _from_nominal(
+        self, base: Point, contenders: Sequence[Contender], stage: str
+    ) -> list[Contender]:
+        """All effects that show at all, fitted from the nominal parameters."""
+        moving = [c for c in contenders if c.norm > 0.0]
+        tasks = [Task(base=base, runs=self._runs, effect=c.effect) for c in moving]
+        points = self._told(stage, tasks, self._pool.map(once_more, self._recipe, tasks))
+        return self._polished([replace(c, point=p) for c, p in zip(moving, points, strict=True)])
 
     def _contend(self, base: Point, stage: str) -> list[Contender]:
         names = [name for name in self._names if name not in base.effects]
         tasks = [Task(base=base, runs=self._runs, effect=name) for name in names]
-        found = []
-        for done, contender in enumerate(self._pool.map(contend, self._recipe, tasks)):
-            self._tell(stage, (done + 1) / len(tasks))
-            found.append(contender)
+        found = self._told(stage, tasks, self._pool.map(contend, self._recipe, tasks))
         return self._polished(found)
 
     def _polished(self, contenders: Sequence[Contender]) -> list[Contender]:
@@ -282,9 +312,28 @@ class Contest:
                 final = best
         return final, rivals
 
-    def _tell(self, stage: str, done: float) -> None:
-        if self._progress is not None:
-            self._progress(stage, done)
+    def _told(self, stage: str, tasks: Sequence[Task], found: Iterator[Found]) -> list[Found]:
+        """All that is found, told as it comes."""
+        every = []
+        for done, one in enumerate(found):
+            if self._progress is not None:
+                self._progress(stage, (done + 1) / len(tasks))
+            every.append(one)
+        return every
+
+
+def _explained(contenders: Sequence[Contender]) -> bool:
+    """Whether an effect leaves nothing but noise."""
+    return any(point.chi_squared <= NOISE_LEFT for point in _points(contenders))
+
+
+def _better(first: Sequence[Contender], second: Sequence[Contender]) -> list[Contender]:
+    """Of two fits of the same effect the better one."""
+    others = {c.effect: c for c in second if c.point is not None}
+    return [
+        min(c, others.get(c.effect, c), key=lambda o: o.point.cost if o.point else np.inf)
+        for c in first
+    ]
 
 
 def _points(contenders: Sequence[Contender]) -> Iterator[Point]:

@@ -7,7 +7,16 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis import explain as engine
-from plant_emulator.diagnosis.contest import Point, Tangents, linearised, null_fit, signature
+from plant_emulator.diagnosis.contest import (
+    Point,
+    Tangents,
+    fit,
+    from_nominal,
+    joint,
+    linearised,
+    null_fit,
+    signature,
+)
 from plant_emulator.diagnosis.explain import Contest, Explanation, adequate, excess
 from plant_emulator.diagnosis.model import Candidate, Run
 from plant_emulator.diagnosis.pool import Here
@@ -219,3 +228,37 @@ def test_contest_is_the_same_whoever_runs_it(monkeypatch: pytest.MonkeyPatch) ->
     assert explained(model).final.effects == forward.final.effects
     monkeypatch.setattr(engine, "POLISHED", 1)
     assert explained(model).final.effects == forward.final.effects
+
+
+class Wave(Line):
+    """y = 8 sin(b x) + effects: valleys in b; a search that ends in a wrong one."""
+
+    parameters = (linear("a", 0.0, std=10.0), linear("b", 5.0, prior=5.0, std=20.0))
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+        others = super().residual(run, effects)
+        return lambda v: others({**v, "b": 0.0}) - 8.0 * np.sin(v["b"] * TIME)
+
+    def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
+        """See `Model`."""
+        return {"a": 0.0, "b": 19.0}, [{} for _ in runs]
+
+
+def test_effect_behind_a_fit_in_a_wrong_valley_is_found_from_the_nominal_parameters() -> None:
+    model = Wave([noisy(8.0 * np.sin(5.3 * TIME) + 2.0 * np.abs(TIME))], ["kink"])
+    wrong = fit(model, (), [0], *model.search([0]))
+    assert wrong.chi_squared > 10.0
+    found = signature(model, "kink", wrong, [0], Tangents(linearised(model, wrong, [0])))
+    assert found is not None
+    assert joint(model, found, wrong, [0]).chi_squared > 10.0
+    right = from_nominal(model, "kink", wrong, [0])
+    assert right.chi_squared < 1.1
+    assert right.values["kink_size"] == pytest.approx(2.0, abs=0.3)
+    assert right.values["b"] == pytest.approx(5.3, abs=0.05)
+
+
+def test_fit_without_effects_in_a_wrong_valley_is_left_for_a_better_one() -> None:
+    model = Wave([noisy(8.0 * np.sin(5.3 * TIME))], [])
+    assert fit(model, (), [0], *model.search([0])).chi_squared > 10.0
+    assert null_fit(model, [0]).chi_squared < 1.1
