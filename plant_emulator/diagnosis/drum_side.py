@@ -1,6 +1,5 @@
 """Gap, shaft and drum alone, driven by the measured motor speed: what the drum's speed should be.
 
-The bench is simulated with a drive and motor so stiff that they follow the measured motor speed.
 Whatever ails drive, motor, gear friction or torque sensor leaves this simulation untouched; the
 drum's speed then tells of gap, shaft, drum and its own sensor only. What the noise of the smoothed
 motor speed does to it, the drum's flight through the gap above all, is sampled.
@@ -13,12 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.diagnosis.driven_drum import compiled, drum_speed
 from plant_emulator.diagnosis.relations import NOISES, smoothed_speed
-from plant_emulator.errors import UnsettledError
 from plant_emulator.estimation import Unknown, at, estimate
-from plant_emulator.recording import IMPOSSIBLE
-from plant_emulator.search import GAP_POSITION, SCAN_TOLERANCE
-from plant_emulator.simulate import simulate
+from plant_emulator.search import GAP_POSITION
 from plant_emulator.start_states import GAP
 
 if TYPE_CHECKING:
@@ -26,22 +23,9 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.relations import Measured
     from plant_emulator.estimation import Array, Estimate, Residual
-    from plant_emulator.log import Log
     from plant_emulator.parameters import ParameterSet
     from plant_emulator.recording import Recording
-    from plant_emulator.simulate import Run
 
-# A drive that holds the motor speed within 0.1 rad/s of its reference at any torque of this bench.
-STIFF = {
-    "speed_gain": 1e4,
-    "current_gain": 1e5,
-    "speed_integral_time": 1e6,
-    "current_integral_time": 1e6,
-    "armature_current_limit": 1e9,
-    "voltage_limit": 1e9,
-    "speed_limit": 1e9,
-    "dead_time": 1e-6,
-}
 # What of the bench shapes the drum's speed; the drum's inertia only together with the damping.
 FREE = ("backlash_half_gap", "drum_shaft_damping")
 GAPS = 17
@@ -69,39 +53,32 @@ class DrumSide:
     values: Mapping[str, float]
     laws: Sequence[Array]
 
-    def simulated(
-        self,
-        run: int,
-        found: Mapping[str, float],
-        speed: Array | None = None,
-    ) -> Log:
-        """The run with the motor speed as measured.
+    def simulated(self, run: int, found: Mapping[str, float], speed: Array | None = None) -> Array:
+        """The drum's speed [rad/s] with the motor speed as measured, shape (n,).
 
-        found : values that differ, the gap's position, sizes of the unknown torque as torque_k
+        found : gap, damping, the gap's position at the start, sizes of the unknown torque, torque_k
         """
-        changed = {name: found[name] for name in FREE}
+        p, inputs = self.values, self.recordings[run].run
         sizes = [found.get(f"torque_{k}", 0.0) for k in range(self.laws[run].shape[1])]
-        inputs = prescribed(
-            self.recordings[run].run,
-            self.signals[run].speed if speed is None else speed,
-            self.laws[run] @ np.array(sizes),
-            self.values,
+        wheel = p["drum_radius"] / p["wheel_radius"] * inputs.wheel_torque
+        driven = compiled(drum_speed)(
+            inputs.time,
+            (self.signals[run].speed if speed is None else speed) / p["gear_ratio"],
+            wheel + self.laws[run] @ np.array(sizes),
+            inputs.parked,
+            found[GAP_POSITION],
+            found["backlash_half_gap"],
+            p["drum_shaft_stiffness"],
+            found["drum_shaft_damping"],
+            p["drum_inertia"],
         )
-        return simulate(
-            inputs,
-            {**self.values, **changed, **STIFF},
-            gap_position=found[GAP_POSITION],
-            tolerance=SCAN_TOLERANCE,
-        )
+        return np.asarray(driven)
 
     def residual(self, run: int, found: Mapping[str, float], speed: Array | None = None) -> Array:
         """The drum's speed, measured minus simulated over its noise, shape (n,)."""
         m = self.signals[run]
-        try:
-            drum = self.simulated(run, found, speed)["drum_speed"]
-        except UnsettledError:
-            return np.full(len(m.time), IMPOSSIBLE)
-        return np.asarray((m.drum_speed - drum) / m.noise[NOISES.index("drum_speed")])
+        left = m.drum_speed - self.simulated(run, found, speed)
+        return np.asarray(left / m.noise[NOISES.index("drum_speed")])
 
     def loss(self, run: int, found: Mapping[str, float]) -> float:
         """Sum of log(1 + r^2): what lies far off counts, but little more than near."""
@@ -203,11 +180,3 @@ class DrumSide:
             )
             columns.append(self.residual(run, found, speed) - base)
         return np.asarray(np.stack(columns, axis=-1) / np.sqrt(DRAWS))
-
-
-def prescribed(run: Run, speed: Array, torque: Array, p: Mapping[str, float]) -> Run:
-    """A run whose reference is a motor speed [rad/s], with a further torque on the drum [N m]."""
-    slope = np.zeros_like(speed)
-    slope[:-1] = np.diff(speed) / np.diff(run.time)
-    wheel = run.wheel_torque + torque * p["wheel_radius"] / p["drum_radius"]
-    return replace(run, reference=speed, slope=slope, corners=np.zeros(0), wheel_torque=wheel)

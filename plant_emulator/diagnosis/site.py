@@ -97,7 +97,7 @@ class Site:
         return [
             laws.inside(
                 m,
-                self.side.simulated(k, {**found, **self.plain.states(k)})["drum_speed"],
+                self.side.simulated(k, {**found, **self.plain.states(k)}),
                 self.values,
             )
             for k, m in enumerate(self.signals)
