@@ -111,7 +111,7 @@ def command(
             ).diagnose()
     finally:
         pool.close()
-    for note in run.notes:
+    for note in found.details.notes:
         click.echo(f"note: {note}", err=True)
     if save:
         parameter_sets.save(parameter_set(found, given), save)

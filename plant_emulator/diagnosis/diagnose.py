@@ -9,7 +9,7 @@ from plant_emulator.diagnosis import answer as parts
 from plant_emulator.diagnosis import place, shrink, verdict
 from plant_emulator.diagnosis.calibration import confidence
 from plant_emulator.diagnosis.details import Details
-from plant_emulator.diagnosis.explain import THRESHOLD, Contest, Task
+from plant_emulator.diagnosis.explain import DETECTABLE, THRESHOLD, Contest, Task
 from plant_emulator.diagnosis.pool import model_of
 from plant_emulator.diagnosis.shrink import Fold
 
@@ -30,6 +30,10 @@ TRIED = 3
 NOMINAL = ("nominal",)
 
 
+# Of every fold the runs that are fitted, and those that are predicted.
+Folds = tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Plan:
     """Which runs are fitted and which are predicted; indices of the model's runs.
@@ -39,7 +43,7 @@ class Plan:
     """
 
     fitted: tuple[int, ...]
-    folds: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
+    folds: Folds
     as_fitted: bool = False
 
 
@@ -74,6 +78,7 @@ class Diagnose:
         self.model: Model = model_of(recipe)
         self.settings, self.notes, self.progress = settings, tuple(notes), progress
         self.cases = tuple(cases)
+        self.folds = plan.folds
 
     def diagnose(self) -> Diagnosis:
         """Contest, verdict, held-out runs, place."""
@@ -88,8 +93,26 @@ class Diagnose:
         )
         explained = contest.explain()
         found = verdict.decide(self.model, explained)
+        self.folds = self._usable(explained, found)
         predicted = self._predictions(explained, found)
         return self._answered(explained, found, predicted)
+
+    def _usable(self, explained: Explanation, found: Verdict) -> Folds:
+        """The folds whose fitted runs show all named effects: others cannot predict these."""
+        tasks = [self._fold(explained.final, *fold, refitted=False) for fold in self.plan.folds]
+        if not found.effects or len(tasks) < 2:
+            return self.plan.folds
+        usable = []
+        for fold, norms in zip(
+            self.plan.folds, self.pool.map(shrink.shown, self.recipe, tasks), strict=True
+        ):
+            hidden = [name for name, norm in norms.items() if norm < DETECTABLE]
+            if not hidden:
+                usable.append(fold)
+                continue
+            lost = ", ".join(self.model.runs[run].source for run in fold[1])
+            self.notes += (f"{lost}: not predicted; the other runs do not show {hidden[0]}",)
+        return tuple(usable) or self.plan.folds
 
     def _predictions(
         self, explained: Explanation, found: Verdict
@@ -108,7 +131,7 @@ class Diagnose:
         nominal = replace(explained.null, values={u.name: u.prior for u in self.model.parameters})
         tasks, keys = [], []
         for key, point in [(NOMINAL, nominal), *points.items()]:
-            for fitted, predicted in self.plan.folds:
+            for fitted, predicted in self.folds:
                 keys.append(key)
                 tasks.append(self._fold(point, fitted, predicted, refitted=key != NOMINAL))
         found_all: dict[tuple[str, ...], list[Prediction]] = {}
@@ -142,7 +165,7 @@ class Diagnose:
         found: Verdict,
         predicted: Mapping[tuple[str, ...], list[Prediction]],
     ) -> Diagnosis:
-        runs = [self.model.runs[run] for _, some in self.plan.folds for run in some]
+        runs = [self.model.runs[run] for _, some in self.folds for run in some]
         lengths = shrink.block_lengths(predicted[()])
         channels = [run.channels for run in runs]
         gaps = {key: shrink.gap(channels, some, lengths) for key, some in predicted.items()}

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.covariance import correlation_time
-from plant_emulator.diagnosis.contest import Point, again
+from plant_emulator.diagnosis.contest import Point, Tangents, again, linearised
 from plant_emulator.estimation import estimate
 
 if TYPE_CHECKING:
@@ -64,6 +64,22 @@ def predict(model: Model, fold: Fold) -> Prediction:
     known = point.states[0] if fold.as_fitted else None
     residuals = tuple(_predicted(model, point, run, known) for run in fold.predicted)
     return Prediction(residuals=residuals, converged=point.converged)
+
+
+def shown(model: Model, fold: Fold) -> dict[str, float]:
+    """What each effect of the fold's start does to the fitted runs that drift cannot [noise]."""
+    return {name: _shown(model, fold, name) for name in fold.start.effects}
+
+
+def _shown(model: Model, fold: Fold, name: str) -> float:
+    start = fold.start
+    without = replace(start, effects=tuple(e for e in start.effects if e != name))
+    tangents = Tangents(linearised(model, without, fold.fitted))
+    complete = [
+        model.residual(run, start.effects)({**start.values, **states}).ravel()
+        for run, states in zip(fold.fitted, start.states, strict=True)
+    ]
+    return float(np.linalg.norm(tangents.rest(np.concatenate(complete) - tangents.residual)))
 
 
 def _predicted(model: Model, point: Point, run: int, known: Mapping[str, float] | None) -> Array:

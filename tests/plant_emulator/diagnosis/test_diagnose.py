@@ -1,0 +1,43 @@
+"""A whole diagnosis on a machine so small that it can be checked by hand."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+import pytest
+
+from plant_emulator.diagnosis.diagnose import Diagnose, Diagnosis, Plan
+from plant_emulator.diagnosis.pool import Here
+from plant_emulator.estimation import Array
+from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, noisy
+
+EACH_IN_TURN = Plan(fitted=(0, 1, 2), folds=(((1, 2), (0,)), ((0, 2), (1,)), ((0, 1), (2,))))
+
+
+class OnlyInTheFirst(Line):
+    """Effects act in the first run only."""
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+        return super().residual(run, effects if run == 0 else ())
+
+
+def diagnosed(model: Line) -> Diagnosis:
+    return Diagnose(Here(), Given(model), EACH_IN_TURN, settings={}).diagnose()
+
+
+def test_run_that_alone_shows_the_effect_is_not_predicted_and_named() -> None:
+    line = 2.0 + 3.0 * TIME
+    effect = 4.0 * np.abs(TIME)
+    runs = [noisy(line + effect, 1), noisy(line, 2), noisy(line, 3)]
+    found = diagnosed(OnlyInTheFirst(runs, ["kink", "wave"]))
+    assert found.answer["verdict"]["effects"] == ["kink"]
+    assert found.answer["logs"]["held_out"] == ["run 1", "run 2"]
+    assert found.details.notes == ("run 0: not predicted; the other runs do not show kink",)
+
+
+def test_effect_that_every_run_shows_is_predicted_in_all() -> None:
+    line, effect = 2.0 + 3.0 * TIME, 4.0 * np.abs(TIME)
+    found = diagnosed(Line([noisy(line + effect, seed) for seed in (1, 2, 3)], ["kink", "wave"]))
+    assert found.answer["logs"]["held_out"] == ["run 0", "run 1", "run 2"]
+    assert found.details.notes == ()
+    assert found.answer["gap"]["closed_fraction"] == pytest.approx(1.0, abs=0.05)
