@@ -21,6 +21,8 @@ from plant_emulator.start_states import GAP
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from numpy.typing import NDArray
+
     from plant_emulator.diagnosis.relations import Measured
     from plant_emulator.estimation import Array, Estimate, Residual
     from plant_emulator.parameters import ParameterSet
@@ -180,3 +182,14 @@ class DrumSide:
             )
             columns.append(self.residual(run, found, speed) - base)
         return np.asarray(np.stack(columns, axis=-1) / np.sqrt(DRAWS))
+
+
+def is_torque(fitted: Estimate) -> NDArray[np.bool_]:
+    """Which unknowns of a fit are sizes of an unknown torque."""
+    return np.array([u.name.startswith("torque_") for u in fitted.unknowns])
+
+
+def expected(fitted: Estimate) -> Array:
+    """Where the unknowns of a fit lie by their priors; those without one stay where they are."""
+    pairs = zip(fitted.unknowns, fitted.z, strict=True)
+    return np.array([float(z) if u.std is None else u.scaled(u.prior) for u, z in pairs])

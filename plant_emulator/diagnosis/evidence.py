@@ -49,49 +49,73 @@ def _system(gram: Array, deviations: Array) -> Array:
     return np.asarray(np.eye(len(gram)) + deviations[:, None] * gram * deviations)
 
 
-class Linear:
-    """Data y with its nuisance columns F (scaled to unit priors)."""
+class Products:
+    """Products of groups of columns, kept: a group is one array and does not change."""
 
-    def __init__(self, y: Array, nuisance: Array) -> None:
-        self.y, self.nuisance = y, nuisance
+    def __init__(self) -> None:
+        self._known: dict[tuple[int, int], tuple[Array, Array, Array]] = {}
+        self._rows: dict[int, tuple[int, int]] = {}
+
+    def of(self, a: Array, b: Array) -> Array:
+        """A' B, computed once for a pair of arrays, over the rows where both are not zero."""
+        key = (id(a), id(b))
+        if key not in self._known:
+            transposed = self._known.get((id(b), id(a)))
+            found = self._product(a, b) if transposed is None else transposed[2].T
+            self._known[key] = (a, b, found)  # the arrays too: their identity stays theirs
+        return self._known[key][2]
+
+    def _product(self, a: Array, b: Array) -> Array:
+        (begin, end), (first, last) = self._within(a), self._within(b)
+        rows = slice(max(begin, first), max(min(end, last), begin, first))
+        return np.asarray(a[rows].T @ b[rows])
+
+    def _within(self, a: Array) -> tuple[int, int]:
+        """The rows of an array that are not zero lie from the first of these to before the last."""
+        if id(a) not in self._rows:
+            filled = np.flatnonzero(np.any(a != 0.0, axis=1))
+            self._rows[id(a)] = (int(filled[0]), int(filled[-1]) + 1) if len(filled) else (0, 0)
+        return self._rows[id(a)]
+
+
+class Linear:
+    """Data y with its nuisance columns F (scaled to unit priors), in parts.
+
+    products : of parts and groups, shared with other data that have them too
+    """
+
+    def __init__(
+        self, y: Array, nuisance: Sequence[Array], products: Products | None = None
+    ) -> None:
+        self.y, self.nuisance = y, tuple(nuisance)
         self.square = float(y @ y)
         self._y = y[:, None]
-        self._known: dict[tuple[int, int], tuple[Array, Array, Array]] = {}
+        self._products = products or Products()
 
     def left(self, rows: slice) -> float:
         """Sum of squares of these rows that the nuisance leaves, their own prior paid."""
-        y, x = self.y[rows], self.nuisance[rows]
+        y, x = self.y[rows], np.concatenate([part[rows] for part in self.nuisance], axis=1)
         product = x.T @ y
         system = np.eye(x.shape[1]) + x.T @ x
         return float(y @ y - product @ np.linalg.solve(system, product))
 
     def evidence(self, groups: Sequence[Array]) -> Evidence:
-        """The evidence with groups of columns, each as large as the data want it.
-
-        Products of groups are kept for the next evidence: a group is one array and does not change.
-        """
-        parts = [self.nuisance, *groups]
-        gram = np.block([[self._product(a, b) for b in parts] for a in parts])
-        product = np.concatenate([self._product(a, self._y)[:, 0] for a in parts])
-        counts = [part.shape[1] for part in parts]
+        """The evidence with groups of columns, each as large as the data want it."""
+        parts, of = [*self.nuisance, *groups], self._products.of
+        gram = np.block([[of(a, b) for b in parts] for a in parts])
+        product = np.concatenate([of(a, self._y)[:, 0] for a in parts])
+        known = sum(part.shape[1] for part in self.nuisance)
+        counts = [known, *(group.shape[1] for group in groups)]
         search = _Sizes(gram, product, counts)
         search.run()
         deviations = np.repeat(search.sizes, counts)
         system = _system(gram, deviations)
         mean = deviations * np.linalg.solve(system, deviations * product)
         left = self.y.copy()
-        for part, own in zip(parts, np.split(mean, np.cumsum(counts)[:-1]), strict=True):
+        ends = np.cumsum([part.shape[1] for part in parts])[:-1]
+        for part, own in zip(parts, np.split(mean, ends), strict=True):
             left -= part @ own
         return Evidence(search.best - 0.5 * self.square, mean, left)
-
-    def _product(self, a: Array, b: Array) -> Array:
-        """A' B, computed once for a pair of arrays."""
-        key = (id(a), id(b))
-        if key not in self._known:
-            transposed = self._known.get((id(b), id(a)))
-            found = a.T @ b if transposed is None else transposed[2].T
-            self._known[key] = (a, b, found)  # the arrays too: their identity stays theirs
-        return self._known[key][2]
 
 
 class _Sizes:

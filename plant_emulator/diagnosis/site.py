@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis import drift, drum_laws, laws
-from plant_emulator.diagnosis.drum_side import TORQUE, DrumSide
-from plant_emulator.diagnosis.evidence import Evidence, Linear, unrest
+from plant_emulator.diagnosis.drum_side import TORQUE, DrumSide, expected, is_torque
+from plant_emulator.diagnosis.evidence import Evidence, Linear, Products, unrest
 from plant_emulator.diagnosis.relations import (
     DRIVE,
     GEAR,
@@ -32,8 +32,6 @@ from plant_emulator.simulate import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-
-    from numpy.typing import NDArray
 
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.estimation import Array, Estimate
@@ -67,6 +65,7 @@ class Site:
         top = max(float(np.max(np.abs(m.speed))) for m in self.signals)
         unknown = [drum_laws.torque(m, p["gear_ratio"], top) for m in self.signals]
         self.side = DrumSide(recordings, self.signals, parameters, p, unknown)
+        self.products = Products()
         self.plain = self.side.null(null.values, [s[GAP_POSITION] for s in null.states])
         self.relations = [self._relations(k) for k in range(len(recordings))]
         self.blocks = tuple(
@@ -126,29 +125,34 @@ class Site:
         """Where columns stand in the rows of all runs."""
         return Table(self.relations, self.weights)
 
-    def linear(self, fitted: Estimate) -> Linear:
-        """Data and drift, the drum's speed linearised at a fit of the drum's side."""
-        runs = range(len(self.signals))
-        none = [None] * len(self.signals)
-        away = fitted.z - expected(fitted)
-        speed = [fitted.residuals[k][0] - fitted.jacobians[k][0] @ away for k in runs]
-        drifting = [
+    @cached_property
+    def drifting(self) -> list[Array]:
+        """Columns of the parameters that drift in the relations of every run."""
+        return [
             drift.columns(m, q, self.values, self.stds)
             for m, q in zip(self.signals, self.inside, strict=True)
         ]
+
+    @cached_property
+    def nuisance(self) -> tuple[Array, Array]:
+        """Columns of drift in the relations, and of the smoothing's noise in the drum's speed."""
+        none = [None] * len(self.signals)
+        return self.table.shared(self.drifting, none), self.table.own_speed(self.spread)
+
+    def linear(self, fitted: Estimate) -> Linear:
+        """Data and drift, the drum's speed linearised at a fit of the drum's side."""
+        runs = range(len(self.signals))
+        away = fitted.z - expected(fitted)
+        speed = [fitted.residuals[k][0] - fitted.jacobians[k][0] @ away for k in runs]
         relation = [
             (r.value - d @ self.prior)[..., None]
-            for r, d in zip(self.relations, drifting, strict=True)
+            for r, d in zip(self.relations, self.drifting, strict=True)
         ]
         y = self.table.shared(relation, [s[:, None] for s in speed])
         scale = np.array([min(u.scaled_std, 1.0) for u in fitted.unknowns])
-        bent = [(fitted.jacobians[k][0] * scale)[:, ~_is_torque(fitted)] for k in runs]
-        nuisance = [
-            self.table.shared(drifting, none),
-            self.table.shared(none, bent),
-            self.table.own_speed(self.spread),
-        ]
-        return Linear(y[:, 0], np.concatenate(nuisance, axis=1))
+        bent = [(fitted.jacobians[k][0] * scale)[:, ~is_torque(fitted)] for k in runs]
+        own = self.table.shared([None] * len(self.signals), bent)
+        return Linear(y[:, 0], [*self.nuisance, own], self.products)
 
     @cached_property
     def data(self) -> Linear:
@@ -192,7 +196,7 @@ class Site:
 
     def _drum(self, fitted: Estimate) -> list[Array]:
         """An unknown torque on the drum, in the gear's relation and in the drum's speed."""
-        speed = [-fitted.jacobians[k][0][:, _is_torque(fitted)] for k in range(len(self.signals))]
+        speed = [-fitted.jacobians[k][0][:, is_torque(fitted)] for k in range(len(self.signals))]
         return [self.table.shared(self._on_gear(), speed) * TORQUE]
 
     @cached_property
@@ -236,13 +240,3 @@ class Site:
         count = ROWS * sum(len(m.intervals) for m in self.signals)
         slope = np.concatenate([q.demand_rate for q in self.inside])
         return found.log + unrest(found.left[DRIVE:count:ROWS], slope)
-
-
-def _is_torque(fitted: Estimate) -> NDArray[np.bool_]:
-    return np.array([u.name.startswith("torque_") for u in fitted.unknowns])
-
-
-def expected(fitted: Estimate) -> Array:
-    """Where the unknowns of a fit lie by their priors; those without one stay where they are."""
-    pairs = zip(fitted.unknowns, fitted.z, strict=True)
-    return np.array([float(z) if u.std is None else u.scaled(u.prior) for u, z in pairs])

@@ -24,13 +24,13 @@ def test_it_is_the_marginal_density_up_to_the_noise_s_own_constant(size: float) 
 
 
 def test_noise_takes_no_group() -> None:
-    data = Linear(NOISE, NUISANCE)
+    data = Linear(NOISE, [NUISANCE])
     assert data.evidence([LAW]).log - data.evidence([]).log < 2.0
 
 
 def test_of_two_groups_the_one_in_the_data_is_found_with_its_coefficients() -> None:
     other = RANDOM.standard_normal((40, 3))
-    found = Linear(NOISE + LAW @ [6.0, -7.0, 8.0], NUISANCE).evidence([other, LAW])
+    found = Linear(NOISE + LAW @ [6.0, -7.0, 8.0], [NUISANCE]).evidence([other, LAW])
     assert found.mean[5:] == pytest.approx([6.0, -7.0, 8.0], abs=0.6)
     assert np.abs(found.mean[2:5]).max() < 0.6
 
