@@ -51,7 +51,7 @@ def experiments(
         return []
     count = len(found.parameters)
     known = without_states(found.estimate.information, count)
-    noise = _noise(recordings)
+    noise = noise_levels(recordings)
     errors = {}
     for drive in PROGRAMS.values():
         if isinstance(drive, SpeedProgram):
@@ -90,7 +90,7 @@ def without_states(information: Array, count: int) -> Array:
     return np.asarray(own - cross @ np.linalg.pinv(rest, hermitian=True) @ cross.T)
 
 
-def _noise(recordings: Sequence[Recording]) -> dict[str, float]:
+def noise_levels(recordings: Sequence[Recording]) -> dict[str, float]:
     """Noise of each channel, the mean over the logs that have it [SI]."""
     return {
         name: float(

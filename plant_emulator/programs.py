@@ -162,6 +162,15 @@ PROGRAMS: dict[str, Program] = {
 }
 
 
+def in_words(program: Program) -> str:
+    """A program as one plans it: name, length, what it reaches or carries."""
+    if isinstance(program, TravelProgram):
+        return f"{program.name} (a truck of {program.mass:.0f} kg on the drum)"
+    fastest = max(speed for _, speed in program.corners)
+    sweeps = ", with sweeps" if program.sweeps else ""
+    return f"{program.name} ({program.duration:g} s, to {fastest:.0f} rad/s{sweeps})"
+
+
 def program(name: str) -> Program:
     """The program of that name; ParameterError where there is none."""
     if name not in PROGRAMS:

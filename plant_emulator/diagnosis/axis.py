@@ -131,6 +131,14 @@ class AxisModel:
         """See `Model`: one channel has no blocks to tell apart."""
         return
 
+    def with_planned(self, where: Point, runs: Sequence[int]) -> AxisModel:  # noqa: ARG002
+        """See `Model`: an axis has no drive programs."""
+        return self
+
+    def lacks(self, runs: Sequence[int]) -> dict[str, tuple[str, ...]]:  # noqa: ARG002
+        """See `Model`: what an effect needs is told with the effect."""
+        return {}
+
     def _level(self) -> dict[str, float]:
         return {u.name: u.start for u in self.states}
 

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from plant_emulator.diagnosis.bench_plans import COLD_SHELL, lacks, planned
 from plant_emulator.diagnosis.locate import locate
 from plant_emulator.diagnosis.model import Candidate, Run
+from plant_emulator.diagnosis.relations import base_speed
 from plant_emulator.effects import from_file
 from plant_emulator.equation_error import start_values
 from plant_emulator.estimation import Unknown
@@ -113,6 +115,7 @@ class BenchModel:
         free: Sequence[str] = (),
     ) -> None:
         self._free = free_parameters(parameters, free)
+        self._effects = effects
         self._values = values_of(parameters)
         self._set = parameters
         everything = {name: effect.plausible() for name, effect in effects.items()}
@@ -174,6 +177,27 @@ class BenchModel:
     def located(self, where: Point, runs: Sequence[int]) -> Mapping[str, Any] | None:
         """See `Model`."""
         return locate([self._recordings[k] for k in runs], self._set, where).as_answer()
+
+    def with_planned(self, where: Point, runs: Sequence[int]) -> BenchModel:
+        """See `Model`: drive programs that no log shows, starting as the last run did."""
+        warm = {**self._fixed(runs[-1], where.effects), **where.values, **where.states[-1]}
+        fitted = self._set.with_values({name: where.values[name] for name in self._free})
+        more = planned(self._recordings, fitted, warm, {**warm, **self._cold(where.effects)})
+        return BenchModel([*self._recordings, *more], self._set, self._effects, self._free)
+
+    def lacks(self, runs: Sequence[int]) -> dict[str, tuple[str, ...]]:
+        """See `Model`."""
+        return lacks([self._recordings[k].log for k in runs], base_speed(self._values))
+
+    def _cold(self, effects: Sequence[str]) -> dict[str, float]:
+        """What of these effects is of another value where the gear starts cold."""
+        tables = {name: self._effects[name].parameters for name in effects}
+        return {
+            f"{name}_{key}": COLD_SHELL
+            for name, own in tables.items()
+            for key, p in own.items()
+            if p.per_run and p.unit == "K" and any(q.measured for q in own.values())
+        }
 
 
 @dataclass(frozen=True)

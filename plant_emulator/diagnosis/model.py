@@ -110,3 +110,13 @@ class Model(Protocol):
 
         In the form of the answer's `location`; None: this machine has no blocks to tell apart.
         """
+
+    def with_planned(self, where: Point, runs: Sequence[int]) -> Model:
+        """The machine with runs that it has not shown yet behind its own, the least effort first.
+
+        As the fit of these runs predicts them, without noise, judged by its own runs' noise; their
+        source tells a person what to do. A machine that plans no runs has its own only.
+        """
+
+    def lacks(self, runs: Sequence[int]) -> Mapping[str, Sequence[str]]:
+        """By subsystem: what would tell more of it and is in none of these runs."""

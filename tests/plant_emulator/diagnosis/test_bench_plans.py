@@ -1,0 +1,42 @@
+"""Which drive programs logs show, and what logs lack."""
+
+import numpy as np
+
+from plant_emulator.diagnosis.bench_plans import lacks, shows, undriven
+from plant_emulator.estimation import Array
+from plant_emulator.log import Log
+from plant_emulator.programs import PROGRAMS, in_words
+
+
+def driven(name: str, factor: float = 1.0, **more: Array) -> Log:
+    time, reference = PROGRAMS[name].reference()  # type: ignore[union-attr]
+    speed = factor * reference
+    return Log(time, {"speed_reference": speed, "motor_speed": speed, **more})
+
+
+def test_log_shows_the_program_whose_reference_it_has():
+    assert shows(driven("program2"), PROGRAMS["program2"])
+    assert not shows(driven("program2", 0.9), PROGRAMS["program2"])
+    assert not shows(driven("program3"), PROGRAMS["program2"])
+    rest = [p.name for p in undriven([driven(f"program{k}") for k in (1, 2, 3)])]
+    assert rest == ["program4", "program6", "program6L"]
+    truck = driven("program1", wheel_torque=np.zeros(1851))
+    assert [p.name for p in undriven([truck])] == ["program1", "program2", "program3", "program4"]
+
+
+def test_what_logs_lack_is_told_of_the_blocks_that_it_tells_of():
+    slow = driven("program1", 0.3)
+    assert "a run above 190 rad/s, where the field is weakened" in lacks([slow], 190.0)["motor"]
+    everything = driven(
+        "program1",
+        wheel_torque=np.zeros(1851),
+        armature_voltage=np.zeros(1851),
+        shell_temperature=np.full(1851, 288.0),
+    )
+    assert lacks([everything], 190.0) == {"gear": ("a run in the other direction",)}
+    assert lacks([slow], 190.0)["drum"] == ("a run with a truck on the drum",)
+
+
+def test_program_is_told_as_one_plans_it():
+    assert in_words(PROGRAMS["program4"]) == "program4 (60 s, to 350 rad/s, with sweeps)"
+    assert in_words(PROGRAMS["program6"]) == "program6 (a truck of 3640 kg on the drum)"
