@@ -174,4 +174,4 @@ def _rest(answer: Mapping[str, Any], width: int) -> list[str]:
     hidden = [f"{u['effect']} ({u['reason']})" for u in answer["undetectable"]]
     rows = _listed(moved, width, 2 if verdict["kind"] == "parameter" else 1, "moved")
     rows += _listed(hidden, width, 1 if len(verdict["effects"]) > 1 else 2, "unseen")
-    return rows + _paragraph(verdict["next_experiment"] or "", width, 2, "next")
+    return rows + _paragraph(verdict["next_experiment"] or "", width, 3, "next")

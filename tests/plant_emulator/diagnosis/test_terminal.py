@@ -122,3 +122,13 @@ def test_number_has_three_digits(value, text):
 )
 def test_share_near_the_ends_shows_a_decimal(share, text):
     assert percent(share) == text
+
+
+def test_advice_for_two_rivals_is_told_whole():
+    answer = answers.two_effects()
+    answer["verdict"]["next_experiment"] = (
+        "Drive program4 (60 s, to 350 rad/s, with sweeps): there drum_speed_scale differs from "
+        "motor_speed_scale by 20 and from drum_speed_lag by 497 times the noise."
+    )
+    told = " ".join(" ".join(lines(answer)).split())
+    assert answer["verdict"]["next_experiment"] in told
