@@ -9,19 +9,22 @@ from plant_emulator.diagnosis import answer as parts
 from plant_emulator.diagnosis import place, shrink, verdict
 from plant_emulator.diagnosis.calibration import confidence
 from plant_emulator.diagnosis.details import Details
-from plant_emulator.diagnosis.explain import DETECTABLE, THRESHOLD, Contest, Task
+from plant_emulator.diagnosis.explain import DETECTABLE, THRESHOLD
 from plant_emulator.diagnosis.pool import model_of
 from plant_emulator.diagnosis.shrink import Fold
+from plant_emulator.diagnosis.steps import Task
+from plant_emulator.diagnosis.stepwise import Contest
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.calibration import Case
     from plant_emulator.diagnosis.contest import Point
-    from plant_emulator.diagnosis.explain import Contender, Explanation, Progress
+    from plant_emulator.diagnosis.explain import Contender, Explanation
     from plant_emulator.diagnosis.model import Model
     from plant_emulator.diagnosis.pool import Pool, Recipe
     from plant_emulator.diagnosis.shrink import Gap, Prediction
+    from plant_emulator.diagnosis.stepwise import Progress
     from plant_emulator.diagnosis.verdict import Verdict
 
 # Effects whose held-out gain is computed: the best ones only, each takes a fit a fold.

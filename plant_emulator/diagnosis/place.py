@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from plant_emulator.diagnosis.explain import Explanation, Task
+    from plant_emulator.diagnosis.explain import Explanation
     from plant_emulator.diagnosis.model import Candidate, Model
+    from plant_emulator.diagnosis.steps import Task
     from plant_emulator.diagnosis.verdict import Verdict
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis import explain as engine
+from plant_emulator.diagnosis import stepwise as engine
 from plant_emulator.diagnosis.contest import (
     Point,
     Tangents,
@@ -17,9 +17,10 @@ from plant_emulator.diagnosis.contest import (
     null_fit,
     signature,
 )
-from plant_emulator.diagnosis.explain import Contest, Explanation, adequate, excess
+from plant_emulator.diagnosis.explain import Explanation, adequate, excess
 from plant_emulator.diagnosis.model import Candidate, Run
 from plant_emulator.diagnosis.pool import Here
+from plant_emulator.diagnosis.stepwise import Contest
 from plant_emulator.estimation import Array, Unknown
 
 TIME = np.linspace(-1.0, 1.0, 2000)

@@ -1,0 +1,72 @@
+"""The steps of a contest: each a function of a model and plain data, for a pool to run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from plant_emulator.diagnosis.contest import (
+    Point,
+    Tangents,
+    again,
+    from_nominal,
+    joint,
+    linearised,
+    null_fit,
+    signature,
+)
+
+if TYPE_CHECKING:
+    from plant_emulator.diagnosis.contest import Signature
+    from plant_emulator.diagnosis.model import Model
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """One step: an effect, or none, on top of a fit, on these runs.
+
+    signature : where a joint fit starts from, if it has been computed
+    """
+
+    base: Point
+    runs: tuple[int, ...]
+    effect: str = ""
+    signature: Signature | None = None
+
+
+def start(model: Model, runs: tuple[int, ...]) -> Point:
+    """The fit without effects."""
+    return null_fit(model, runs)
+
+
+def show(model: Model, task: Task) -> Signature | None:
+    """The signature of an effect; None where it changes nothing."""
+    return signature(model, task.effect, task.base, task.runs, _tangents(model, task))
+
+
+def contend(model: Model, task: Task) -> Point:
+    """The joint fit of an effect from its signature."""
+    assert task.signature is not None
+    return joint(model, task.signature, task.base, task.runs)
+
+
+def once_more(model: Model, task: Task) -> Point:
+    """The joint fit of an effect from the nominal parameters."""
+    return from_nominal(model, task.effect, task.base, task.runs)
+
+
+def refit(model: Model, task: Task) -> Point:
+    """The fit of `task.base` with the effects named there, from its values."""
+    return again(model, task.base.effects, task.runs, task.base)
+
+
+# The tangents of the fit that this process was last asked about: every effect asks for the same.
+_last: dict[tuple[int, tuple[object, ...]], Tangents] = {}
+
+
+def _tangents(model: Model, task: Task) -> Tangents:
+    key = (id(model), task.base.key)
+    if key not in _last:
+        _last.clear()
+        _last[key] = Tangents(linearised(model, task.base, task.runs))
+    return _last[key]
