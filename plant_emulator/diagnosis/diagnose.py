@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from plant_emulator.diagnosis import answer as parts
 from plant_emulator.diagnosis import place, shrink, verdict
+from plant_emulator.diagnosis.advice import Advice
 from plant_emulator.diagnosis.calibration import confidence
 from plant_emulator.diagnosis.details import Details
 from plant_emulator.diagnosis.explain import DETECTABLE, THRESHOLD
@@ -174,6 +175,8 @@ class Diagnose:
         gaps = {key: shrink.gap(channels, some, lengths) for key, some in predicted.items()}
         location = self._location(explained, found)
         closed, interval = self._closed(found, gaps)
+        hidden = parts.undetectable(explained, self.model.candidates)
+        advice = Advice(self.pool, self.recipe, self.model, self.plan.fitted)
         answer = {
             "schema": "gap-diagnosis/1",
             "logs": {
@@ -191,7 +194,9 @@ class Diagnose:
                     location["subsystem"],
                     complete=self.model.reaches_noise,
                 ),
-                next_experiment=None,
+                next_experiment=advice.next_experiment(
+                    explained, found, location, [entry["effect"] for entry in hidden]
+                ),
             ),
             "location": location,
             "gap": {
@@ -203,7 +208,7 @@ class Diagnose:
                 "closed_fraction_ci95": interval,
             },
             "ranking": [self._rank(c, explained, found, gaps) for c in parts.ranked(explained)],
-            "undetectable": parts.undetectable(explained, self.model.candidates),
+            "undetectable": hidden,
         }
         details = Details(
             traces=parts.traces(runs, predicted[()], predicted[found.effects]),

@@ -32,6 +32,13 @@ def spoken(name: str | None) -> str:
     return printable(name).replace("_", " ") if name else UNKNOWN
 
 
+def listed(items: Sequence[str], most: int, between: str = ", ") -> str:
+    """The items in a row, and the number of those beyond so many."""
+    shown = [printable(item) for item in items[:most]]
+    rest = len(items) - len(shown)
+    return between.join([*shown, f"and {rest} more"] if rest else shown)
+
+
 def number(value: float | None, digits: int = 3) -> str:
     """A number with this many significant digits."""
     if value is None or not isfinite(value):
