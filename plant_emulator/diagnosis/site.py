@@ -33,6 +33,8 @@ from plant_emulator.simulate import simulate
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from numpy.typing import NDArray
+
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.estimation import Array, Estimate
     from plant_emulator.parameters import ParameterSet
@@ -75,10 +77,13 @@ class Site:
         )
 
     def _relations(self, run: int) -> Relations:
-        return relations(self.signals[run], self.values, self._discretisation(run))
+        return relations(self.signals[run], self.values, self._simulated(run))
 
-    def _discretisation(self, run: int) -> Array | None:
-        """What the fit without effects leaves of the relations: their error between samples."""
+    def _simulated(self, run: int) -> tuple[Array, NDArray[np.bool_]] | None:
+        """What the fit without effects leaves of the relations, their error between samples.
+
+        And where its drive is limited.
+        """
         recording, gap = self.recordings[run], self.null.states[run][GAP_POSITION]
         try:
             log = simulate(recording.run, self.fitted, gap_position=gap)
@@ -87,7 +92,7 @@ class Site:
         m = measured(replace(recording, log=log), self.fitted)
         left, limited = values(replace(m, speed=m.motor_speed), self.fitted)
         left[-1, limited] = 0.0
-        return left
+        return left, limited
 
     @cached_property
     def inside(self) -> list[laws.Inside]:

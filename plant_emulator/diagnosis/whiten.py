@@ -29,24 +29,40 @@ if TYPE_CHECKING:
 
 # Standard deviation of the torque of the truck's brake, which reacts at standstill [N m].
 BRAKE = 300.0
+# A simulated drive reaches and leaves a limit that much before or after the real one [s].
+SAME_LIMIT = 0.1
 
 
 def relations(
-    m: Measured, p: Mapping[str, float], discretisation: Array | None = None
+    m: Measured,
+    p: Mapping[str, float],
+    simulated: tuple[Array, NDArray[np.bool_]] | None = None,
 ) -> Relations:
     """The relations of a run.
 
-    discretisation : what a simulated run with the same samples leaves of them: taken off, and not
-        believed better than by half
+    simulated : what a simulated run with the same samples leaves of them, taken off and not
+        believed better than by half, and where its drive is limited. A limit that both runs reach
+        begins and ends with the earlier and the later one
     """
     value, limited = values(m, p)
-    variance = extra_variance(m, p, limited)
-    if discretisation is not None:
-        value = value - discretisation
-        variance += (0.5 * discretisation) ** 2
+    if simulated is None:
+        variance = extra_variance(m, p, limited)
+    else:
+        left, also = simulated
+        limited = limited | (also & near(limited, m))
+        value = value - left
+        variance = extra_variance(m, p, limited) + (0.5 * left) ** 2
     if m.missing_current:
         variance[[MOTOR, DRIVE]] += VOID
     return Relations(value, factor(m, p, variance))
+
+
+def near(limited: NDArray[np.bool_], m: Measured) -> NDArray[np.bool_]:
+    """Which intervals lie no further than SAME_LIMIT from one in which the drive is limited."""
+    from scipy.ndimage import maximum_filter1d
+
+    reach = int(np.ceil(SAME_LIMIT / float(np.median(m.intervals))))
+    return np.asarray(maximum_filter1d(limited, 2 * reach + 1, mode="constant"))
 
 
 def extra_variance(m: Measured, p: Mapping[str, float], limited: NDArray[np.bool_]) -> Array:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.relations import DRIVE, GEAR, MOTOR, measured, smoothed_speed
+from plant_emulator.diagnosis.relations import DRIVE, GEAR, MOTOR, measured, smoothed_speed, values
 from plant_emulator.diagnosis.whiten import relations
 from plant_emulator.log import Log
 from plant_emulator.parameters import ParameterSet
@@ -85,3 +85,20 @@ def test_the_smoothed_speed_has_less_than_half_of_the_noise(
     ]
     found = smoothed_speed(true.time, *seen, noise, nominal.values())
     assert np.std(found - true["motor_speed"]) < 0.15 / 2.0
+
+
+def test_a_limit_of_the_simulated_drive_counts_only_next_to_one_of_the_real_drive(
+    run: Recording, nominal: ParameterSet
+) -> None:
+    p = nominal.values()
+    # At its limit of 72 A (thesis, eq. 3.5) for a while.
+    current = np.where(np.arange(len(run.log.time)) // 10 == 100, 72.0, 20.0)
+    signals = replace(measured(run, p), current=current)
+    limited = values(signals, p)[1]
+    last = int(np.flatnonzero(limited)[-1])
+    also = np.zeros_like(limited)
+    soon, late = last + 3, last + 60
+    also[[soon, late]] = True
+    found = relations(signals, p, (np.zeros((3, len(limited))), also))
+    drive = np.abs(found.white(np.ones((3, len(limited), 1))).reshape(-1, 3)[:, DRIVE])
+    assert drive[soon] < 0.01 * drive[late]
