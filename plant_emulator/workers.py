@@ -6,6 +6,8 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from threadpoolctl import threadpool_limits
+
 from plant_emulator.diagnosis.pool import Here, model_of
 from plant_emulator.errors import EmulatorError
 
@@ -20,7 +22,8 @@ Answer = TypeVar("Answer")
 
 
 def _step(function: Callable[[Model, Any], Any], recipe: Recipe, item: Any) -> Any:
-    return function(model_of(recipe), item)
+    with threadpool_limits(1):  # side by side, threads of one wait for those of the others
+        return function(model_of(recipe), item)
 
 
 class Processes:

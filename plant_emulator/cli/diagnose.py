@@ -82,6 +82,8 @@ def command(
     The verdict is an effect, a class of effects that these logs cannot tell apart, other
     parameters, nothing, or unknown; how far the gap shrinks is measured on runs not fitted.
     """
+    from threadpoolctl import threadpool_limits
+
     from plant_emulator import parameter_sets
     from plant_emulator.cli._progress import progress
     from plant_emulator.diagnosis.diagnose import Diagnose
@@ -99,7 +101,7 @@ def command(
     settings = {"command": f"plant-emulator {shlex.join(sys.argv[1:])}", **run.settings}
     pool = pool_of(workers, scheduler)
     try:
-        with progress() as tell:
+        with progress() as tell, threadpool_limits(1):
             found = Diagnose(
                 pool,
                 run.recipe,

@@ -39,6 +39,8 @@ SIZES = (0.03, 0.1, 0.3, 1.0, 2.0)
 # Steps of a fit that only has to show whether it is worth more: without and with states of its
 # own, which make a long curved valley of the cost.
 FEW, FEW_WITH_STATES = 8, 24
+# The same from the nominal parameters, where a step goes far.
+FEW_FAR, FEW_FAR_WITH_STATES = 4, 8
 # Sizes that a start from the nominal parameters is tried at, in plausible sizes.
 FAR_SIZES = (0.4, 1.0, 2.0)
 # Mean square from which on a fit may lie in a wrong valley.
@@ -346,15 +348,17 @@ def from_nominal(model: Model, effect: str, base: Point, runs: Sequence[int]) ->
     effects = (*base.effects, effect)
     candidate = model.candidates[effect]
     nominal = {**base.values, **{u.name: u.prior for u in model.parameters}}
-    starts = []
-    for size in FAR_SIZES:
-        for sign in signs(candidate.sizes):
-            values = {**nominal, **_sized(candidate, sign * size)}
-            states = [model.start_states(k, effects, values) for k in runs]
-            starts.append((_loss(model, effects, runs, values, states), values, states))
-    _, values, states = min(starts, key=lambda start: start[0])
-    few = FEW_WITH_STATES if candidate.states else FEW
-    return fit(model, effects, runs, values, states, few)
+    own = {u.name: u.start for u in candidate.states}
+    states = [{**state, **own} for state in base.states]
+    starts = [
+        {**nominal, **_sized(candidate, sign * size)}
+        for size in FAR_SIZES
+        for sign in signs(candidate.sizes)
+    ]
+    best = min(starts, key=lambda values: _loss(model, effects, runs, values, states))
+    found = [model.start_states(k, effects, best) for k in runs]
+    few = FEW_FAR_WITH_STATES if candidate.states else FEW_FAR
+    return fit(model, effects, runs, best, found, few)
 
 
 def _loss(
