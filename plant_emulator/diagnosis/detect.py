@@ -15,14 +15,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from plant_emulator.diagnosis.contest import Point, Tangents, linearised, signature
+from plant_emulator.diagnosis.contest import Point, linearised
 from plant_emulator.diagnosis.explain import DETECTABLE, MARGIN
+from plant_emulator.diagnosis.signature import Tangents, signature
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.contest import Signature
     from plant_emulator.diagnosis.model import Candidate, Model
+    from plant_emulator.diagnosis.signature import Signature
 
 ALIKE = 0.95
 

@@ -20,16 +20,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.contest import (
-    FEW_WITH_STATES,
-    Point,
-    Tangents,
-    bounded,
-    fit,
-    linearised,
-    signs,
-)
+from plant_emulator.diagnosis.contest import FEW_WITH_STATES, Point, fit, linearised
 from plant_emulator.diagnosis.explain import DETECTABLE
+from plant_emulator.diagnosis.signature import Tangents, bounded, signs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

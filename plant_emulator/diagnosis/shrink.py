@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.covariance import correlation_time
-from plant_emulator.diagnosis.contest import Point, Tangents, again, linearised
+from plant_emulator.diagnosis.contest import Point, again, linearised
+from plant_emulator.diagnosis.signature import Tangents
 from plant_emulator.estimation import estimate
 
 if TYPE_CHECKING:

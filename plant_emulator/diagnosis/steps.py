@@ -5,20 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.contest import (
-    Point,
-    Tangents,
-    again,
-    from_nominal,
-    joint,
-    linearised,
-    null_fit,
-    signature,
-)
+from plant_emulator.diagnosis.contest import Point, again, from_nominal, joint, linearised, null_fit
+from plant_emulator.diagnosis.signature import Tangents, signature
 
 if TYPE_CHECKING:
-    from plant_emulator.diagnosis.contest import Signature
     from plant_emulator.diagnosis.model import Model
+    from plant_emulator.diagnosis.signature import Signature
 
 
 @dataclass(frozen=True, kw_only=True)

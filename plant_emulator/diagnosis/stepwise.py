@@ -28,9 +28,10 @@ from plant_emulator.diagnosis.steps import Task, contend, once_more, refit, show
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from plant_emulator.diagnosis.contest import Point, Signature
+    from plant_emulator.diagnosis.contest import Point
     from plant_emulator.diagnosis.model import Model
     from plant_emulator.diagnosis.pool import Pool, Recipe
+    from plant_emulator.diagnosis.signature import Signature
 
     Progress = Callable[[str, float], None]
     Shown = Mapping[str, Signature | None]

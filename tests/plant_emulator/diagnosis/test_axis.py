@@ -12,7 +12,8 @@ from plant_emulator.diagnosis.axis import AxisModel, AxisRecipe
 from plant_emulator.diagnosis.axis_effects import EFFECTS
 from plant_emulator.diagnosis.axis_signals import AxisLog
 from plant_emulator.diagnosis.bands import power
-from plant_emulator.diagnosis.contest import Point, Tangents, joint, linearised, null_fit, signature
+from plant_emulator.diagnosis.contest import Point, joint, linearised, null_fit
+from plant_emulator.diagnosis.signature import Tangents, signature
 from plant_emulator.errors import LogError
 
 spec = importlib.util.spec_from_file_location(

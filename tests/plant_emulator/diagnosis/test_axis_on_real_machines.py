@@ -15,7 +15,8 @@ import pytest
 from plant_emulator import axis_log
 from plant_emulator.diagnosis.axis import AxisModel
 from plant_emulator.diagnosis.bands import BANDS, power
-from plant_emulator.diagnosis.contest import Point, Tangents, joint, linearised, null_fit, signature
+from plant_emulator.diagnosis.contest import Point, joint, linearised, null_fit
+from plant_emulator.diagnosis.signature import Tangents, signature
 from plant_emulator.estimation import estimate
 
 ROOT = Path(__file__).parents[3]

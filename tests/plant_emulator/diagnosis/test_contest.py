@@ -7,19 +7,11 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis import stepwise as engine
-from plant_emulator.diagnosis.contest import (
-    Point,
-    Tangents,
-    fit,
-    from_nominal,
-    joint,
-    linearised,
-    null_fit,
-    signature,
-)
+from plant_emulator.diagnosis.contest import Point, fit, from_nominal, joint, linearised, null_fit
 from plant_emulator.diagnosis.explain import Explanation, adequate, excess
 from plant_emulator.diagnosis.model import Candidate, Run
 from plant_emulator.diagnosis.pool import Here
+from plant_emulator.diagnosis.signature import Tangents, signature
 from plant_emulator.diagnosis.stepwise import Contest
 from plant_emulator.estimation import Array, Unknown
 

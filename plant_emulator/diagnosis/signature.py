@@ -1,0 +1,185 @@
+"""The signature of an effect: what it does to a residual that drift cannot imitate.
+
+The residual's change when the effect comes in at some size, all else as fitted, less its part along
+the tangents of the drifting parameters (Basseville and Nikiforov, INRIA RR-4438, 2002).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.diagnosis.contest import Point
+    from plant_emulator.diagnosis.model import Candidate, Model
+    from plant_emulator.estimation import Array, Estimate, Unknown
+
+# Sizes at which a signature is tried, in plausible sizes.
+SIZES = (0.03, 0.1, 0.3, 1.0, 2.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Signature:
+    """What an effect does to the whitened residual of a fit that lacks it.
+
+    start : where a joint fit may begin, by name; states : the same of every run
+    norm : of the part that drift cannot imitate, at the plausible size
+    raw : of the whole, at the plausible size
+    gain : fall of the sum of squares that the linear picture expects at the best size
+    tangent_gain : the same at whatever size, from the signature of the smallest
+    imitated_by : the parameter that follows it most
+    norms : of the part that drift cannot imitate, by size in plausible sizes, ascending
+    direction : the part that drift cannot imitate over its norm, all runs and channels
+    """
+
+    effect: str
+    start: Mapping[str, float]
+    states: tuple[Mapping[str, float], ...]
+    norm: float
+    raw: float
+    gain: float
+    tangent_gain: float
+    norms: tuple[tuple[float, float], ...]
+    imitated_by: str
+    direction: Array
+
+
+class Tangents:
+    """The drift's tangent space at a fit, for removing from signatures what drift can imitate."""
+
+    def __init__(self, found: Estimate) -> None:
+        p = len(found.z)
+        self.found = found
+        self.residual = np.concatenate([r.ravel() for r in found.residuals])
+        self._slopes = np.concatenate([j.reshape(-1, p) for j in found.jacobians])
+        precision = np.diag([u.scaled_std**-2.0 for u in found.unknowns])
+        self._inverse = np.linalg.pinv(found.information + precision, hermitian=True)
+
+    def imitation(self, change: Array) -> Array:
+        """Shift of z that follows a change of the residual best."""
+        return np.asarray(-self._inverse @ (self._slopes.T @ change))
+
+    def rest(self, change: Array) -> Array:
+        """The change of the residual that remains when drift follows it."""
+        return np.asarray(change + self._slopes @ self.imitation(change))
+
+    def moved(self, shift: Array, runs: int) -> tuple[dict[str, float], list[dict[str, float]]]:
+        """Values and states after a shift of z, within their bounds."""
+        values: dict[str, float] = {}
+        states: list[dict[str, float]] = [{} for _ in range(runs)]
+        for u, z in zip(self.found.unknowns, self.found.z + shift, strict=True):
+            value = u.value(float(np.clip(z, u.scaled(u.lower), u.scaled(u.upper))))
+            (values if u.run is None else states[u.run])[u.name] = value
+        return values, states
+
+
+def signature(
+    model: Model, name: str, where: Point, runs: Sequence[int], tangents: Tangents
+) -> Signature | None:
+    """The signature of an effect at a fit that lacks it; None: it changes nothing there."""
+    trials = [
+        _trial(model, name, where, runs, tangents, sign * size)
+        for size in SIZES
+        for sign in signs(model.candidates[name].sizes)
+    ]
+    moving = [trial for trial in trials if trial.norm > 1e-6]
+    if not moving:
+        return None
+    best = max(moving, key=lambda trial: trial.gain)
+    plausible = max((t for t in trials if abs(t.size) == 1.0), key=lambda t: t.norm)
+    values, states = tangents.moved(tangents.imitation(best.change), len(runs))
+    own = {u.name: u.start for u in model.candidates[name].states}
+    names = [u.name for u in tangents.found.unknowns]
+    follows = np.abs(tangents.imitation(plausible.change)) * _lengths(tangents.found)
+    return Signature(
+        effect=name,
+        start={**values, **best.sizes},
+        states=tuple({**state, **own} for state in states),
+        norm=plausible.norm,
+        raw=float(np.linalg.norm(plausible.change)),
+        gain=best.gain,
+        tangent_gain=max(_tangent_gain(t, tangents) for t in trials if abs(t.size) == SIZES[0]),
+        norms=tuple((t.size, t.norm) for t in trials if t.size > 0.0),
+        imitated_by=names[int(np.argmax(follows))],
+        direction=plausible.rest / max(plausible.norm, 1e-12),
+    )
+
+
+def _tangent_gain(trial: _Trial, tangents: Tangents) -> float:
+    """Fall of the sum of squares at the best multiple of a signature, 0 where that is negative."""
+    along = min(0.0, float(trial.rest @ tangents.residual))
+    return along**2 / max(trial.norm**2, 1e-12)
+
+
+def _lengths(found: Estimate) -> Array:
+    """Length of each column of the Jacobian: what a unit of z moves in the residual."""
+    return np.asarray(np.sqrt(np.diag(found.information)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Trial:
+    size: float
+    sizes: Mapping[str, float]
+    change: Array
+    rest: Array
+    norm: float
+    gain: float
+
+
+def _trial(
+    model: Model, name: str, where: Point, runs: Sequence[int], tangents: Tangents, size: float
+) -> _Trial:
+    """The effect at one size, in plausible sizes."""
+    candidate = model.candidates[name]
+    sizes = sized(candidate, size)
+    changed = _residual(model, candidate, where, runs, sizes)
+    change = changed - tangents.residual
+    rest = tangents.rest(change)
+    after = tangents.residual + rest
+    return _Trial(
+        size=size,
+        sizes=sizes,
+        change=change,
+        rest=rest,
+        norm=float(np.linalg.norm(rest)),
+        gain=float(tangents.residual @ tangents.residual - after @ after),
+    )
+
+
+def _residual(
+    model: Model,
+    candidate: Candidate,
+    where: Point,
+    runs: Sequence[int],
+    sizes: Mapping[str, float],
+) -> Array:
+    """Residual of all runs with one more effect, all else as fitted."""
+    effects = (*where.effects, candidate.name)
+    own = {u.name: u.start for u in candidate.states}
+    return np.concatenate(
+        [
+            model.residual(k, effects)({**where.values, **state, **own, **sizes}).ravel()
+            for k, state in zip(runs, where.states, strict=True)
+        ]
+    )
+
+
+def sized(candidate: Candidate, size: float) -> dict[str, float]:
+    """Sizes, in plausible sizes from neutral, and shapes of an effect."""
+    sizes = {u.name: bounded(u, candidate.neutral[u.name], size) for u in candidate.sizes}
+    return sizes | {u.name: u.start for u in candidate.shapes}
+
+
+def signs(sizes: Sequence[Unknown]) -> tuple[float, ...]:
+    """Both directions where the bounds allow an effect in both."""
+    return (1.0, -1.0) if any(u.lower < 0.0 < u.upper for u in sizes) else (1.0,)
+
+
+def bounded(unknown: Unknown, neutral: float, factor: float) -> float:
+    """A size in plausible sizes from neutral, within its bounds."""
+    value = neutral + factor * (unknown.start - neutral)
+    return float(np.clip(value, unknown.lower, unknown.upper))
