@@ -86,8 +86,13 @@ def locate(recordings: Sequence[Recording], parameters: ParameterSet, null: Poin
 
     null : the converged fit of all that drifts, without effects
     """
-    site = Site(recordings, parameters, null)
-    shares, gain = divide(site)
+    from threadpoolctl import threadpool_limits
+
+    # Threads that wait for each other in decompositions of some hundred columns take ten times
+    # as long as one.
+    with threadpool_limits(1):
+        site = Site(recordings, parameters, null)
+        shares, gain = divide(site)
     residuals = [
         recording.residual(site.fitted, state[GAP_POSITION])
         for recording, state in zip(recordings, null.states, strict=True)
