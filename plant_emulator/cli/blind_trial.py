@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from pathlib import Path
 
 import click
@@ -58,13 +59,20 @@ def command(cases: int, seed: int, out: str | None, workers: int, json_file: str
     trial = Trial(path, seed, cases)
     manifest = trial.seal()
     click.echo(f"{path}: {cases} answers sealed, SHA-256 of the manifest {manifest}", err=True)
+    before = signal.signal(signal.SIGTERM, _interrupt)  # its diagnoses must not outlive the trial
     try:
         with progress() as tell:
             details = trial.run(workers, tell)
     except KeyboardInterrupt:
         click.echo(f"{path}: the same command goes on from here", err=True)
         raise
+    finally:
+        signal.signal(signal.SIGTERM, before)
     if json_file:
         _options.write_json(trial.answer(details), json_file)
     if json_file != "-":
         click.echo("\n".join([*lines(details, seed), f"All cases: {path / 'cases.csv'}"]))
+
+
+def _interrupt(_signal: int, _frame: object) -> None:
+    raise KeyboardInterrupt

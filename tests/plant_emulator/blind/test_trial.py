@@ -1,7 +1,9 @@
 """The trial as a whole: the diagnosis sees logs only, and an interrupted trial goes on."""
 
 import json
+import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -67,8 +69,6 @@ def test_diagnosis_opens_no_answer_and_knows_no_law_of_the_trial(
 
 
 def test_witness_would_tell_of_an_opened_answer(tmp_path: Path, folder: Path) -> None:
-    import subprocess
-
     Trial(folder, 1, 1).seal()
     record = tmp_path / "record.txt"
     answer = folder / "sealed" / "case_001.json"
@@ -140,6 +140,29 @@ def test_command_shows_the_table_and_writes_the_answer(
     found = json.loads(target.read_text())
     assert found["schema"] == "blind-trial/1"
     assert found["confusion"] == {"none": {"none": 2}}
+
+
+def diagnoses_of(process: int) -> list[str]:
+    """Children of a process that diagnose."""
+    listed = subprocess.run(["ps", "--ppid", str(process), "-o", "pid=,args="], text=True,
+                            capture_output=True, check=False)  # fmt: skip
+    return [line.split()[0] for line in listed.stdout.splitlines() if " diagnose " in line]
+
+
+@pytest.mark.slow
+def test_ended_trial_leaves_no_diagnosis_behind(folder: Path) -> None:
+    command = [sys.executable, "-m", "plant_emulator", "blind-trial", "--cases", "1"]
+    trial = subprocess.Popen([*command, "--out", str(folder)], stderr=subprocess.PIPE, text=True)
+    children: list[str] = []
+    limit = time.monotonic() + 120.0
+    while not children and time.monotonic() < limit:
+        children = diagnoses_of(trial.pid)
+        time.sleep(0.1)
+    trial.terminate()
+    _, told = trial.communicate(timeout=30)
+    assert children
+    assert "the same command goes on from here" in told
+    assert not any(Path("/proc", child).exists() for child in children)
 
 
 def test_command_refuses_a_folder_of_another_seed(
