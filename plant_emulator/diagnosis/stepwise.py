@@ -40,6 +40,8 @@ Found = TypeVar("Found")
 
 # Share of the gap that a further effect has to close to be named.
 FURTHER = 0.04
+# Share of the gap that the first of two effects closes at least.
+PART = 0.2
 # Mean square up to which a model leaves nothing but noise.
 NOISE_LEFT = 1.05
 # Share of the gap that a better fit without effects closes when it has moved to another valley.
@@ -97,7 +99,12 @@ class Contest:
         )
 
     def _enough(self, final: Point, null: Point) -> bool:
-        return bool(final.effects) and excess(final) <= max(LEFT_OF_MORE * excess(null), THRESHOLD)
+        """Whether to look for no further effect: there is little left for it, or far too much."""
+        if not final.effects:
+            return False
+        left, gap = excess(final), excess(null)
+        too_much = self._reaches_noise and left > (1.0 - PART) * gap
+        return too_much or left <= max(LEFT_OF_MORE * gap, THRESHOLD)
 
     def _counts(self, best: Point, base: Point, null: Point) -> bool:
         """Whether one more effect earns its place."""
