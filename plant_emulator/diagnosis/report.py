@@ -140,7 +140,7 @@ def _effects(answer: Mapping[str, Any]) -> Markup:
     ]
     parts = [tables.ranking(entries)]
     if classes:
-        parts += [tag("h3", "Effects that cannot be told apart"), tag("ul", *classes)]
+        parts += [tag("h3", "Can another effect look the same?"), tag("ul", *classes)]
     return _section("Which effect", *parts)
 
 

@@ -96,7 +96,7 @@ svg path { fill: none; stroke-linejoin: round; }
   html { font-size: 10.5pt; -webkit-print-color-adjust: exact; print-color-adjust: exact; }
   body { max-width: none; padding: 0; }
   h2, h3, caption { break-after: avoid; } h2 { margin-top: 1.5rem; }
-  figure, tr, .verdict, .keep { break-inside: avoid; }
+  figure, tr, .map, .verdict, .keep { break-inside: avoid; }
   thead { display: table-header-group; }
   figure svg { min-width: 0; } .wide { overflow: visible; }
   table { font-size: 9pt; } th, td { padding: .25rem .4rem; } }

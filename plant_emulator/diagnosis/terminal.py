@@ -6,6 +6,7 @@ not fit is counted ("and 3 more"): the whole stands in the JSON answer and in th
 
 from __future__ import annotations
 
+import re
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +34,12 @@ HEIGHT = 23
 MOST_RANKED = 6
 NAME, CELL = 29, 9
 LABEL = 13
+EVIDENCE_DECIMALS = 1
+# Runners-up beyond so many give way to the empty lines between the sections.
+LEAST_OTHERS = 2
+# Spaces within "2.83 N m" at which no line ends.
+WITHIN_QUANTITY = re.compile(r"(?<=\d) (?=[%A-Za-z])|(?<=[\d ]N) (?=m\b)|(?<=kg) (?=m\^2)")
+UNBROKEN = "\N{NO-BREAK SPACE}"
 GAPS = {
     "nominal": "nominal",
     "recalibrated": "recalibrated",
@@ -47,9 +54,12 @@ def lines(answer: Mapping[str, Any], width: int = 80) -> list[str]:
     shrinkage = _shrinkage(answer["gap"], width)
     rest = _rest(answer, width)
     room = HEIGHT - len(head) - len(shrinkage) - len(rest)
-    ranking = _ranking(answer["ranking"], indistinguishable(answer["verdict"]), room, width)
+    ranking, others = _ranking(answer, room, width), _runners_up(answer["ranking"])
+    room -= len(ranking)
+    breaks = sum(map(bool, (ranking, shrinkage, rest)))
+    spaced = room - breaks >= min(len(others), LEAST_OTHERS)
+    ranking += others[: max(0, room - breaks if spaced else room)]
     sections = [part for part in (head, ranking, shrinkage, rest) if part]
-    spaced = sum(map(len, sections)) + len(sections) - 1 <= HEIGHT
     rows = [
         row for part in sections for row in ([""] if spaced and part is not head else []) + part
     ]
@@ -59,14 +69,15 @@ def lines(answer: Mapping[str, Any], width: int = 80) -> list[str]:
 def _paragraph(text: str, width: int, most: int, label: str = "") -> list[str]:
     """Text in at most so many lines behind a label, cut at a word with three dots."""
     first = f"{label:9}" if label else ""
-    return wrap(
-        printable(text),
+    rows = wrap(
+        WITHIN_QUANTITY.sub(UNBROKEN, printable(text)),
         width,
         initial_indent=first,
         subsequent_indent=" " * len(first),
         max_lines=most,
         placeholder=" ...",
     )
+    return [row.replace(UNBROKEN, " ") for row in rows]
 
 
 def _listed(items: Sequence[str], width: int, most: int, label: str) -> list[str]:
@@ -93,31 +104,36 @@ def _verdict(answer: Mapping[str, Any], width: int) -> list[str]:
     ]
 
 
-def _ranking(
-    ranking: Sequence[Mapping[str, Any]],
-    classes: Mapping[str, Sequence[str]],
-    room: int,
-    width: int,
-) -> list[str]:
-    """Accepted effects with what there is room for, then the runners-up, a line each."""
-    if not ranking:
+def _ranking(answer: Mapping[str, Any], room: int, width: int) -> list[str]:
+    """Head of the ranking, and the accepted effects with what there is room for."""
+    if not answer["ranking"]:
         return []
-    accepted = [r for r in ranking if r["accepted"]]
-    others = [r for r in ranking if not r["accepted"]]
+    classes = indistinguishable(answer["verdict"])
+    accepted = [r for r in answer["ranking"] if r["accepted"]]
     room -= 1 + len(accepted)
     rows = [f"{'  effect':{NAME}}{'evidence':>{CELL}}{'gain':>7}  size +- standard error"]
     for entry in accepted:
         beside = _beside(entry, classes.get(entry["effect"], ()), width)[: max(0, room)]
         rows += [_row(entry), *beside]
         room -= len(beside)
-    return rows + [_row(r) for r in others[: max(0, min(MOST_RANKED - len(accepted), room))]]
+    return rows
+
+
+def _runners_up(ranking: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The effects that were not accepted, a line each, but for those whose evidence reads 0.0."""
+    accepted = sum(bool(r["accepted"]) for r in ranking)
+    counting = [
+        r for r in ranking if r["evidence"] is None or round(r["evidence"], EVIDENCE_DECIMALS) > 0.0
+    ]
+    others = [_row(r) for r in counting if not r["accepted"]]
+    return others[: max(0, MOST_RANKED - accepted)]
 
 
 def _row(entry: Mapping[str, Any]) -> str:
     """Effect, evidence, share of the held-out gap that it closes alone, its first size."""
     mark = "*" if entry["accepted"] else " "
     gain = "" if entry["held_out_gain"] is None else percent(entry["held_out_gain"])
-    evidence = "" if entry["evidence"] is None else f"{entry['evidence']:.1f}"
+    evidence = "" if entry["evidence"] is None else f"{entry['evidence']:.{EVIDENCE_DECIMALS}f}"
     first = size(entry["parameters"][0]) if entry["parameters"] else ""
     name = printable(entry["effect"])[: NAME - 2]
     return f"{mark} {name:{NAME - 2}}{evidence:>{CELL}}{gain:>7}  {first}"
@@ -171,7 +187,15 @@ def _rest(answer: Mapping[str, Any], width: int) -> list[str]:
     """Parameters that moved, effects that these logs cannot show, the next experiment."""
     verdict = answer["verdict"]
     moved = [shifted(p) for p in verdict["parameters"]]
-    hidden = [f"{u['effect']} ({u['reason']})" for u in answer["undetectable"]]
     rows = _listed(moved, width, 2 if verdict["kind"] == "parameter" else 1, "moved")
-    rows += _listed(hidden, width, 1 if len(verdict["effects"]) > 1 else 2, "unseen")
+    rows += _unseen(answer["undetectable"], width, 1 if len(verdict["effects"]) > 1 else 2)
     return rows + _paragraph(verdict["next_experiment"] or "", width, 3, "next")
+
+
+def _unseen(hidden: Sequence[Mapping[str, str]], width: int, most: int) -> list[str]:
+    """Effects that these logs cannot show, each with its reason if there is room for all."""
+    reasons = "; ".join(f"{u['effect']} ({u['reason']})" for u in hidden)
+    rows = _paragraph(reasons, width, most + 1, "unseen") if hidden else []
+    if len(rows) <= most:
+        return rows
+    return _listed([u["effect"] for u in hidden], width, most, "unseen")

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from plant_emulator.diagnosis.explain import adequate
+from plant_emulator.diagnosis.wording import percent
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -104,7 +105,9 @@ def statement(
             f"{name} ({candidates[name].title[:1].lower()}{candidates[name].title[1:]})"
             for name in verdict.effects
         )
-        share = "" if closed is None else f"; with it the held-out gap closes by {closed:.0%}"
+        them = "it" if len(verdict.effects) == 1 else "them"
+        gap = f"; with {them} the held-out gap closes by"
+        share = "" if closed is None else f"{gap} {percent(closed)}"
         rest = "" if complete else ", and the rest is unknown"
         return f"The machine has what the model lacks: {names}{share}{rest}."
     if verdict.kind == "parameter":

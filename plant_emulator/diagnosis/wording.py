@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 UNKNOWN = "not known"
+WITHOUT_UNIT = (None, "", "1")
 UNITS = {column.signal: column.unit for column in LOG_COLUMNS.values()}
 KINDS = {
     "effect": "Effect found",
@@ -75,21 +76,21 @@ def percent(share: float | None) -> str:
     """A share of 1 in percent; one decimal where it is small or nearly all."""
     if share is None or not isfinite(share):
         return UNKNOWN
-    decimals = 1 if 0.0 < abs(share) < 0.0095 or 0.995 <= share < 1.0 else 0
-    return f"{100.0 * share:.{decimals}f} %"
+    decimals = 1 if 0.0005 <= abs(share) < 0.0095 or 0.995 <= share < 0.9995 else 0
+    return f"{round(100.0 * share, decimals) + 0.0:.{decimals}f} %"  # + 0.0: no minus zero
 
 
 def size(parameter: Mapping[str, Any], sign: str = "+-") -> str:
     """A parameter of an effect: value, standard error and unit."""
     text = with_error(parameter["value"], parameter["standard_error"], sign)
     unit = parameter["unit"]
-    return text if unit in {"", "1"} else f"{text} {printable(unit)}"
+    return text if unit in WITHOUT_UNIT else f"{text} {printable(unit)}"
 
 
 def quantity(value: float | None, unit: str | None, digits: int = 3) -> str:
     """A number and its unit."""
     text = number(value, digits)
-    return text if text == UNKNOWN or not unit else f"{text} {unit}"
+    return text if text == UNKNOWN or unit in WITHOUT_UNIT else f"{text} {unit}"
 
 
 def own_name(parameter: str, effect: str) -> str:

@@ -82,6 +82,47 @@ def test_unconverged_answer_shows_its_statement_and_no_confidence():
     assert any("12.00 +- not known N m" in row for row in rows)
 
 
+def test_no_line_ends_between_a_number_and_its_unit():
+    answer = answers.effect()
+    for more in range(40):
+        answer["verdict"]["statement"] = f"{'x' * (40 + more)} 2.83 N m, 312.7 kg m^2 and 98 %."
+        told = lines(answer)[1:3]
+        assert not [row for row in told if row.endswith(("2.83", "N", "312.7", "kg", "98"))]
+
+
+def test_effect_without_evidence_is_no_runner_up():
+    answer = answers.effect()
+    for entry in answer["ranking"]:
+        if entry["effect"] == "armature_reaction":
+            entry["evidence"] = 0.04
+    assert not [row for row in lines(answer) if row.startswith("  armature_reaction")]
+    assert [row for row in lines(answer) if row.startswith("  stribeck")]
+
+
+def test_runners_up_give_way_to_the_lines_between_the_sections():
+    answer = answers.effect()
+    answer["verdict"]["next_experiment"] = None
+    rows = lines(answer)
+    # four others have evidence; 23 lines hold two of them and three empty ones
+    assert (len(rows), rows.count("")) == (23, 3)
+    assert [row.split()[0] for row in rows if row.startswith("  ") and row[2].isalpha()] == [
+        "effect",
+        "with",
+        "class",
+        "stribeck",
+        "load_dependent_gear_loss",
+    ]
+
+
+def test_effects_that_do_not_show_are_all_named_where_their_reasons_have_no_room():
+    answer = answers.effect()
+    names = [f"effect_number_{k}" for k in range(5)]
+    answer["undetectable"] = [{"effect": name, "reason": "too small " * 9} for name in names]
+    told = "\n".join(lines(answer))
+    assert all(name in told for name in names)
+    assert "too small" not in told
+
+
 def test_logs_held_out_in_turn_are_told_as_such():
     answer = answers.effect()
     logs = ["a.csv", "b.csv", "c.csv"]
@@ -118,7 +159,16 @@ def test_number_has_three_digits(value, text):
 
 @pytest.mark.parametrize(
     ("share", "text"),
-    [(0.98, "98 %"), (0.998, "99.8 %"), (1.0, "100 %"), (0.004, "0.4 %"), (-0.02, "-2 %")],
+    [
+        (0.98, "98 %"),
+        (0.998, "99.8 %"),
+        (1.0, "100 %"),
+        (0.004, "0.4 %"),
+        (-0.02, "-2 %"),
+        (1.5e-14, "0 %"),
+        (-1e-4, "0 %"),
+        (0.9998, "100 %"),
+    ],
 )
 def test_share_near_the_ends_shows_a_decimal(share, text):
     assert percent(share) == text
