@@ -111,3 +111,22 @@ def correlation_time(residual: Array) -> float:
     if covariance[0] <= 0.0:
         return 1.0
     return max(1.0, float(2.0 * covariance.sum() / covariance[0] - 1.0))
+
+
+def structure(residual: Array, lags: int = 20) -> float:
+    """How much more a residual is correlated than white noise is, in units of chi squared.
+
+    Expected 0 with a standard deviation of sqrt(2 lags) for white noise (Ljung and Box, Biometrika
+    65 (1978) 297). Samples of exactly 0 do not count.
+    """
+    counted = residual[residual != 0.0]
+    n = len(counted)
+    if n <= lags:
+        return 0.0
+    centred = counted - counted.mean()
+    square = float(centred @ centred)
+    if square == 0.0:
+        return 0.0
+    correlations = [float(centred[k:] @ centred[:-k]) / square for k in range(1, lags + 1)]
+    terms = [r**2 / (n - k) for k, r in enumerate(correlations, start=1)]
+    return n * (n + 2.0) * sum(terms) - lags

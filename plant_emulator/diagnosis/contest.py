@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.covariance import correlation_time
+from plant_emulator.covariance import correlation_time, structure
 from plant_emulator.diagnosis.signature import signs, sized
 from plant_emulator.estimation import Estimate, at, estimate
 
@@ -57,6 +57,7 @@ class Point:
     cost : sum of squares with the priors; squares : of the residuals alone; samples : counted
     share : of the samples that are independent, from the residual's autocorrelation time
     errors : standard errors by name of `values`
+    structure : of the residuals, beyond white noise, see `covariance.structure`
     """
 
     effects: tuple[str, ...]
@@ -68,6 +69,7 @@ class Point:
     share: float
     errors: Mapping[str, float]
     converged: bool
+    structure: float = 0.0
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -140,6 +142,7 @@ def point(effects: Sequence[str], found: Estimate, runs: int) -> Point:
             u.name: u.error(u.value(float(z)), float(e)) for u, z, e in errors if u.run is None
         },
         converged=found.converged,
+        structure=sum(structure(channel) for run in found.residuals for channel in run),
     )
 
 

@@ -21,6 +21,8 @@ Kind = Literal["effect", "parameter", "none", "unknown"]
 SHIFTED = 3.0
 # Mean square of the whitened residual up to which a model without effects leaves nothing but noise.
 NOISE_ONLY = 1.1
+# Structure of a residual from which on it is no noise [chi squared].
+STRUCTURED = 200.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,6 +76,9 @@ def decide(model: Model, explained: Explanation) -> Verdict:
     moved = shifts(model, final)
     if explained.unconverged:
         return Verdict(kind="unknown", effects=(), shifts=moved, reason=explained.unconverged)
+    if model.reaches_noise and _structured(explained):
+        reason = "what is left is as small as the noise, but not as random"
+        return Verdict(kind="unknown", effects=(), shifts=moved, reason=reason)
     if final.effects and (adequate(final, null) or not model.reaches_noise):
         return Verdict(kind="effect", effects=final.effects, shifts=moved, reason="")
     moved = shifts(model, null)
@@ -86,6 +91,16 @@ def decide(model: Model, explained: Explanation) -> Verdict:
         shifts=moved,
         reason="no effect of the library, alone or with others, brings the residual to the noise",
     )
+
+
+def _structured(explained: Explanation) -> bool:
+    """Whether more structure is left than was explained, and more than noise has by chance.
+
+    Of a model that leaves more than the noise the squares tell.
+    """
+    null, final = explained.null, explained.final
+    small = adequate(final, null) if final.effects else null.chi_squared <= NOISE_ONLY
+    return small and final.structure > max(STRUCTURED, null.cost - final.cost)
 
 
 def statement(

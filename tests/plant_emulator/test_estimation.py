@@ -5,7 +5,13 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from plant_emulator.covariance import Array, autocovariance, correlation_time, data_errors
+from plant_emulator.covariance import (
+    Array,
+    autocovariance,
+    correlation_time,
+    data_errors,
+    structure,
+)
 from plant_emulator.estimation import Unknown, at, estimate
 
 
@@ -164,3 +170,15 @@ def test_what_neither_data_nor_prior_know_has_no_finite_error() -> None:
     assert found.standard_errors[1] == np.inf
     assert found.data_errors[1] == np.inf
     assert found.correlation[0, 1] == 0.0
+
+
+def test_structure_is_none_in_white_noise_and_that_of_a_hidden_ripple() -> None:
+    """White: 0 +- sqrt(2 lags). A ripple of variance v beside noise of 1: correlations
+    v / (1 + v) cos, whose squares over 20 lags of whole periods sum to 10 (v / (1 + v))^2."""
+    random = np.random.default_rng(2)
+    white = [structure(random.standard_normal(3000)) for _ in range(200)]
+    assert np.mean(white) == pytest.approx(0.0, abs=3.0 * np.sqrt(40.0 / 200.0))
+    assert np.std(white) == pytest.approx(np.sqrt(40.0), rel=0.2)
+    n = np.arange(3000)
+    rippled = random.standard_normal(3000) + np.sin(2.0 * np.pi * n / 5.0)
+    assert structure(rippled) == pytest.approx(3000 * 10.0 * (0.5 / 1.5) ** 2, rel=0.1)

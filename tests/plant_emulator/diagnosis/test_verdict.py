@@ -1,0 +1,41 @@
+"""The verdict on a machine so small that it can be checked by hand."""
+
+import numpy as np
+
+from plant_emulator.diagnosis.verdict import Verdict, decide
+from tests.plant_emulator.diagnosis.test_contest import TIME, Line, explained, noisy
+
+LINE = 2.0 + 3.0 * TIME
+SAMPLE = np.arange(len(TIME))
+
+
+def verdict(model: Line) -> Verdict:
+    return decide(model, explained(model))
+
+
+def test_ripple_as_small_as_the_noise_is_a_gap_without_a_name() -> None:
+    """Within the noise's square of 1.1, but correlated: 2000 * 10 (0.2 / 1.2)^2 = 560."""
+    ripple = np.sqrt(0.4) * np.sin(2.0 * np.pi * SAMPLE / 5.0)
+    both = np.random.default_rng(3).standard_normal(len(TIME)) + ripple
+    found = verdict(Line([LINE + both / np.sqrt(1.2)]))
+    assert found.kind == "unknown"
+    assert "not as random" in found.reason
+
+
+def test_same_line_in_white_noise_is_only_other_parameters() -> None:
+    assert verdict(Line([noisy(LINE)])).kind == "parameter"
+
+
+def test_effect_that_explains_less_than_is_left_beside_it_is_not_named() -> None:
+    """The kink lowers the cost by some 40; the ripple beside it has a structure of 560."""
+    ripple = np.sqrt(0.4) * np.sin(2.0 * np.pi * SAMPLE / 5.0)
+    both = np.random.default_rng(3).standard_normal(len(TIME)) + ripple
+    model = Line([LINE + both / np.sqrt(1.2) + 0.5 * np.abs(TIME)], ["kink"])
+    assert explained(model).final.effects == ("kink",)
+    assert verdict(model).kind == "unknown"
+
+
+def test_effect_that_explains_much_more_than_is_left_is_named() -> None:
+    ripple = np.sqrt(0.05) * np.sin(2.0 * np.pi * SAMPLE / 5.0)
+    model = Line([noisy(LINE + 5.0 * np.abs(TIME) + ripple)], ["kink"])
+    assert verdict(model).kind == "effect"
