@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from plant_emulator import axis_log, logs
+from plant_emulator import axis_log, effects, logs
 from plant_emulator.diagnosis.axis import AxisRecipe
+from plant_emulator.diagnosis.axis_effects import EFFECTS as AXIS_EFFECTS
 from plant_emulator.diagnosis.bench import BenchRecipe
 from plant_emulator.diagnosis.calibration import Case
 from plant_emulator.diagnosis.diagnose import Plan
@@ -22,7 +23,7 @@ from plant_emulator.preflight import preflight
 from plant_emulator.recording import Recording, recording
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     from plant_emulator.diagnosis.axis_signals import AxisLog
     from plant_emulator.diagnosis.diagnose import Diagnosis
@@ -67,15 +68,16 @@ def loaded(
         recordings.append(recording(log, cast("Hold | None", hold), checked.use))
         notes += checked.notes
     recordings, plan = planned(recordings, len(paths))
-    settings = {
-        "date": datetime.now(UTC).date().isoformat(),
-        "version": version("road-load-bench"),
-        "parameters": parameters.name,
-        "without": ", ".join(without) or "-",
-        "own effects": ", ".join(own) or "-",
-    }
-    settings |= {f"sha256 of {path}": digest for path, digest in hashes.items()}
     files = tuple(Path(file) for file in own)
+    _known(without, [*effects.names(), *(file.stem for file in files)])
+    settings = _settings(
+        {
+            "parameters": parameters.name,
+            "without": ", ".join(without) or "-",
+            "own effects": ", ".join(own) or "-",
+        },
+        {**hashes, **_digests([parameters.name, *own])},
+    )
     recipe = BenchRecipe(tuple(recordings), parameters, tuple(without), files)
     return Loaded(recipe=recipe, plan=plan, notes=tuple(notes), settings=settings)
 
@@ -101,14 +103,9 @@ def axis_loaded(
         raise DiagnosisError(
             f"{paths[0]}: one run of an axis cannot be held out; give another with --hold-out"
         )
+    _known(without, AXIS_EFFECTS)
     plan = plan_of(len(axis_logs), len(paths))
-    settings = {
-        "date": datetime.now(UTC).date().isoformat(),
-        "version": version("road-load-bench"),
-        "model": "axis",
-        "without": ", ".join(without) or "-",
-    }
-    settings |= {f"sha256 of {path}": digest for path, digest in hashes.items()}
+    settings = _settings({"model": "axis", "without": ", ".join(without) or "-"}, hashes)
     recipe = AxisRecipe(tuple(axis_logs), fitted=plan.fitted, without=tuple(without))
     return Loaded(recipe=recipe, plan=plan, notes=(), settings=settings)
 
@@ -145,6 +142,30 @@ def _telling(log: Log | AxisLog) -> None:
                 f"{log.source}: line 1: column {column} looks like the answer; a diagnosis must "
                 "not see it: take it out"
             )
+
+
+def _known(without: Sequence[str], library: Collection[str]) -> None:
+    """Refuse to take out what is not there: a misspelt name would leave its effect in."""
+    for name in without:
+        if name not in library:
+            known = ", ".join(sorted(library))
+            raise DiagnosisError(f"--without {name}: no effect of that name; known: {known}")
+
+
+def _settings(own: Mapping[str, str], hashes: Mapping[str, str]) -> dict[str, str]:
+    """What a report tells to repeat a diagnosis."""
+    return {
+        "date": datetime.now(UTC).date().isoformat(),
+        "version": version("road-load-bench"),
+        **own,
+        **{f"sha256 of {path}": digest for path, digest in hashes.items()},
+    }
+
+
+def _digests(paths: Sequence[str]) -> dict[str, str]:
+    """SHA-256 of every one of these that is a file."""
+    files = [path for path in paths if Path(path).is_file()]
+    return {path: hashlib.sha256(Path(path).read_bytes()).hexdigest() for path in files}
 
 
 def _hashes(paths: Sequence[str]) -> dict[str, str]:
