@@ -1,5 +1,6 @@
 """The report of a diagnosis in a real browser: Chromium, without a display."""
 
+import hashlib
 import re
 import subprocess
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from matplotlib.image import imread
 
 from plant_emulator.diagnosis.report import html
 from tests.plant_emulator.diagnosis import answers
+from tests.system.conftest import FITTED, PREDICTED, Diagnosed
 
 pytestmark = [pytest.mark.peer, pytest.mark.slow]
 
@@ -20,6 +22,8 @@ onload="document.body.dataset.wide = this.contentDocument.documentElement.scroll
 BROKEN = """<!DOCTYPE html><html><head><meta http-equiv="Content-Security-Policy"
 content="default-src 'none'"/></head><body><svg><path d="M nan l"/></svg>
 <img src="other.png"/></body></html>"""
+
+ASKING = """<!DOCTYPE html><img src="http://127.0.0.1:9/asked.png">"""
 
 
 @pytest.fixture
@@ -129,3 +133,61 @@ def test_print_is_a_few_pages_of_a4(chromium, tmp_path):
     assert 3 <= len(boxes) <= 5
     # 210 mm by 297 mm in points
     assert {(round(float(w)), round(float(h))) for w, h in boxes} == {(595, 842)}
+
+
+def asked(chromium: Callable[..., tuple[str, list[str]]], page: Path, folder: Path) -> list[str]:
+    """What a page made the browser load; the browser's own calls home are not its."""
+    log = folder / "net.json"
+    chromium(page, "--dump-dom", f"--log-net-log={log}")
+    loaded = r'"network_isolation_key":"file://.*?"url":"([^"]*)"'
+    return re.findall(loaded, log.read_text(encoding="utf-8"))
+
+
+def test_what_a_page_loads_is_heard(chromium, tmp_path):
+    page = tmp_path / "asking.html"
+    page.write_text(ASKING, encoding="utf-8")
+    assert "http://127.0.0.1:9/asked.png" in asked(chromium, page, tmp_path)
+
+
+def test_report_of_a_real_diagnosis_holds_all_and_loads_nothing(
+    chromium, tmp_path, diagnosed: Diagnosed
+):
+    document, console = chromium(diagnosed.report, "--dump-dom")
+    assert console == []
+    assert asked(chromium, diagnosed.report, tmp_path) == []
+    assert not re.search(r"<(script|link|img|iframe)\b", document)
+    for title in (
+        "How far the gap shrinks", "Where it lies", "Which effect", "Parameters that moved",
+        "What these logs cannot show", "Held-out runs, measured over predicted", "To repeat it",
+    ):  # fmt: skip
+        assert f"<h2>{title}</h2>" in document
+    assert "with torque_sensor_lag" in re.search(r'aria-label="(Waterfall of[^"]*)', document)[1]
+    for entry in diagnosed.answer["ranking"]:
+        assert f"<code>{entry['effect']}</code>" in document
+    for log in (*FITTED, PREDICTED):
+        assert hashlib.sha256(Path(log).read_bytes()).hexdigest() in document
+    assert f"plant-emulator diagnose {FITTED[0]}" in document
+
+
+@pytest.mark.parametrize(("scheme", "paper"), [(1, (255, 255, 255)), (0, (23, 25, 28))])
+def test_report_of_a_real_diagnosis_shows_both_predictions(
+    chromium, tmp_path, diagnosed: Diagnosed, scheme, paper
+):
+    picture = tmp_path / "report.png"
+    chromium(
+        diagnosed.report,
+        f"--screenshot={picture}",
+        "--window-size=1280,6000",
+        f"--blink-settings=preferredColorScheme={scheme}",
+    )
+    pixels = seen(picture)
+    assert share(pixels, paper) > 0.5
+    before, after = ((213, 94, 0), (0, 114, 178)) if scheme else ((240, 136, 58), (86, 180, 233))
+    assert min(share(pixels, ink, within=40) for ink in (before, after)) > 5e-4
+
+
+def test_report_of_a_real_diagnosis_prints_on_a_few_pages(chromium, tmp_path, diagnosed: Diagnosed):
+    pdf = tmp_path / "report.pdf"
+    chromium(diagnosed.report, f"--print-to-pdf={pdf}", "--no-pdf-header-footer")
+    boxes = re.findall(rb"/MediaBox ?\[ ?0 0 ([\d.]+) ([\d.]+) ?\]", pdf.read_bytes())
+    assert 3 <= len(boxes) <= 8
