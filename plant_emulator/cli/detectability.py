@@ -49,7 +49,9 @@ def _table(effects: list[dict[str, object]]) -> list[str]:
         assert isinstance(sizes, dict)
         assert isinstance(units, dict)
         shown = ", ".join(
-            f"{name} {value:.2g} {units[name]}" if value is not None else f"{name}: none"
+            f"{name} {value:.2g} {units[name]}".removesuffix(" 1")
+            if value is not None
+            else f"{name}: none"
             for name, value in sizes.items()
         )
         same = entry["class"]
