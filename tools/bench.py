@@ -6,7 +6,8 @@ everything is compiled and warm. Errors are the worst channel's NRMSD on program
 converged solution, on which the independent solver has to agree. We run at the loosest tolerance
 from which on our error stays below a bound; a peer at the one where it is fastest of all at which
 it errs at most a quarter more than we do. ratio = peers / ours, and holds where it reaches the
-target; target 0: for information.
+target; target 0: for information. The diagnosis is the whole command on all cores, run once,
+against its budget on the clock; its growth with logs and effects is CPU time of all processes.
 """
 
 from __future__ import annotations

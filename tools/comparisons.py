@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+import diagnoses
 import numpy as np
 import peers
 from fits import Fits, Fitted
@@ -22,6 +23,7 @@ from timing import alone, duration, side_by_side
 
 from plant_emulator import kernel, parameter_sets
 from plant_emulator.bench import Bench
+from plant_emulator.effects import names as effect_names
 from plant_emulator.simulate import LARGEST_STEP, simulate
 
 if TYPE_CHECKING:
@@ -33,6 +35,7 @@ FIXED_STEP = 1e-3
 SCAN = 10
 TICK_BUDGET = 50e-6
 MANY = 1000
+DIAGNOSIS_BUDGET = 60.0
 FIRST_RESULT = """
 import sys
 from plant_emulator import parameter_sets, programs
@@ -209,6 +212,22 @@ def identification(_: Study) -> Rows:
     yield row("identification", mine, f"lmfit on scipy LSODA; ours {costs}", peer, 100.0)
 
 
+def diagnosis(_: Study) -> Rows:
+    """Programs 1 to 3 over the whole library, and how it grows with logs and effects."""
+    every = len(effect_names())
+    few = diagnoses.SMALL
+    diagnoses.diagnosis(1, few)  # compiles what is not in the cache yet
+    whole = diagnoses.diagnosis(3, every)
+    label = f"budget on the clock; here {diagnoses.cores()}"
+    yield row("diagnosis", whole.clock, label, DIAGNOSIS_BUDGET, 1.0)
+    yield row("diagnosis_processor", whole.processors, "its time on the clock", whole.clock, 0.0)
+    fewer = [(logs, every) for logs in (1, 2)] + [(3, count) for count in (few, 2 * few)]
+    for logs, count in fewer:
+        cost = diagnoses.diagnosis(logs, count)
+        label = f"3 logs, {every} effects; processor time of both"
+        yield row(f"logs_{logs}_effects_{count}", cost.processors, label, whole.processors, 0.0)
+
+
 GROUPS = {
     group.__name__: group
     for group in (
@@ -220,6 +239,7 @@ GROUPS = {
         tick,
         effects,
         identification,
+        diagnosis,
         thousand,
         first_result,
     )
