@@ -80,13 +80,17 @@ def _paragraph(text: str, width: int, most: int, label: str = "") -> list[str]:
     return [row.replace(UNBROKEN, " ") for row in rows]
 
 
-def _listed(items: Sequence[str], width: int, most: int, label: str) -> list[str]:
-    """As many items as fit, and the number of those that do not."""
+def _listed(
+    items: Sequence[str], width: int, most: int, label: str, names: Sequence[str] = ()
+) -> list[str]:
+    """As many items as fit, and the number of those that do not; their names where none fits."""
     for shown in range(len(items), 0, -1):
         more = f"; and {len(items) - shown} more" if shown < len(items) else ""
         rows = _paragraph("; ".join(items[:shown]) + more, width, 99, label)
         if len(rows) <= most:
             return rows
+    if names:
+        return _listed(names, width, most, label)
     return _paragraph("; ".join(items), width, most, label) if items else []
 
 
@@ -187,7 +191,8 @@ def _rest(answer: Mapping[str, Any], width: int) -> list[str]:
     """Parameters that moved, effects that these logs cannot show, the next experiment."""
     verdict = answer["verdict"]
     moved = [shifted(p) for p in verdict["parameters"]]
-    rows = _listed(moved, width, 2 if verdict["kind"] == "parameter" else 1, "moved")
+    names = [p["name"] for p in verdict["parameters"]]
+    rows = _listed(moved, width, 2 if verdict["kind"] == "parameter" else 1, "moved", names)
     rows += _unseen(answer["undetectable"], width, 1 if len(verdict["effects"]) > 1 else 2)
     return rows + _paragraph(verdict["next_experiment"] or "", width, 3, "next")
 

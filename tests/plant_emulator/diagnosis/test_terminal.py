@@ -123,6 +123,14 @@ def test_effects_that_do_not_show_are_all_named_where_their_reasons_have_no_room
     assert "too small" not in told
 
 
+def test_parameters_that_moved_are_counted_where_the_first_has_no_room():
+    answer = answers.effect()
+    long = answers.INERTIA | {"name": "gear_viscous_friction", "unit": "N m (s/rad)^delta_g"}
+    answer["verdict"]["parameters"] = [long, *[answers.INERTIA] * 4]
+    (moved,) = [row for row in lines(answer) if row.startswith("moved")]
+    assert moved == "moved    gear_viscous_friction; drum_inertia; drum_inertia; and 2 more"
+
+
 def test_logs_held_out_in_turn_are_told_as_such():
     answer = answers.effect()
     logs = ["a.csv", "b.csv", "c.csv"]
