@@ -117,6 +117,7 @@ def command(
         click.echo(f"note: {note}", err=True)
     if save:
         parameter_sets.save(parameter_set(found, given), save)
+        _own_in(save, own, found.answer["verdict"]["effects"])
     if report:
         from plant_emulator.diagnosis.report import html
 
@@ -125,3 +126,14 @@ def command(
         _options.write_json(found.answer, json_file)
     if json_file != "-":
         click.echo("\n".join(lines(found.answer)))
+
+
+def _own_in(saved: str, own: tuple[str, ...], named: list[str]) -> None:
+    """Tell of effects in a saved set that the other commands do not know."""
+    for file in own:
+        if Path(file).stem in named:
+            click.echo(
+                f"note: {saved}: serve, simulate and validate know {Path(file).stem} once {file} "
+                "lies in plant_emulator/effects",
+                err=True,
+            )
