@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import re
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -128,6 +129,24 @@ def test_single_log_is_predicted_on_its_later_part_and_its_cause_withheld_is_unk
     assert answer["verdict"]["kind"] == "unknown"
     assert answer["location"]["subsystem"] == "torque_sensor"
     assert answer["gap"]["closed_fraction"] is None
+
+
+@pytest.mark.slow
+def test_own_effect_of_the_readme_is_found_in_the_place_of_the_one_left_out(tmp_path: Path) -> None:
+    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?amplifier.*?)```", readme, re.DOTALL)
+    own, saved = tmp_path / "amplifier_filter.py", tmp_path / "bench.toml"
+    own.write_text(code, encoding="utf-8")
+    left_out = [*LEFT_OUT, "torque_sensor_lag", "stribeck"]
+    done = plant_emulator(
+        "diagnose", *FITTED, "--effects", own, *without(left_out), "--save", saved, "--json", "-"
+    )
+    answer = json.loads(done.stdout)
+    assert answer["verdict"]["effects"] == ["amplifier_filter"]
+    (size,) = answer["ranking"][0]["parameters"]
+    assert (size["name"], size["unit"]) == ("tau", "s")
+    assert abs(size["value"] - 0.1) < 4.0 * size["standard_error"] < 0.004
+    assert f"{saved}: serve, simulate and validate know amplifier_filter once" in done.stderr
 
 
 @pytest.mark.parametrize("column", ["label", "true_effect", "drift_fg"])
