@@ -107,7 +107,7 @@ def command(
                 run.recipe,
                 run.plan,
                 settings=settings,
-                cases=calibration(),
+                cases=None if model == "axis" else calibration(),
                 notes=run.notes,
                 progress=tell,
             ).diagnose()

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.axis_candidates import candidate, scale_of
+from plant_emulator.diagnosis.axis_candidates import NAMES, UNITS, candidate, scale_of
 from plant_emulator.diagnosis.axis_effects import EFFECTS
 from plant_emulator.diagnosis.axis_signals import SAMPLES, AxisRun, prepared, told
 from plant_emulator.diagnosis.model import Run
@@ -35,16 +35,11 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.estimation import Array, Residual
 
-NAMES = ("inertia", "viscous_friction", "coulomb_friction", "offset")
 LEVEL = "friction_level"
 LEVEL_STD = 0.1
 """Friction of lubricated machines changes by some per cent a kelvin around room temperature."""
 SCREW_PITCH = 0.005
 """[m] a revolution, where none is told; a rotary axis has 2 pi."""
-UNITS = {
-    False: dict(zip(NAMES, ("kg", "N s/m", "N", "N"), strict=True)),
-    True: dict(zip(NAMES, ("kg m^2", "N m s/rad", "N m", "N m"), strict=True)),
-}
 SUBSYSTEMS = dict(zip(NAMES, ("drum", "gear", "gear", "torque_sensor"), strict=True))
 
 

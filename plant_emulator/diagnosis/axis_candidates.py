@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.axis_effects import Scale
-from plant_emulator.diagnosis.model import Candidate
+from plant_emulator.diagnosis.model import Candidate, Term
 from plant_emulator.estimation import Unknown
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.axis_effects import AxisEffect, Constant
     from plant_emulator.diagnosis.axis_signals import AxisRun
@@ -20,6 +20,12 @@ OF_UNITS = {
     False: {"force": "N", "speed": "m/s", "sample": "s"},
     True: {"force": "N m", "speed": "rad/s", "sample": "s"},
 }
+NAMES = ("inertia", "viscous_friction", "coulomb_friction", "offset")
+UNITS = {
+    False: dict(zip(NAMES, ("kg", "N s/m", "N", "N"), strict=True)),
+    True: dict(zip(NAMES, ("kg m^2", "N m s/rad", "N m", "N m"), strict=True)),
+}
+DIRECTIONS = {"forwards": 1.0, "backwards": -1.0}
 
 
 def scale_of(runs: Sequence[AxisRun], pitch: float) -> Scale:
@@ -57,7 +63,20 @@ def candidate(name: str, effect: AxisEffect, scale: Scale, *, rotary: bool) -> C
             f"{name}_{key}": OF_UNITS[rotary].get(constant.of, constant.unit)
             for key, constant in effect.constants.items()
         },
+        terms=tuple(
+            _one_way(name, effect.by_direction, way, UNITS[rotary][effect.by_direction])
+            for way in (DIRECTIONS if effect.by_direction else ())
+        ),
     )
+
+
+def _one_way(effect: str, friction: str, way: str, unit: str) -> Term:
+    """The coefficient of one direction, (1 + a) F forwards and (1 - a) F backwards [unit]."""
+
+    def of(p: Mapping[str, float]) -> float:
+        return p[friction] * (1.0 + DIRECTIONS[way] * p[f"{effect}_ratio"])
+
+    return Term(name=way, unit=unit, of=of)
 
 
 def measure(constant: Constant, scale: Scale) -> float:

@@ -67,6 +67,7 @@ class AxisEffect:
     """An effect: its law, what it is in one line, where it sits, its constants by name.
 
     needs : what a log must have to show it; empty: nothing special
+    by_direction : the nominal friction that it splits into one of either direction; empty: none
     """
 
     law: Law
@@ -74,6 +75,7 @@ class AxisEffect:
     subsystem: str
     constants: Mapping[str, Constant]
     needs: str = ""
+    by_direction: str = ""
 
 
 def viscous_asymmetry(force: Array, m: Motion, p: Values, _scale: Scale) -> Array:
@@ -169,6 +171,7 @@ EFFECTS: Mapping[str, AxisEffect] = {
         law=viscous_asymmetry,
         title="viscous friction differs by direction",
         needs="motion in both directions",
+        by_direction="viscous_friction",
         subsystem="gear",
         constants={"ratio": _ratio(0.1, -0.9, 0.9)},
     ),
@@ -176,6 +179,7 @@ EFFECTS: Mapping[str, AxisEffect] = {
         law=coulomb_asymmetry,
         title="Coulomb friction differs by direction",
         needs="an offset that is known, not fitted",
+        by_direction="coulomb_friction",
         subsystem="gear",
         constants={"ratio": _ratio(0.1, -0.9, 0.9)},
     ),

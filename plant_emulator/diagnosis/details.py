@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from plant_emulator.diagnosis.rest import Rest
     from plant_emulator.estimation import Array
 
 
@@ -48,9 +49,11 @@ class Details:
 
     settings : how to repeat it: command, version, date, hashes of logs and sets, thresholds
     notes : what the preflight told of the logs
+    rest : of a machine in outline, of which more than the noise is left
     """
 
     traces: tuple[Trace, ...]
     waterfall: tuple[Step, ...]
     settings: Mapping[str, str]
     notes: tuple[str, ...]
+    rest: Rest | None = None

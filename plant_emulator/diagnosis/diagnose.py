@@ -12,9 +12,11 @@ from plant_emulator.diagnosis.calibration import confidence
 from plant_emulator.diagnosis.details import Details
 from plant_emulator.diagnosis.explain import DETECTABLE, THRESHOLD
 from plant_emulator.diagnosis.pool import model_of
+from plant_emulator.diagnosis.rest import rest_of
 from plant_emulator.diagnosis.shrink import Fold
 from plant_emulator.diagnosis.steps import Task
 from plant_emulator.diagnosis.stepwise import Contest
+from plant_emulator.diagnosis.terms import in_terms
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -65,7 +67,10 @@ class Diagnosis:
 
 
 class Diagnose:
-    """The steps from a plan to a diagnosis; cases : a blind trial's, for the confidence."""
+    """The steps from a plan to a diagnosis.
+
+    cases : a blind trial's, for the confidence; None: there are none of this machine
+    """
 
     def __init__(
         self,
@@ -74,14 +79,14 @@ class Diagnose:
         plan: Plan,
         *,
         settings: Mapping[str, str],
-        cases: Sequence[Case] = (),
+        cases: Sequence[Case] | None = None,
         notes: Sequence[str] = (),
         progress: Progress | None = None,
     ) -> None:
         self.pool, self.recipe, self.plan = pool, recipe, plan
         self.model: Model = model_of(recipe)
         self.settings, self.notes, self.progress = settings, tuple(notes), progress
-        self.cases = tuple(cases)
+        self.cases = None if cases is None else tuple(cases)
         self.folds = plan.folds
 
     def diagnose(self) -> Diagnosis:
@@ -174,6 +179,12 @@ class Diagnose:
         channels = [run.channels for run in runs]
         gaps = {key: shrink.gap(channels, some, lengths) for key, some in predicted.items()}
         location = self._location(explained, found)
+        final = explained.final if found.effects else explained.null
+        traces = parts.traces(runs, predicted[()], predicted[found.effects])
+        terms = in_terms(self.model, final, self.plan.fitted)
+        rest = None
+        if not self.model.reaches_noise:
+            rest = rest_of(self.model, final, self.plan.fitted, traces)
         closed, interval = self._closed(found, gaps)
         hidden = parts.undetectable(explained, self.model.candidates)
         advice = Advice(self.pool, self.recipe, self.model, self.plan.fitted)
@@ -186,13 +197,14 @@ class Diagnose:
             "verdict": verdict.as_answer(
                 found,
                 classes=explained.classes(),
-                confidence=confidence(self.cases, found.kind, self._evidence(explained, found)),
+                confidence=self._confidence(explained, found),
                 sentence=verdict.statement(
                     found,
                     self.model.candidates,
                     closed,
                     location["subsystem"],
-                    complete=self.model.reaches_noise,
+                    terms=terms,
+                    rest=rest,
                 ),
                 next_experiment=advice.next_experiment(
                     explained, found, location, [entry["effect"] for entry in hidden]
@@ -207,19 +219,22 @@ class Diagnose:
                 "closed_fraction": closed,
                 "closed_fraction_ci95": interval,
             },
-            "ranking": [self._rank(c, explained, found, gaps) for c in parts.ranked(explained)],
+            "ranking": [
+                self._rank(c, explained, found, gaps, terms) for c in parts.ranked(explained)
+            ],
             "undetectable": hidden,
         }
         details = Details(
-            traces=parts.traces(runs, predicted[()], predicted[found.effects]),
+            traces=traces,
             waterfall=parts.waterfall(gaps, found.effects),
             settings=self.settings,
             notes=self.notes,
+            rest=rest,
         )
         return Diagnosis(
             answer=answer,
             details=details,
-            final=explained.final if found.effects else explained.null,
+            final=final,
             fixed={name: self._fixed(name) for name in found.effects},
         )
 
@@ -253,11 +268,19 @@ class Diagnose:
         explained: Explanation,
         found: Verdict,
         gaps: Mapping[tuple[str, ...], Gap],
+        terms: Mapping[str, list[dict[str, Any]]],
     ) -> dict[str, Any]:
         alone = gaps.get((contender.effect,))
         gain = None if alone is None else shrink.closed_fraction(gaps[()], alone)
         candidate = self.model.candidates[contender.effect]
-        return parts.rank(contender, explained, found.effects, candidate, gain)
+        entry = parts.rank(contender, explained, found.effects, candidate, gain)
+        entry["parameters"] += terms.get(contender.effect, [])
+        return entry
+
+    def _confidence(self, explained: Explanation, found: Verdict) -> float | None:
+        if self.cases is None:
+            return None
+        return confidence(self.cases, found.kind, self._evidence(explained, found))
 
     def _evidence(self, explained: Explanation, found: Verdict) -> float:
         """Evidence of the weakest effect that is named; of the best one where none is."""

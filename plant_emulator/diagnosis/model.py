@@ -9,10 +9,22 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.estimation import Array, Residual, Unknown
+
+
+@dataclass(frozen=True, kw_only=True)
+class Term:
+    """A quantity that the field knows an effect by, such as a coefficient of either direction.
+
+    of : its value [unit] from the values of a fit by name
+    """
+
+    name: str
+    unit: str
+    of: Callable[[Mapping[str, float]], float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,6 +38,7 @@ class Candidate:
     fixed : values of the rest while the effect is there
     units : of all its parameters, by name
     title : what it is, in one line; needs : what a log must have to show it, empty: nothing special
+    terms : what else it is known by, made of its own values and the machine's
     """
 
     name: str
@@ -38,6 +51,7 @@ class Candidate:
     units: Mapping[str, str]
     title: str
     needs: str = ""
+    terms: tuple[Term, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

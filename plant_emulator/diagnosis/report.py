@@ -12,6 +12,7 @@ from plant_emulator.diagnosis import report_tables as tables
 from plant_emulator.diagnosis import report_traces
 from plant_emulator.diagnosis.markup import Markup, join, tag
 from plant_emulator.diagnosis.report_pictures import line, waterfall
+from plant_emulator.diagnosis.report_rest import rest_by_band
 from plant_emulator.diagnosis.report_style import STYLE
 from plant_emulator.diagnosis.wording import (
     KINDS,
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.details import Details, Trace
+    from plant_emulator.diagnosis.rest import Rest
 
 # Runs drawn: those with the largest gaps; the others are named.
 MOST_RUNS = 8
@@ -58,6 +60,7 @@ def html(answer: Mapping[str, Any], details: Details) -> str:
         _verdict(answer, units),
         _shrinkage(answer, details),
         _location(answer["location"], units),
+        _rest(details.rest),
         _effects(answer),
         _parameters(verdict),
         _limits(answer["undetectable"]),
@@ -128,6 +131,10 @@ def _location(location: Mapping[str, Any], units: Mapping[str, str]) -> Markup:
     if location["subsystems"]:
         parts.append(tables.subsystems(location))
     return _section("Where it lies", *(parts or [tag("p", "Nothing stands out of the noise.")]))
+
+
+def _rest(rest: Rest | None) -> Markup:
+    return Markup("") if rest is None else _section("What is left", rest_by_band(rest))
 
 
 def _effects(answer: Mapping[str, Any]) -> Markup:

@@ -9,10 +9,13 @@ import numpy as np
 from plant_emulator.diagnosis.markup import Markup, join, tag
 from plant_emulator.diagnosis.report_traces import residuals, rms
 from plant_emulator.diagnosis.wording import (
+    EXPLAINED,
+    RESIDUAL,
     number,
     own_name,
     percent,
     quantity,
+    share_of,
     size,
     spoken,
 )
@@ -163,10 +166,13 @@ def subsystems(location: Mapping[str, Any]) -> Markup:
         tag("tr", row_head(spoken(s["name"])), bar(percent(s["share"]), s["share"]))
         for s in location["subsystems"]
     ]
+    whole = share_of(location)
+    told = {
+        RESIDUAL: "in the residual, without any hypothesis about the cause",
+        EXPLAINED: "in what the best effect of each explains alone",
+    }
     return table(
-        "Share of each subsystem in the residual, without any hypothesis about the cause.",
-        ["subsystem", right("share of the residual")],
-        rows,
+        f"Share of each subsystem {told[whole]}.", ["subsystem", right(f"share {whole}")], rows
     )
 
 

@@ -103,7 +103,7 @@ def _verdict(answer: Mapping[str, Any], width: int) -> list[str]:
     where = place(answer["location"], UNITS)
     return [
         ", ".join(parts),
-        *_paragraph(verdict["statement"], width, 3),
+        *_paragraph(verdict["statement"], width, 3 if len(verdict["effects"]) > 1 else 4),
         *(_paragraph(where, width, 2, "where") if where else []),
     ]
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from plant_emulator.diagnosis.explain import adequate
-from plant_emulator.diagnosis.wording import percent
+from plant_emulator.diagnosis.rest import lies, shrinks
+from plant_emulator.diagnosis.wording import number, percent
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.diagnosis.explain import Explanation
     from plant_emulator.diagnosis.model import Candidate, Model
+    from plant_emulator.diagnosis.rest import Rest
 
 Kind = Literal["effect", "parameter", "none", "unknown"]
 
@@ -82,7 +84,7 @@ def decide(model: Model, explained: Explanation) -> Verdict:
     if final.effects and (adequate(final, null) or not model.reaches_noise):
         return Verdict(kind="effect", effects=final.effects, shifts=moved, reason="")
     moved = shifts(model, null)
-    if not final.effects and (null.chi_squared <= NOISE_ONLY or not model.reaches_noise):
+    if not final.effects and null.chi_squared <= NOISE_ONLY:
         kind: Kind = "parameter" if moved else "none"
         return Verdict(kind=kind, effects=(), shifts=moved, reason="")
     return Verdict(
@@ -109,22 +111,22 @@ def statement(
     closed: float | None,
     place: str | None,
     *,
-    complete: bool = True,
+    terms: Mapping[str, Sequence[Mapping[str, Any]]] | None = None,
+    rest: Rest | None = None,
 ) -> str:
     """The verdict in one sentence.
 
-    complete : whether what the named effects leave is only the noise
+    terms : by effect, what the field knows it by
+    rest : of a machine in outline, of which more than the noise is left
     """
     if verdict.kind == "effect":
-        names = " and ".join(
-            f"{name} ({candidates[name].title[:1].lower()}{candidates[name].title[1:]})"
-            for name in verdict.effects
-        )
+        named = [_named(name, candidates[name], terms or {}) for name in verdict.effects]
+        share = "" if closed is None else f"the held-out gap closes by {percent(closed)}"
+        if rest is not None:
+            share = f"{shrinks(rest)}; {lies(rest)}"
         them = "it" if len(verdict.effects) == 1 else "them"
-        gap = f"; with {them} the held-out gap closes by"
-        share = "" if closed is None else f"{gap} {percent(closed)}"
-        rest = "" if complete else ", and the rest is unknown"
-        return f"The machine has what the model lacks: {names}{share}{rest}."
+        more = f"; with {them} {share}" if share else ""
+        return f"The machine has what the model lacks: {' and '.join(named)}{more}."
     if verdict.kind == "parameter":
         first = verdict.shifts[0]
         change = 100.0 * (first.estimated / first.nominal - 1.0)
@@ -137,7 +139,19 @@ def statement(
     if verdict.kind == "none":
         return "The logs show no gap beyond the noise of the sensors."
     where = "" if place is None else f" It lies in the {place.replace('_', ' ')}."
+    where = where if rest is None else f" Of the held-out {rest.channel}, {lies(rest)}."
     return f"There is a gap whose cause is unknown: {verdict.reason}.{where}"
+
+
+def _named(
+    name: str, candidate: Candidate, terms: Mapping[str, Sequence[Mapping[str, Any]]]
+) -> str:
+    """An effect, what it is, and its terms."""
+    title = f"{candidate.title[:1].lower()}{candidate.title[1:]}"
+    values = ", ".join(
+        f"{number(t['value'], 4)} {t['unit']} {t['name']}" for t in terms.get(name, ())
+    )
+    return f"{name} ({title}{': ' if values else ''}{values})"
 
 
 def as_answer(

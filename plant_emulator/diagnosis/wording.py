@@ -19,6 +19,8 @@ KINDS = {
     "none": "No gap beyond the noise",
     "unknown": "Cause unknown",
 }
+# What a subsystem's share is of.
+RESIDUAL, EXPLAINED = "of the residual", "of what effects explain"
 # Numbers of this size and more, or less, are written with an exponent.
 LARGE, SMALL = 1e6, 1e-4
 
@@ -133,7 +135,7 @@ def place(location: Mapping[str, Any], units: Mapping[str, str]) -> str | None:
     shares = {s["name"]: s["share"] for s in location["subsystems"] or ()}
     parts = [spoken(location["subsystem"])]
     if location["subsystem"] in shares:
-        parts[0] += f" ({percent(shares[location['subsystem']])} of the residual)"
+        parts[0] += f" ({percent(shares[location['subsystem']])} {share_of(location)})"
     channel, phase = location["channel"], location["phase"]
     if channel is None:
         return parts[0]
@@ -143,6 +145,11 @@ def place(location: Mapping[str, Any], units: Mapping[str, str]) -> str | None:
             unit = units.get(channel)
             parts[1] += f": {quantity(cell['gap'], unit)}, noise {quantity(cell['noise'], unit, 2)}"
     return ", ".join(parts)
+
+
+def share_of(location: Mapping[str, Any]) -> str:
+    """What the subsystems' shares are of: without blocks to tell apart, of the effects' gains."""
+    return RESIDUAL if location["map"] else EXPLAINED
 
 
 def shifted(parameter: Mapping[str, Any], sign: str = "+-") -> str:

@@ -1,0 +1,101 @@
+"""What a machine in outline leaves, and effects in the field's own terms, checked by hand."""
+
+import numpy as np
+import pytest
+
+from plant_emulator.diagnosis.axis import AxisModel
+from plant_emulator.diagnosis.contest import Point, fit
+from plant_emulator.diagnosis.details import Trace
+from plant_emulator.diagnosis.rest import lies, rest_of, shrinks
+from plant_emulator.diagnosis.terms import in_terms
+from tests.plant_emulator.diagnosis import axis_truth
+from tests.plant_emulator.diagnosis.axis_truth import Array
+
+STEP = 0.01
+TIME = STEP * np.arange(6000)
+SIZE = 100.0
+
+
+@pytest.fixture(scope="module")
+def axis() -> AxisModel:
+    return AxisModel([axis_truth.log(seed=1), axis_truth.log(phase=1.0, seed=2)], fitted=(0,))
+
+
+@pytest.fixture(scope="module")
+def nominal(axis: AxisModel) -> Point:
+    return fit(axis, (), (0,), axis.search((0,))[0], [{}])
+
+
+def trace(before: Array, after: Array, source: str = "held out") -> Trace:
+    measured = SIZE * np.sin(2.0 * np.pi * 0.5 * TIME)
+    return Trace(
+        source=source,
+        channel="force",
+        unit="N",
+        time=TIME,
+        measured=measured,
+        recalibrated=measured - before,
+        explained=measured - after,
+        noise=0.1,
+    )
+
+
+def wave(size: float, frequency: float) -> Array:
+    return size * np.sin(2.0 * np.pi * frequency * TIME)
+
+
+def test_relative_error_of_sines_is_the_ratio_of_their_sizes(
+    axis: AxisModel, nominal: Point
+) -> None:
+    rest = rest_of(axis, nominal, (0,), [trace(wave(6.0, 1.0), wave(5.0, 27.0))])
+    assert (rest.before, rest.after) == pytest.approx((0.06, 0.05), rel=1e-6)
+    assert "falls from 6.00 % to 5.00 %" in shrinks(rest)
+
+
+@pytest.mark.parametrize(
+    ("frequency", "told"),
+    [(27.0, "20 to 35 Hz: elasticity, or unknown"), (1.1, "0.2 to 2 Hz: unknown")],
+)
+def test_rest_lies_in_the_band_of_its_frequency(
+    axis: AxisModel, nominal: Point, frequency: float, told: str
+) -> None:
+    rest = rest_of(axis, nominal, (0,), [trace(wave(6.0, 1.0), wave(5.0, frequency))])
+    assert lies(rest).endswith(told)
+    # Half the square of its size, whatever the band's width.
+    assert rest.held_out.max() == pytest.approx(12.5, rel=0.1)
+
+
+def test_what_fitted_runs_leave_too_is_not_where_the_rest_lies(
+    axis: AxisModel, nominal: Point
+) -> None:
+    # Without Coulomb friction the fitted run leaves 25 N that turn with the motion: 625 N^2.
+    off = Point(**{**vars(nominal), "values": {**nominal.values, "coulomb_friction": 0.0}})
+    rest = rest_of(axis, off, (0,), [trace(wave(9.0, 1.0), wave(25.0, 1.0) + wave(20.0, 15.0))])
+    assert rest.fitted is not None
+    assert rest.fitted[0] > rest.held_out[0] > rest.held_out[3]
+    assert rest.band == (10.0, 20.0)
+
+
+def test_runs_held_out_in_turn_are_compared_with_nothing(axis: AxisModel, nominal: Point) -> None:
+    rest = rest_of(axis, nominal, (0,), [trace(wave(6.0, 1.0), wave(5.0, 27.0), source="axis 1")])
+    assert rest.fitted is None
+
+
+def test_coefficients_by_direction_are_those_of_a_fit_of_both() -> None:
+    log = axis_truth.log(lambda _q, v, _a: 0.2 * axis_truth.VISCOUS * np.abs(v))
+    model = AxisModel([log, axis_truth.log(phase=1.0, seed=2)], fitted=(0,))
+    start = {**model.search((0,))[0], "viscous_asymmetry_ratio": 0.1}
+    found = fit(model, ("viscous_asymmetry",), (0,), start, [{}])
+    terms = {t["name"]: t for t in in_terms(model, found, (0,))["viscous_asymmetry"]}
+    for name, truth in {"forwards": 1.2, "backwards": 0.8}.items():
+        value, error = terms[name]["value"], terms[name]["standard_error"]
+        assert value == pytest.approx(truth * axis_truth.VISCOUS, rel=0.01)
+        assert abs(value - truth * axis_truth.VISCOUS) < 4.0 * error
+        # Of the mean of both and of half their difference, neither alone.
+        both = found.errors["viscous_friction"], found.errors["viscous_asymmetry_ratio"]
+        rough = float(np.hypot(both[0] * truth, both[1] * axis_truth.VISCOUS))
+        assert 0.3 * rough < error < 1.5 * rough
+
+
+def test_effect_without_terms_of_its_own_has_none(axis: AxisModel, nominal: Point) -> None:
+    assert in_terms(axis, nominal, (0,)) == {}
