@@ -19,6 +19,7 @@ from plant_emulator.diagnosis.bench import BenchRecipe
 from plant_emulator.diagnosis.calibration import Case
 from plant_emulator.diagnosis.diagnose import Plan
 from plant_emulator.errors import DiagnosisError
+from plant_emulator.one_bench import one_bench
 from plant_emulator.preflight import preflight
 from plant_emulator.recording import Recording, recording
 
@@ -67,6 +68,7 @@ def loaded(
         checked = preflight(log, parameters.value("gear_ratio"))
         recordings.append(recording(log, cast("Hold | None", hold), checked.use))
         notes += checked.notes
+    one_bench([r.log for r in recordings], parameters.values())
     recordings, plan = planned(recordings, len(paths))
     files = tuple(Path(file) for file in own)
     _known(without, [*effects.names(), *(file.stem for file in files)])
