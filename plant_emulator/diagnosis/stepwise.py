@@ -49,6 +49,8 @@ MOVED = 0.1
 # More effects than that at once explain anything.
 MOST_EFFECTS = 2
 RESTARTS = 3
+# Times that a fit that ran out of steps is taken up again.
+PATIENCE = 3
 # Effects that are fitted before the others, and on top of another effect at all.
 PROMISING, FURTHER_PROMISING = 12, 10
 # Best of a round that are fitted to convergence.
@@ -90,6 +92,7 @@ class Contest:
                 break
             final = best
             final, rivals = self._stand(final, found)
+        final = self._settled(final)
         return Explanation(
             null=null,
             final=final,
@@ -97,6 +100,14 @@ class Contest:
             rivals=rivals,
             unconverged="" if final.converged else "the last fit did not converge",
         )
+
+    def _settled(self, final: Point) -> Point:
+        """The fit taken up again where it ran out of steps."""
+        for _ in range(PATIENCE):
+            if final.converged:
+                break
+            (final,) = self._pool.map(refit, self._recipe, [Task(base=final, runs=self._runs)])
+        return final
 
     def _enough(self, final: Point, null: Point) -> bool:
         """Whether to look for no further effect: there is little left for it, or far too much."""
@@ -121,16 +132,19 @@ class Contest:
     def _first(self, null: Point) -> tuple[Point, list[Contender]]:
         """All effects on the fit without any, and that fit, started again from the best of them.
 
-        The most promising come first. Unless one of them leaves nothing but noise, so do the rest;
-        all are tried again where the fit without effects has moved to another valley, and start
-        once more from the nominal parameters where it leaves much.
+        The most promising come first. Unless one of them leaves nothing but noise, the rest follow,
+        and those that promise nothing too where there is a gap: in a cost of many valleys a
+        signature is but a hint. All are tried again where the fit without effects has moved to
+        another valley, and start once more from the nominal parameters where it leaves much.
         """
         stage = "contest"
         shown, promising = self._show(null, stage)
         contenders = self._contend(null, shown, promising[:PROMISING], stage)
         if not _explained(contenders):
-            rest = self._contend(null, shown, promising[PROMISING:], stage)
-            contenders = _better(contenders, rest)
+            rest = promising[PROMISING:]
+            if null.chi_squared > NOISE_LEFT:
+                rest += [name for name, one in shown.items() if one and name not in promising]
+            contenders = _better(contenders, self._contend(null, shown, rest, stage))
         better = self._restarted(null, contenders)
         if _explained(contenders):
             return better, contenders
