@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from plant_emulator.diagnosis import answer as parts
-from plant_emulator.diagnosis import place, shrink, verdict
+from plant_emulator.diagnosis import apart, place, shrink, verdict
 from plant_emulator.diagnosis.advice import Advice
 from plant_emulator.diagnosis.calibration import confidence
 from plant_emulator.diagnosis.details import Details
@@ -101,10 +101,21 @@ class Diagnose:
             reaches_noise=self.model.reaches_noise,
         )
         explained = contest.explain()
-        found = verdict.decide(self.model, explained)
+        found = self._between(explained, verdict.decide(self.model, explained))
         self.folds = self._usable(explained, found)
         predicted = self._predictions(explained, found)
         return self._answered(explained, found, predicted)
+
+    def _between(self, explained: Explanation, found: Verdict) -> Verdict:
+        """The verdict; where nothing explains runs that each alone agree, with that reason."""
+        runs = self.plan.fitted
+        unexplained = found.kind == "unknown" and not explained.unconverged
+        if not unexplained or len(runs) < 2 or not self.model.reaches_noise:
+            return found
+        tasks = [Task(base=explained.null, runs=(run,)) for run in runs]
+        points = list(self.pool.map(apart.alone, self.recipe, tasks))
+        reason = apart.between(self.model, runs, points)
+        return replace(found, reason=reason) if reason else found
 
     def _usable(self, explained: Explanation, found: Verdict) -> Folds:
         """The folds whose fitted runs show all named effects: others cannot predict these."""

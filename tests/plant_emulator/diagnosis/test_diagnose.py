@@ -1,10 +1,12 @@
 """A whole diagnosis on a machine so small that it can be checked by hand."""
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pytest
 
+from plant_emulator.diagnosis.contest import Point
 from plant_emulator.diagnosis.diagnose import Diagnose, Diagnosis, Plan
 from plant_emulator.diagnosis.pool import Here
 from plant_emulator.estimation import Array
@@ -19,6 +21,18 @@ class OnlyInTheFirst(Line):
     def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
         """See `Model`."""
         return super().residual(run, effects if run == 0 else ())
+
+
+class Unplanned(Line):
+    """Knows no further run that would tell more."""
+
+    def with_planned(self, where: Point, runs: Sequence[int]) -> Line:
+        """See `Model`."""
+        return self
+
+    def lacks(self, runs: Sequence[int]) -> dict[str, tuple[str, ...]]:
+        """See `Model`."""
+        return {}
 
 
 def diagnosed(model: Line) -> Diagnosis:
@@ -41,3 +55,24 @@ def test_effect_that_every_run_shows_is_predicted_in_all() -> None:
     assert found.answer["logs"]["held_out"] == ["run 0", "run 1", "run 2"]
     assert found.details.notes == ()
     assert found.answer["gap"]["closed_fraction"] == pytest.approx(1.0, abs=0.05)
+
+
+def test_runs_that_agree_alone_with_other_values_are_told_as_such() -> None:
+    slope = 3.0 * TIME
+    levels = (2.0, 2.0, 9.0)
+    runs = [noisy(level + slope, seed) for seed, level in enumerate(levels, 1)]
+    verdict = diagnosed(Unplanned(runs, ["kink"])).answer["verdict"]
+    assert (verdict["kind"], verdict["effects"]) == ("unknown", [])
+    told = re.search(
+        r": a is (\S+) \+- \S+ in run [01] and (\S+) \+- \S+ in run 2;", verdict["statement"]
+    )
+    assert told is not None
+    assert [float(value) for value in told.groups()] == pytest.approx([2.0, 9.0], abs=0.5)
+
+
+def test_runs_that_do_not_agree_alone_are_not_told_apart() -> None:
+    bow = 40.0 * np.sin(5.0 * TIME)
+    runs = [noisy(level + bow, seed) for seed, level in enumerate((2.0, 2.0, 9.0), 1)]
+    verdict = diagnosed(Unplanned(runs, ["kink"])).answer["verdict"]
+    assert verdict["kind"] == "unknown"
+    assert "each log alone" not in verdict["statement"]

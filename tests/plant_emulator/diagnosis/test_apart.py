@@ -1,0 +1,59 @@
+"""Runs each fitted alone: what was done to two benches (tests/data/README.md) is told."""
+
+import re
+from collections.abc import Callable
+
+import pytest
+
+from plant_emulator.diagnosis import apart
+from plant_emulator.diagnosis.bench import BenchModel
+from plant_emulator.diagnosis.contest import null_fit
+from plant_emulator.kernel import kernel
+from plant_emulator.log import Log
+from plant_emulator.parameters import ParameterSet
+from plant_emulator.recording import recording
+
+BenchLog = Callable[[str], Log]
+NUMBER = r"(\d\S+) \+- (\d\S+) s in "
+
+
+def told(nominal: ParameterSet, *logs: Log) -> str:
+    model = BenchModel([recording(log) for log in logs], nominal, kernel().effects)
+    runs = range(len(logs))
+    return apart.between(model, runs, [null_fit(model, (run,)) for run in runs])
+
+
+def test_two_drifted_benches_differ_in_what_was_shifted_most(
+    bench_log: BenchLog, nominal: ParameterSet
+) -> None:
+    logs = (
+        bench_log(f"bench_practice/{name}")
+        for name in ("practice_002/program1", "practice_008/program3")
+    )
+    found = told(nominal, *logs)
+    # The dead time, by +2.0889 and -7.0835 %, which a step of the reference tells best.
+    values = re.search(
+        rf"dead_time is {NUMBER}practice_002/program1\S* and {NUMBER}practice_008/program3", found
+    )
+    assert values is not None
+    first, error, second, other = map(float, values.groups())
+    assert first == pytest.approx(1.020889 * nominal.value("dead_time"), abs=4.0 * error)
+    assert second == pytest.approx(0.929165 * nominal.value("dead_time"), abs=4.0 * other)
+
+
+@pytest.mark.parametrize("bench", ["practice_002", "practice_008"])
+def test_runs_of_one_drifted_bench_do_not_differ(
+    bench: str, bench_log: BenchLog, nominal: ParameterSet
+) -> None:
+    logs = (bench_log(f"bench_practice/{bench}/program{k}") for k in (1, 2, 3))
+    assert told(nominal, *logs) == ""
+
+
+def test_run_that_has_an_effect_is_not_taken_for_another_bench(
+    bench_log: BenchLog, nominal: ParameterSet
+) -> None:
+    logs = (
+        bench_log(f"bench_practice/{name}")
+        for name in ("practice_002/program1", "practice_003/program1")
+    )
+    assert told(nominal, *logs) == ""
