@@ -40,6 +40,8 @@ Found = TypeVar("Found")
 
 # Share of the gap that a further effect has to close to be named.
 FURTHER = 0.04
+# Share of what the effects before leave that a further one has to close.
+REST = 0.75
 # Share of the gap that the first of two effects closes at least.
 PART = 0.2
 # Mean square up to which a model leaves nothing but noise.
@@ -124,8 +126,9 @@ class Contest:
         if not self._reaches_noise:
             return counts
         further = excess(null) > THRESHOLD and fall > FURTHER * excess(null)
-        if base.effects:
-            return fall > THRESHOLD and further
+        if base.effects:  # what a law slightly other than the library's leaves is no second effect
+            most_of_the_rest = fall > REST * (base.squares - base.samples)
+            return fall > THRESHOLD and further and most_of_the_rest
         # The first of several effects leaves a correlated rest: it is judged by the gap as well.
         return counts or (fall > THRESHOLD and further)
 
