@@ -17,7 +17,7 @@ from plant_emulator.diagnosis.axis import AxisRecipe
 from plant_emulator.diagnosis.axis_effects import EFFECTS as AXIS_EFFECTS
 from plant_emulator.diagnosis.bench import BenchRecipe
 from plant_emulator.diagnosis.calibration import Case
-from plant_emulator.diagnosis.diagnose import Plan
+from plant_emulator.diagnosis.held_out import Plan
 from plant_emulator.errors import DiagnosisError
 from plant_emulator.one_bench import one_bench
 from plant_emulator.preflight import preflight

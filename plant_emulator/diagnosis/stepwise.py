@@ -14,15 +14,14 @@ import numpy as np
 
 from plant_emulator.diagnosis.contest import ASTRAY, WORTH
 from plant_emulator.diagnosis.explain import (
-    LEFT_OF_MORE,
     MARGIN,
     THRESHOLD,
     Contender,
     Explanation,
     excess,
-    weighed,
 )
 from plant_emulator.diagnosis.pool import model_of
+from plant_emulator.diagnosis.rules import counts, enough
 from plant_emulator.diagnosis.steps import Task, contend, once_more, refit, show, start
 
 if TYPE_CHECKING:
@@ -38,12 +37,6 @@ if TYPE_CHECKING:
 
 Found = TypeVar("Found")
 
-# Share of the gap that a further effect has to close to be named.
-FURTHER = 0.04
-# Share of what the effects before leave that a further one has to close.
-REST = 0.75
-# Share of the gap that the first of two effects closes at least.
-PART = 0.2
 # Mean square up to which a model leaves nothing but noise.
 NOISE_LEFT = 1.05
 # Share of the gap that a better fit without effects closes when it has moved to another valley.
@@ -85,12 +78,12 @@ class Contest:
         null, contenders = self._first(null)
         final = null
         rivals: dict[str, dict[str, float]] = {}
-        while len(final.effects) < MOST_EFFECTS and not self._enough(final, null):
+        while len(final.effects) < MOST_EFFECTS and not enough(final, null, self._reaches_noise):
             found = contenders
             if final.effects:
                 final, found = self._further(final, "further effects")
             best = _best(found)
-            if best is None or not self._counts(best, final, null):
+            if best is None or not counts(best, final, null, self._reaches_noise):
                 break
             final = best
             final, rivals = self._stand(final, found)
@@ -110,27 +103,6 @@ class Contest:
                 break
             (final,) = self._pool.map(refit, self._recipe, [Task(base=final, runs=self._runs)])
         return final
-
-    def _enough(self, final: Point, null: Point) -> bool:
-        """Whether to look for no further effect: there is little left for it, or far too much."""
-        if not final.effects:
-            return False
-        left, gap = excess(final), excess(null)
-        too_much = self._reaches_noise and left > (1.0 - PART) * gap
-        return too_much or left <= max(LEFT_OF_MORE * gap, THRESHOLD)
-
-    def _counts(self, best: Point, base: Point, null: Point) -> bool:
-        """Whether one more effect earns its place."""
-        fall = base.cost - best.cost
-        counts = weighed(fall, best, null) > THRESHOLD
-        if not self._reaches_noise:
-            return counts
-        further = excess(null) > THRESHOLD and fall > FURTHER * excess(null)
-        if base.effects:  # what a law slightly other than the library's leaves is no second effect
-            most_of_the_rest = fall > REST * (base.squares - base.samples)
-            return fall > THRESHOLD and further and most_of_the_rest
-        # The first of several effects leaves a correlated rest: it is judged by the gap as well.
-        return counts or (fall > THRESHOLD and further)
 
     def _first(self, null: Point) -> tuple[Point, list[Contender]]:
         """All effects on the fit without any, and that fit, started again from the best of them.

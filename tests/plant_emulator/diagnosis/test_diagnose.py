@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.contest import Point
-from plant_emulator.diagnosis.diagnose import Diagnose, Diagnosis, Plan
+from plant_emulator.diagnosis.diagnose import Diagnose, Diagnosis
+from plant_emulator.diagnosis.held_out import Plan
 from plant_emulator.diagnosis.pool import Here
 from plant_emulator.estimation import Array
 from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, noisy

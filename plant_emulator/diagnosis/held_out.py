@@ -1,0 +1,116 @@
+"""The runs held out of a diagnosis: which can be predicted, and what every model leaves there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from plant_emulator.diagnosis import shrink
+from plant_emulator.diagnosis.explain import DETECTABLE, THRESHOLD
+from plant_emulator.diagnosis.shrink import Fold
+
+if TYPE_CHECKING:
+    from plant_emulator.diagnosis.contest import Point
+    from plant_emulator.diagnosis.explain import Contender, Explanation
+    from plant_emulator.diagnosis.model import Model
+    from plant_emulator.diagnosis.pool import Pool, Recipe
+    from plant_emulator.diagnosis.shrink import Prediction
+    from plant_emulator.diagnosis.stepwise import Progress
+    from plant_emulator.diagnosis.verdict import Verdict
+
+# Effects whose held-out gain is computed: the best ones only, each takes a fit a fold.
+TRIED = 3
+# The model "as given" among those that are compared by their effects.
+NOMINAL = ("nominal",)
+# Of every fold the runs that are fitted, and those that are predicted.
+Folds = tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """Which runs are fitted and which are predicted; indices of the model's runs.
+
+    folds : (fitted, predicted); with as_fitted the predicted run is a later part of the fitted one
+        and starts as that does
+    """
+
+    fitted: tuple[int, ...]
+    folds: Folds
+    as_fitted: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeldOut:
+    """The held-out runs of one diagnosis."""
+
+    pool: Pool
+    recipe: Recipe
+    model: Model
+    plan: Plan
+    progress: Progress | None = None
+
+    def usable(self, explained: Explanation, found: Verdict) -> tuple[Folds, tuple[str, ...]]:
+        """The folds whose fitted runs show all named effects, and a note on every other.
+
+        Runs that do not show an effect cannot predict it; should no fold be left, all are.
+        """
+        tasks = [self._fold(explained.final, *fold, refitted=False) for fold in self.plan.folds]
+        if not found.effects or len(tasks) < 2:
+            return self.plan.folds, ()
+        usable, notes = [], []
+        for fold, norms in zip(
+            self.plan.folds, self.pool.map(shrink.shown, self.recipe, tasks), strict=True
+        ):
+            hidden = [name for name, norm in norms.items() if norm < DETECTABLE]
+            if not hidden:
+                usable.append(fold)
+                continue
+            lost = ", ".join(self.model.runs[run].source for run in fold[1])
+            notes.append(f"{lost}: not predicted; the other runs do not show {hidden[0]}")
+        return (tuple(usable) or self.plan.folds), tuple(notes)
+
+    def predictions(
+        self, explained: Explanation, found: Verdict, folds: Folds
+    ) -> dict[tuple[str, ...], list[Prediction]]:
+        """Held-out residuals of every model that is compared, by its effects.
+
+        ("nominal",) : the parameter set as given.
+        """
+        points: dict[tuple[str, ...], Point] = {(): explained.null}
+        for count in range(1, len(found.effects) + 1):
+            some = found.effects[:count]
+            points[some] = replace(explained.final, effects=some)
+        for contender in _best(explained):
+            assert contender.point is not None
+            points.setdefault((contender.effect,), contender.point)
+        nominal = replace(explained.null, values={u.name: u.prior for u in self.model.parameters})
+        tasks, keys = [], []
+        for key, point in [(NOMINAL, nominal), *points.items()]:
+            for fitted, predicted in folds:
+                keys.append(key)
+                tasks.append(self._fold(point, fitted, predicted, refitted=key != NOMINAL))
+        found_all: dict[tuple[str, ...], list[Prediction]] = {}
+        answers = self.pool.map(shrink.predict, self.recipe, tasks)
+        for done, (key, prediction) in enumerate(zip(keys, answers, strict=True)):
+            if self.progress is not None:
+                self.progress("held-out runs", (done + 1) / len(keys))
+            found_all.setdefault(key, []).append(prediction)
+        return found_all
+
+    def _fold(
+        self, point: Point, fitted: tuple[int, ...], predicted: tuple[int, ...], *, refitted: bool
+    ) -> Fold:
+        """A fold that begins where the fit to all runs has ended."""
+        states = tuple(point.states[self.plan.fitted.index(run)] for run in fitted)
+        return Fold(
+            fitted=fitted,
+            predicted=predicted,
+            start=replace(point, states=states),
+            refitted=refitted,
+            as_fitted=self.plan.as_fitted,
+        )
+
+
+def _best(explained: Explanation) -> list[Contender]:
+    ranked = sorted(explained.contenders, key=explained.evidence, reverse=True)
+    return [c for c in ranked[:TRIED] if explained.evidence(c) > THRESHOLD]
