@@ -154,8 +154,10 @@ class _Problem:
     unknowns: tuple[Unknown, ...]
     residuals: Sequence[Residual]
     progress: Callable[[float], None] | None
+    follow: _Followed | None = None
     simulations: int = 0
     known: tuple[bytes, list[Array]] = (b"", [])
+    slopes_known: tuple[bytes, list[Array]] = (b"", [])
     steps: Array = field(default_factory=lambda: np.zeros(0))
 
     def residual(self, z: Array) -> list[Array]:
@@ -173,9 +175,17 @@ class _Problem:
 
     def jacobian(self, z: Array) -> list[Array]:
         """Jacobian of every run at z: forward differences, backward at an upper bound."""
+        key = z.tobytes()
+        if self.slopes_known[0] != key:
+            self.slopes_known = key, self._jacobian(z)
+        return self.slopes_known[1]
+
+    def _jacobian(self, z: Array) -> list[Array]:
         base = self.residual(z)
         jacobians = [np.zeros((*r.shape, len(z))) for r in base]
         for j, unknown in enumerate(self.unknowns):
+            if self.follow is not None and self.follow.has[j]:
+                continue
             step = self.steps[j]
             if z[j] + step > unknown.scaled(unknown.upper):
                 step = -step
@@ -184,6 +194,8 @@ class _Problem:
             runs = range(len(base)) if unknown.run is None else (unknown.run,)
             for k in runs:
                 jacobians[k][..., j] = (self._run(k, changed) - base[k]) / (changed[j] - z[j])
+        if self.follow is not None:
+            self.follow.fill(z, base, jacobians)
         self.steps = _steps(jacobians)
         return jacobians
 
@@ -206,6 +218,36 @@ class _Problem:
         )
 
 
+class _Followed:
+    """Columns of the Jacobian that are not differenced: they begin as those of another estimate and
+    follow the residual by secants (Broyden, Math. Comp. 19 (1965) 577).
+    """
+
+    def __init__(self, unknowns: Sequence[Unknown], other: Estimate) -> None:
+        column = {(u.name, u.run): j for j, u in enumerate(other.unknowns)}
+        self.has = np.array([(u.name, u.run) in column for u in unknowns])
+        wanted = [column[u.name, u.run] for u in unknowns if (u.name, u.run) in column]
+        self._slopes = [j[..., wanted] for j in other.jacobians]
+        self._last: tuple[Array, Sequence[Array], Sequence[Array]] | None = None
+
+    def fill(self, z: Array, residuals: Sequence[Array], jacobians: Sequence[Array]) -> None:
+        """Put the columns into Jacobians at z that have all others."""
+        if self._last is not None:
+            before, old, others = self._last
+            step = z - before
+            weight = sum(np.einsum("cnj,cnj->j", j, j) for j in self._slopes) * step[self.has]
+            length = float(weight @ step[self.has])
+            if length > 0.0:
+                for k, jacobian in enumerate(jacobians):
+                    between = 0.5 * (others[k] + jacobian)[..., ~self.has]
+                    missed = residuals[k] - old[k] - between @ step[~self.has]
+                    missed -= self._slopes[k] @ step[self.has]
+                    self._slopes[k] += missed[..., None] * (weight / length)
+        for slopes, jacobian in zip(self._slopes, jacobians, strict=True):
+            jacobian[..., self.has] = slopes
+        self._last = z.copy(), list(residuals), list(jacobians)
+
+
 def _values(unknowns: Sequence[Unknown], z: Array, run: int) -> dict[str, float]:
     return {u.name: u.value(float(z[j])) for j, u in enumerate(unknowns) if u.run in {None, run}}
 
@@ -224,6 +266,7 @@ def estimate(
     settled: float = COST_SETTLED,
     iterations: int | None = None,
     progress: Callable[[float], None] | None = None,
+    follow: Estimate | None = None,
 ) -> Estimate:
     """Fit the unknowns from their starts.
 
@@ -231,6 +274,8 @@ def estimate(
     settled : relative fall of the cost that ends the fit
     iterations : at most so many; None: MAX_ITERATIONS
     progress : called with the sum of squares after every simulation of all runs
+    follow : an estimate nearby, of the same runs; the columns of its unknowns are then not
+        simulated but follow by secants: far cheaper, and good for a first look only
     """
     from scipy.optimize import least_squares
     from threadpoolctl import threadpool_limits
@@ -240,7 +285,8 @@ def estimate(
     upper = np.array([u.scaled(u.upper) for u in unknowns])
     margin = 1e-6 * (upper - lower)
     start = np.array([u.scaled(u.start) for u in unknowns])
-    problem = _Problem(unknowns, residuals, progress)
+    followed = None if follow is None else _Followed(unknowns, follow)
+    problem = _Problem(unknowns, residuals, progress, followed)
     problem.steps = np.full(len(unknowns), 1e-5)
     # Threads that wait for each other in a decomposition of ten columns take most of the time.
     with threadpool_limits(1):

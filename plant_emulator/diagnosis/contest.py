@@ -5,11 +5,14 @@
     else as fitted; and what of that the drifting parameters cannot imitate (the part orthogonal to
     their tangents: Basseville and Nikiforov, INRIA RR-4438, 2002).
  3. A joint fit of drift and effect, started from the size whose signature explains most, the drift
-    moved by what the linear picture says.
+    moved by what the linear picture says: of every effect a cheap first look, whose drift follows
+    by secants; of the best a few full steps; of the best of these to convergence.
  4. Where the fit without effects leaves much, it may lie in a wrong valley, and mislead both the
     signature and the start: the joint fit then starts once more from the nominal parameters and
     the size that fits these best.
- 5. The fit without effects starts again from every joint fit's drift: should it get as low, there
+ 5. What leaves more than noise starts again from some way off (3 times): where contact comes and
+    goes, the cost is rough, and a fit may have stopped in a small hollow.
+ 6. The fit without effects starts again from every joint fit's drift: should it get as low, there
     was no effect, only a better valley.
 
 Every step is a function of a model and plain data, so that steps run side by side on other
@@ -36,9 +39,13 @@ if TYPE_CHECKING:
 
 # Relative fall of the cost that ends a fit here: a few hundredths in units of chi squared.
 SETTLED = 1e-6
+# Steps of a first look, whose drift follows by secants, and the relative fall that ends it.
+GLANCE, GLANCE_SETTLED = 10, 1e-4
 # Steps of a fit that only has to show whether it is worth more: without and with states of its
 # own, which make a long curved valley of the cost.
 FEW, FEW_WITH_STATES = 8, 24
+# The same from some way off, and how far off that is [standard errors].
+FEW_SHAKEN, SHAKE = 12, 30.0
 # The same from the nominal parameters, where a step goes far.
 FEW_FAR, FEW_FAR_WITH_STATES = 4, 8
 # Sizes that a start from the nominal parameters is tried at, in plausible sizes.
@@ -108,11 +115,16 @@ def fit(
     values: Mapping[str, float],
     states: Sequence[Mapping[str, float]],
     iterations: int | None = None,
+    near: Estimate | None = None,
 ) -> Point:
-    """Joint fit of drift, states and these effects, from these values."""
+    """Joint fit of drift, states and these effects, from these values.
+
+    near : see `estimate`'s `follow`; a first look only
+    """
     unknowns = started(template(model, effects, runs), values, states)
     residuals = [model.residual(k, effects) for k in runs]
-    found = estimate(unknowns, residuals, settled=SETTLED, iterations=iterations)
+    settled = SETTLED if near is None else GLANCE_SETTLED
+    found = estimate(unknowns, residuals, settled=settled, iterations=iterations, follow=near)
     return point(effects, found, len(runs))
 
 
@@ -166,19 +178,47 @@ def null_fit(model: Model, runs: Sequence[int]) -> Point:
     return min(found, fit(model, (), runs, nominal, states), key=lambda p: p.cost)
 
 
-def joint(model: Model, found: Signature, base: Point, runs: Sequence[int]) -> Point:
-    """Joint fit of one more effect, a few steps only: from its signature's start, or, where that
+def glance(
+    model: Model, found: Signature, base: Point, runs: Sequence[int], near: Estimate
+) -> Point:
+    """A first look at the joint fit of one more effect, from its signature's start, or, where that
     leads nowhere, from the drift as it is.
+
+    near : the base's estimate; the drift's slopes follow from its own, only the effect's are
+        simulated
     """
     effects = (*base.effects, found.effect)
-    few = FEW_WITH_STATES if model.candidates[found.effect].states else FEW
-    best = fit(model, effects, runs, found.start, found.states, few)
+    best = fit(model, effects, runs, found.start, found.states, GLANCE, near)
     if best.cost < base.cost - WORTH:
         return best
     own = {u.name: u.start for u in model.candidates[found.effect].states}
     states = [{**state, **own} for state in base.states]
     small = {**found.start, **base.values}
-    return min(best, fit(model, effects, runs, small, states, few), key=lambda p: p.cost)
+    other = fit(model, effects, runs, small, states, GLANCE, near)
+    return min(best, other, key=lambda p: p.cost)
+
+
+def look(model: Model, effects: Sequence[str], runs: Sequence[int], start: Point) -> Point:
+    """A few steps of a joint fit, from where another fit has come to."""
+    with_states = any(model.candidates[name].states for name in effects)
+    few = FEW_WITH_STATES if with_states else FEW
+    return fit(model, effects, runs, start.values, start.states, few)
+
+
+def shaken(
+    model: Model, effects: Sequence[str], runs: Sequence[int], start: Point, number: int
+) -> Point:
+    """A few steps of a joint fit from some way off where it has come to, each number another way.
+
+    As far as SHAKE standard errors, no further than a prior deviation.
+    """
+    random = np.random.default_rng(number)
+    moved = dict(start.values)
+    for u in template(model, effects, runs):
+        if u.run is None:
+            far = min(SHAKE * start.errors[u.name], u.std or abs(moved[u.name]))
+            moved[u.name] += far * float(random.standard_normal())
+    return fit(model, effects, runs, moved, start.states, FEW_SHAKEN)
 
 
 def from_nominal(model: Model, effect: str, base: Point, runs: Sequence[int]) -> Point:

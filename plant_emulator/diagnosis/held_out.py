@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.explain import Contender, Explanation
     from plant_emulator.diagnosis.model import Model
     from plant_emulator.diagnosis.pool import Pool, Recipe
+    from plant_emulator.diagnosis.rounds import Progress
     from plant_emulator.diagnosis.shrink import Prediction
-    from plant_emulator.diagnosis.stepwise import Progress
     from plant_emulator.diagnosis.verdict import Verdict
 
 # Effects whose held-out gain is computed: the best ones only, each takes a fit a fold.

@@ -5,7 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.contest import Point, again, from_nominal, joint, linearised, null_fit
+from plant_emulator.diagnosis.contest import (
+    Point,
+    again,
+    from_nominal,
+    glance,
+    linearised,
+    look,
+    null_fit,
+    shaken,
+)
 from plant_emulator.diagnosis.signature import Tangents, signature
 
 if TYPE_CHECKING:
@@ -18,12 +27,14 @@ class Task:
     """One step: an effect, or none, on top of a fit, on these runs.
 
     signature : where a joint fit starts from, if it has been computed
+    number : of several starts
     """
 
     base: Point
     runs: tuple[int, ...]
     effect: str = ""
     signature: Signature | None = None
+    number: int = 0
 
 
 def start(model: Model, runs: tuple[int, ...]) -> Point:
@@ -37,9 +48,20 @@ def show(model: Model, task: Task) -> Signature | None:
 
 
 def contend(model: Model, task: Task) -> Point:
-    """The joint fit of an effect from its signature."""
+    """A first look at the joint fit of an effect from its signature."""
     assert task.signature is not None
-    return joint(model, task.signature, task.base, task.runs)
+    near = _tangents(model, task).found
+    return glance(model, task.signature, task.base, task.runs, near)
+
+
+def follow(model: Model, task: Task) -> Point:
+    """A few steps more of `task.base`'s fit."""
+    return look(model, task.base.effects, task.runs, task.base)
+
+
+def shake(model: Model, task: Task) -> Point:
+    """The fit of `task.base` from some way off its values."""
+    return shaken(model, task.base.effects, task.runs, task.base, task.number)
 
 
 def once_more(model: Model, task: Task) -> Point:

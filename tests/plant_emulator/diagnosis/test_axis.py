@@ -12,7 +12,7 @@ from plant_emulator.diagnosis.axis import AxisModel, AxisRecipe
 from plant_emulator.diagnosis.axis_effects import EFFECTS
 from plant_emulator.diagnosis.axis_signals import AxisLog
 from plant_emulator.diagnosis.bands import power
-from plant_emulator.diagnosis.contest import Point, joint, linearised, null_fit
+from plant_emulator.diagnosis.contest import Point, glance, linearised, look, null_fit
 from plant_emulator.diagnosis.signature import Tangents, signature
 from plant_emulator.errors import LogError
 
@@ -38,7 +38,9 @@ def contest(model: AxisModel, runs: tuple[int, ...]) -> tuple[Point, dict[str, P
     tangents = Tangents(linearised(model, null, runs))
     found = {name: signature(model, name, null, runs, tangents) for name in model.candidates}
     return null, {
-        name: joint(model, one, null, runs) for name, one in found.items() if one is not None
+        name: look(model, (name,), runs, glance(model, one, null, runs, tangents.found))
+        for name, one in found.items()
+        if one is not None
     }
 
 

@@ -15,7 +15,7 @@ import pytest
 from plant_emulator import axis_log
 from plant_emulator.diagnosis.axis import AxisModel
 from plant_emulator.diagnosis.bands import BANDS, power
-from plant_emulator.diagnosis.contest import Point, joint, linearised, null_fit
+from plant_emulator.diagnosis.contest import Point, glance, linearised, look, null_fit
 from plant_emulator.diagnosis.signature import Tangents, signature
 from plant_emulator.estimation import estimate
 
@@ -39,7 +39,11 @@ def contest(model: AxisModel, runs: tuple[int, ...], base: Point | None = None) 
     others = (name for name in model.candidates if name not in base.effects)
     found = {name: signature(model, name, base, runs, tangents) for name in others}
     return base, {
-        name: joint(model, one, base, runs) for name, one in found.items() if one is not None
+        name: look(
+            model, (*base.effects, name), runs, glance(model, one, base, runs, tangents.found)
+        )
+        for name, one in found.items()
+        if one is not None
     }
 
 

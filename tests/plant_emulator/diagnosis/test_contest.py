@@ -6,8 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis import stepwise as engine
-from plant_emulator.diagnosis.contest import Point, fit, from_nominal, joint, linearised, null_fit
+from plant_emulator.diagnosis import rounds as engine
+from plant_emulator.diagnosis.contest import (
+    Point,
+    fit,
+    from_nominal,
+    glance,
+    linearised,
+    look,
+    null_fit,
+)
 from plant_emulator.diagnosis.explain import Explanation, adequate, excess
 from plant_emulator.diagnosis.model import Candidate, Run
 from plant_emulator.diagnosis.pool import Here
@@ -242,9 +250,11 @@ def test_effect_behind_a_fit_in_a_wrong_valley_is_found_from_the_nominal_paramet
     model = Wave([noisy(8.0 * np.sin(5.3 * TIME) + 2.0 * np.abs(TIME))], ["kink"])
     wrong = fit(model, (), [0], *model.search([0]))
     assert wrong.chi_squared > 10.0
-    found = signature(model, "kink", wrong, [0], Tangents(linearised(model, wrong, [0])))
+    near = linearised(model, wrong, [0])
+    found = signature(model, "kink", wrong, [0], Tangents(near))
     assert found is not None
-    assert joint(model, found, wrong, [0]).chi_squared > 10.0
+    first = glance(model, found, wrong, [0], near)
+    assert look(model, ("kink",), [0], first).chi_squared > 10.0
     right = from_nominal(model, "kink", wrong, [0])
     assert right.chi_squared < 1.1
     assert right.values["kink_size"] == pytest.approx(2.0, abs=0.3)

@@ -1,0 +1,212 @@
+"""One round of a contest: every effect on top of a fit, the best of them taken further and further.
+
+Most effects of most rounds lead nowhere, so that each step is made for fewer of them: all get a
+first look, the best a few full steps, the best of these go to convergence and start again from some
+way off.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, TypeVar
+
+from plant_emulator.diagnosis.contest import ASTRAY, WORTH
+from plant_emulator.diagnosis.explain import Contender
+from plant_emulator.diagnosis.steps import (
+    Task,
+    contend,
+    follow,
+    once_more,
+    refit,
+    shake,
+    show,
+    start,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from plant_emulator.diagnosis.contest import Point
+    from plant_emulator.diagnosis.model import Model
+    from plant_emulator.diagnosis.pool import Pool, Recipe
+    from plant_emulator.diagnosis.signature import Signature
+
+    Progress = Callable[[str, float], None]
+
+Found = TypeVar("Found")
+
+# Mean square up to which a model leaves nothing but noise.
+NOISE_LEFT = 1.05
+RESTARTS = 3
+# Times that a fit that ran out of steps is taken up again.
+PATIENCE = 3
+# Best of a round's first looks that are fitted, and best of these that are fitted to convergence.
+CHOSEN, POLISHED = 8, 4
+# What keeps an effect in a round: the fall of its cost [fall of the best one], or that it is no
+# further behind the best than a first look may be wrong [chi squared].
+KEPT, NEAR = 0.25, 50.0
+# Best of a round that start again from some way off, and how often.
+SHAKEN, SHAKES = 3, 3
+
+
+class Rounds:
+    """The rounds of one diagnosis on its pool.
+
+    names : of the effects; runs : by number; progress : told the stage and its done share
+    """
+
+    def __init__(
+        self,
+        pool: Pool,
+        recipe: Recipe,
+        names: Sequence[str],
+        runs: Sequence[int],
+        progress: Progress | None = None,
+    ) -> None:
+        self._pool, self._recipe, self._names = pool, recipe, tuple(names)
+        self._runs, self._progress = tuple(runs), progress
+
+    def without_effects(self) -> Point:
+        """The fit without effects."""
+        (null,) = self._pool.map(start, self._recipe, [self._runs])
+        if null.chi_squared > NOISE_LEFT:
+            (null,) = self._shaken([null])
+        return null
+
+    def refitted(self, point: Point) -> Point:
+        """A fit to convergence from where another has come to."""
+        (found,) = self._pool.map(refit, self._recipe, [Task(base=point, runs=self._runs)])
+        return found
+
+    def settled(self, final: Point) -> Point:
+        """The fit taken up again where it ran out of steps."""
+        for _ in range(PATIENCE):
+            if final.converged:
+                break
+            final = self.refitted(final)
+        return final
+
+    def contend(self, base: Point, stage: str) -> list[Contender]:
+        """All effects on top of a fit: a first look at each, the best of them fitted."""
+        names = [name for name in self._names if name not in base.effects]
+        tasks = [Task(base=base, runs=self._runs, effect=name) for name in names]
+        found = self._told(stage, tasks, self._pool.map(show, self._recipe, tasks))
+        shown = dict(zip(names, found, strict=True))
+        tasks = [
+            Task(base=base, runs=self._runs, effect=name, signature=one)
+            for name, one in shown.items()
+            if one is not None
+        ]
+        points = self._told(stage, tasks, self._pool.map(contend, self._recipe, tasks))
+        seen = {task.effect: point for task, point in zip(tasks, points, strict=True)}
+        contenders = [_contender(name, one, seen.get(name)) for name, one in shown.items()]
+        contenders = self._fitted(contenders, base, CHOSEN, follow, stage)
+        contenders = self._fitted(contenders, base, POLISHED, refit, stage)
+        return contenders if explained(contenders) else self._moved(contenders, base)
+
+    def from_nominal(
+        self, base: Point, contenders: Sequence[Contender], stage: str
+    ) -> list[Contender]:
+        """Effects fitted from the nominal parameters: the best, or all where much is left."""
+        moving = sorted((c for c in contenders if c.point is not None), key=_cost)
+        chosen = moving if base.chi_squared > ASTRAY else moving[:CHOSEN]
+        tasks = [Task(base=base, runs=self._runs, effect=c.effect) for c in chosen]
+        points = self._told(stage, tasks, self._pool.map(once_more, self._recipe, tasks))
+        again = [replace(c, point=p) for c, p in zip(chosen, points, strict=True)]
+        return self._fitted(again, base, POLISHED, refit, stage)
+
+    def restarted(self, base: Point, contenders: Sequence[Contender]) -> Point:
+        """The best fit with the base's effects from the drift of the best contenders."""
+        ranked = sorted(_points(contenders), key=lambda p: p.cost)[:RESTARTS]
+        starts = [replace(p, effects=base.effects) for p in ranked if base.cost - p.cost > WORTH]
+        tasks = [Task(base=p, runs=self._runs) for p in starts]
+        again = self._pool.map(refit, self._recipe, tasks)
+        return min([base, *again], key=lambda p: p.cost)
+
+    def _moved(self, contenders: Sequence[Contender], base: Point) -> list[Contender]:
+        """The best of a round started again from some way off."""
+        best = _best_few(contenders, base, SHAKEN)
+        points = self._shaken([c.point for c in best if c.point is not None])
+        again = [replace(c, point=p) for c, p in zip(best, points, strict=True)]
+        return better_of(contenders, again)
+
+    def _shaken(self, points: Sequence[Point]) -> list[Point]:
+        """Fits, each the best of itself and those from some way off."""
+        tasks = [
+            Task(base=point, runs=self._runs, number=k) for point in points for k in range(SHAKES)
+        ]
+        found = list(self._pool.map(shake, self._recipe, tasks))
+        best = [
+            min(found[SHAKES * k : SHAKES * (k + 1)], key=lambda p: p.cost)
+            for k in range(len(points))
+        ]
+        lower = {k: new for k, new in enumerate(best) if new.cost < points[k].cost - WORTH}
+        tasks = [Task(base=new, runs=self._runs) for new in lower.values()]
+        ended = dict(zip(lower, self._pool.map(refit, self._recipe, tasks), strict=True))
+        return [ended.get(k, point) for k, point in enumerate(points)]
+
+    def _fitted(
+        self,
+        contenders: Sequence[Contender],
+        base: Point,
+        most: int,
+        step: Callable[[Model, Task], Point],
+        stage: str,
+    ) -> list[Contender]:
+        """The best of a round taken a step further."""
+        best = _best_few(contenders, base, most)
+        tasks = [Task(base=c.point, runs=self._runs) for c in best if c.point is not None]
+        fitted = self._told(stage, tasks, self._pool.map(step, self._recipe, tasks))
+        done = {c.effect: replace(c, point=p) for c, p in zip(best, fitted, strict=True)}
+        return [done.get(c.effect, c) for c in contenders]
+
+    def _told(self, stage: str, tasks: Sequence[Task], found: Iterator[Found]) -> list[Found]:
+        """All that is found, told as it comes."""
+        every = []
+        for done, one in enumerate(found):
+            if self._progress is not None:
+                self._progress(stage, (done + 1) / len(tasks))
+            every.append(one)
+        return every
+
+
+def explained(contenders: Sequence[Contender]) -> bool:
+    """Whether an effect leaves nothing but noise."""
+    return any(point.chi_squared <= NOISE_LEFT for point in _points(contenders))
+
+
+def _contender(name: str, shown: Signature | None, point: Point | None) -> Contender:
+    if shown is None:
+        return Contender(effect=name, norm=0.0, raw=0.0, imitated_by="", point=None)
+    return Contender(
+        effect=name, norm=shown.norm, raw=shown.raw, imitated_by=shown.imitated_by, point=point
+    )
+
+
+def better_of(first: Sequence[Contender], second: Sequence[Contender]) -> list[Contender]:
+    """Of two fits of the same effect the better one."""
+    others = {c.effect: c for c in second if c.point is not None}
+    return [min(c, others.get(c.effect, c), key=_cost) for c in first]
+
+
+def _best_few(contenders: Sequence[Contender], base: Point, most: int) -> list[Contender]:
+    """Those whose cost is least, without those that fall far behind the best."""
+    order = sorted((c for c in contenders if c.point is not None), key=_cost)
+    if not order:
+        return []
+    least = _cost(order[0])
+    reach = max(least + NEAR, base.cost - KEPT * (base.cost - least))
+    return [c for c in order[:most] if _cost(c) <= reach]
+
+
+def _cost(contender: Contender) -> float:
+    return contender.point.cost if contender.point is not None else float("inf")
+
+
+def _points(contenders: Sequence[Contender]) -> Iterator[Point]:
+    return (c.point for c in contenders if c.point is not None)
+
+
+def best_of(contenders: Sequence[Contender]) -> Point | None:
+    """The fit whose cost is least; None where no effect shows."""
+    return min(_points(contenders), key=lambda p: p.cost, default=None)
