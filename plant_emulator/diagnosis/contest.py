@@ -10,8 +10,9 @@
  4. Where the fit without effects leaves much, it may lie in a wrong valley, and mislead both the
     signature and the start: the joint fit then starts once more from the nominal parameters and
     the size that fits these best.
- 5. What leaves more than noise starts again from some way off (3 times): where contact comes and
-    goes, the cost is rough, and a fit may have stopped in a small hollow.
+ 5. What leaves more than noise starts again from a larger size, for the linear picture is wrong
+    where drift has gone far to imitate the effect; and the best from some way off (3 times): where
+    contact comes and goes, the cost is rough, and a fit may have stopped in a small hollow.
  6. The fit without effects starts again from every joint fit's drift: should it get as low, there
     was no effect, only a better valley.
 
@@ -196,6 +197,15 @@ def glance(
     small = {**found.start, **base.values}
     other = fit(model, effects, runs, small, states, GLANCE, near)
     return min(best, other, key=lambda p: p.cost)
+
+
+def glance_far(
+    model: Model, found: Signature, base: Point, runs: Sequence[int], near: Estimate
+) -> Point | None:
+    """The same from a larger size; None where the signature has none."""
+    if found.far is None:
+        return None
+    return fit(model, (*base.effects, found.effect), runs, *found.far, GLANCE, near)
 
 
 def look(model: Model, effects: Sequence[str], runs: Sequence[int], start: Point) -> Point:

@@ -10,11 +10,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
-from plant_emulator.diagnosis.contest import ASTRAY, WORTH
+from plant_emulator.diagnosis.contest import WORTH
 from plant_emulator.diagnosis.explain import Contender
 from plant_emulator.diagnosis.steps import (
     Task,
     contend,
+    contend_far,
     follow,
     once_more,
     refit,
@@ -98,21 +99,39 @@ class Rounds:
             if one is not None
         ]
         points = self._told(stage, tasks, self._pool.map(contend, self._recipe, tasks))
-        seen = {task.effect: point for task, point in zip(tasks, points, strict=True)}
-        contenders = [_contender(name, one, seen.get(name)) for name, one in shown.items()]
-        contenders = self._fitted(contenders, base, CHOSEN, follow, stage)
-        contenders = self._fitted(contenders, base, POLISHED, refit, stage)
+        seen = dict(zip((task.effect for task in tasks), points, strict=True))
+        contenders = self._taken_further(
+            [_contender(name, one, seen.get(name)) for name, one in shown.items()], base, stage
+        )
+        if explained(contenders) or base.chi_squared <= NOISE_LEFT:
+            return contenders
+        far = self._told(stage, tasks, self._pool.map(contend_far, self._recipe, tasks))
+        seen = {task.effect: point for task, point in zip(tasks, far, strict=True) if point}
+        again = [replace(c, point=seen.get(c.effect)) for c in contenders]
+        contenders = better_of(contenders, self._taken_further(again, base, stage))
         return contenders if explained(contenders) else self._moved(contenders, base)
+
+    def _taken_further(
+        self, contenders: Sequence[Contender], base: Point, stage: str
+    ) -> list[Contender]:
+        """The best after a first look fitted, and the best of these to convergence."""
+        contenders = self._fitted(contenders, base, CHOSEN, follow, stage)
+        return self._fitted(contenders, base, POLISHED, refit, stage)
 
     def from_nominal(
         self, base: Point, contenders: Sequence[Contender], stage: str
     ) -> list[Contender]:
-        """Effects fitted from the nominal parameters: the best, or all where much is left."""
-        moving = sorted((c for c in contenders if c.point is not None), key=_cost)
-        chosen = moving if base.chi_squared > ASTRAY else moving[:CHOSEN]
+        """Effects fitted from the nominal parameters."""
+        chosen = [c for c in contenders if c.point is not None]
         tasks = [Task(base=base, runs=self._runs, effect=c.effect) for c in chosen]
         points = self._told(stage, tasks, self._pool.map(once_more, self._recipe, tasks))
-        again = [replace(c, point=p) for c, p in zip(chosen, points, strict=True)]
+        again = sorted(
+            (replace(c, point=p) for c, p in zip(chosen, points, strict=True)), key=_cost
+        )
+        # A few steps from afar end anywhere: the best go on, however they stand against the others.
+        tasks = [Task(base=c.point, runs=self._runs) for c in again[:POLISHED] if c.point]
+        points = self._told(stage, tasks, self._pool.map(follow, self._recipe, tasks))
+        again = [replace(c, point=p) for c, p in zip(again, points, strict=False)]
         return self._fitted(again, base, POLISHED, refit, stage)
 
     def restarted(self, base: Point, contenders: Sequence[Contender]) -> Point:

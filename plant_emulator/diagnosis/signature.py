@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 # Sizes at which a signature is tried, in plausible sizes.
 SIZES = (0.03, 0.1, 0.3, 1.0, 2.0)
+# From which of these on a fit may begin besides the best one.
+FAR = 0.3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,6 +29,7 @@ class Signature:
     """What an effect does to the whitened residual of a fit that lacks it.
 
     start : where a joint fit may begin, by name; states : the same of every run
+    far : the same at a larger size, if there is one
     norm : of the part that drift cannot imitate, at the plausible size
     raw : of the whole, at the plausible size
     gain : fall of the sum of squares that the linear picture expects at the best size
@@ -39,6 +42,7 @@ class Signature:
     effect: str
     start: Mapping[str, float]
     states: tuple[Mapping[str, float], ...]
+    far: tuple[Mapping[str, float], tuple[Mapping[str, float], ...]] | None
     norm: float
     raw: float
     gain: float
@@ -90,15 +94,18 @@ def signature(
     if not moving:
         return None
     best = max(moving, key=lambda trial: trial.gain)
+    beyond = [t for t in moving if t.size / best.size > 1.0 and abs(t.size) >= FAR]
+    larger = min(beyond, key=lambda trial: abs(trial.size), default=None)
     plausible = max((t for t in trials if abs(t.size) == 1.0), key=lambda t: t.norm)
-    values, states = tangents.moved(tangents.imitation(best.change), len(runs))
     own = {u.name: u.start for u in model.candidates[name].states}
+    values, states = _start(best, tangents, own, len(runs))
     names = [u.name for u in tangents.found.unknowns]
     follows = np.abs(tangents.imitation(plausible.change)) * _lengths(tangents.found)
     return Signature(
         effect=name,
-        start={**values, **best.sizes},
-        states=tuple({**state, **own} for state in states),
+        start=values,
+        states=states,
+        far=None if larger is None else _start(larger, tangents, own, len(runs)),
         norm=plausible.norm,
         raw=float(np.linalg.norm(plausible.change)),
         gain=best.gain,
@@ -107,6 +114,14 @@ def signature(
         imitated_by=names[int(np.argmax(follows))],
         direction=plausible.rest / max(plausible.norm, 1e-12),
     )
+
+
+def _start(
+    trial: _Trial, tangents: Tangents, own: Mapping[str, float], runs: int
+) -> tuple[dict[str, float], tuple[dict[str, float], ...]]:
+    """Values and states with the effect at a size, and the drift moved as it would imitate it."""
+    values, states = tangents.moved(tangents.imitation(trial.change), runs)
+    return {**values, **trial.sizes}, tuple({**state, **own} for state in states)
 
 
 def _tangent_gain(trial: _Trial, tangents: Tangents) -> float:

@@ -10,6 +10,7 @@ from plant_emulator.diagnosis.contest import (
     again,
     from_nominal,
     glance,
+    glance_far,
     linearised,
     look,
     null_fit,
@@ -52,6 +53,13 @@ def contend(model: Model, task: Task) -> Point:
     assert task.signature is not None
     near = _tangents(model, task).found
     return glance(model, task.signature, task.base, task.runs, near)
+
+
+def contend_far(model: Model, task: Task) -> Point | None:
+    """The same from a larger size."""
+    assert task.signature is not None
+    near = _tangents(model, task).found
+    return glance_far(model, task.signature, task.base, task.runs, near)
 
 
 def follow(model: Model, task: Task) -> Point:

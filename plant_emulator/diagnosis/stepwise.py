@@ -10,8 +10,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from plant_emulator.diagnosis.contest import ASTRAY
 from plant_emulator.diagnosis.explain import MARGIN, THRESHOLD, Explanation, excess
-from plant_emulator.diagnosis.rounds import NOISE_LEFT, Rounds, best_of, better_of, explained
+from plant_emulator.diagnosis.rounds import Rounds, best_of, better_of, explained
 from plant_emulator.diagnosis.rules import counts, enough
 
 if TYPE_CHECKING:
@@ -71,8 +72,8 @@ class Contest:
         """All effects on the fit without any, and that fit, started again from the best of them.
 
         All are tried again where the fit without effects has moved to another valley, and start
-        once more from the nominal parameters where nothing leaves noise only: in a cost of many
-        valleys a signature is but a hint.
+        once more from the nominal parameters where much is left: in a cost of many valleys a
+        signature is but a hint.
         """
         stage = "contest"
         contenders = self._rounds.contend(null, stage)
@@ -81,7 +82,7 @@ class Contest:
             return better, contenders
         if null.cost - better.cost > max(THRESHOLD, MOVED * excess(null)):
             contenders = better_of(contenders, self._rounds.contend(better, stage))
-        if better.chi_squared > NOISE_LEFT and not explained(contenders):
+        if better.chi_squared > ASTRAY and not explained(contenders):
             contenders = better_of(contenders, self._rounds.from_nominal(better, contenders, stage))
             better = self._rounds.restarted(better, contenders)
         return better, contenders

@@ -46,16 +46,60 @@ MISRA_Y = np.array(
 )
 
 
+def misra(v: Mapping[str, float]) -> Array:
+    """Residual of the regression."""
+    return (MISRA_Y - v["b1"] * (1 - np.exp(-v["b2"] * MISRA_X)))[None, :]
+
+
+MISRA = [
+    Unknown(name="b1", start=250.0, lower=1.0, upper=1e4),
+    Unknown(name="b2", start=5e-4, lower=1e-6, upper=1e-1),
+]
+
+
+def test_nothing_is_simulated_twice() -> None:
+    """The slopes where a fit has ended are those of its last step."""
+    asked: list[tuple[float, ...]] = []
+
+    def residual(v: Mapping[str, float]) -> Array:
+        asked.append(tuple(v.values()))
+        return misra(v)
+
+    found = estimate(MISRA, [residual])
+    assert found.converged
+    assert len(set(asked)) == len(asked) == found.simulations
+
+
+def test_columns_that_follow_are_not_simulated_and_lead_to_the_same_optimum() -> None:
+    """Misra1a with a third unknown, from the estimate without it."""
+    tilt = number("tilt", 0.0, scale=1e-3)
+    near = estimate(MISRA, [misra])
+
+    def tilted(v: Mapping[str, float]) -> Array:
+        return misra({"b1": v["b1"], "b2": v["b2"]}) + 0.002 * MISRA_X - v["tilt"] * MISRA_X
+
+    start = [
+        Unknown(name=u.name, start=u.value(z), lower=u.lower, upper=u.upper)
+        for u, z in zip(near.unknowns, near.z, strict=True)
+    ]
+    full = estimate([*start, tilt], [tilted])
+    quick = estimate([*start, tilt], [tilted], follow=near)
+    assert quick.cost == pytest.approx(full.cost, rel=0.05)
+    assert quick.cost < 0.2 * near.cost
+    for name, value in full.parameters().items():
+        assert quick.parameters()[name] == pytest.approx(value, rel=0.05)
+    first = estimate([*start, tilt], [tilted], follow=near, iterations=1)
+    assert np.array_equal(first.jacobians[0][..., :2], near.jacobians[0])
+    assert first.simulations == 2  # where it starts, and the tilt
+
+
 @pytest.mark.parametrize("start", [(500.0, 1e-4), (250.0, 5e-4)])  # NIST's two starts
 def test_certified_regression_is_reproduced(start: tuple[float, float]) -> None:
-    def residual(v: Mapping[str, float]) -> Array:
-        return (MISRA_Y - v["b1"] * (1 - np.exp(-v["b2"] * MISRA_X)))[None, :]
-
     unknowns = [
         Unknown(name="b1", start=start[0], lower=1.0, upper=1e4),
         Unknown(name="b2", start=start[1], lower=1e-6, upper=1e-1),
     ]
-    found = estimate(unknowns, [residual])
+    found = estimate(unknowns, [misra])
     assert found.converged
     assert found.parameters()["b1"] == pytest.approx(2.3894212918e02, rel=1e-5)
     assert found.parameters()["b2"] == pytest.approx(5.5015643181e-04, rel=1e-5)

@@ -12,6 +12,7 @@ from plant_emulator.diagnosis.contest import (
     fit,
     from_nominal,
     glance,
+    glance_far,
     linearised,
     look,
     null_fit,
@@ -265,6 +266,77 @@ def test_fit_without_effects_in_a_wrong_valley_is_left_for_a_better_one() -> Non
     model = Wave([noisy(8.0 * np.sin(5.3 * TIME))], [])
     assert fit(model, (), [0], *model.search([0])).chi_squared > 10.0
     assert null_fit(model, [0]).chi_squared < 1.1
+
+
+class Hollow(Line):
+    """y = a + 10 (b + a bump near b = 2) x: a hollow of the cost at 2, whatever b is in truth."""
+
+    parameters = (linear("a", 0.0, std=10.0), linear("b", 2.0, prior=2.0, std=20.0))
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+        others = super().residual(run, effects)
+
+        def residual(v: Mapping[str, float]) -> Array:
+            bump = 0.7 * np.exp(-(((v["b"] - 2.0) / 0.05) ** 2))
+            return others({**v, "b": 10.0 * (v["b"] + bump)})
+
+        return residual
+
+    def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
+        """See `Model`."""
+        return {"a": 0.0, "b": 2.0}, [{} for _ in runs]
+
+
+def test_fit_in_a_small_hollow_starts_again_from_some_way_off() -> None:
+    """By hand: in the hollow 10 (3 - 2.7) x is left, of mean square 3; at b = 3 the noise."""
+    model = Hollow([noisy(30.0 * TIME)], ["kink"])
+    assert null_fit(model, [0]).chi_squared == pytest.approx(4.0, abs=0.2)
+    found = explained(model)
+    assert found.null.values["b"] == pytest.approx(3.0, abs=0.02)
+    assert found.final.effects == ()
+
+
+def test_effect_in_a_small_hollow_starts_again_from_some_way_off() -> None:
+    """The fit without the kink may lie in the hollow; with it, b = 3 is found."""
+    model = Hollow([noisy(30.0 * TIME + 2.0 * np.abs(TIME))], ["kink", "wave"])
+    found = explained(model)
+    assert found.final.effects == ("kink",)
+    assert found.final.values["b"] == pytest.approx(3.0, abs=0.02)
+    assert found.final.values["kink_size"] == pytest.approx(2.0, abs=0.3)
+
+
+def test_first_look_orders_effects_as_their_fits_do() -> None:
+    model = Wave([noisy(8.0 * np.sin(5.3 * TIME) + 2.0 * np.abs(TIME))], ["kink", "wave", "cube"])
+    base = null_fit(model, [0])
+    near = linearised(model, base, [0])
+    looks, fits = {}, {}
+    for name in model.candidates:
+        shown = signature(model, name, base, [0], Tangents(near))
+        assert shown is not None
+        looks[name] = glance(model, shown, base, [0], near)
+        fits[name] = fit(model, (name,), [0], shown.start, shown.states)
+        assert looks[name].cost < base.cost
+        assert looks[name].cost == pytest.approx(fits[name].cost, abs=5.0)
+    assert sorted(looks, key=lambda n: looks[n].cost) == sorted(fits, key=lambda n: fits[n].cost)
+
+
+def test_second_look_starts_from_a_larger_size_with_the_drift_moved_for_it() -> None:
+    """By hand: the best line through x^3 is 3/5 x; at three times the size b is 1.8 less."""
+    model = Line([noisy(2.4 * TIME + 0.96 * TIME**3)], ["cube"])
+    model.candidates = {"cube": effect("cube", 10.0)}
+    base = null_fit(model, [0])
+    near = linearised(model, base, [0])
+    found = signature(model, "cube", base, [0], Tangents(near))
+    assert found is not None
+    assert found.far is not None
+    assert found.start["cube_size"] == pytest.approx(1.0)
+    assert found.far[0]["cube_size"] == pytest.approx(3.0)
+    assert found.far[0]["b"] == pytest.approx(base.values["b"] - 0.6 * 3.0, abs=0.02)
+    second = glance_far(model, found, base, [0], near)
+    assert second is not None
+    assert second.values["cube_size"] == pytest.approx(0.96, abs=0.4)
+    assert second.cost == pytest.approx(glance(model, found, base, [0], near).cost, abs=0.1)
 
 
 def test_what_takes_but_a_part_of_the_rest_is_no_second_effect() -> None:
