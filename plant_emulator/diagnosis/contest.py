@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.covariance import correlation_time, structure
-from plant_emulator.diagnosis.signature import signs, sized
+from plant_emulator.diagnosis.signature import STATES, signs, sized, tried
 from plant_emulator.estimation import Estimate, at, estimate
 
 if TYPE_CHECKING:
@@ -192,8 +192,7 @@ def glance(
     best = fit(model, effects, runs, found.start, found.states, GLANCE, near)
     if best.cost < base.cost - WORTH:
         return best
-    own = {u.name: u.start for u in model.candidates[found.effect].states}
-    states = [{**state, **own} for state in base.states]
+    states = [{**own, **state} for own, state in zip(found.states, base.states, strict=True)]
     small = {**found.start, **base.values}
     other = fit(model, effects, runs, small, states, GLANCE, near)
     return min(best, other, key=lambda p: p.cost)
@@ -228,7 +227,30 @@ def shaken(
         if u.run is None:
             far = min(SHAKE * start.errors[u.name], u.std or abs(moved[u.name]))
             moved[u.name] += far * float(random.standard_normal())
-    return fit(model, effects, runs, moved, start.states, FEW_SHAKEN)
+    states = start.states
+    if any(model.candidates[name].states for name in effects):
+        states = _scanned(model, effects, runs, moved, states)
+    return fit(model, effects, runs, moved, states, FEW_SHAKEN)
+
+
+def _scanned(
+    model: Model,
+    effects: Sequence[str],
+    runs: Sequence[int],
+    values: Mapping[str, float],
+    states: Sequence[Mapping[str, float]],
+) -> tuple[dict[str, float], ...]:
+    """States of every run, each the best of some values while the others stay, two times over."""
+    own = (*model.states, *(u for name in effects for u in model.candidates[name].states))
+    found = []
+    for k, state in zip(runs, states, strict=True):
+        best = dict(state)
+        for u in (*own, *own):
+            trials = [{**best, u.name: value} for value in (best[u.name], *tried(u, STATES))]
+            losses = [_loss(model, effects, [k], values, [trial]) for trial in trials]
+            best = trials[int(np.argmin(losses))]
+        found.append(best)
+    return tuple(found)
 
 
 def from_nominal(model: Model, effect: str, base: Point, runs: Sequence[int]) -> Point:

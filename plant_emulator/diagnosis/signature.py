@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 SIZES = (0.03, 0.1, 0.3, 1.0, 2.0)
 # From which of these on a fit may begin besides the best one.
 FAR = 0.3
+# Values of a state that are tried.
+STATES = 9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,6 +73,16 @@ class Tangents:
         """The change of the residual that remains when drift follows it."""
         return np.asarray(change + self._slopes @ self.imitation(change))
 
+    def gains(self, change: Array) -> list[float]:
+        """Fall of every run's sum of squares at the best multiple of a change of that run alone."""
+        found, first = [], 0
+        for residual in self.found.residuals:
+            part = np.zeros_like(change)
+            part[first : first + residual.size] = change[first : first + residual.size]
+            first += residual.size
+            found.append(_gain(self.rest(part), self.residual))
+        return found
+
     def moved(self, shift: Array, runs: int) -> tuple[dict[str, float], list[dict[str, float]]]:
         """Values and states after a shift of z, within their bounds."""
         values: dict[str, float] = {}
@@ -85,8 +97,9 @@ def signature(
     model: Model, name: str, where: Point, runs: Sequence[int], tangents: Tangents
 ) -> Signature | None:
     """The signature of an effect at a fit that lacks it; None: it changes nothing there."""
+    own = _own_states(model, name, where, runs, tangents)
     trials = [
-        _trial(model, name, where, runs, tangents, sign * size)
+        _trial(model, name, where, runs, tangents, own, sign * size)
         for size in SIZES
         for sign in signs(model.candidates[name].sizes)
     ]
@@ -97,15 +110,14 @@ def signature(
     beyond = [t for t in moving if t.size / best.size > 1.0 and abs(t.size) >= FAR]
     larger = min(beyond, key=lambda trial: abs(trial.size), default=None)
     plausible = max((t for t in trials if abs(t.size) == 1.0), key=lambda t: t.norm)
-    own = {u.name: u.start for u in model.candidates[name].states}
-    values, states = _start(best, tangents, own, len(runs))
+    values, states = _start(best, tangents, own)
     names = [u.name for u in tangents.found.unknowns]
     follows = np.abs(tangents.imitation(plausible.change)) * _lengths(tangents.found)
     return Signature(
         effect=name,
         start=values,
         states=states,
-        far=None if larger is None else _start(larger, tangents, own, len(runs)),
+        far=None if larger is None else _start(larger, tangents, own),
         norm=plausible.norm,
         raw=float(np.linalg.norm(plausible.change)),
         gain=best.gain,
@@ -116,18 +128,54 @@ def signature(
     )
 
 
+def _own_states(
+    model: Model, name: str, where: Point, runs: Sequence[int], tangents: Tangents
+) -> list[dict[str, float]]:
+    """An effect's states of every run: those whose small signature explains most of that run.
+
+    Where an angle or a temperature at the start is unknown, a fit from a wrong one ends anywhere.
+    """
+    candidate = model.candidates[name]
+    own = [{u.name: u.start for u in candidate.states} for _ in runs]
+    sizes = sized(candidate, SIZES[1])
+    for unknown in candidate.states:
+        best = [-1.0] * len(runs)
+        for value in tried(unknown, STATES):
+            trial = [{**state, unknown.name: value} for state in own]
+            change = _residual(model, candidate, where, runs, trial, sizes) - tangents.residual
+            for k, gain in enumerate(tangents.gains(change)):
+                if gain > best[k]:
+                    best[k], own[k] = gain, trial[k]
+    return own
+
+
+def tried(unknown: Unknown, count: int) -> list[float]:
+    """Values of a state, evenly over its prior, or over its bounds where it has none."""
+    low, high = unknown.lower, unknown.upper
+    if unknown.std is not None:
+        reach = np.sqrt(3.0) * unknown.std  # of an even spread
+        low, high = max(low, unknown.prior - reach), min(high, unknown.prior + reach)
+    return [float(value) for value in np.linspace(low, high, count)]
+
+
 def _start(
-    trial: _Trial, tangents: Tangents, own: Mapping[str, float], runs: int
+    trial: _Trial, tangents: Tangents, own: Sequence[Mapping[str, float]]
 ) -> tuple[dict[str, float], tuple[dict[str, float], ...]]:
     """Values and states with the effect at a size, and the drift moved as it would imitate it."""
-    values, states = tangents.moved(tangents.imitation(trial.change), runs)
-    return {**values, **trial.sizes}, tuple({**state, **own} for state in states)
+    values, states = tangents.moved(tangents.imitation(trial.change), len(own))
+    return {**values, **trial.sizes}, tuple(
+        {**state, **more} for state, more in zip(states, own, strict=True)
+    )
 
 
 def _tangent_gain(trial: _Trial, tangents: Tangents) -> float:
     """Fall of the sum of squares at the best multiple of a signature, 0 where that is negative."""
-    along = min(0.0, float(trial.rest @ tangents.residual))
-    return along**2 / max(trial.norm**2, 1e-12)
+    return _gain(trial.rest, tangents.residual)
+
+
+def _gain(rest: Array, residual: Array) -> float:
+    along = min(0.0, float(rest @ residual))
+    return along**2 / max(float(rest @ rest), 1e-12)
 
 
 def _lengths(found: Estimate) -> Array:
@@ -146,13 +194,18 @@ class _Trial:
 
 
 def _trial(
-    model: Model, name: str, where: Point, runs: Sequence[int], tangents: Tangents, size: float
+    model: Model,
+    name: str,
+    where: Point,
+    runs: Sequence[int],
+    tangents: Tangents,
+    own: Sequence[Mapping[str, float]],
+    size: float,
 ) -> _Trial:
-    """The effect at one size, in plausible sizes."""
+    """The effect at one size, in plausible sizes; own : its states of every run."""
     candidate = model.candidates[name]
     sizes = sized(candidate, size)
-    changed = _residual(model, candidate, where, runs, sizes)
-    change = changed - tangents.residual
+    change = _residual(model, candidate, where, runs, own, sizes) - tangents.residual
     rest = tangents.rest(change)
     after = tangents.residual + rest
     return _Trial(
@@ -170,15 +223,15 @@ def _residual(
     candidate: Candidate,
     where: Point,
     runs: Sequence[int],
+    own: Sequence[Mapping[str, float]],
     sizes: Mapping[str, float],
 ) -> Array:
     """Residual of all runs with one more effect, all else as fitted."""
     effects = (*where.effects, candidate.name)
-    own = {u.name: u.start for u in candidate.states}
     return np.concatenate(
         [
-            model.residual(k, effects)({**where.values, **state, **own, **sizes}).ravel()
-            for k, state in zip(runs, where.states, strict=True)
+            model.residual(k, effects)({**where.values, **state, **more, **sizes}).ravel()
+            for k, state, more in zip(runs, where.states, own, strict=True)
         ]
     )
 

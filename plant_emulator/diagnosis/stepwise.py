@@ -58,7 +58,7 @@ class Contest:
             if best is None or not counts(best, final, null, self._reaches_noise):
                 break
             final = best
-            final, rivals = self._stand(final, found)
+            final, rivals = self._missed(*self._stand(final, found), null)
         final = self._rounds.settled(final)
         return Explanation(
             null=null,
@@ -107,6 +107,19 @@ class Contest:
                 other = best.effects[-1]
                 rivals[other] = rivals.pop(name)
                 final = best
+        return final, rivals
+
+    def _missed(
+        self, final: Point, rivals: dict[str, dict[str, float]], null: Point
+    ) -> tuple[Point, dict[str, dict[str, float]]]:
+        """Without an effect that another has made needless."""
+        if len(final.effects) < 2:
+            return final, rivals
+        for name in final.effects:
+            rest = tuple(e for e in final.effects if e != name)
+            without = self._rounds.refitted(replace(final, effects=rest))
+            if not counts(final, without, null, self._reaches_noise):
+                return without, {kept: rivals[kept] for kept in rest}
         return final, rivals
 
 
