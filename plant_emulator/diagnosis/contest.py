@@ -210,8 +210,10 @@ def glance_far(
 def look(model: Model, effects: Sequence[str], runs: Sequence[int], start: Point) -> Point:
     """A few steps of a joint fit, from where another fit has come to."""
     with_states = any(model.candidates[name].states for name in effects)
-    few = FEW_WITH_STATES if with_states else FEW
-    return fit(model, effects, runs, start.values, start.states, few)
+    if not with_states:
+        return fit(model, effects, runs, start.values, start.states, FEW)
+    states = _scanned(model, effects, runs, start.values, start.states)
+    return fit(model, effects, runs, start.values, states, FEW_WITH_STATES)
 
 
 def shaken(
