@@ -22,8 +22,8 @@ MARGIN = 10.0
 DETECTABLE = 7.0
 # What the noise of a log is known to, as a part of its square.
 NOISE_KNOWN = 0.02
-# Share of the gap that may be left for the cause to be known, with one effect and with more.
-LEFT, LEFT_OF_MORE = 0.1, 0.04
+# Share of the gap that may be left for the cause to be known.
+LEFT = 0.1
 # Mean square from which on a model leaves more than what the noise explains.
 MISFIT = 1.5
 
@@ -94,5 +94,4 @@ def excess(point: Point) -> float:
 
 def adequate(point: Point, null: Point) -> bool:
     """Whether a model leaves so little of the gap that its cause is known."""
-    left = LEFT if len(point.effects) <= 1 else LEFT_OF_MORE
-    return excess(point) <= max(left * excess(null), THRESHOLD)
+    return excess(point) <= max(LEFT * excess(null), THRESHOLD)

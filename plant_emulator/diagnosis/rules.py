@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.explain import LEFT_OF_MORE, THRESHOLD, excess, weighed
+from plant_emulator.diagnosis.explain import THRESHOLD, excess, weighed
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.contest import Point
@@ -12,7 +12,9 @@ if TYPE_CHECKING:
 # Share of the gap that a further effect has to close to be named.
 FURTHER = 0.04
 # Share of what the effects before leave that a further one has to close.
-REST = 0.75
+REST = 0.5
+# Share of the gap that is too little to look for more.
+LITTLE = 0.04
 # Share of the gap that the first of two effects closes at least.
 PART = 0.2
 
@@ -23,7 +25,7 @@ def enough(final: Point, null: Point, reaches_noise: bool) -> bool:
         return False
     left, gap = excess(final), excess(null)
     too_much = reaches_noise and left > (1.0 - PART) * gap
-    return too_much or left <= max(LEFT_OF_MORE * gap, THRESHOLD)
+    return too_much or left <= max(LITTLE * gap, THRESHOLD)
 
 
 def counts(best: Point, base: Point, null: Point, reaches_noise: bool) -> bool:
