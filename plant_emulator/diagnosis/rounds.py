@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 from plant_emulator.diagnosis.contest import WORTH
-from plant_emulator.diagnosis.explain import Contender
+from plant_emulator.diagnosis.explain import LEFT, Contender, excess
 from plant_emulator.diagnosis.steps import (
     Task,
     contend,
@@ -87,8 +87,11 @@ class Rounds:
             final = self.refitted(final)
         return final
 
-    def contend(self, base: Point, stage: str) -> list[Contender]:
-        """All effects on top of a fit: a first look at each, the best of them fitted."""
+    def contend(self, base: Point, stage: str, *, thorough: bool) -> list[Contender]:
+        """All effects on top of a fit: a first look at each, the best of them fitted.
+
+        thorough : where none leaves little, all get a second look from a larger size
+        """
         names = [name for name in self._names if name not in base.effects]
         tasks = [Task(base=base, runs=self._runs, effect=name) for name in names]
         found = self._told(stage, tasks, self._pool.map(show, self._recipe, tasks))
@@ -105,11 +108,18 @@ class Rounds:
         )
         if explained(contenders) or base.chi_squared <= NOISE_LEFT:
             return contenders
-        far = self._told(stage, tasks, self._pool.map(contend_far, self._recipe, tasks))
-        seen = {task.effect: point for task, point in zip(tasks, far, strict=True) if point}
-        again = [replace(c, point=seen.get(c.effect)) for c in contenders]
-        contenders = better_of(contenders, self._taken_further(again, base, stage))
-        return contenders if explained(contenders) else self._moved(contenders, base)
+        if thorough and not closed(contenders, base, 1.0 - LEFT):
+            far = self._told(stage, tasks, self._pool.map(contend_far, self._recipe, tasks))
+            again = [
+                replace(c, point=p)
+                for c, p in zip(_with_point(contenders), far, strict=True)
+                if p is not None and p.cost < _cost(c) - WORTH
+            ]
+            contenders = better_of(contenders, self._taken_further(again, base, stage))
+        if explained(contenders):
+            return contenders
+        alone = not thorough or closed(contenders, base, 1.0 - LEFT)
+        return self._moved(contenders, base, 1 if alone else SHAKEN)
 
     def _taken_further(
         self, contenders: Sequence[Contender], base: Point, stage: str
@@ -122,7 +132,7 @@ class Rounds:
         self, base: Point, contenders: Sequence[Contender], stage: str
     ) -> list[Contender]:
         """Effects fitted from the nominal parameters."""
-        chosen = [c for c in contenders if c.point is not None]
+        chosen = _with_point(contenders)
         tasks = [Task(base=base, runs=self._runs, effect=c.effect) for c in chosen]
         points = self._told(stage, tasks, self._pool.map(once_more, self._recipe, tasks))
         again = sorted(
@@ -142,9 +152,9 @@ class Rounds:
         again = self._pool.map(refit, self._recipe, tasks)
         return min([base, *again], key=lambda p: p.cost)
 
-    def _moved(self, contenders: Sequence[Contender], base: Point) -> list[Contender]:
+    def _moved(self, contenders: Sequence[Contender], base: Point, most: int) -> list[Contender]:
         """The best of a round started again from some way off."""
-        best = _best_few(contenders, base, SHAKEN)
+        best = _best_few(contenders, base, most)
         points = self._shaken([c.point for c in best if c.point is not None])
         again = [replace(c, point=p) for c, p in zip(best, points, strict=True)]
         return better_of(contenders, again)
@@ -194,6 +204,11 @@ def explained(contenders: Sequence[Contender]) -> bool:
     return any(point.chi_squared <= NOISE_LEFT for point in _points(contenders))
 
 
+def closed(contenders: Sequence[Contender], base: Point, share: float) -> bool:
+    """Whether an effect closes so much of what a fit leaves beyond the noise."""
+    return any(excess(point) <= (1.0 - share) * excess(base) for point in _points(contenders))
+
+
 def _contender(name: str, shown: Signature | None, point: Point | None) -> Contender:
     if shown is None:
         return Contender(effect=name, norm=0.0, raw=0.0, imitated_by="", point=None)
@@ -210,7 +225,7 @@ def better_of(first: Sequence[Contender], second: Sequence[Contender]) -> list[C
 
 def _best_few(contenders: Sequence[Contender], base: Point, most: int) -> list[Contender]:
     """Those whose cost is least, without those that fall far behind the best."""
-    order = sorted((c for c in contenders if c.point is not None), key=_cost)
+    order = sorted(_with_point(contenders), key=_cost)
     if not order:
         return []
     least = _cost(order[0])
@@ -220,6 +235,10 @@ def _best_few(contenders: Sequence[Contender], base: Point, most: int) -> list[C
 
 def _cost(contender: Contender) -> float:
     return contender.point.cost if contender.point is not None else float("inf")
+
+
+def _with_point(contenders: Sequence[Contender]) -> list[Contender]:
+    return [c for c in contenders if c.point is not None]
 
 
 def _points(contenders: Sequence[Contender]) -> Iterator[Point]:

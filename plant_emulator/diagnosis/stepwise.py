@@ -11,8 +11,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.contest import ASTRAY
-from plant_emulator.diagnosis.explain import MARGIN, THRESHOLD, Explanation, excess
-from plant_emulator.diagnosis.rounds import Rounds, best_of, better_of, explained
+from plant_emulator.diagnosis.explain import LEFT, MARGIN, THRESHOLD, Explanation, excess
+from plant_emulator.diagnosis.rounds import Rounds, best_of, better_of, closed, explained
 from plant_emulator.diagnosis.rules import counts, enough
 
 if TYPE_CHECKING:
@@ -23,8 +23,9 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.pool import Pool, Recipe
     from plant_emulator.diagnosis.rounds import Progress
 
-# Share of the gap that a better fit without effects closes when it has moved to another valley.
-MOVED = 0.1
+# Share of the gap that a better fit without effects closes when it has moved to another valley;
+# share that an effect closes which no start from elsewhere is likely to outdo.
+MOVED, HALF = 0.5, 0.5
 # More effects than that at once explain anything.
 MOST_EFFECTS = 2
 
@@ -71,25 +72,27 @@ class Contest:
     def _first(self, null: Point) -> tuple[Point, list[Contender]]:
         """All effects on the fit without any, and that fit, started again from the best of them.
 
-        All are tried again where the fit without effects has moved to another valley, and start
-        once more from the nominal parameters where much is left: in a cost of many valleys a
-        signature is but a hint.
+        Where none leaves little, all are tried again when the fit without effects has moved to
+        another valley, and start once more from the nominal parameters when none closes half the
+        gap: in a cost of many valleys a signature is but a hint.
         """
         stage = "contest"
-        contenders = self._rounds.contend(null, stage)
+        contenders = self._rounds.contend(null, stage, thorough=True)
         better = self._rounds.restarted(null, contenders)
-        if explained(contenders):
+        if explained(contenders) or closed(contenders, better, 1.0 - LEFT):
             return better, contenders
         if null.cost - better.cost > max(THRESHOLD, MOVED * excess(null)):
-            contenders = better_of(contenders, self._rounds.contend(better, stage))
-        if better.chi_squared > ASTRAY and not explained(contenders):
-            contenders = better_of(contenders, self._rounds.from_nominal(better, contenders, stage))
+            again = self._rounds.contend(better, stage, thorough=True)
+            contenders = better_of(contenders, again)
+        if better.chi_squared > ASTRAY and not closed(contenders, better, HALF):
+            again = self._rounds.from_nominal(better, contenders, stage)
+            contenders = better_of(contenders, again)
             better = self._rounds.restarted(better, contenders)
         return better, contenders
 
     def _further(self, base: Point, stage: str) -> tuple[Point, list[Contender]]:
         """All other effects on top of some, and that fit started again from the best of them."""
-        contenders = self._rounds.contend(base, stage)
+        contenders = self._rounds.contend(base, stage, thorough=False)
         return self._rounds.restarted(base, contenders), contenders
 
     def _stand(
