@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.signature import Tangents
+from plant_emulator.diagnosis.tangents import Tangents
 from plant_emulator.estimation import at
 from plant_emulator.identify import free_parameters, unknowns
 from plant_emulator.log import COMPARED

@@ -28,29 +28,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.covariance import correlation_time, structure
-from plant_emulator.diagnosis.signature import STATES, signs, sized, tried
 from plant_emulator.estimation import Estimate, at, estimate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.model import Model
-    from plant_emulator.diagnosis.signature import Signature
     from plant_emulator.estimation import Unknown
 
 # Relative fall of the cost that ends a fit here: a few hundredths in units of chi squared.
 SETTLED = 1e-6
-# Steps of a first look, whose drift follows by secants, and the relative fall that ends it.
-GLANCE, GLANCE_SETTLED = 10, 1e-4
-# Steps of a fit that only has to show whether it is worth more: without and with states of its
-# own, which make a long curved valley of the cost.
-FEW, FEW_WITH_STATES = 8, 24
-# The same from some way off, and how far off that is [standard errors].
-FEW_SHAKEN, SHAKE = 12, 30.0
-# The same from the nominal parameters, where a step goes far.
-FEW_FAR, FEW_FAR_WITH_STATES = 4, 8
-# Sizes that a start from the nominal parameters is tried at, in plausible sizes.
-FAR_SIZES = (0.4, 1.0, 2.0)
+# The same of a fit whose slopes are not exact.
+GLANCE_SETTLED = 1e-4
 # Mean square from which on a fit may lie in a wrong valley.
 ASTRAY = 1.5
 # A fit that is to be improved by starting again has to fall by more than this [chi squared].
@@ -177,113 +166,3 @@ def null_fit(model: Model, runs: Sequence[int]) -> Point:
     nominal = {u.name: u.prior for u in model.parameters}
     states = [model.start_states(k, (), nominal) for k in runs]
     return min(found, fit(model, (), runs, nominal, states), key=lambda p: p.cost)
-
-
-def glance(
-    model: Model, found: Signature, base: Point, runs: Sequence[int], near: Estimate
-) -> Point:
-    """A first look at the joint fit of one more effect, from its signature's start, or, where that
-    leads nowhere, from the drift as it is.
-
-    near : the base's estimate; the drift's slopes follow from its own, only the effect's are
-        simulated
-    """
-    effects = (*base.effects, found.effect)
-    best = fit(model, effects, runs, found.start, found.states, GLANCE, near)
-    if best.cost < base.cost - WORTH:
-        return best
-    states = [{**own, **state} for own, state in zip(found.states, base.states, strict=True)]
-    small = {**found.start, **base.values}
-    other = fit(model, effects, runs, small, states, GLANCE, near)
-    return min(best, other, key=lambda p: p.cost)
-
-
-def glance_far(
-    model: Model, found: Signature, base: Point, runs: Sequence[int], near: Estimate
-) -> Point | None:
-    """The same from a larger size; None where the signature has none."""
-    if found.far is None:
-        return None
-    return fit(model, (*base.effects, found.effect), runs, *found.far, GLANCE, near)
-
-
-def look(model: Model, effects: Sequence[str], runs: Sequence[int], start: Point) -> Point:
-    """A few steps of a joint fit, from where another fit has come to."""
-    with_states = any(model.candidates[name].states for name in effects)
-    if not with_states:
-        return fit(model, effects, runs, start.values, start.states, FEW)
-    states = _scanned(model, effects, runs, start.values, start.states)
-    return fit(model, effects, runs, start.values, states, FEW_WITH_STATES)
-
-
-def shaken(
-    model: Model, effects: Sequence[str], runs: Sequence[int], start: Point, number: int
-) -> Point:
-    """A few steps of a joint fit from some way off where it has come to, each number another way.
-
-    As far as SHAKE standard errors, no further than a prior deviation.
-    """
-    random = np.random.default_rng(number)
-    moved = dict(start.values)
-    for u in template(model, effects, runs):
-        if u.run is None:
-            far = min(SHAKE * start.errors[u.name], u.std or abs(moved[u.name]))
-            moved[u.name] += far * float(random.standard_normal())
-    states = start.states
-    if any(model.candidates[name].states for name in effects):
-        states = _scanned(model, effects, runs, moved, states)
-    return fit(model, effects, runs, moved, states, FEW_SHAKEN)
-
-
-def _scanned(
-    model: Model,
-    effects: Sequence[str],
-    runs: Sequence[int],
-    values: Mapping[str, float],
-    states: Sequence[Mapping[str, float]],
-) -> tuple[dict[str, float], ...]:
-    """States of every run, each the best of some values while the others stay, two times over."""
-    own = (*model.states, *(u for name in effects for u in model.candidates[name].states))
-    found = []
-    for k, state in zip(runs, states, strict=True):
-        best = dict(state)
-        for u in (*own, *own):
-            trials = [{**best, u.name: value} for value in (best[u.name], *tried(u, STATES))]
-            losses = [_loss(model, effects, [k], values, [trial]) for trial in trials]
-            best = trials[int(np.argmin(losses))]
-        found.append(best)
-    return tuple(found)
-
-
-def from_nominal(model: Model, effect: str, base: Point, runs: Sequence[int]) -> Point:
-    """Joint fit of one more effect, a few steps only: the drift from its nominal values, the effect
-    from the size that fits them best.
-    """
-    effects = (*base.effects, effect)
-    candidate = model.candidates[effect]
-    nominal = {**base.values, **{u.name: u.prior for u in model.parameters}}
-    own = {u.name: u.start for u in candidate.states}
-    states = [{**state, **own} for state in base.states]
-    starts = [
-        {**nominal, **sized(candidate, sign * size)}
-        for size in FAR_SIZES
-        for sign in signs(candidate.sizes)
-    ]
-    best = min(starts, key=lambda values: _loss(model, effects, runs, values, states))
-    found = [model.start_states(k, effects, best) for k in runs]
-    few = FEW_FAR_WITH_STATES if candidate.states else FEW_FAR
-    return fit(model, effects, runs, best, found, few)
-
-
-def _loss(
-    model: Model,
-    effects: Sequence[str],
-    runs: Sequence[int],
-    values: Mapping[str, float],
-    states: Sequence[Mapping[str, float]],
-) -> float:
-    """Sum of log(1 + r^2): what lies far off counts, but little more than near."""
-    return sum(
-        float(np.sum(np.log1p(model.residual(k, effects)({**values, **state}) ** 2)))
-        for k, state in zip(runs, states, strict=True)
-    )

@@ -17,7 +17,8 @@ import numpy as np
 
 from plant_emulator.diagnosis.contest import Point, linearised
 from plant_emulator.diagnosis.explain import DETECTABLE, MARGIN
-from plant_emulator.diagnosis.signature import Tangents, signature
+from plant_emulator.diagnosis.signature import signature
+from plant_emulator.diagnosis.tangents import Tangents
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -20,9 +20,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.contest import FEW_WITH_STATES, Point, fit, linearised
+from plant_emulator.diagnosis.contest import Point, fit, linearised
 from plant_emulator.diagnosis.explain import DETECTABLE
-from plant_emulator.diagnosis.signature import Tangents, bounded, signs
+from plant_emulator.diagnosis.looks import FEW_WITH_STATES
+from plant_emulator.diagnosis.signature import bounded, signs
+from plant_emulator.diagnosis.tangents import Tangents
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

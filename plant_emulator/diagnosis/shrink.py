@@ -15,7 +15,7 @@ import numpy as np
 
 from plant_emulator.covariance import correlation_time
 from plant_emulator.diagnosis.contest import Point, again, linearised
-from plant_emulator.diagnosis.signature import Tangents
+from plant_emulator.diagnosis.tangents import Tangents
 from plant_emulator.estimation import estimate
 
 if TYPE_CHECKING:

@@ -11,11 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.diagnosis.tangents import gain_along
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.diagnosis.model import Candidate, Model
+    from plant_emulator.diagnosis.tangents import Tangents
     from plant_emulator.estimation import Array, Estimate, Unknown
 
 # Sizes at which a signature is tried, in plausible sizes.
@@ -52,45 +55,6 @@ class Signature:
     norms: tuple[tuple[float, float], ...]
     imitated_by: str
     direction: Array
-
-
-class Tangents:
-    """The drift's tangent space at a fit, for removing from signatures what drift can imitate."""
-
-    def __init__(self, found: Estimate) -> None:
-        p = len(found.z)
-        self.found = found
-        self.residual = np.concatenate([r.ravel() for r in found.residuals])
-        self._slopes = np.concatenate([j.reshape(-1, p) for j in found.jacobians])
-        precision = np.diag([u.scaled_std**-2.0 for u in found.unknowns])
-        self._inverse = np.linalg.pinv(found.information + precision, hermitian=True)
-
-    def imitation(self, change: Array) -> Array:
-        """Shift of z that follows a change of the residual best."""
-        return np.asarray(-self._inverse @ (self._slopes.T @ change))
-
-    def rest(self, change: Array) -> Array:
-        """The change of the residual that remains when drift follows it."""
-        return np.asarray(change + self._slopes @ self.imitation(change))
-
-    def gains(self, change: Array) -> list[float]:
-        """Fall of every run's sum of squares at the best multiple of a change of that run alone."""
-        found, first = [], 0
-        for residual in self.found.residuals:
-            part = np.zeros_like(change)
-            part[first : first + residual.size] = change[first : first + residual.size]
-            first += residual.size
-            found.append(_gain(self.rest(part), self.residual))
-        return found
-
-    def moved(self, shift: Array, runs: int) -> tuple[dict[str, float], list[dict[str, float]]]:
-        """Values and states after a shift of z, within their bounds."""
-        values: dict[str, float] = {}
-        states: list[dict[str, float]] = [{} for _ in range(runs)]
-        for u, z in zip(self.found.unknowns, self.found.z + shift, strict=True):
-            value = u.value(float(np.clip(z, u.scaled(u.lower), u.scaled(u.upper))))
-            (values if u.run is None else states[u.run])[u.name] = value
-        return values, states
 
 
 def signature(
@@ -170,12 +134,7 @@ def _start(
 
 def _tangent_gain(trial: _Trial, tangents: Tangents) -> float:
     """Fall of the sum of squares at the best multiple of a signature, 0 where that is negative."""
-    return _gain(trial.rest, tangents.residual)
-
-
-def _gain(rest: Array, residual: Array) -> float:
-    along = min(0.0, float(rest @ residual))
-    return along**2 / max(float(rest @ rest), 1e-12)
+    return gain_along(trial.rest, tangents.residual)
 
 
 def _lengths(found: Estimate) -> Array:

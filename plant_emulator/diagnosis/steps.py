@@ -5,18 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.contest import (
-    Point,
-    again,
-    from_nominal,
-    glance,
-    glance_far,
-    linearised,
-    look,
-    null_fit,
-    shaken,
-)
-from plant_emulator.diagnosis.signature import Tangents, signature
+from plant_emulator.diagnosis.contest import Point, again, linearised, null_fit
+from plant_emulator.diagnosis.looks import from_nominal, glance, glance_far, look, shaken
+from plant_emulator.diagnosis.signature import signature
+from plant_emulator.diagnosis.tangents import Tangents
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.model import Model

@@ -12,8 +12,10 @@ from plant_emulator.diagnosis.axis import AxisModel, AxisRecipe
 from plant_emulator.diagnosis.axis_effects import EFFECTS
 from plant_emulator.diagnosis.axis_signals import AxisLog
 from plant_emulator.diagnosis.bands import power
-from plant_emulator.diagnosis.contest import Point, glance, linearised, look, null_fit
-from plant_emulator.diagnosis.signature import Tangents, signature
+from plant_emulator.diagnosis.contest import Point, linearised, null_fit
+from plant_emulator.diagnosis.looks import glance, look
+from plant_emulator.diagnosis.signature import signature
+from plant_emulator.diagnosis.tangents import Tangents
 from plant_emulator.errors import LogError
 
 spec = importlib.util.spec_from_file_location(

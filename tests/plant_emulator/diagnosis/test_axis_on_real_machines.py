@@ -15,8 +15,10 @@ import pytest
 from plant_emulator import axis_log
 from plant_emulator.diagnosis.axis import AxisModel
 from plant_emulator.diagnosis.bands import BANDS, power
-from plant_emulator.diagnosis.contest import Point, glance, linearised, look, null_fit
-from plant_emulator.diagnosis.signature import Tangents, signature
+from plant_emulator.diagnosis.contest import Point, linearised, null_fit
+from plant_emulator.diagnosis.looks import glance, look
+from plant_emulator.diagnosis.signature import signature
+from plant_emulator.diagnosis.tangents import Tangents
 from plant_emulator.estimation import estimate
 
 ROOT = Path(__file__).parents[3]

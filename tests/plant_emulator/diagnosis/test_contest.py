@@ -7,21 +7,14 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis import rounds as engine
-from plant_emulator.diagnosis.contest import (
-    Point,
-    fit,
-    from_nominal,
-    glance,
-    glance_far,
-    linearised,
-    look,
-    null_fit,
-)
+from plant_emulator.diagnosis.contest import Point, fit, linearised, null_fit
 from plant_emulator.diagnosis.explain import Explanation, adequate, excess
+from plant_emulator.diagnosis.looks import from_nominal, glance, glance_far, look
 from plant_emulator.diagnosis.model import Candidate, Run
 from plant_emulator.diagnosis.pool import Here
-from plant_emulator.diagnosis.signature import Tangents, signature
+from plant_emulator.diagnosis.signature import signature
 from plant_emulator.diagnosis.stepwise import Contest
+from plant_emulator.diagnosis.tangents import Tangents
 from plant_emulator.estimation import Array, Unknown
 
 TIME = np.linspace(-1.0, 1.0, 2000)
