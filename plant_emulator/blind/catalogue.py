@@ -71,7 +71,7 @@ INSIDE = (
     Entry(effect="load_dependent_gear_loss", law="two_efficiencies", programs=("program6",)),
     Entry(effect="gear_eccentricity", law="runout_two_harmonics", starts={"phase": ANY_ANGLE}),
     Entry(effect="friction_asymmetry", law="coulomb_asymmetry"),
-    Entry(effect="drum_bearing_friction", law="palmgren_drum"),
+    Entry(effect="drum_bearing_friction", law="shear_thinning_drum"),
     Entry(effect="drum_imbalance", law="drum_imbalance", starts={"start_angle": ANY_ANGLE}),
     Entry(effect="torque_sensor_offset", law="torque_sensor_offset"),
     Entry(effect="torque_sensor_gain", law="torque_sensor_gain"),

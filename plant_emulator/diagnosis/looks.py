@@ -30,7 +30,7 @@ FEW_SHAKEN, SHAKE = 12, 30.0
 # The same from the nominal parameters, where a step goes far.
 FEW_FAR, FEW_FAR_WITH_STATES = 4, 8
 # Sizes that a start from the nominal parameters is tried at, in plausible sizes.
-FAR_SIZES = (0.4, 1.0, 2.0)
+FAR_SIZES = (0.25, 0.4, 0.6, 0.8, 1.0, 1.4, 2.0)
 
 
 def glance(
@@ -123,7 +123,11 @@ def from_nominal(model: Model, effect: str, base: Point, runs: Sequence[int]) ->
         for size in FAR_SIZES
         for sign in signs(candidate.sizes)
     ]
-    best = min(starts, key=lambda values: _loss(model, effects, runs, values, states))
+    losses = np.array([_loss(model, effects, runs, values, states) for values in starts])
+    # A size at which nothing happens, as of a limit that is not reached, is no start.
+    without = _loss(model, base.effects, runs, nominal, base.states)
+    losses[losses == without] = np.inf
+    best = starts[int(np.argmin(losses))]
     found = [model.start_states(k, effects, best) for k in runs]
     few = FEW_FAR_WITH_STATES if candidate.states else FEW_FAR
     return fit(model, effects, runs, best, found, few)

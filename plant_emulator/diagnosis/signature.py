@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from plant_emulator.estimation import Array, Estimate, Unknown
 
 # Sizes at which a signature is tried, in plausible sizes.
-SIZES = (0.03, 0.1, 0.3, 1.0, 2.0)
+SIZES = (0.03, 0.1, 0.3, 0.6, 1.0, 2.0)
 # From which of these on a fit may begin besides the best one.
 FAR = 0.3
 # Values of a state that are tried.

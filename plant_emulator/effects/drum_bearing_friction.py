@@ -1,9 +1,11 @@
 """The drum's bearings have Coulomb and viscous friction.
 
-    T_dw = T_c sgn omega_d + b omega_d
+    T_dw = T_c sgn omega_d + b omega_d (|omega_d| / 1 rad/s)^(n - 1)
 
 Source: SKF, Rolling Bearings catalogue, chapter on bearing friction: a load-dependent torque that
-hardly knows the speed (with that of the seals), and a torque of the lubricant that rises with it.
+hardly knows the speed (with that of the seals), and a torque of the lubricant that rises with it:
+in proportion (n = 1) where it is thick, with n = 2/3 where it is a thin film (A. Palmgren, Ball and
+Roller Bearing Engineering, 1959).
 """
 
 from __future__ import annotations
@@ -23,7 +25,13 @@ PARAMETERS = {
     "viscous": EffectParameter(
         neutral=0.0, lower=0.0, upper=100.0, plausible=5.0, unit="N m s/rad", meaning="b"
     ),
+    "exponent": EffectParameter(
+        neutral=1.0, lower=0.3, upper=1.5, plausible=1.0, unit="1", meaning="n", std=0.25
+    ),
 }
+
+# Below this speed the lubricant's torque is proportional [rad/s]; its slope stays finite at rest.
+SLOW = 0.02
 
 
 def drum_coulomb_friction(value: float, s: Record, p: Record) -> float:
@@ -32,5 +40,7 @@ def drum_coulomb_friction(value: float, s: Record, p: Record) -> float:
 
 
 def drum_viscous_friction(value: float, s: Record, p: Record) -> float:
-    """Speed-proportional friction of the bearings [N m s/rad]."""
-    return value + p.drum_bearing_friction_viscous
+    """Torque of the lubricant over the drum speed [N m s/rad]."""
+    speed = abs(s.drum_speed) + SLOW
+    film: float = speed ** (p.drum_bearing_friction_exponent - 1.0)
+    return value + p.drum_bearing_friction_viscous * film

@@ -334,7 +334,7 @@ def test_second_look_starts_from_a_larger_size_with_the_drift_moved_for_it() -> 
 
 def test_what_takes_but_a_part_of_the_rest_is_no_second_effect() -> None:
     """By hand, of 2000 samples: the kink closes 4 / 12, a ripple of the library 0.09 / 2, and one
-    that is not in it 0.16 / 2: what the first takes of both is less than half."""
+    that is not in it 0.16 / 2: what the first takes of both is less than three quarters."""
     first, second = 0.3 * np.sin(20.0 * TIME), 0.4 * np.sin(50.0 * TIME)
     y = 2.0 + 3.0 * TIME + 2.0 * np.abs(TIME) + first
     assert explained(Line([noisy(y + second)], ["kink", "wave"])).final.effects == ("kink",)
