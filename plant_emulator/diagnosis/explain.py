@@ -24,6 +24,10 @@ DETECTABLE = 7.0
 NOISE_KNOWN = 0.02
 # Share of the gap that may be left for the cause to be known.
 LEFT = 0.1
+# Mean square up to which a model leaves nothing but noise.
+NOISE_LEFT = 1.05
+# Structure of a residual from which on it is no noise [chi squared].
+STRUCTURED = 200.0
 # Mean square from which on a model leaves more than what the noise explains.
 MISFIT = 1.5
 

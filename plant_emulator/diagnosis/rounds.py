@@ -11,7 +11,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 from plant_emulator.diagnosis.contest import WORTH
-from plant_emulator.diagnosis.explain import LEFT, Contender, excess
+from plant_emulator.diagnosis.explain import LEFT, NOISE_LEFT, Contender, excess
+from plant_emulator.diagnosis.rules import noise_only
 from plant_emulator.diagnosis.steps import (
     Task,
     contend,
@@ -36,8 +37,6 @@ if TYPE_CHECKING:
 
 Found = TypeVar("Found")
 
-# Mean square up to which a model leaves nothing but noise.
-NOISE_LEFT = 1.05
 RESTARTS = 3
 # Times that a fit that ran out of steps is taken up again.
 PATIENCE = 3
@@ -46,6 +45,8 @@ CHOSEN, POLISHED = 8, 4
 # What keeps an effect in a round: the fall of its cost [fall of the best one], or that it is no
 # further behind the best than a first look may be wrong [chi squared].
 KEPT, NEAR = 0.25, 50.0
+# Fall of the cost at first look that makes one more effect on top of noise worth a fit.
+SIGHT = 20.0
 # Best of a round that start again from some way off, and how often.
 SHAKEN, SHAKES = 3, 3
 
@@ -103,9 +104,11 @@ class Rounds:
         ]
         points = self._told(stage, tasks, self._pool.map(contend, self._recipe, tasks))
         seen = dict(zip((task.effect for task in tasks), points, strict=True))
-        contenders = self._taken_further(
-            [_contender(name, one, seen.get(name)) for name, one in shown.items()], base, stage
-        )
+        contenders = [_contender(name, one, seen.get(name)) for name, one in shown.items()]
+        least = min(map(_cost, contenders), default=base.cost)
+        if base.effects and noise_only(base) and base.cost - least < SIGHT:
+            return contenders
+        contenders = self._taken_further(contenders, base, stage)
         if explained(contenders) or base.chi_squared <= NOISE_LEFT:
             return contenders
         if thorough and not closed(contenders, base, 1.0 - LEFT):

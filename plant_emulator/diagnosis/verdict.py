@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from plant_emulator.diagnosis.explain import adequate
+from plant_emulator.diagnosis.explain import STRUCTURED, adequate
 from plant_emulator.diagnosis.rest import lies, shrinks
 from plant_emulator.diagnosis.wording import number, percent
 
@@ -23,8 +23,6 @@ Kind = Literal["effect", "parameter", "none", "unknown"]
 SHIFTED = 3.0
 # Mean square of the whitened residual up to which a model without effects leaves nothing but noise.
 NOISE_ONLY = 1.1
-# Structure of a residual from which on it is no noise [chi squared].
-STRUCTURED = 200.0
 
 
 @dataclass(frozen=True, kw_only=True)

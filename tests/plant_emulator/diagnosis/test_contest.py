@@ -332,6 +332,15 @@ def test_second_look_starts_from_a_larger_size_with_the_drift_moved_for_it() -> 
     assert second.cost == pytest.approx(glance(model, found, base, [0], near).cost, abs=0.1)
 
 
+@pytest.mark.parametrize(("amplitude", "named"), [(0.35, {"kink", "wave"}), (0.2, {"kink"})])
+def test_second_effect_in_what_looks_like_noise_needs_its_own_evidence(
+    amplitude: float, named: set[str]
+) -> None:
+    """By hand: a ripple of amplitude A takes n A^2 / 2 from the squares: 122 of 2000, or 40."""
+    y = 2.0 + 3.0 * TIME + 2.0 * np.abs(TIME) + amplitude * np.sin(20.0 * TIME)
+    assert set(explained(Line([noisy(y)], ["kink", "wave"])).final.effects) == named
+
+
 def test_what_takes_but_a_part_of_the_rest_is_no_second_effect() -> None:
     """By hand, of 2000 samples: the kink closes 4 / 12, a ripple of the library 0.09 / 2, and one
     that is not in it 0.16 / 2: what the first takes of both is less than three quarters."""
