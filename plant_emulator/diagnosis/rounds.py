@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 from plant_emulator.diagnosis.contest import WORTH
-from plant_emulator.diagnosis.explain import LEFT, NOISE_LEFT, Contender, excess
+from plant_emulator.diagnosis.explain import NOISE_LEFT, Contender, excess
 from plant_emulator.diagnosis.rules import noise_only
 from plant_emulator.diagnosis.steps import (
     Task,
@@ -45,6 +45,8 @@ CHOSEN, POLISHED = 8, 4
 # What keeps an effect in a round: the fall of its cost [fall of the best one], or that it is no
 # further behind the best than a first look may be wrong [chi squared].
 KEPT, NEAR = 0.25, 50.0
+# Share of the gap that an effect closes where no other is likely to close more.
+MOST = 0.9
 # Fall of the cost at first look that makes one more effect on top of noise worth a fit.
 SIGHT = 20.0
 # Best of a round that start again from some way off, and how often.
@@ -111,7 +113,7 @@ class Rounds:
         contenders = self._taken_further(contenders, base, stage)
         if explained(contenders) or base.chi_squared <= NOISE_LEFT:
             return contenders
-        if thorough and not closed(contenders, base, 1.0 - LEFT):
+        if thorough and not closed(contenders, base, MOST):
             far = self._told(stage, tasks, self._pool.map(contend_far, self._recipe, tasks))
             again = [
                 replace(c, point=p)
@@ -121,7 +123,7 @@ class Rounds:
             contenders = better_of(contenders, self._taken_further(again, base, stage))
         if explained(contenders):
             return contenders
-        alone = not thorough or closed(contenders, base, 1.0 - LEFT)
+        alone = not thorough or closed(contenders, base, MOST)
         return self._moved(contenders, base, 1 if alone else SHAKEN)
 
     def _taken_further(

@@ -11,8 +11,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.contest import ASTRAY
-from plant_emulator.diagnosis.explain import LEFT, MARGIN, THRESHOLD, Explanation, excess
-from plant_emulator.diagnosis.rounds import Rounds, best_of, better_of, closed, explained
+from plant_emulator.diagnosis.explain import MARGIN, THRESHOLD, Explanation, excess
+from plant_emulator.diagnosis.rounds import MOST, Rounds, best_of, better_of, closed, explained
 from plant_emulator.diagnosis.rules import counts, enough
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ class Contest:
         stage = "contest"
         contenders = self._rounds.contend(null, stage, thorough=True)
         better = self._rounds.restarted(null, contenders)
-        if explained(contenders) or closed(contenders, better, 1.0 - LEFT):
+        if explained(contenders) or closed(contenders, better, MOST):
             return better, contenders
         if null.cost - better.cost > max(THRESHOLD, MOVED * excess(null)):
             again = self._rounds.contend(better, stage, thorough=True)
