@@ -59,17 +59,30 @@ class Cluster:
             self._client: Any = distributed.Client(address, timeout=10)  # type: ignore[no-untyped-call]
         except (OSError, ValueError) as error:
             raise EmulatorError(f"--scheduler {address}: no scheduler answers ({error})") from error
+        self._recipes: dict[str, Any] = {}
 
     def map(
         self, function: Callable[[Model, Item], Answer], recipe: Recipe, items: Sequence[Item]
     ) -> Iterator[Answer]:
         """See `Pool`."""
-        shared = self._client.scatter(recipe, broadcast=True)
+        shared = self._given(recipe)
         futures = [self._client.submit(_step, function, shared, item, pure=False) for item in items]
         return (future.result() for future in futures)
 
+    def _given(self, recipe: Recipe) -> Any:
+        """The recipe on the workers, sent once and kept there.
+
+        Let go after a step and sent again for the next one under the same name, it can be freed
+        late, with the steps that wait for it.
+        """
+        key = recipe.digest()
+        if key not in self._recipes:
+            self._recipes[key] = self._client.scatter(recipe, broadcast=True, hash=False)
+        return self._recipes[key]
+
     def close(self) -> None:
-        """Leave the cluster."""
+        """Leave the cluster, and nothing on it."""
+        self._recipes.clear()
         self._client.close()
 
 
