@@ -57,7 +57,7 @@ INSIDE = (
         ranges={"share": (0.5, 1.0)},
     ),
     Entry(effect="motor_friction", law="palmgren_motor"),
-    Entry(effect="armature_reaction", law="quadratic_armature_reaction", programs=("program4",)),
+    Entry(effect="armature_reaction", law="knee_armature_reaction", programs=("program4",)),
     Entry(effect="field_lag", law="field_lag_with_eddies"),
     Entry(
         effect="armature_resistance_heating",

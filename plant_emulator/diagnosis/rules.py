@@ -14,6 +14,9 @@ PART_OF_GAP = 0.04
 # Evidence of a second effect where the first leaves nothing but noise: one with angles of its own
 # in every run came to 40 by chance.
 SECOND = 60.0
+# And the share of the whole gap that the first's own law may have left: the square of an error of
+# 3 % in it.
+LAW = 0.001
 # Elsewhere the share of what the first leaves that a second has to close: squares and structure.
 REST = 0.75
 # Share of the gap that is too little to look for more, of a model that never reaches the noise.
@@ -48,7 +51,7 @@ def counts(best: Point, base: Point, null: Point, reaches_noise: bool) -> bool:
         closes = gap > THRESHOLD and fall > max(THRESHOLD, PART_OF_GAP * gap)
         return closes or evidence > THRESHOLD
     if noise_only(base):
-        return evidence > SECOND
+        return evidence > SECOND and fall > LAW * excess(null)
     orderly = best.structure <= max(STRUCTURED, (1.0 - REST) * base.structure)
     most = fall > REST * (base.squares - base.samples)
     return evidence > THRESHOLD and orderly and most

@@ -1,10 +1,11 @@
 """The flux falls with the armature current, whose field saturates one tip of each pole.
 
-    k Phi = (k Phi)_0 (1 - a |i| / i_max)
+    k Phi = (k Phi)_0 (1 - a (|i| / i_max)^n)
 
 Source: A. E. Fitzgerald, C. Kingsley, S. D. Umans, Electric Machinery, chapter on DC machines
-(armature reaction, its demagnetising effect). i_max is the drive's nominal largest current: a is
-the share of the flux that is lost there.
+(armature reaction, its demagnetising effect: in proportion to the current where the pole tips are
+saturated already, n = 1, with its square where they begin to be). i_max is the drive's nominal
+largest current: a is the share of the flux that is lost there.
 """
 
 from __future__ import annotations
@@ -21,6 +22,9 @@ PARAMETERS = {
     "share": EffectParameter(
         neutral=0.0, lower=0.0, upper=0.5, plausible=0.1, unit="1", meaning="a"
     ),
+    "exponent": EffectParameter(
+        neutral=1.0, lower=0.5, upper=3.0, plausible=1.0, unit="1", meaning="n", std=0.5
+    ),
 }
 
 
@@ -29,4 +33,5 @@ def flux(value: float, s: Record, p: Record) -> float:
     if p.armature_reaction_share == 0.0:
         return value
     current = abs(s.armature_current) / p.armature_current_limit
-    return value * (1.0 - p.armature_reaction_share * current)
+    lost: float = current**p.armature_reaction_exponent
+    return value * (1.0 - p.armature_reaction_share * lost)
