@@ -24,7 +24,7 @@ from plant_emulator.simulate import run_of, simulate
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.estimation import Array, Residual
+    from plant_emulator.estimates import Array, Residual
     from plant_emulator.identify import Identification
     from plant_emulator.recording import Recording
 

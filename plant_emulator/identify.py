@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 from plant_emulator import estimation
 from plant_emulator.equation_error import start_values
 from plant_emulator.errors import IdentificationError
-from plant_emulator.estimation import Estimate, Unknown
+from plant_emulator.estimates import Estimate, Unknown
 from plant_emulator.search import FINE_SCANS, GAP_POSITION, Search
 from plant_emulator.simulate import TOLERANCE, values_of
 from plant_emulator.start_states import GAP, states_of, with_own
@@ -29,7 +29,7 @@ from plant_emulator.start_states import GAP, states_of, with_own
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.estimation import Residual
+    from plant_emulator.estimates import Residual
     from plant_emulator.log import Array
     from plant_emulator.parameters import ParameterSet
     from plant_emulator.recording import Recording

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.estimation import Unknown, estimate
+from plant_emulator.estimates import Unknown
+from plant_emulator.estimation import estimate
 from plant_emulator.kernel import kernel
 from plant_emulator.search import GAP_POSITION, Search
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.effects import Effect
-    from plant_emulator.estimation import Array
+    from plant_emulator.estimates import Array
     from plant_emulator.recording import Recording
 
     Effects = Mapping[str, Mapping[str, float]]

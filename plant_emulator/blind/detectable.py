@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.blind.case import Case, Hidden
-    from plant_emulator.estimation import Array, Residual
+    from plant_emulator.estimates import Array, Residual
     from plant_emulator.log import Log
     from plant_emulator.parameters import ParameterSet
 

@@ -23,7 +23,7 @@ from plant_emulator.start_states import fit_states, states_of, with_own
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.estimation import Array
+    from plant_emulator.estimates import Array
     from plant_emulator.log import Log
     from plant_emulator.parameters import ParameterSet
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.explain import Contender, Explanation
     from plant_emulator.diagnosis.model import Candidate, Run
     from plant_emulator.diagnosis.shrink import Gap, Prediction
-    from plant_emulator.estimation import Array
+    from plant_emulator.estimates import Array
 
 # Effects of no account that a ranking still shows.
 SHOWN = 5

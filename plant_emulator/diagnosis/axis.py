@@ -25,7 +25,7 @@ from plant_emulator.diagnosis.axis_effects import EFFECTS
 from plant_emulator.diagnosis.axis_signals import SAMPLES, AxisRun, prepared, told
 from plant_emulator.diagnosis.model import Run
 from plant_emulator.errors import LogError
-from plant_emulator.estimation import Unknown
+from plant_emulator.estimates import Unknown
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.axis_effects import AxisEffect
     from plant_emulator.diagnosis.axis_signals import AxisLog, Motion
     from plant_emulator.diagnosis.contest import Point
-    from plant_emulator.estimation import Array, Residual
+    from plant_emulator.estimates import Array, Residual
 
 LEVEL = "friction_level"
 LEVEL_STD = 0.1

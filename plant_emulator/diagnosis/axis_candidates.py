@@ -8,7 +8,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.axis_effects import Scale
 from plant_emulator.diagnosis.model import Candidate, Term
-from plant_emulator.estimation import Unknown
+from plant_emulator.estimates import Unknown
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

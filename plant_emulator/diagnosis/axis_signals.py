@@ -20,7 +20,7 @@ from plant_emulator.noise import noise
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from plant_emulator.estimation import Array
+    from plant_emulator.estimates import Array
 
 ORDER = 4
 TOPS = (2.0, 5.0, 10.0, 20.0, 40.0)

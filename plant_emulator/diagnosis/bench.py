@@ -15,7 +15,7 @@ from plant_emulator.diagnosis.model import Candidate, Run
 from plant_emulator.diagnosis.relations import base_speed
 from plant_emulator.effects import from_file
 from plant_emulator.equation_error import start_values
-from plant_emulator.estimation import Unknown
+from plant_emulator.estimates import Unknown
 from plant_emulator.identify import free_parameters, unknowns
 from plant_emulator.kernel import kernel, know
 from plant_emulator.parameters import UNITS
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.effects import Effect
-    from plant_emulator.estimation import Array, Residual
+    from plant_emulator.estimates import Array, Residual
     from plant_emulator.parameters import ParameterSet
     from plant_emulator.recording import Recording
 

@@ -28,13 +28,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.covariance import correlation_time, structure
-from plant_emulator.estimation import Estimate, at, estimate
+from plant_emulator.estimation import at, estimate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.model import Model
-    from plant_emulator.estimation import Unknown
+    from plant_emulator.estimates import Estimate, Unknown
 
 # Relative fall of the cost that ends a fit here: a few hundredths in units of chi squared.
 SETTLED = 1e-6

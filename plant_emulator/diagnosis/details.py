@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from plant_emulator.diagnosis.rest import Rest
-    from plant_emulator.estimation import Array
+    from plant_emulator.estimates import Array
 
 
 @dataclass(frozen=True, kw_only=True)

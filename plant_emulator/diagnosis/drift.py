@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.laws import Inside
-    from plant_emulator.estimation import Array
+    from plant_emulator.estimates import Array
     from plant_emulator.parameters import Parameter, ParameterSet
 
 # Prior standard deviations that a fit without effects is believed within.

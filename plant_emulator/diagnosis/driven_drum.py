@@ -15,7 +15,7 @@ from plant_emulator import compiler
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from plant_emulator.estimation import Array
+    from plant_emulator.estimates import Array
 
 
 @cache

@@ -11,7 +11,7 @@ from plant_emulator.diagnosis.phases import smooth
 from plant_emulator.diagnosis.relations import NOISES, Measured, turned
 
 if TYPE_CHECKING:
-    from plant_emulator.estimation import Array
+    from plant_emulator.estimates import Array
 
 # Window of the speed that laws depend on, and step of laws of time [s].
 WINDOW, SLOW = 0.3, 2.0

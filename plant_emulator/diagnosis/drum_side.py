@@ -14,7 +14,8 @@ import numpy as np
 
 from plant_emulator.diagnosis.driven_drum import compiled, drum_speed
 from plant_emulator.diagnosis.relations import NOISES, smoothed_speed
-from plant_emulator.estimation import Unknown, at, estimate
+from plant_emulator.estimates import Unknown
+from plant_emulator.estimation import at, estimate
 from plant_emulator.search import GAP_POSITION
 from plant_emulator.start_states import GAP
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from plant_emulator.diagnosis.relations import Measured
-    from plant_emulator.estimation import Array, Estimate, Residual
+    from plant_emulator.estimates import Array, Estimate, Residual
     from plant_emulator.parameters import ParameterSet
     from plant_emulator.recording import Recording
 

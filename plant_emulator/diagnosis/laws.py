@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from plant_emulator.diagnosis.relations import Measured
-    from plant_emulator.estimation import Array
+    from plant_emulator.estimates import Array
 
 # Windows of the smooth quantities, and steps of laws of time [s].
 WINDOW = 0.15

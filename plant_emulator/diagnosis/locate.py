@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.contest import Point
-    from plant_emulator.estimation import Array
+    from plant_emulator.estimates import Array
     from plant_emulator.parameters import ParameterSet
     from plant_emulator.recording import Recording
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.model import Model
     from plant_emulator.diagnosis.signature import Signature
-    from plant_emulator.estimation import Estimate
+    from plant_emulator.estimates import Estimate
 
 # Steps of a first look, whose drift follows by secants.
 GLANCE = 10

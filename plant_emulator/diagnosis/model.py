@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from plant_emulator.diagnosis.contest import Point
-    from plant_emulator.estimation import Array, Residual, Unknown
+    from plant_emulator.estimates import Array, Residual, Unknown
 
 
 @dataclass(frozen=True, kw_only=True)

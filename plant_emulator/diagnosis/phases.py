@@ -13,7 +13,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from plant_emulator.estimation import Array
+    from plant_emulator.estimates import Array
 
 PHASES = ("standstill", "breakaway", "acceleration", "cruise", "deceleration", "field_weakening")
 STANDSTILL, BREAKAWAY, ACCELERATION, CRUISE, DECELERATION = range(5)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from plant_emulator.estimation import Array
+    from plant_emulator.estimates import Array
     from plant_emulator.recording import Recording
 
 MOTOR, GEAR, DRIVE = range(3)

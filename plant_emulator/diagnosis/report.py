@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from plant_emulator.diagnosis import report_tables as tables
 from plant_emulator.diagnosis import report_traces
 from plant_emulator.diagnosis.markup import Markup, join, tag
+from plant_emulator.diagnosis.report_parts import code, scrolled
 from plant_emulator.diagnosis.report_pictures import line, waterfall
 from plant_emulator.diagnosis.report_rest import rest_by_band
 from plant_emulator.diagnosis.report_style import STYLE
@@ -114,7 +115,7 @@ def _shrinkage(answer: Mapping[str, Any], details: Details) -> Markup:
             "left above the noise; dashed: what the step took away; whiskers: 95 % interval from "
             "a block bootstrap."
         )
-        drawn = tables.scrolled(waterfall(details.waterfall), "Waterfall")
+        drawn = scrolled(waterfall(details.waterfall), "Waterfall")
         parts.append(tag("figure", drawn, tag("figcaption", caption)))
     share = closed(answer["gap"])
     if share:
@@ -153,9 +154,9 @@ def _effects(answer: Mapping[str, Any]) -> Markup:
 
 def _class(name: str, others: Sequence[str]) -> list[str]:
     if not others:
-        return [tables.code(name), ": these logs tell it from every other effect of the library."]
-    listed = [part for other in others for part in (", ", tables.code(other))][1:]
-    return [tables.code(name), ": these logs cannot tell it from ", *listed, "."]
+        return [code(name), ": these logs tell it from every other effect of the library."]
+    listed = [part for other in others for part in (", ", code(other))][1:]
+    return [code(name), ": these logs cannot tell it from ", *listed, "."]
 
 
 def _parameters(verdict: Mapping[str, Any]) -> Markup:
@@ -213,7 +214,7 @@ def _legend(traces: Sequence[Trace]) -> Markup:
 
 def _figure(trace: Trace, columns: int) -> Markup:
     name = f"{spoken(trace.channel)} [{trace.unit}]"
-    drawn = tables.scrolled(report_traces.draw(trace, columns), name)
+    drawn = scrolled(report_traces.draw(trace, columns), name)
     words = tag("figcaption", tag("strong", name), f": {report_traces.summary(trace)}")
     return tag("figure", words, drawn)
 

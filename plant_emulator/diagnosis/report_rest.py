@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.bands import BANDS
 from plant_emulator.diagnosis.markup import Markup, join, tag
-from plant_emulator.diagnosis.report_tables import TIMES, bar, cell, right, row_head, table
+from plant_emulator.diagnosis.report_parts import bar, cell, right, row_head, table
+from plant_emulator.diagnosis.report_tables import TIMES
 from plant_emulator.diagnosis.rest import lies
 from plant_emulator.diagnosis.wording import number
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from plant_emulator.diagnosis.details import Trace
-    from plant_emulator.estimation import Array
+    from plant_emulator.estimates import Array
 
     Axis = Callable[[Array], Array]
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.diagnosis.details import Trace
     from plant_emulator.diagnosis.model import Model
-    from plant_emulator.estimation import Array
+    from plant_emulator.estimates import Array
 
 FAST = 10.0
 """[Hz]"""

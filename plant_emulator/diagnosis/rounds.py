@@ -10,8 +10,18 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
+from plant_emulator.diagnosis.contenders import (
+    best_few,
+    better_of,
+    closed,
+    contender_of,
+    cost_of,
+    explained,
+    points_of,
+    with_point,
+)
 from plant_emulator.diagnosis.contest import WORTH
-from plant_emulator.diagnosis.explain import NOISE_LEFT, Contender, excess
+from plant_emulator.diagnosis.explain import NOISE_LEFT
 from plant_emulator.diagnosis.rules import noise_only
 from plant_emulator.diagnosis.steps import (
     Task,
@@ -29,9 +39,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from plant_emulator.diagnosis.contest import Point
+    from plant_emulator.diagnosis.explain import Contender
     from plant_emulator.diagnosis.model import Model
     from plant_emulator.diagnosis.pool import Pool, Recipe
-    from plant_emulator.diagnosis.signature import Signature
 
     Progress = Callable[[str, float], None]
 
@@ -42,9 +52,6 @@ RESTARTS = 3
 PATIENCE = 3
 # Best of a round's first looks that are fitted, and best of these that are fitted to convergence.
 CHOSEN, POLISHED = 8, 4
-# What keeps an effect in a round: the fall of its cost [fall of the best one], or that it is no
-# further behind the best than a first look may be wrong [chi squared].
-KEPT, NEAR = 0.25, 50.0
 # Share of the gap that an effect closes where no other is likely to close more.
 MOST = 0.9
 # Fall of the cost at first look that makes one more effect on top of noise worth a fit.
@@ -106,8 +113,8 @@ class Rounds:
         ]
         points = self._told(stage, tasks, self._pool.map(contend, self._recipe, tasks))
         seen = dict(zip((task.effect for task in tasks), points, strict=True))
-        contenders = [_contender(name, one, seen.get(name)) for name, one in shown.items()]
-        least = min(map(_cost, contenders), default=base.cost)
+        contenders = [contender_of(name, one, seen.get(name)) for name, one in shown.items()]
+        least = min(map(cost_of, contenders), default=base.cost)
         if base.effects and noise_only(base) and base.cost - least < SIGHT:
             return contenders
         contenders = self._taken_further(contenders, base, stage)
@@ -117,8 +124,8 @@ class Rounds:
             far = self._told(stage, tasks, self._pool.map(contend_far, self._recipe, tasks))
             again = [
                 replace(c, point=p)
-                for c, p in zip(_with_point(contenders), far, strict=True)
-                if p is not None and p.cost < _cost(c) - WORTH
+                for c, p in zip(with_point(contenders), far, strict=True)
+                if p is not None and p.cost < cost_of(c) - WORTH
             ]
             contenders = better_of(contenders, self._taken_further(again, base, stage))
         if explained(contenders):
@@ -137,11 +144,11 @@ class Rounds:
         self, base: Point, contenders: Sequence[Contender], stage: str
     ) -> list[Contender]:
         """Effects fitted from the nominal parameters."""
-        chosen = _with_point(contenders)
+        chosen = with_point(contenders)
         tasks = [Task(base=base, runs=self._runs, effect=c.effect) for c in chosen]
         points = self._told(stage, tasks, self._pool.map(once_more, self._recipe, tasks))
         again = sorted(
-            (replace(c, point=p) for c, p in zip(chosen, points, strict=True)), key=_cost
+            (replace(c, point=p) for c, p in zip(chosen, points, strict=True)), key=cost_of
         )
         # A few steps from afar end anywhere: the best go on, however they stand against the others.
         tasks = [Task(base=c.point, runs=self._runs) for c in again[:POLISHED] if c.point]
@@ -151,7 +158,7 @@ class Rounds:
 
     def restarted(self, base: Point, contenders: Sequence[Contender]) -> Point:
         """The best fit with the base's effects from the drift of the best contenders."""
-        ranked = sorted(_points(contenders), key=lambda p: p.cost)[:RESTARTS]
+        ranked = sorted(points_of(contenders), key=lambda p: p.cost)[:RESTARTS]
         starts = [replace(p, effects=base.effects) for p in ranked if base.cost - p.cost > WORTH]
         tasks = [Task(base=p, runs=self._runs) for p in starts]
         again = self._pool.map(refit, self._recipe, tasks)
@@ -159,7 +166,7 @@ class Rounds:
 
     def _moved(self, contenders: Sequence[Contender], base: Point, most: int) -> list[Contender]:
         """The best of a round started again from some way off."""
-        best = _best_few(contenders, base, most)
+        best = best_few(contenders, base, most)
         points = self._shaken([c.point for c in best if c.point is not None])
         again = [replace(c, point=p) for c, p in zip(best, points, strict=True)]
         return better_of(contenders, again)
@@ -188,7 +195,7 @@ class Rounds:
         stage: str,
     ) -> list[Contender]:
         """The best of a round taken a step further."""
-        best = _best_few(contenders, base, most)
+        best = best_few(contenders, base, most)
         tasks = [Task(base=c.point, runs=self._runs) for c in best if c.point is not None]
         fitted = self._told(stage, tasks, self._pool.map(step, self._recipe, tasks))
         done = {c.effect: replace(c, point=p) for c, p in zip(best, fitted, strict=True)}
@@ -202,54 +209,3 @@ class Rounds:
                 self._progress(stage, (done + 1) / len(tasks))
             every.append(one)
         return every
-
-
-def explained(contenders: Sequence[Contender]) -> bool:
-    """Whether an effect leaves nothing but noise."""
-    return any(point.chi_squared <= NOISE_LEFT for point in _points(contenders))
-
-
-def closed(contenders: Sequence[Contender], base: Point, share: float) -> bool:
-    """Whether an effect closes so much of what a fit leaves beyond the noise."""
-    return any(excess(point) <= (1.0 - share) * excess(base) for point in _points(contenders))
-
-
-def _contender(name: str, shown: Signature | None, point: Point | None) -> Contender:
-    if shown is None:
-        return Contender(effect=name, norm=0.0, raw=0.0, imitated_by="", point=None)
-    return Contender(
-        effect=name, norm=shown.norm, raw=shown.raw, imitated_by=shown.imitated_by, point=point
-    )
-
-
-def better_of(first: Sequence[Contender], second: Sequence[Contender]) -> list[Contender]:
-    """Of two fits of the same effect the better one."""
-    others = {c.effect: c for c in second if c.point is not None}
-    return [min(c, others.get(c.effect, c), key=_cost) for c in first]
-
-
-def _best_few(contenders: Sequence[Contender], base: Point, most: int) -> list[Contender]:
-    """Those whose cost is least, without those that fall far behind the best."""
-    order = sorted(_with_point(contenders), key=_cost)
-    if not order:
-        return []
-    least = _cost(order[0])
-    reach = max(least + NEAR, base.cost - KEPT * (base.cost - least))
-    return [c for c in order[:most] if _cost(c) <= reach]
-
-
-def _cost(contender: Contender) -> float:
-    return contender.point.cost if contender.point is not None else float("inf")
-
-
-def _with_point(contenders: Sequence[Contender]) -> list[Contender]:
-    return [c for c in contenders if c.point is not None]
-
-
-def _points(contenders: Sequence[Contender]) -> Iterator[Point]:
-    return (c.point for c in contenders if c.point is not None)
-
-
-def best_of(contenders: Sequence[Contender]) -> Point | None:
-    """The fit whose cost is least; None where no effect shows."""
-    return min(_points(contenders), key=lambda p: p.cost, default=None)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from plant_emulator.diagnosis.model import Model
-    from plant_emulator.estimation import Array
+    from plant_emulator.estimates import Array
 
 # A channel counts in the closed fraction from this gap on, in the noise.
 OPEN = 1.1

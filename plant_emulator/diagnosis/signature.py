@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.diagnosis.model import Candidate, Model
     from plant_emulator.diagnosis.tangents import Tangents
-    from plant_emulator.estimation import Array, Estimate, Unknown
+    from plant_emulator.estimates import Array, Estimate, Unknown
 
 # Sizes at which a signature is tried, in plausible sizes.
 SIZES = (0.03, 0.1, 0.3, 0.6, 1.0, 2.0)

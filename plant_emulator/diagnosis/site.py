@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from plant_emulator.diagnosis.contest import Point
-    from plant_emulator.estimation import Array, Estimate
+    from plant_emulator.estimates import Array, Estimate
     from plant_emulator.parameters import ParameterSet
     from plant_emulator.recording import Recording
 

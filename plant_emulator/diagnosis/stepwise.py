@@ -10,9 +10,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from plant_emulator.diagnosis.contenders import best_of, better_of, closed, explained
 from plant_emulator.diagnosis.contest import ASTRAY
 from plant_emulator.diagnosis.explain import MARGIN, THRESHOLD, Explanation, excess
-from plant_emulator.diagnosis.rounds import MOST, Rounds, best_of, better_of, closed, explained
+from plant_emulator.diagnosis.rounds import MOST, Rounds
 from plant_emulator.diagnosis.rules import counts, enough
 
 if TYPE_CHECKING:

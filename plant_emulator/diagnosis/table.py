@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from plant_emulator.diagnosis.relations import Relations
-    from plant_emulator.estimation import Array
+    from plant_emulator.estimates import Array
 
     Columns = Sequence[Array | None]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from plant_emulator.estimation import Array, Estimate
+    from plant_emulator.estimates import Array, Estimate
 
 
 class Tangents:

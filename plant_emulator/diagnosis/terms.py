@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.diagnosis.model import Model, Term
-    from plant_emulator.estimation import Estimate
+    from plant_emulator.estimates import Estimate
 
 # Half step of a central difference on the scale of the estimation.
 STEP = 1e-4

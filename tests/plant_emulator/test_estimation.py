@@ -12,7 +12,8 @@ from plant_emulator.covariance import (
     data_errors,
     structure,
 )
-from plant_emulator.estimation import Unknown, at, estimate
+from plant_emulator.estimates import Unknown
+from plant_emulator.estimation import at, estimate
 
 
 def number(name: str, start: float, **more: object) -> Unknown:

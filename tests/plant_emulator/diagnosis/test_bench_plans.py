@@ -3,7 +3,7 @@
 import numpy as np
 
 from plant_emulator.diagnosis.bench_plans import lacks, shows, undriven
-from plant_emulator.estimation import Array
+from plant_emulator.estimates import Array
 from plant_emulator.log import Log
 from plant_emulator.programs import PROGRAMS, in_words
 

@@ -15,7 +15,7 @@ from plant_emulator.diagnosis.pool import Here
 from plant_emulator.diagnosis.signature import signature
 from plant_emulator.diagnosis.stepwise import Contest
 from plant_emulator.diagnosis.tangents import Tangents
-from plant_emulator.estimation import Array, Unknown
+from plant_emulator.estimates import Array, Unknown
 
 TIME = np.linspace(-1.0, 1.0, 2000)
 

@@ -10,7 +10,7 @@ from plant_emulator.diagnosis.contest import Point
 from plant_emulator.diagnosis.diagnose import Diagnose, Diagnosis
 from plant_emulator.diagnosis.held_out import Plan
 from plant_emulator.diagnosis.pool import Here
-from plant_emulator.estimation import Array
+from plant_emulator.estimates import Array
 from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, noisy
 
 EACH_IN_TURN = Plan(fitted=(0, 1, 2), folds=(((1, 2), (0,)), ((0, 2), (1,)), ((0, 1), (2,))))

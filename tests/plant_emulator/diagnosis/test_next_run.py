@@ -15,7 +15,7 @@ from plant_emulator.diagnosis.explain import Contender, Explanation
 from plant_emulator.diagnosis.model import Candidate, Run
 from plant_emulator.diagnosis.pool import Here
 from plant_emulator.diagnosis.verdict import Verdict
-from plant_emulator.estimation import Array, Unknown
+from plant_emulator.estimates import Array, Unknown
 from plant_emulator.recording import recording
 from plant_emulator.search import GAP_POSITION
 from plant_emulator.sensors import noisy

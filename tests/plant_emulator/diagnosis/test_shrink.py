@@ -10,7 +10,7 @@ from plant_emulator.diagnosis.shrink import (
     gap,
     interval,
 )
-from plant_emulator.estimation import Array
+from plant_emulator.estimates import Array
 
 
 def prediction(*channels: Array) -> Prediction:
