@@ -48,7 +48,13 @@ INSIDE = (
         programs=("program4",),
         ranges={"reduction": (44.0, 54.0)},
     ),
-    Entry(effect="voltage_sag", law="lagging_voltage_sag", programs=("program4",)),
+    # Beyond it a braking current takes away the voltage that limits it, and runs away.
+    Entry(
+        effect="voltage_sag",
+        law="lagging_voltage_sag",
+        programs=("program4",),
+        ranges={"source_resistance": (0.4, 1.1)},
+    ),
     Entry(effect="converter_dead_time", law="tanh_converter", ranges={"mains": (49.95, 50.05)}),
     Entry(
         effect="integrator_windup",

@@ -183,7 +183,7 @@ class Diagnose:
         shares = place.evidence_shares(explained, self.model.candidates)
         if located is not None:
             shares = {entry["name"]: entry["share"] for entry in located["subsystems"]}
-        where = place.subsystem(found, explained, self.model.candidates, shares)
+        where = place.subsystem(found, self.model.candidates, shares)
         return place.location(where, shares, located)
 
     def _closed(

@@ -38,7 +38,7 @@ class Contender:
     """An effect in the contest.
 
     norm : of its drift-free signature at the plausible size; raw : without removing drift
-    point : its joint fit; None where its signature vanishes
+    point : its joint fit; None where its signature vanishes, or promises nothing beyond noise
     """
 
     effect: str
@@ -74,10 +74,11 @@ class Explanation:
     def classes(self) -> list[list[str]]:
         """For every accepted effect those that these logs cannot tell from it, itself first."""
         found = []
-        for name, costs in self.rivals.items():
+        for name in self.final.effects:
+            costs = sorted(self.rivals.get(name, {}).items(), key=lambda pair: pair[1])
             near = [
                 other
-                for other, cost in sorted(costs.items(), key=lambda pair: pair[1])
+                for other, cost in costs
                 if other != name and weighed(cost - self.final.cost, self.final, self.null) < MARGIN
             ]
             found.append([name, *near])

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 # Effects whose held-out gain is computed: the best ones only, each takes a fit a fold.
 TRIED = 3
+# Share of the best one's evidence that another has at least.
+NEAR = 0.1
 # The model "as given" among those that are compared by their effects.
 NOMINAL = ("nominal",)
 # Of every fold the runs that are fitted, and those that are predicted.
@@ -112,5 +114,7 @@ class HeldOut:
 
 
 def _best(explained: Explanation) -> list[Contender]:
-    ranked = sorted(explained.contenders, key=explained.evidence, reverse=True)
-    return [c for c in ranked[:TRIED] if explained.evidence(c) > THRESHOLD]
+    """Those that count, and come somewhere near the best."""
+    ranked = sorted(explained.contenders, key=explained.evidence, reverse=True)[:TRIED]
+    least = max([THRESHOLD, *(NEAR * explained.evidence(c) for c in ranked[:1])])
+    return [c for c in ranked if explained.evidence(c) > least]

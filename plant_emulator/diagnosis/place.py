@@ -29,19 +29,19 @@ def evidence_shares(
 
 def subsystem(
     verdict: Verdict,
-    explained: Explanation,
     candidates: Mapping[str, Candidate],
     shares: Mapping[str, float],
 ) -> str | None:
-    """The place of the strongest effect, of the most surprising parameter, or of the gap."""
+    """The place of the effect with the largest share there, of the most surprising parameter, or of
+    the gap.
+    """
     if verdict.kind == "none":
         return None
     if verdict.kind == "parameter":
         return verdict.shifts[0].subsystem
     if verdict.kind == "effect":
-        alone = {c.effect: explained.evidence(c) for c in explained.contenders}
-        strongest = max(verdict.effects, key=lambda name: alone[name])
-        return candidates[strongest].subsystem
+        places = [candidates[name].subsystem for name in verdict.effects]
+        return max(places, key=lambda place: shares.get(place, 0.0))
     return max(shares, key=shares.__getitem__, default=None)
 
 

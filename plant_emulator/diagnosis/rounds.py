@@ -8,6 +8,7 @@ way off.
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf
 from typing import TYPE_CHECKING, TypeVar
 
 from plant_emulator.diagnosis.contenders import (
@@ -22,7 +23,7 @@ from plant_emulator.diagnosis.contenders import (
 )
 from plant_emulator.diagnosis.contest import WORTH
 from plant_emulator.diagnosis.explain import NOISE_LEFT
-from plant_emulator.diagnosis.rules import noise_only
+from plant_emulator.diagnosis.rules import SECOND, noise_only
 from plant_emulator.diagnosis.steps import (
     Task,
     contend,
@@ -54,6 +55,9 @@ PATIENCE = 3
 CHOSEN, POLISHED = 8, 4
 # Share of the gap that an effect closes where no other is likely to close more.
 MOST = 0.9
+# Fall of the sum of squares that the signature promises where one more effect on top of noise is
+# worth a look: there the linear picture holds.
+GLIMPSE = 5.0
 # Fall of the cost at first look that makes one more effect on top of noise worth a fit.
 SIGHT = 20.0
 # Best of a round that start again from some way off, and how often.
@@ -106,17 +110,19 @@ class Rounds:
         tasks = [Task(base=base, runs=self._runs, effect=name) for name in names]
         found = self._told(stage, tasks, self._pool.map(show, self._recipe, tasks))
         shown = dict(zip(names, found, strict=True))
+        promising = GLIMPSE if noise_only(base) else -inf
         tasks = [
             Task(base=base, runs=self._runs, effect=name, signature=one)
             for name, one in shown.items()
-            if one is not None
+            if one is not None and one.gain > promising
         ]
         points = self._told(stage, tasks, self._pool.map(contend, self._recipe, tasks))
         seen = dict(zip((task.effect for task in tasks), points, strict=True))
         contenders = [contender_of(name, one, seen.get(name)) for name, one in shown.items()]
-        least = min(map(cost_of, contenders), default=base.cost)
-        if base.effects and noise_only(base) and base.cost - least < SIGHT:
-            return contenders
+        if base.effects and noise_only(base):
+            contenders = self._sighted(contenders, base, stage)
+            if base.cost - _least(contenders) < SECOND:
+                return contenders
         contenders = self._taken_further(contenders, base, stage)
         if explained(contenders) or base.chi_squared <= NOISE_LEFT:
             return contenders
@@ -132,6 +138,15 @@ class Rounds:
             return contenders
         alone = not thorough or closed(contenders, base, MOST)
         return self._moved(contenders, base, 1 if alone else SHAKEN)
+
+    def _sighted(self, contenders: Sequence[Contender], base: Point, stage: str) -> list[Contender]:
+        """The best effect on top of noise fitted to convergence, where it is worth that."""
+        found = list(contenders)
+        for step in (follow, refit):
+            if base.cost - _least(found) < SIGHT:
+                break
+            found = self._fitted(found, base, 1, step, stage)
+        return found
 
     def _taken_further(
         self, contenders: Sequence[Contender], base: Point, stage: str
@@ -158,7 +173,8 @@ class Rounds:
 
     def restarted(self, base: Point, contenders: Sequence[Contender]) -> Point:
         """The best fit with the base's effects from the drift of the best contenders."""
-        ranked = sorted(points_of(contenders), key=lambda p: p.cost)[:RESTARTS]
+        most = 1 if base.effects and noise_only(base) else RESTARTS
+        ranked = sorted(points_of(contenders), key=lambda p: p.cost)[:most]
         starts = [replace(p, effects=base.effects) for p in ranked if base.cost - p.cost > WORTH]
         tasks = [Task(base=p, runs=self._runs) for p in starts]
         again = self._pool.map(refit, self._recipe, tasks)
@@ -209,3 +225,7 @@ class Rounds:
                 self._progress(stage, (done + 1) / len(tasks))
             every.append(one)
         return every
+
+
+def _least(contenders: Sequence[Contender]) -> float:
+    return min(map(cost_of, contenders), default=inf)

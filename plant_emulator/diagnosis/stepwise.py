@@ -50,8 +50,10 @@ class Contest:
     def explain(self) -> Explanation:
         """Go through the contest."""
         null, contenders = self._first(self._rounds.without_effects())
+        null = self._rounds.settled(null)
         final = null
         rivals: dict[str, dict[str, float]] = {}
+        tried: set[frozenset[str]] = set()
         while len(final.effects) < MOST_EFFECTS and not enough(final, null, self._reaches_noise):
             found = contenders
             if final.effects:
@@ -59,15 +61,20 @@ class Contest:
             best = best_of(found)
             if best is None or not counts(best, final, null, self._reaches_noise):
                 break
-            final = best
-            final, rivals = self._missed(*self._stand(final, found), null)
+            final, rivals = self._stand(best, found)
+            final = self._missed(final, null)
+            if len(final.effects) == 1:
+                rivals = {final.effects[0]: _costs(contenders)}
+            if frozenset(final.effects) in tried:
+                break  # each makes the other needless, in turn
+            tried.add(frozenset(final.effects))
         final = self._rounds.settled(final)
         return Explanation(
             null=null,
             final=final,
             contenders=tuple(contenders),
             rivals=rivals,
-            unconverged="" if final.converged else "the last fit did not converge",
+            unconverged=_unconverged(null, final),
         )
 
     def _first(self, null: Point) -> tuple[Point, list[Contender]]:
@@ -99,33 +106,45 @@ class Contest:
     def _stand(
         self, final: Point, last: Sequence[Contender]
     ) -> tuple[Point, dict[str, dict[str, float]]]:
-        """Let every effect but the last stand the contest again; take the best in its place."""
+        """Let every effect but the last stand the contest again; take the best in its place.
+
+        Where another takes an effect's place, the rest have new company, and stand once more.
+        """
         rivals = {final.effects[-1]: _costs(last)}
-        for name in final.effects[:-1]:
-            rest = tuple(e for e in final.effects if e != name)
+        for _ in range(MOST_EFFECTS**2):
+            waiting = [name for name in final.effects if name not in rivals]
+            if not waiting:
+                break
+            rest = tuple(e for e in final.effects if e != waiting[0])
             without = self._rounds.refitted(replace(final, effects=rest))
             without, found = self._further(without, "standing again")
             best = best_of(found)
-            rivals[name] = _costs(found)
             if best is not None and best.cost < final.cost - MARGIN:
-                other = best.effects[-1]
-                rivals[other] = rivals.pop(name)
-                final = best
+                final, rivals = best, {best.effects[-1]: _costs(found)}
+            else:
+                rivals[waiting[0]] = _costs(found)
         return final, rivals
 
-    def _missed(
-        self, final: Point, rivals: dict[str, dict[str, float]], null: Point
-    ) -> tuple[Point, dict[str, dict[str, float]]]:
+    def _missed(self, final: Point, null: Point) -> Point:
         """Without an effect that another has made needless."""
         if len(final.effects) < 2:
-            return final, rivals
+            return final
         for name in final.effects:
             rest = tuple(e for e in final.effects if e != name)
             without = self._rounds.refitted(replace(final, effects=rest))
             if not counts(final, without, null, self._reaches_noise):
-                return without, {kept: rivals[kept] for kept in rest}
-        return final, rivals
+                return without
+        return final
 
 
 def _costs(contenders: Sequence[Contender]) -> dict[str, float]:
     return {c.effect: c.point.cost for c in contenders if c.point is not None}
+
+
+def _unconverged(null: Point, final: Point) -> str:
+    """Why a contest cannot be trusted; empty where it can."""
+    if not final.converged:
+        return "the last fit did not converge"
+    if not null.converged:
+        return "the fit without effects did not converge"
+    return ""

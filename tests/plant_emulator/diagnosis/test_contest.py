@@ -11,10 +11,12 @@ from plant_emulator.diagnosis.contest import Point, fit, linearised, null_fit
 from plant_emulator.diagnosis.explain import Explanation, adequate, excess
 from plant_emulator.diagnosis.looks import from_nominal, glance, glance_far, look
 from plant_emulator.diagnosis.model import Candidate, Run
+from plant_emulator.diagnosis.place import subsystem
 from plant_emulator.diagnosis.pool import Here
 from plant_emulator.diagnosis.signature import signature
 from plant_emulator.diagnosis.stepwise import Contest
 from plant_emulator.diagnosis.tangents import Tangents
+from plant_emulator.diagnosis.verdict import decide
 from plant_emulator.estimates import Array, Unknown
 
 TIME = np.linspace(-1.0, 1.0, 2000)
@@ -163,7 +165,37 @@ def test_both_of_two_effects_are_named() -> None:
     y = 2.0 + 3.0 * TIME + 0.8 * np.sin(20.0 * TIME) - 3.0 * TIME**3
     found = explained(Line([noisy(y)]))
     assert set(found.final.effects) == {"wave", "cube"}
+    assert [names[0] for names in found.classes()] == list(found.final.effects)
     assert adequate(found.final, found.null)
+
+
+def test_two_effects_lie_where_the_larger_share_is() -> None:
+    y = 2.0 + 3.0 * TIME + 0.8 * np.sin(20.0 * TIME) - 3.0 * TIME**3
+    model = Line([noisy(y)])
+    found = decide(model, explained(model))
+    for larger, smaller in (("wave", "cube"), ("cube", "wave")):
+        shares = {f"part of {larger}": 0.6, f"part of {smaller}": 0.4}
+        assert subsystem(found, model.candidates, shares) == f"part of {larger}"
+
+
+class Stuck(Line):
+    """The line whose fit without effects never ends: a bottomless slope."""
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        inner = super().residual(run, effects)
+        calls = iter(range(10**9))
+
+        def falling(values: Mapping[str, float]) -> Array:
+            return inner(values) * (1.0 if effects else 10.0 * 0.99 ** next(calls))
+
+        return falling
+
+
+def test_fit_without_effects_that_does_not_converge_lets_nothing_be_named() -> None:
+    model = Stuck([noisy(2.0 + 3.0 * TIME + 0.8 * np.sin(20.0 * TIME))], ["wave"])
+    found = decide(model, explained(model))
+    assert (found.kind, found.effects) == ("unknown", ())
+    assert "without effects did not converge" in found.reason
 
 
 def test_nothing_is_named_where_only_the_line_has_drifted() -> None:
