@@ -110,7 +110,7 @@ class Rounds:
         tasks = [Task(base=base, runs=self._runs, effect=name) for name in names]
         found = self._told(stage, tasks, self._pool.map(show, self._recipe, tasks))
         shown = dict(zip(names, found, strict=True))
-        promising = GLIMPSE if noise_only(base) else -inf
+        promising = GLIMPSE if base.chi_squared <= NOISE_LEFT else -inf
         tasks = [
             Task(base=base, runs=self._runs, effect=name, signature=one)
             for name, one in shown.items()
