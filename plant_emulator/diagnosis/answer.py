@@ -39,10 +39,15 @@ def ranged(gap: Gap | None, runs: Sequence[Run]) -> dict[str, float]:
 
 
 def ranked(explained: Explanation) -> list[Contender]:
-    """Effects with evidence, and a few of those without, the best first."""
+    """Effects with evidence or accepted, and a few of those without, the best first.
+
+    What is needed beside another effect may have little evidence alone.
+    """
     order = sorted(explained.contenders, key=explained.evidence, reverse=True)
     counting = [c for c in order if explained.evidence(c) > THRESHOLD]
-    return order[: max(SHOWN, len(counting))]
+    shown = max(SHOWN, len(counting))
+    accepted = [c for c in order[shown:] if c.effect in explained.final.effects]
+    return [*order[:shown], *accepted]
 
 
 def rank(
