@@ -90,6 +90,7 @@ class Diagnose:
         self.folds, notes = held_out.usable(explained, found)
         self.notes += notes
         predicted = held_out.predictions(explained, found, self.folds)
+        self.notes += held_out.unsettled(self.folds, predicted)
         return self._answered(explained, found, predicted)
 
     def _between(self, explained: Explanation, found: Verdict) -> Verdict:

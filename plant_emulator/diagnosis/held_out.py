@@ -10,6 +10,8 @@ from plant_emulator.diagnosis.explain import DETECTABLE, THRESHOLD
 from plant_emulator.diagnosis.shrink import Fold
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.diagnosis.explain import Contender, Explanation
     from plant_emulator.diagnosis.model import Model
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 TRIED = 3
 # The model "as given" among those that are compared by their effects.
 NOMINAL = ("nominal",)
+NONE_SHOWS = "no choice of fitted runs shows all effects; every run is predicted nevertheless"
 # Of every fold the runs that are fitted, and those that are predicted.
 Folds = tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
 
@@ -52,7 +55,8 @@ class HeldOut:
     def usable(self, explained: Explanation, found: Verdict) -> tuple[Folds, tuple[str, ...]]:
         """The folds whose fitted runs show all named effects, and a note on every other.
 
-        Runs that do not show an effect cannot predict it; should no fold be left, all are.
+        Runs that do not show an effect cannot predict it; should no fold be left, all are
+        predicted, and one note tells it.
         """
         tasks = [self._fold(explained.final, *fold, refitted=False) for fold in self.plan.folds]
         if not found.effects or len(tasks) < 2:
@@ -67,7 +71,9 @@ class HeldOut:
                 continue
             lost = ", ".join(self.model.runs[run].source for run in fold[1])
             notes.append(f"{lost}: not predicted; the other runs do not show {hidden[0]}")
-        return (tuple(usable) or self.plan.folds), tuple(notes)
+        if not usable:
+            return self.plan.folds, (NONE_SHOWS,)
+        return tuple(usable), tuple(notes)
 
     def predictions(
         self, explained: Explanation, found: Verdict, folds: Folds
@@ -96,6 +102,20 @@ class HeldOut:
                 self.progress("held-out runs", (done + 1) / len(keys))
             found_all.setdefault(key, []).append(prediction)
         return found_all
+
+    def unsettled(
+        self, folds: Folds, predictions: Mapping[tuple[str, ...], list[Prediction]]
+    ) -> tuple[str, ...]:
+        """A note on every model whose fit for a held-out run ran out of steps."""
+        notes = []
+        for key, found in predictions.items():
+            pairs = zip(folds, found, strict=True)
+            runs = [run for (_, some), one in pairs if not one.converged for run in some]
+            sources = ", ".join(self.model.runs[run].source for run in runs)
+            if runs:
+                those = ", ".join(key) or "no effect"
+                notes.append(f"{sources}: predicted by a fit with {those} that did not end")
+        return tuple(notes)
 
     def _fold(
         self, point: Point, fitted: tuple[int, ...], predicted: tuple[int, ...], *, refitted: bool

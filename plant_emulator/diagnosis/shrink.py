@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 # A channel counts in the closed fraction from this gap on, in the noise.
 OPEN = 1.1
+# Times that a fit that ran out of steps is taken up again.
+PATIENCE = 3
 BLOCK = 3.0
 RESAMPLED = 400
 SEED = 1
@@ -51,7 +53,10 @@ class Fold:
 
 @dataclass(frozen=True, kw_only=True)
 class Prediction:
-    """The whitened residual of predicted runs, one array a run, shape (channels, samples)."""
+    """The whitened residual of predicted runs, one array a run, shape (channels, samples).
+
+    converged : the fit, and those of the predicted runs' own states
+    """
 
     residuals: tuple[Array, ...]
     converged: bool
@@ -59,12 +64,23 @@ class Prediction:
 
 def predict(model: Model, fold: Fold) -> Prediction:
     """Fit the fold's model on its runs, and predict the others."""
-    point = fold.start
-    if fold.refitted:
-        point = again(model, point.effects, fold.fitted, point)
+    point = refitted(model, fold) if fold.refitted else fold.start
     known = point.states[0] if fold.as_fitted else None
-    residuals = tuple(_predicted(model, point, run, known) for run in fold.predicted)
-    return Prediction(residuals=residuals, converged=point.converged)
+    found = [_predicted(model, point, run, known) for run in fold.predicted]
+    return Prediction(
+        residuals=tuple(residual for residual, _ in found),
+        converged=(point.converged or not fold.refitted) and all(ended for _, ended in found),
+    )
+
+
+def refitted(model: Model, fold: Fold) -> Point:
+    """The fold's model fitted on its runs, taken up again where it ran out of steps."""
+    point = fold.start
+    for _ in range(1 + PATIENCE):
+        point = again(model, point.effects, fold.fitted, point)
+        if point.converged:
+            break
+    return point
 
 
 def shown(model: Model, fold: Fold) -> dict[str, float]:
@@ -83,8 +99,10 @@ def _shown(model: Model, fold: Fold, name: str) -> float:
     return float(np.linalg.norm(tangents.rest(np.concatenate(complete) - tangents.residual)))
 
 
-def _predicted(model: Model, point: Point, run: int, known: Mapping[str, float] | None) -> Array:
-    """Residual of a run with all parameters kept, its own states fitted unless known."""
+def _predicted(
+    model: Model, point: Point, run: int, known: Mapping[str, float] | None
+) -> tuple[Array, bool]:
+    """Residual of a run with all parameters kept, its own states fitted unless known; converged."""
     effects = point.effects
     residual = model.residual(run, effects)
 
@@ -93,10 +111,11 @@ def _predicted(model: Model, point: Point, run: int, known: Mapping[str, float] 
 
     own = (*model.states, *(u for name in effects for u in model.candidates[name].states))
     if known is not None or not own:
-        return of(known or {})
+        return of(known or {}), True
     start = model.start_states(run, effects, point.values)
     states = [replace(u, run=0, start=float(np.clip(start[u.name], u.lower, u.upper))) for u in own]
-    return estimate(states, [of]).residuals[0]
+    found = estimate(states, [of])
+    return found.residuals[0], found.converged
 
 
 @dataclass(frozen=True, kw_only=True)
