@@ -2,9 +2,15 @@
 
 from dataclasses import replace
 
-from plant_emulator.diagnosis.answer import ranked
+import numpy as np
+import pytest
+
+from plant_emulator.diagnosis.answer import noise_floor, ranged, ranked
 from plant_emulator.diagnosis.contest import Point
 from plant_emulator.diagnosis.explain import Contender, Explanation
+from plant_emulator.diagnosis.model import Run
+from plant_emulator.diagnosis.shrink import Prediction, gap
+from plant_emulator.estimates import Array
 
 POINT = Point(
     effects=(),
@@ -46,3 +52,31 @@ def test_effects_of_no_account_beyond_a_few_are_not_ranked() -> None:
     falls = {"f": 1.0, "a": 300.0, "b": 20.0, "c": 15.0, "d": 10.0, "e": 5.0}
     names = [c.effect for c in ranked(explanation(falls, ("a",)))]
     assert names == ["a", "b", "c", "d", "e"]
+
+
+def run(measured: Array, noise: float) -> Run:
+    return Run(
+        source="run",
+        channels=("y",),
+        units=("A",),
+        time=np.arange(float(len(measured))),
+        measured=measured[None, :],
+        noise=np.array([noise]),
+    )
+
+
+def halves() -> tuple[list[Run], list[Prediction]]:
+    """Two runs; of the first, from 0 to 990 A, only the second half is held out."""
+    early = run(10.0 * np.arange(100.0), noise=2.0)
+    late = run(np.linspace(400.0, 700.0, 50), noise=1.0)
+    first = np.where(np.arange(100) < 50, 0.0, 3.0)[None, :]
+    residuals = (first, np.full((1, 50), 4.0))
+    return [early, late], [Prediction(residuals=residuals, converged=True)]
+
+
+def test_relative_gap_is_pooled_rms_over_the_range_of_held_out_samples() -> None:
+    """Residuals of 6 A and 4 A, 50 each: rms sqrt(26) A; held out lie 400 A to 990 A."""
+    runs, predictions = halves()
+    found = gap(runs, predictions, [10, 10])
+    assert ranged(found, runs) == {"y": pytest.approx(np.sqrt(26.0) / 590.0)}
+    assert noise_floor(found, runs) == {"y": pytest.approx(np.sqrt(2.5) / 590.0)}
