@@ -123,7 +123,7 @@ def waterfall(gaps: Mapping[tuple[str, ...], Gap], accepted: Sequence[str]) -> t
 def traces(
     runs: Sequence[Run], before: Sequence[Prediction], after: Sequence[Prediction]
 ) -> tuple[Trace, ...]:
-    """Measured and predicted channels of all held-out runs."""
+    """Measured and predicted channels of all held-out runs, those with samples that count."""
     pairs = zip(
         runs,
         [r for prediction in before for r in prediction.residuals],
@@ -143,9 +143,11 @@ def traces(
         )
         for run, first, second in pairs
         for k, name in enumerate(run.channels)
+        if first[k].any()
     )
 
 
 def _simulated(run: Run, channel: int, residual: Array) -> Array:
-    """The prediction behind a whitened residual; the measurement itself where it does not count."""
-    return np.asarray(run.measured[channel] - residual[channel] * run.noise[channel])
+    """The prediction behind a whitened residual; NaN where a sample does not count."""
+    whitened = np.where(residual[channel] == 0.0, np.nan, residual[channel])
+    return np.asarray(run.measured[channel] - whitened * run.noise[channel])

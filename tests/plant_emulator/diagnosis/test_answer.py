@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.answer import noise_floor, ranged, ranked
+from plant_emulator.diagnosis.answer import noise_floor, ranged, ranked, traces
 from plant_emulator.diagnosis.contest import Point
 from plant_emulator.diagnosis.explain import Contender, Explanation
 from plant_emulator.diagnosis.model import Run
+from plant_emulator.diagnosis.report_traces import path, rms
 from plant_emulator.diagnosis.shrink import Prediction, gap
 from plant_emulator.estimates import Array
 
@@ -80,3 +81,21 @@ def test_relative_gap_is_pooled_rms_over_the_range_of_held_out_samples() -> None
     found = gap(runs, predictions, [10, 10])
     assert ranged(found, runs) == {"y": pytest.approx(np.sqrt(26.0) / 590.0)}
     assert noise_floor(found, runs) == {"y": pytest.approx(np.sqrt(2.5) / 590.0)}
+
+
+def test_fitted_part_of_a_log_is_not_drawn_as_predicted() -> None:
+    runs, predictions = halves()
+    early, late = traces(runs, predictions, predictions)
+    assert np.isnan(early.explained[:50]).all()
+    assert early.explained[50:] == pytest.approx(early.measured[50:] - 6.0)
+    assert rms(early.measured - early.recalibrated) == pytest.approx(6.0)
+    assert late.recalibrated == pytest.approx(late.measured - 4.0)
+    drawn = path(early.time, early.recalibrated, 100)
+    assert drawn.count("M") == 1
+    assert drawn.startswith("M50 ")
+
+
+def test_channel_without_held_out_samples_is_not_drawn() -> None:
+    (early, late), _ = halves()
+    none = [Prediction(residuals=(np.zeros((1, 100)), np.ones((1, 50))), converged=True)]
+    assert len(traces([early, late], none, none)) == 1
