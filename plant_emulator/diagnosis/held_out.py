@@ -80,7 +80,7 @@ class HeldOut:
     ) -> dict[tuple[str, ...], list[Prediction]]:
         """Held-out residuals of every model that is compared, by its effects.
 
-        ("nominal",) : the parameter set as given.
+        ("nominal",) : the parameter set as given, or the fold's own where none is.
         """
         points: dict[tuple[str, ...], Point] = {(): explained.null}
         for count in range(1, len(found.effects) + 1):
@@ -89,12 +89,14 @@ class HeldOut:
         for contender in _best(explained):
             assert contender.point is not None
             points.setdefault((contender.effect,), contender.point)
-        nominal = replace(explained.null, values={u.name: u.prior for u in self.model.parameters})
         tasks, keys = [], []
-        for key, point in [(NOMINAL, nominal), *points.items()]:
+        for key, point in [(NOMINAL, explained.null), *points.items()]:
             for fitted, predicted in folds:
+                start = point
+                if key == NOMINAL:
+                    start = replace(point, values=self.model.nominal(fitted))
                 keys.append(key)
-                tasks.append(self._fold(point, fitted, predicted, refitted=key != NOMINAL))
+                tasks.append(self._fold(start, fitted, predicted, refitted=key != NOMINAL))
         found_all: dict[tuple[str, ...], list[Prediction]] = {}
         answers = self.pool.map(shrink.predict, self.recipe, tasks)
         for done, (key, prediction) in enumerate(zip(keys, answers, strict=True)):
