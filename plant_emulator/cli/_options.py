@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -49,9 +50,18 @@ json_file = click.option(
 
 
 def write_json(answer: Any, target: str) -> None:
-    """Write an answer to a file, or to standard output for `-`."""
-    text = json.dumps(answer, indent=2)
+    """Write an answer to a file, or to standard output for `-`; null where it has no number."""
+    text = json.dumps(_finite(answer), indent=2, allow_nan=False)
     if target == "-":
         click.echo(text)
     else:
         Path(target).write_text(text + "\n", encoding="utf-8")
+
+
+def _finite(answer: Any) -> Any:
+    """The same with null for infinite and undefined numbers, which JSON has none of (RFC 8259)."""
+    if isinstance(answer, dict):
+        return {key: _finite(value) for key, value in answer.items()}
+    if isinstance(answer, list | tuple):
+        return [_finite(value) for value in answer]
+    return None if isinstance(answer, float) and not isfinite(answer) else answer

@@ -22,27 +22,36 @@ if TYPE_CHECKING:
 SHOWN = 5
 
 
-def ranged(gap: Gap | None, runs: Sequence[Run]) -> dict[str, float]:
-    """NRMSD of every channel; of the noise where there is no gap given.
+def ranged(gap: Gap, runs: Sequence[Run]) -> dict[str, float]:
+    """NRMSD of every channel: its rms over its measured range, held-out samples of all runs."""
+    return dict(zip(gap.channels, _shares(gap, runs, gap.by_channel), strict=True))
 
-    The range of a channel and its noise are pooled over the runs, as its residual is.
-    """
-    names = dict.fromkeys(name for run in runs for name in run.channels)
-    found = {}
-    for name in names:
-        rows = [(run, run.channels.index(name)) for run in runs if name in run.channels]
-        span = float(np.ptp(np.concatenate([run.measured[k] for run, k in rows])))
-        noise = float(np.sqrt(np.mean([run.noise[k] ** 2 for run, k in rows])))
-        times = 1.0 if gap is None else float(gap.by_channel[gap.channels.index(name)])
-        found[name] = times * noise / span
+
+def noise_floor(gap: Gap, runs: Sequence[Run]) -> dict[str, float]:
+    """The noise of every channel over its measured range, as `ranged`."""
+    return dict(zip(gap.channels, _shares(gap, runs, np.ones(len(gap.channels))), strict=True))
+
+
+def _shares(gap: Gap, runs: Sequence[Run], times: Array) -> list[float]:
+    """So many times the noise of each channel over the range of its samples that count."""
+    found = []
+    for k, name in enumerate(gap.channels):
+        own = [(r, w) for r, w in zip(runs, gap.weights, strict=True) if name in r.channels]
+        counted = [run.measured[run.channels.index(name)][w[k] > 0.0] for run, w in own]
+        found.append(float(times[k] * gap.noise[k] / np.ptp(np.concatenate(counted))))
     return found
 
 
 def ranked(explained: Explanation) -> list[Contender]:
-    """Effects with evidence, and a few of those without, the best first."""
+    """Effects with evidence or accepted, and a few of those without, the best first.
+
+    What is needed beside another effect may have little evidence alone.
+    """
     order = sorted(explained.contenders, key=explained.evidence, reverse=True)
     counting = [c for c in order if explained.evidence(c) > THRESHOLD]
-    return order[: max(SHOWN, len(counting))]
+    shown = max(SHOWN, len(counting))
+    accepted = [c for c in order[shown:] if c.effect in explained.final.effects]
+    return [*order[:shown], *accepted]
 
 
 def rank(
@@ -114,7 +123,7 @@ def waterfall(gaps: Mapping[tuple[str, ...], Gap], accepted: Sequence[str]) -> t
 def traces(
     runs: Sequence[Run], before: Sequence[Prediction], after: Sequence[Prediction]
 ) -> tuple[Trace, ...]:
-    """Measured and predicted channels of all held-out runs."""
+    """Measured and predicted channels of all held-out runs, those with samples that count."""
     pairs = zip(
         runs,
         [r for prediction in before for r in prediction.residuals],
@@ -134,9 +143,11 @@ def traces(
         )
         for run, first, second in pairs
         for k, name in enumerate(run.channels)
+        if first[k].any()
     )
 
 
 def _simulated(run: Run, channel: int, residual: Array) -> Array:
-    """The prediction behind a whitened residual; the measurement itself where it does not count."""
-    return np.asarray(run.measured[channel] - residual[channel] * run.noise[channel])
+    """The prediction behind a whitened residual; NaN where a sample does not count."""
+    whitened = np.where(residual[channel] == 0.0, np.nan, residual[channel])
+    return np.asarray(run.measured[channel] - whitened * run.noise[channel])

@@ -109,9 +109,13 @@ class AxisModel:
 
         return residual
 
+    def nominal(self, runs: Sequence[int]) -> dict[str, float]:
+        """See `Model`: an axis has no data sheet; least squares of these runs."""
+        return self._least_squares(runs, self.parameters)
+
     def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
         """See `Model`: least squares, for which the axis without effects is linear."""
-        return self._least_squares(runs, self.parameters), [self._level() for _ in runs]
+        return self.nominal(runs), [self._level() for _ in runs]
 
     def start_states(
         self,

@@ -153,6 +153,10 @@ class BenchModel:
 
         return residual
 
+    def nominal(self, runs: Sequence[int]) -> dict[str, float]:  # noqa: ARG002
+        """See `Model`: the parameter set's."""
+        return {u.name: u.prior for u in self.parameters}
+
     def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
         """See `Model`."""
         recordings = [self._recordings[k] for k in runs]

@@ -17,6 +17,7 @@ class Trace:
     """A channel of a held-out run, measured and predicted, shape (n,) each [unit].
 
     recalibrated : the same equations, parameters re-estimated; explained : with the effects named
+        NaN where a sample does not count
     noise : standard deviation of the sensor's noise
     """
 

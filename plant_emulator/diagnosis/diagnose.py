@@ -90,6 +90,7 @@ class Diagnose:
         self.folds, notes = held_out.usable(explained, found)
         self.notes += notes
         predicted = held_out.predictions(explained, found, self.folds)
+        self.notes += held_out.unsettled(self.folds, predicted)
         return self._answered(explained, found, predicted)
 
     def _between(self, explained: Explanation, found: Verdict) -> Verdict:
@@ -111,8 +112,7 @@ class Diagnose:
     ) -> Diagnosis:
         runs = [self.model.runs[run] for _, some in self.folds for run in some]
         lengths = shrink.block_lengths(predicted[()])
-        channels = [run.channels for run in runs]
-        gaps = {key: shrink.gap(channels, some, lengths) for key, some in predicted.items()}
+        gaps = {key: shrink.gap(runs, some, lengths) for key, some in predicted.items()}
         location = self._location(explained, found)
         final = explained.final if found.effects else explained.null
         traces = parts.traces(runs, predicted[()], predicted[found.effects])
@@ -150,7 +150,7 @@ class Diagnose:
                 "nominal": parts.ranged(gaps[NOMINAL], runs),
                 "recalibrated": parts.ranged(gaps[()], runs),
                 "explained": parts.ranged(gaps[found.effects], runs),
-                "noise_floor": parts.ranged(None, runs),
+                "noise_floor": parts.noise_floor(gaps[()], runs),
                 "closed_fraction": closed,
                 "closed_fraction_ci95": interval,
             },

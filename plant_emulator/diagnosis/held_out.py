@@ -10,6 +10,8 @@ from plant_emulator.diagnosis.explain import DETECTABLE, THRESHOLD
 from plant_emulator.diagnosis.shrink import Fold
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.diagnosis.explain import Contender, Explanation
     from plant_emulator.diagnosis.model import Model
@@ -24,6 +26,7 @@ TRIED = 3
 NEAR = 0.1
 # The model "as given" among those that are compared by their effects.
 NOMINAL = ("nominal",)
+NONE_SHOWS = "no choice of fitted runs shows all effects; every run is predicted nevertheless"
 # Of every fold the runs that are fitted, and those that are predicted.
 Folds = tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
 
@@ -54,7 +57,8 @@ class HeldOut:
     def usable(self, explained: Explanation, found: Verdict) -> tuple[Folds, tuple[str, ...]]:
         """The folds whose fitted runs show all named effects, and a note on every other.
 
-        Runs that do not show an effect cannot predict it; should no fold be left, all are.
+        Runs that do not show an effect cannot predict it; should no fold be left, all are
+        predicted, and one note tells it.
         """
         tasks = [self._fold(explained.final, *fold, refitted=False) for fold in self.plan.folds]
         if not found.effects or len(tasks) < 2:
@@ -69,14 +73,16 @@ class HeldOut:
                 continue
             lost = ", ".join(self.model.runs[run].source for run in fold[1])
             notes.append(f"{lost}: not predicted; the other runs do not show {hidden[0]}")
-        return (tuple(usable) or self.plan.folds), tuple(notes)
+        if not usable:
+            return self.plan.folds, (NONE_SHOWS,)
+        return tuple(usable), tuple(notes)
 
     def predictions(
         self, explained: Explanation, found: Verdict, folds: Folds
     ) -> dict[tuple[str, ...], list[Prediction]]:
         """Held-out residuals of every model that is compared, by its effects.
 
-        ("nominal",) : the parameter set as given.
+        ("nominal",) : the parameter set as given, or the fold's own where none is.
         """
         points: dict[tuple[str, ...], Point] = {(): explained.null}
         for count in range(1, len(found.effects) + 1):
@@ -85,12 +91,14 @@ class HeldOut:
         for contender in _best(explained):
             assert contender.point is not None
             points.setdefault((contender.effect,), contender.point)
-        nominal = replace(explained.null, values={u.name: u.prior for u in self.model.parameters})
         tasks, keys = [], []
-        for key, point in [(NOMINAL, nominal), *points.items()]:
+        for key, point in [(NOMINAL, explained.null), *points.items()]:
             for fitted, predicted in folds:
+                start = point
+                if key == NOMINAL:
+                    start = replace(point, values=self.model.nominal(fitted))
                 keys.append(key)
-                tasks.append(self._fold(point, fitted, predicted, refitted=key != NOMINAL))
+                tasks.append(self._fold(start, fitted, predicted, refitted=key != NOMINAL))
         found_all: dict[tuple[str, ...], list[Prediction]] = {}
         answers = self.pool.map(shrink.predict, self.recipe, tasks)
         for done, (key, prediction) in enumerate(zip(keys, answers, strict=True)):
@@ -98,6 +106,20 @@ class HeldOut:
                 self.progress("held-out runs", (done + 1) / len(keys))
             found_all.setdefault(key, []).append(prediction)
         return found_all
+
+    def unsettled(
+        self, folds: Folds, predictions: Mapping[tuple[str, ...], list[Prediction]]
+    ) -> tuple[str, ...]:
+        """A note on every model whose fit for a held-out run ran out of steps."""
+        notes = []
+        for key, found in predictions.items():
+            pairs = zip(folds, found, strict=True)
+            runs = [run for (_, some), one in pairs if not one.converged for run in some]
+            sources = ", ".join(self.model.runs[run].source for run in runs)
+            if runs:
+                those = ", ".join(key) or "no effect"
+                notes.append(f"{sources}: predicted by a fit with {those} that did not end")
+        return tuple(notes)
 
     def _fold(
         self, point: Point, fitted: tuple[int, ...], predicted: tuple[int, ...], *, refitted: bool

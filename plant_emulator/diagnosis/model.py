@@ -111,6 +111,9 @@ class Model(Protocol):
         Measured minus simulated over the noise, shape (channels, samples); 0: does not count.
         """
 
+    def nominal(self, runs: Sequence[int]) -> Mapping[str, float]:
+        """The parameters as given; of a machine without such, what these runs tell of them."""
+
     def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
         """Parameters, and the states of each of these runs, near the best fit without effects."""
 

@@ -32,7 +32,8 @@ WIDTH = np.array([high - low for low, high in BANDS])
 class Rest:
     """What is left of one channel on the held-out runs.
 
-    before, after : norm(e) / norm(y) without and with the effects named [1]
+    before, after : norm(e) / norm(y) without and with the effects named [1], both over the samples
+        that count: the force at rest is whatever holds the machine
     held_out, fitted : power of the residual in each of BANDS [unit^2]; fitted None: where the
         held-out runs are the fitted ones in turn, there is nothing to compare with
     """
@@ -58,21 +59,22 @@ def rest_of(model: Model, found: Point, fitted: Sequence[int], traces: Sequence[
     known = {model.runs[run].source for run in fitted}
     apart = known.isdisjoint(t.source for t in same)
     own = [_residual(model, found, k, run) for k, run in enumerate(fitted)] if apart else []
-    measured = np.concatenate([t.measured for t in same])
-    before, after = (
-        float(np.linalg.norm(np.concatenate(e)) / np.linalg.norm(measured))
-        for e in zip(
-            *((t.measured - t.recalibrated, t.measured - t.explained) for t in same), strict=True
-        )
-    )
     return Rest(
         channel=first.channel,
         unit=first.unit,
-        before=before,
-        after=after,
-        held_out=_power([(t.measured - t.explained, t.time) for t in same]),
+        before=_relative(same, [t.recalibrated for t in same]),
+        after=_relative(same, [t.explained for t in same]),
+        held_out=_power([(np.nan_to_num(t.measured - t.explained), t.time) for t in same]),
         fitted=_power(own) if apart else None,
     )
+
+
+def _relative(traces: Sequence[Trace], predicted: Sequence[Array]) -> float:
+    """norm(e) / norm(y) of predictions over the samples that count [1]."""
+    measured = np.concatenate([t.measured for t in traces])
+    error = measured - np.concatenate(predicted)
+    counts = np.isfinite(error)
+    return float(np.linalg.norm(error[counts]) / np.linalg.norm(measured[counts]))
 
 
 def _residual(model: Model, found: Point, k: int, run: int) -> tuple[Array, Array]:

@@ -13,9 +13,13 @@ from plant_emulator.diagnosis.axis_effects import EFFECTS
 from plant_emulator.diagnosis.axis_signals import AxisLog
 from plant_emulator.diagnosis.bands import power
 from plant_emulator.diagnosis.contest import Point, linearised, null_fit
+from plant_emulator.diagnosis.explain import Explanation
+from plant_emulator.diagnosis.held_out import NOMINAL, HeldOut, Plan
 from plant_emulator.diagnosis.looks import glance, look
+from plant_emulator.diagnosis.pool import Here
 from plant_emulator.diagnosis.signature import signature
 from plant_emulator.diagnosis.tangents import Tangents
+from plant_emulator.diagnosis.verdict import Verdict
 from plant_emulator.errors import LogError
 
 spec = importlib.util.spec_from_file_location(
@@ -252,3 +256,19 @@ def test_a_tone_lies_in_its_band() -> None:
     found = power(tone, 0.01)
     assert int(np.argmax(found)) == 4
     assert found[4] > 1e6 * np.delete(found, 4).max()
+
+
+def test_nominal_axis_of_a_held_out_run_is_that_of_the_other_runs() -> None:
+    """Offsets 20 N apart, each run predicted by the least squares of the other."""
+    raised = truth.log(lambda q, _v, _a: 20.0 + 0.0 * q, seed=2)
+    recipe = AxisRecipe((truth.log(seed=1), raised))
+    model = recipe.build()
+    plan = Plan(fitted=(0, 1), folds=(((1,), (0,)), ((0,), (1,))))
+    null = null_fit(model, (0, 1))
+    nothing = Explanation(null=null, final=null, contenders=(), rivals={}, unconverged="")
+    none = Verdict(kind="none", effects=(), shifts=(), reason="")
+
+    held_out = HeldOut(pool=Here(), recipe=recipe, model=model, plan=plan)
+    found = held_out.predictions(nothing, none, plan.folds)[NOMINAL]
+    left = [one.residuals[0][0] * model.runs[k].noise[0] for k, one in enumerate(found)]
+    assert [float(e[e != 0.0].mean()) for e in left] == pytest.approx([-20.0, 20.0], abs=1.0)

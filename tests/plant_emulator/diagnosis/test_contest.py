@@ -85,6 +85,10 @@ class Line:
 
         return residual
 
+    def nominal(self, runs: Sequence[int]) -> dict[str, float]:
+        """See `Model`."""
+        return {u.name: u.prior for u in self.parameters}
+
     def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
         """See `Model`."""
         return {"a": 0.0, "b": 0.0}, [{} for _ in runs]

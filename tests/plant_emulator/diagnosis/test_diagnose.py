@@ -2,14 +2,17 @@
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.contest import Point
+from plant_emulator import estimation
+from plant_emulator.diagnosis.contest import Point, fit
 from plant_emulator.diagnosis.diagnose import Diagnose, Diagnosis
-from plant_emulator.diagnosis.held_out import Plan
+from plant_emulator.diagnosis.held_out import HeldOut, Plan
 from plant_emulator.diagnosis.pool import Here
+from plant_emulator.diagnosis.shrink import Fold, predict
 from plant_emulator.estimates import Array
 from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, noisy
 
@@ -77,3 +80,56 @@ def test_runs_that_do_not_agree_alone_are_not_told_apart() -> None:
     verdict = diagnosed(Unplanned(runs, ["kink"])).answer["verdict"]
     assert verdict["kind"] == "unknown"
     assert "each log alone" not in verdict["statement"]
+
+
+class EachOwnEffect(Line):
+    """The kink acts in the first run only, the wave in the second only."""
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+        own = "kink" if run == 0 else "wave"
+        return super().residual(run, [name for name in effects if name == own])
+
+
+def test_runs_that_all_lack_an_effect_are_predicted_nevertheless_and_told_so_once() -> None:
+    line = 2.0 + 3.0 * TIME
+    runs = [noisy(line + 4.0 * np.abs(TIME), 1), noisy(line + 4.0 * np.sin(20.0 * TIME), 2)]
+    plan = Plan(fitted=(0, 1), folds=(((1,), (0,)), ((0,), (1,))))
+    model = EachOwnEffect(runs, ["kink", "wave"])
+    found = Diagnose(Here(), Given(model), plan, settings={}).diagnose()
+    assert set(found.answer["verdict"]["effects"]) == {"kink", "wave"}
+    assert found.answer["logs"]["held_out"] == ["run 0", "run 1"]
+    assert found.details.notes == (
+        "no choice of fitted runs shows all effects; every run is predicted nevertheless",
+    )
+
+
+def fold_of_a_line() -> tuple[Line, Fold]:
+    """Two runs of 2 + 3 x; the fit starts at 0."""
+    model = Line([noisy(2.0 + 3.0 * TIME, seed) for seed in (1, 2)], [])
+    start = replace(fit(model, (), (0,), {}, [{}]), values={"a": 0.0, "b": 0.0})
+    return model, Fold(fitted=(0,), predicted=(1,), start=start)
+
+
+def test_fit_that_runs_out_of_steps_is_taken_up_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three steps lead near the least squares, and not to the knowledge that these are reached."""
+    model, fold = fold_of_a_line()
+    monkeypatch.setattr(estimation, "MAX_ITERATIONS", 3)
+    assert not fit(model, (), (0,), fold.start.values, [{}]).converged
+    found = predict(model, fold)
+    assert found.converged
+    assert np.std(found.residuals[0]) == pytest.approx(1.0, abs=0.05)
+
+
+def test_prediction_by_a_fit_that_does_not_end_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    model, fold = fold_of_a_line()
+    monkeypatch.setattr(estimation, "MAX_ITERATIONS", 1)
+    found = {(): [predict(model, fold)], ("kink",): [predict(model, fold)]}
+    folds = (((0,), (1,)),)
+    held_out = HeldOut(
+        pool=Here(), recipe=Given(model), model=model, plan=Plan(fitted=(0,), folds=folds)
+    )
+    assert held_out.unsettled(folds, found) == (
+        "run 1: predicted by a fit with no effect that did not end",
+        "run 1: predicted by a fit with kink that did not end",
+    )

@@ -95,6 +95,9 @@ class Slope:
         x, y = self.speeds[run], self.measured[run]
         return lambda v: ((y - self.foretold(x, effects, v)) / 0.01)[None, :]
 
+    def nominal(self, runs: Sequence[int]) -> dict[str, float]:
+        return {u.name: u.prior for u in self.parameters}
+
     def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
         return {"b": 0.0}, [{} for _ in runs]
 

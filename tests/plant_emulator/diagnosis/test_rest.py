@@ -1,5 +1,7 @@
 """What a machine in outline leaves, and effects in the field's own terms, checked by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -50,6 +52,23 @@ def test_relative_error_of_sines_is_the_ratio_of_their_sizes(
     rest = rest_of(axis, nominal, (0,), [trace(wave(6.0, 1.0), wave(5.0, 27.0))])
     assert (rest.before, rest.after) == pytest.approx((0.06, 0.05), rel=1e-6)
     assert "falls from 6.00 % to 5.00 %" in shrinks(rest)
+
+
+def test_relative_error_leaves_out_the_samples_that_do_not_count(
+    axis: AxisModel, nominal: Point
+) -> None:
+    """At rest for a third of the run, held by a force of ten times the motion's."""
+    whole = trace(wave(6.0, 1.0), wave(5.0, 27.0))
+    held = TIME >= 40.0
+    rests = replace(
+        whole,
+        measured=np.where(held, 10.0 * SIZE, whole.measured),
+        recalibrated=np.where(held, np.nan, whole.recalibrated),
+        explained=np.where(held, np.nan, whole.explained),
+    )
+    rest = rest_of(axis, nominal, (0,), [rests])
+    assert (rest.before, rest.after) == pytest.approx((0.06, 0.05), rel=1e-6)
+    assert rest.band == (20.0, 35.0)
 
 
 @pytest.mark.parametrize(
