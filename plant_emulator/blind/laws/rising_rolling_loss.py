@@ -1,6 +1,6 @@
-"""The truck's tyre takes a rolling loss from the drum that rises with the speed.
+"""The truck's tyre takes a rolling loss from the drum that rises with the square of the speed.
 
-    T_d = ... - r_d F (1 + |v| / v_0) sgn omega_d,   v = r_d omega_d
+    T_d = ... - r_d F (1 + (v / v_2)^2) sgn omega_d,   v = r_d omega_d
 
 Source: H. B. Pacejka, Tyre and Vehicle Dynamics, on rolling resistance against speed. F = 0: no
 loss. Only with a truck.
@@ -21,7 +21,7 @@ PARAMETERS = {
         neutral=0.0, lower=0.0, upper=2e3, plausible=150.0, unit="N", meaning="F"
     ),
     "speed_of_double": EffectParameter(
-        neutral=15.0, lower=1.0, upper=1e3, plausible=15.0, unit="m/s", meaning="v_0"
+        neutral=7.0, lower=1.0, upper=1e3, plausible=7.0, unit="m/s", meaning="v_2"
     ),
 }
 
@@ -32,6 +32,8 @@ def drum_coulomb_friction(value: float, s: Record, p: Record) -> float:
 
 
 def drum_viscous_friction(value: float, s: Record, p: Record) -> float:
-    """Speed-proportional friction on the drum [N m s/rad]."""
-    per_speed = p.drum_radius * p.drum_radius / p.rising_rolling_loss_speed_of_double
-    return value + s.truck * p.rising_rolling_loss_force * per_speed
+    """Torque of the rise over the drum speed [N m s/rad]."""
+    doubled = p.rising_rolling_loss_speed_of_double
+    speed = p.drum_radius * abs(s.drum_speed)
+    share: float = p.drum_radius**2 * speed / (doubled * doubled)
+    return value + s.truck * p.rising_rolling_loss_force * share
