@@ -116,7 +116,7 @@ def command(
     for note in found.details.notes:
         click.echo(f"note: {note}", err=True)
     if save:
-        parameter_sets.save(parameter_set(found, given), save)
+        parameter_sets.save(parameter_set(found, given, run.fitted), save)
         _own_in(save, own, found.answer["verdict"]["effects"])
     if report:
         from plant_emulator.diagnosis.report import html
