@@ -63,11 +63,12 @@ def loaded(
     own: Sequence[str] = (),
     hold: str | None = None,
 ) -> Loaded:
-    """The logs as a recipe and a plan; DiagnosisError or LogError says what cannot be used."""
+    """The logs as a recipe and a plan; an InputError says what cannot be used."""
+    files = tuple(Path(file) for file in own)
+    named = [effect.name for effect in effects.from_files(files)]
+    _known(without, [*effects.names(), *named])
     recordings, notes = admitted([*paths, *held_out], parameters, hold)
     recordings, plan = planned(recordings, len(paths))
-    files = tuple(Path(file) for file in own)
-    _known(without, [*effects.names(), *(file.stem for file in files)])
     settings = _settings(
         {
             "parameters": parameters.name,
