@@ -74,7 +74,7 @@ class Cluster:
     def __init__(self, address: str) -> None:
         try:
             import distributed
-            from distributed.comm import CommClosedError
+            from distributed.comm.core import CommClosedError
         except ImportError as error:
             raise EmulatorError(
                 f"--scheduler {address}: {error}; pip install 'road-load-bench[cluster]' brings it"
