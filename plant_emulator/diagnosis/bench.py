@@ -74,6 +74,9 @@ def candidate(effect: Effect) -> Candidate:
         units={f"{effect.name}_{key}": d.unit for key, d in effect.parameters.items()},
         title=effect.description.partition("\n")[0].rstrip("."),
         needs=effect.needs,
+        untold=any(
+            d.per_run and d.std is None and d.measured is None for d in effect.parameters.values()
+        ),
     )
 
 
