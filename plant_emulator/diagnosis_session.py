@@ -8,45 +8,50 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator import axis_log, effects, logs
+from plant_emulator import axis_log, effects
+from plant_emulator.admission import admitted, distinct, untold
 from plant_emulator.diagnosis.axis import AxisRecipe
 from plant_emulator.diagnosis.axis_effects import EFFECTS as AXIS_EFFECTS
 from plant_emulator.diagnosis.bench import BenchRecipe
 from plant_emulator.diagnosis.calibration import Case
 from plant_emulator.diagnosis.held_out import Plan
 from plant_emulator.errors import DiagnosisError
-from plant_emulator.one_bench import one_bench
-from plant_emulator.preflight import preflight
-from plant_emulator.recording import Recording, recording
+from plant_emulator.kernel import kernel
+from plant_emulator.preflight import LEAST_MOTION
+from plant_emulator.start_states import with_own
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
-    from plant_emulator.diagnosis.axis_signals import AxisLog
+    from numpy.typing import NDArray
+
     from plant_emulator.diagnosis.diagnose import Diagnosis
     from plant_emulator.diagnosis.pool import Recipe
+    from plant_emulator.effects import Effect
     from plant_emulator.log import Log
     from plant_emulator.parameters import ParameterSet
-    from plant_emulator.simulate import Hold
+    from plant_emulator.recording import Recording
 
-# Columns that tell the answer: a diagnosis must not see them.
-TELLING = ("label", "effect", "fault", "cause", "truth", "drift")
 # Of a single log this share is fitted, and the rest predicted.
 FITTED_SHARE = 0.6
 
 
 @dataclass(frozen=True, kw_only=True)
 class Loaded:
-    """Logs ready for a diagnosis, and what the preflight told of them."""
+    """Logs ready for a diagnosis, and what the preflight told of them.
+
+    fitted : those of the bench that are not held out
+    """
 
     recipe: Recipe
     plan: Plan
     notes: tuple[str, ...]
     settings: Mapping[str, str]
+    fitted: tuple[Recording, ...] = ()
 
 
 def loaded(
@@ -58,30 +63,28 @@ def loaded(
     own: Sequence[str] = (),
     hold: str | None = None,
 ) -> Loaded:
-    """The logs as a recipe and a plan; DiagnosisError or LogError says what cannot be used."""
-    hashes = _hashes([*paths, *held_out])
-    recordings: list[Recording] = []
-    notes: list[str] = []
-    for path in (*paths, *held_out):
-        log = logs.read(path)
-        _telling(log)
-        checked = preflight(log, parameters.value("gear_ratio"))
-        recordings.append(recording(log, cast("Hold | None", hold), checked.use))
-        notes += checked.notes
-    one_bench([r.log for r in recordings], parameters.values())
-    recordings, plan = planned(recordings, len(paths))
+    """The logs as a recipe and a plan; an InputError says what cannot be used."""
     files = tuple(Path(file) for file in own)
-    _known(without, [*effects.names(), *(file.stem for file in files)])
+    named = [effect.name for effect in effects.from_files(files)]
+    _known(without, [*effects.names(), *named])
+    recordings, notes = admitted([*paths, *held_out], parameters, hold)
+    recordings, plan = planned(recordings, len(paths))
     settings = _settings(
         {
             "parameters": parameters.name,
             "without": ", ".join(without) or "-",
             "own effects": ", ".join(own) or "-",
         },
-        {**hashes, **_digests([parameters.name, *own])},
+        _digests([*paths, *held_out, parameters.name, *own]),
     )
     recipe = BenchRecipe(tuple(recordings), parameters, tuple(without), files)
-    return Loaded(recipe=recipe, plan=plan, notes=tuple(notes), settings=settings)
+    return Loaded(
+        recipe=recipe,
+        plan=plan,
+        notes=tuple(notes),
+        settings=settings,
+        fitted=tuple(recordings[k] for k in plan.fitted),
+    )
 
 
 def calibration() -> list[Case]:
@@ -97,17 +100,18 @@ def axis_loaded(
     paths: Sequence[str], held_out: Sequence[str], *, without: Sequence[str] = ()
 ) -> Loaded:
     """Logs of a single axis as a recipe and a plan."""
-    hashes = _hashes([*paths, *held_out])
     axis_logs = [axis_log.read(path) for path in (*paths, *held_out)]
     for log in axis_logs:
-        _telling(log)
+        untold(log)
+    distinct([(log.source, np.stack([log.time, log.position, log.force])) for log in axis_logs])
     if len(axis_logs) < 2:
         raise DiagnosisError(
             f"{paths[0]}: one run of an axis cannot be held out; give another with --hold-out"
         )
     _known(without, AXIS_EFFECTS)
     plan = plan_of(len(axis_logs), len(paths))
-    settings = _settings({"model": "axis", "without": ", ".join(without) or "-"}, hashes)
+    digests = _digests([*paths, *held_out])
+    settings = _settings({"model": "axis", "without": ", ".join(without) or "-"}, digests)
     recipe = AxisRecipe(tuple(axis_logs), fitted=plan.fitted, without=tuple(without))
     return Loaded(recipe=recipe, plan=plan, notes=(), settings=settings)
 
@@ -132,17 +136,20 @@ def planned(recordings: Sequence[Recording], count: int) -> tuple[list[Recording
     (whole,) = recordings
     end = whole.log.time[0] + FITTED_SHARE * float(np.ptp(whole.log.time))
     first = whole.log.time <= end
+    _both_move(whole.log, first)
     both = [replace(whole, use=whole.use & part) for part in (first, ~first)]
     return both, Plan(fitted=(0,), folds=(((0,), (1,)),), as_fitted=True)
 
 
-def _telling(log: Log | AxisLog) -> None:
-    """Refuse a log that carries its own answer."""
-    for column in log.other:
-        if any(word in column.lower().split("_") for word in TELLING):
+def _both_move(log: Log, first: NDArray[np.bool_]) -> None:
+    """Refuse a single log of which a part shows no motion: fitted or judged by noise."""
+    for which, part, share in (("first", first, FITTED_SHARE), ("last", ~first, 1 - FITTED_SHARE)):
+        span = float(np.ptp(log["motor_speed"][part]))
+        if span < LEAST_MOTION:
             raise DiagnosisError(
-                f"{log.source}: line 1: column {column} looks like the answer; a diagnosis must "
-                "not see it: take it out"
+                f"{log.source}: no held-out run is possible: in the {which} {100 * share:.0f} % "
+                f"of it motor_speed_rad_s moves by {span:.1f} rad/s only, {LEAST_MOTION:g} or more "
+                "are needed; give another run beside it, or with --hold-out"
             )
 
 
@@ -170,34 +177,23 @@ def _digests(paths: Sequence[str]) -> dict[str, str]:
     return {path: hashlib.sha256(Path(path).read_bytes()).hexdigest() for path in files}
 
 
-def _hashes(paths: Sequence[str]) -> dict[str, str]:
-    """SHA-256 of every file; DiagnosisError where two are the same run."""
-    found: dict[str, str] = {}
-    for path in paths:
-        if not Path(path).is_file():
-            logs.read(path)  # says what is wrong
-        digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()
-        for other, known in found.items():
-            if digest == known:
-                raise DiagnosisError(f"{path}: the same run as {other}; give every run once")
-        found[path] = digest
-    return found
+def parameter_set(
+    diagnosis: Diagnosis, parameters: ParameterSet, recordings: Sequence[Recording]
+) -> ParameterSet:
+    """The set with the accepted effects in it; values of single runs as their mean.
 
-
-def parameter_set(diagnosis: Diagnosis, parameters: ParameterSet) -> ParameterSet:
-    """The set with the accepted effects in it; values of single runs as their mean."""
-    final, effects = diagnosis.final, diagnosis.answer["verdict"]["effects"]
-    own = {name: dict(diagnosis.fixed[name]) for name in effects}
-    for name in effects:
+    recordings : the runs that were fitted
+    """
+    final, named = diagnosis.final, diagnosis.answer["verdict"]["effects"]
+    own = {name: dict(diagnosis.fixed[name]) for name in named}
+    for name in named:
         prefix = f"{name}_"
         own[name] |= {
             key.removeprefix(prefix): value
             for key, value in final.values.items()
             if key.startswith(prefix)
         }
-        for key in {k for state in final.states for k in state if k.startswith(prefix)}:
-            mean = float(np.mean([state[key] for state in final.states]))
-            own[name][key.removeprefix(prefix)] = mean
+        own[name] |= _of_runs(kernel().effects[name], final.states, recordings)
     changed = {n: v for n, v in final.values.items() if n in parameters.parameters}
     new = parameters.with_values(changed)
     kept = {
@@ -212,3 +208,25 @@ def parameter_set(diagnosis: Diagnosis, parameters: ParameterSet) -> ParameterSe
         "verdict": diagnosis.answer["verdict"]["statement"],
     }
     return replace(new, parameters=kept, origin=origin, effects={**parameters.effects, **own})
+
+
+def _of_runs(
+    effect: Effect, states: Sequence[Mapping[str, float]], recordings: Sequence[Recording]
+) -> dict[str, float]:
+    """What is each run's own of an effect, fitted or told by the log, as the mean of the runs."""
+    own = {effect.name: effect.plausible()}
+    told = [*states, *(with_own(r, own).own for r in recordings)]
+    values = {
+        key: [run[name] for run in told if (name := f"{effect.name}_{key}") in run]
+        for key in effect.parameters
+    }
+    return {
+        key: _mean(found, effect.parameters[key].unit) for key, found in values.items() if found
+    }
+
+
+def _mean(values: Sequence[float], unit: str) -> float:
+    """Mean of values; of angles the direction of the sum of their unit vectors [rad]."""
+    if unit == "rad":
+        return float(np.angle(np.mean(np.exp(1j * np.asarray(values)))))
+    return float(np.mean(values))

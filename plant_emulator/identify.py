@@ -20,8 +20,7 @@ from typing import TYPE_CHECKING
 
 from plant_emulator import estimation
 from plant_emulator.equation_error import start_values
-from plant_emulator.errors import IdentificationError
-from plant_emulator.estimates import Estimate, Unknown
+from plant_emulator.free_parameters import free_parameters, unknowns
 from plant_emulator.search import FINE_SCANS, GAP_POSITION, Search
 from plant_emulator.simulate import TOLERANCE, values_of
 from plant_emulator.start_states import GAP, states_of, with_own
@@ -29,17 +28,13 @@ from plant_emulator.start_states import GAP, states_of, with_own
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.estimates import Residual
+    from plant_emulator.estimates import Estimate, Residual, Unknown
     from plant_emulator.log import Array
     from plant_emulator.parameters import ParameterSet
     from plant_emulator.recording import Recording
     from plant_emulator.search import Progress
     from plant_emulator.start_states import Effects
 
-# Held fixed unless asked for: a log shows it only through J_g + xi^2 J_m.
-NOT_FREE = frozenset({"gear_inertia"})
-# A parameter may leave its value in the set by this factor either way.
-BOUND_FACTOR = 5.0
 # The last fit, but for a truck, whose staircase of references takes ten times as long: a step more
 # or less in the simulation then changes the cost by less than a thousandth of a standard error.
 FINAL_TOLERANCE = 1e-8
@@ -89,58 +84,6 @@ class Identification:
     def gap_positions(self) -> tuple[float, ...]:
         """Where in the gap each run starts, -1 to 1."""
         return tuple(states[GAP_POSITION] for states in self.states)
-
-
-def unknowns(
-    parameters: ParameterSet,
-    free: Sequence[str],
-    start: Mapping[str, float],
-    gaps: Sequence[float],
-    states: Sequence[Unknown] = (GAP,),
-) -> list[Unknown]:
-    """The free parameters with their priors, and the states of every run.
-
-    start : values [SI] of the parameters; gaps : of every run, -1 to 1
-    """
-    wide = [
-        Unknown(
-            name=name,
-            start=start[name],
-            lower=parameters.value(name) / BOUND_FACTOR,
-            upper=parameters.value(name) * BOUND_FACTOR,
-            prior=parameters.value(name),
-            std=parameters[name].std,
-        )
-        for name in free
-    ]
-    return wide + [
-        replace(state, run=run, start=gap if state.name == GAP_POSITION else state.start)
-        for run, gap in enumerate(gaps)
-        for state in states
-    ]
-
-
-def free_parameters(parameters: ParameterSet, names: Sequence[str] = ()) -> tuple[str, ...]:
-    """The names given, or all that the set calls estimated but those of NOT_FREE and zeros."""
-    for name in names:
-        if name not in parameters.values():
-            known = ", ".join(parameters.values())
-            raise IdentificationError(f"--free {name}: no parameter of the bench; known: {known}")
-        if parameters.value(name) == 0.0:
-            raise IdentificationError(
-                f"--free {name}: it is 0 in {parameters.name}; a fit needs a value above 0"
-            )
-        if parameters[name].kind == "calculated":
-            raise IdentificationError(
-                f"--free {name}: it is calculated from others; give it a value of its own, "
-                'kind = "estimated", in a parameter set'
-            )
-    estimated = [
-        p.name
-        for p in parameters
-        if p.kind == "estimated" and p.name not in NOT_FREE and p.value > 0.0
-    ]
-    return tuple(dict.fromkeys(names)) or tuple(estimated)
 
 
 def identify(

@@ -12,18 +12,17 @@ NUMBA_DISABLE_JIT=1 step 3 is left out and the same functions run as they are.
 
 from __future__ import annotations
 
-import dis
-import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, wraps
 from itertools import islice
-from types import CodeType, FunctionType, ModuleType, SimpleNamespace
+from types import ModuleType, SimpleNamespace
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from plant_emulator import (
+    binding,
     compiler,
     contact,
     delay,
@@ -36,6 +35,7 @@ from plant_emulator import (
     sdirk,
     stage,
 )
+from plant_emulator.binding import bind, own_functions
 from plant_emulator.errors import ParameterError
 from plant_emulator.parameters import UNITS
 from plant_emulator.trial import memory_names, raise_in_effects, try_out
@@ -184,7 +184,12 @@ def followed(known: Mapping[str, Effect]) -> Iterator[str]:
 def build(known: Mapping[str, Effect]) -> Kernel:
     """Chain, bind and compile; see the module's text."""
     try_out(known)
-    own = (*(str(module.__file__) for module in MODULES), __file__, compiler.__file__)
+    own = (
+        *(str(module.__file__) for module in MODULES),
+        __file__,
+        binding.__file__,
+        compiler.__file__,
+    )
     compiler.use_cache([*own, *(effect.file for effect in known.values())], list(known))
     compiled: dict[Function, Function] = {}
     names: dict[str, Function] = {}
@@ -236,46 +241,3 @@ def by_arrays(function: Function, known: Mapping[str, Effect]) -> Function:
             raise
 
     return call
-
-
-def own_functions(module: ModuleType) -> list[Function]:
-    """Functions that a module defines, in the order of its text: callees stand before callers."""
-    return [
-        f
-        for f in vars(module).values()
-        if isinstance(f, FunctionType) and f.__module__ == module.__name__
-    ]
-
-
-def bind(
-    function: Function, compiled: dict[Function, Function], callers: tuple[Function, ...] = ()
-) -> Function:
-    """Compile a function whose callees are those already compiled; compiled once."""
-    if function in compiled:
-        return compiled[function]
-    assert isinstance(function, FunctionType)
-    code, names = function.__code__, dict(function.__globals__)
-    if function in callers:
-        raise ParameterError(
-            f"{code.co_filename}:{code.co_firstlineno}: {function.__name__} calls itself; "
-            "functions without recursion are needed"
-        )
-    for name in global_names(code):
-        if isinstance(callee := function.__globals__.get(name), FunctionType):
-            names[name] = bind(callee, compiled, (*callers, function))
-    bound = FunctionType(code, names, function.__name__)
-    # numba's cache imports the module by its name; that of a user's effect file has none.
-    bound.__module__ = function.__module__ if function.__module__ in sys.modules else __name__
-    cached = function in (integrate.run, integrate.advance)
-    compiled[function] = compiler.compiled(bound, on_disk=cached)
-    return compiled[function]
-
-
-def global_names(code: CodeType) -> Iterator[str]:
-    """Names that a function looks up in its module, but not those of attributes."""
-    for instruction in dis.get_instructions(code):
-        if instruction.opname == "LOAD_GLOBAL":
-            yield instruction.argval
-    for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            yield from global_names(constant)

@@ -27,6 +27,7 @@ import numpy as np
 
 from plant_emulator.errors import LogError
 from plant_emulator.noise import noise
+from plant_emulator.smoothing import smooth
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -87,10 +88,10 @@ def scale_of(log: Log, values: Mapping[str, float]) -> Scale | None:
         return None
     gear_speed, drum_speed = log["motor_speed"] / values["gear_ratio"], log["drum_speed"]
     period = float(np.median(np.diff(log.time)))
-    speed, driven = smooth(drum_speed, period), smooth(drum_speed, period, 1)
+    speed, driven = (smooth(log.time, drum_speed, WINDOW, order) for order in (0, 1))
     faster = driven * np.sign(speed)
     flank = np.sign(driven) * ((faster > DRIVEN) | (faster < -BRAKED))
-    apart = np.abs(smooth(gear_speed - drum_speed, period))
+    apart = np.abs(smooth(log.time, gear_speed - drum_speed, WINDOW))
     counts = _steady(flank, SETTLED / period) & (apart < TOGETHER + SHARE * np.abs(speed))
     index = np.flatnonzero(counts)[:: max(1, round(APART / period))]
     if len(index) < LEAST_SAMPLES:
@@ -105,14 +106,6 @@ def scale_of(log: Log, values: Mapping[str, float]) -> Scale | None:
         np.diff(columns[index], axis=0) / sigma[:, None], np.diff(delta[index]) / sigma
     )
     return Scale(source=log.source, share=share, error=error)
-
-
-def smooth(values: Array, period: float, order: int = 0) -> Array:
-    """The values, or their derivative, by a sliding parabola (A. Savitzky, M. Golay, 1964)."""
-    from scipy.signal import savgol_filter
-
-    length = 2 * max(2, round(0.5 * WINDOW / period)) + 1
-    return np.asarray(savgol_filter(values, length, 2, deriv=order, delta=period))
 
 
 def _sum(values: Array, time: Array) -> Array:

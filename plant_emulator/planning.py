@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator import logs
+from plant_emulator.admission import admitted
 from plant_emulator.diagnosis.bench import BenchModel, BenchRecipe
 from plant_emulator.diagnosis.contest import Point, null_fit
 from plant_emulator.log import COMPARED
-from plant_emulator.preflight import preflight
 from plant_emulator.programs import PROGRAMS
-from plant_emulator.recording import Recording, recording
+from plant_emulator.recording import Recording
 from plant_emulator.search import GAP_POSITION
 from plant_emulator.sensors import SENSORS
 from plant_emulator.session import simulated
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from plant_emulator.parameters import ParameterSet
-    from plant_emulator.simulate import Hold
 
 
 def planned_run(name: str, parameters: ParameterSet) -> Recording:
@@ -46,11 +44,7 @@ def prepared(
     Logs are fitted; programs are simulated at what the logs say, or at the set as given.
     """
     recorded = [name for name in names if name not in PROGRAMS or Path(name).is_file()]
-    recordings = []
-    for path in recorded:
-        log = logs.read(path)
-        use = preflight(log, parameters.value("gear_ratio")).use
-        recordings.append(recording(log, cast("Hold | None", hold), use))
+    recordings, _ = admitted(recorded, parameters, hold)
     values = parameters.values()
     states: tuple[dict[str, float], ...] = ()
     if recordings:

@@ -1,11 +1,5 @@
 """What a fit of road logs says: values with standard errors, what they cannot tell, doubts (pure).
 
-    cov = H^-1 (L J'J + P'P) H^-1,   H = J'J + P'P
-
-J, P: derivatives of the whitened residual and of the prior. L is the long-run variance of the
-whitened residual (Bartlett's weights): 1 where it is white, more where neighbours are alike, so
-that a thousand samples of one and the same misfit do not count as a thousand.
-
 Mass and load-cell gain enter only as gain times mass. C_rr needs neither; the forces F0 and F1 are
 as good as the mass is, which is taken as exact.
 """
@@ -18,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from plant_emulator.road_covariance import covariance_of, residual_variance
 from plant_emulator.road_fit import LOWER, UPPER
 from plant_emulator.road_prior import NAMES, OFFSET, vector
 from plant_emulator.validate import Fit
@@ -28,8 +23,6 @@ if TYPE_CHECKING:
     from plant_emulator.road_fit import RoadFit
 
 NORMAL_95 = 1.959964
-LAGS = 1.5
-"""[s] over which neighbours of the residual are compared."""
 COLLINEAR = 0.95
 CONTRADICTION = 4.0
 """Standard deviations from what was known of the gain, from which mass or gearing must be wrong."""
@@ -122,37 +115,6 @@ def answer(fit: RoadFit) -> RoadAnswer:
         problems=tuple(problems(fit, quality)),
         starts=fit.reached,
     )
-
-
-def covariance_of(fit: RoadFit) -> Array:
-    """Covariance of the free parameters, shape (free, free)."""
-    rows = len(fit.residual) - len(fit.prior.rows)
-    data, known = fit.jacobian[:rows], fit.jacobian[rows:]
-    scale = np.sqrt(np.sum(fit.jacobian**2, axis=0))
-    data, known = data / scale, known / scale
-    information, prior = data.T @ data, known.T @ known
-    inverse = np.linalg.inv(information + prior)
-    spread = residual_variance(fit) * information + prior
-    found: Array = inverse @ spread @ inverse / np.outer(scale, scale)
-    return found
-
-
-def residual_variance(fit: RoadFit) -> float:
-    """Long-run variance of the whitened residual of the data."""
-    rows = len(fit.residual) - len(fit.prior.rows)
-    return long_run_variance(fit.residual[:rows], round(LAGS / fit.run.spacing))
-
-
-def long_run_variance(white: Array, lags: int) -> float:
-    """Variance of a sum of neighbours, per sample; white noise has its variance.
-
-    At least 1, what the noise of the sensors themselves makes: less is chance.
-    """
-    total = float(np.mean(white**2))
-    for lag in range(1, lags):
-        weight = 2.0 * (1.0 - lag / lags)
-        total += weight * float(np.mean(white[lag:] * white[:-lag]))
-    return max(total, 1.0)
 
 
 def velocity_fit(fit: RoadFit) -> Fit:

@@ -7,9 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from plant_emulator import logs
+from plant_emulator.kernel import kernel
 from plant_emulator.log import Log
 from plant_emulator.programs import PROGRAMS, SpeedProgram, program
+from plant_emulator.recording import recording
+from plant_emulator.search import GAP_POSITION
 from plant_emulator.simulate import Hold, fit_start, run_of, simulate, values_of
+from plant_emulator.start_states import fit_states, states_of, with_own
 from plant_emulator.travel import travel
 
 if TYPE_CHECKING:
@@ -37,8 +41,18 @@ def followed(
 ) -> Log:
     """The simulation of a log from its reference and truck torque.
 
+    What the effects of the set start from is each run's own, as its position in the gap; of an
+    effect that is asked for, in `effects`, every value stays as it was given.
+
     hold, start : as the options --reference and --start
     """
-    run, values = run_of(log, cast("Hold | None", hold)), values_of(parameters, effects)
+    values = values_of(parameters, effects)
+    left = {name: own for name, own in parameters.effects.items() if name not in effects}
+    known = kernel().effects if left else {}
+    if start == "fit" and any(p.per_run for name in left for p in known[name].parameters.values()):
+        measured = with_own(recording(log, cast("Hold | None", hold)), left)
+        own = {**values, **measured.own, **fit_states(measured, values, states_of(left))}
+        return simulate(measured.run, own, gap_position=own.pop(GAP_POSITION))
+    run = run_of(log, cast("Hold | None", hold))
     position = fit_start(log, run, values) if start == "fit" else 0.0
     return simulate(run, values, gap_position=position)

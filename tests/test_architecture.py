@@ -35,6 +35,7 @@ SHELL = {
     "gateway.recorder": "files, processes",
     "gateway.recording": "files",
     "gateway.replay_report": "files",
+    "plant_emulator.admission": "files",
     "plant_emulator.axis_log": "files",
     "plant_emulator.blind.examiner": "files, processes",
     "plant_emulator.blind.folder": "files",

@@ -10,7 +10,8 @@ import numpy as np
 import peers
 
 from plant_emulator import logs, parameter_sets, programs
-from plant_emulator.identify import free_parameters, identify
+from plant_emulator.free_parameters import free_parameters
+from plant_emulator.identify import identify
 from plant_emulator.recording import recording
 from plant_emulator.search import GAP_POSITION
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.tangents import Tangents
 from plant_emulator.estimation import at
-from plant_emulator.identify import free_parameters, unknowns
+from plant_emulator.free_parameters import free_parameters, unknowns
 from plant_emulator.log import COMPARED
 from plant_emulator.search import GAP_POSITION
 from plant_emulator.sensors import SENSORS

@@ -4,7 +4,7 @@
     sealed/case_001.json the answers, each with its nonce
     logs/case_001/*      the logs that the diagnosis gets
     results/case_001.json what became of a case: done cases are not done again
-    cases.csv, evidence.csv, trial.json    the outcome
+    cases.csv, evidence.csv    the outcome
 
 A file is written beside its place and moved there: a trial that is interrupted leaves no half one.
 """

@@ -35,7 +35,7 @@ start = click.option(
     type=click.Choice(["fit", "middle"]),
     default="fit",
     show_default=True,
-    help="Start position in the backlash gap.",
+    help="Fit to each log its start in the backlash gap, and that of the set's effects.",
 )
 table = click.option("--table", type=OutputFile(), help="Write a CSV file for a spreadsheet.")
 plot = click.option(

@@ -48,9 +48,13 @@ def _table(effects: list[dict[str, object]]) -> list[str]:
         units = entry["units"]
         assert isinstance(sizes, dict)
         assert isinstance(units, dict)
+        hidden = entry["hidden_up_to"]
+        assert isinstance(hidden, dict)
         shown = ", ".join(
             f"{name} {value:.2g} {units[name]}".removesuffix(" 1")
             if value is not None
+            else f"{name} > {hidden[name]:.2g} {units[name]}".removesuffix(" 1")
+            if name in hidden
             else f"{name}: none"
             for name, value in sizes.items()
         )

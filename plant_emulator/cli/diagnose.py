@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import click
+from click.core import ParameterSource
 
 from plant_emulator.cli import _options
 from plant_emulator.cli._types import Command, OutputFile
@@ -93,8 +94,7 @@ def command(
 
     given = parameter_sets.load(parameters)
     if model == "axis":
-        if save or own:
-            raise click.UsageError("--save and --effects belong to --model bench")
+        _only_of_the_bench()
         run = axis_loaded(logs, held_out, without=without)
     else:
         run = loaded(logs, held_out, given, without=without, own=own, hold=reference)
@@ -116,7 +116,7 @@ def command(
     for note in found.details.notes:
         click.echo(f"note: {note}", err=True)
     if save:
-        parameter_sets.save(parameter_set(found, given), save)
+        parameter_sets.save(parameter_set(found, given, run.fitted), save)
         _own_in(save, own, found.answer["verdict"]["effects"])
     if report:
         from plant_emulator.diagnosis.report import html
@@ -126,6 +126,16 @@ def command(
         _options.write_json(found.answer, json_file)
     if json_file != "-":
         click.echo("\n".join(lines(found.answer)))
+
+
+def _only_of_the_bench() -> None:
+    """Refuse options that would be ignored with a single axis."""
+    given = click.get_current_context().get_parameter_source
+    options = {"save": "--save", "own": "--effects"}
+    options |= {"parameters": "--parameters", "reference": "--reference"}
+    for name, option in options.items():
+        if given(name) is not ParameterSource.DEFAULT:
+            raise click.UsageError(f"{option} belongs to --model bench")
 
 
 def _own_in(saved: str, own: tuple[str, ...], named: list[str]) -> None:

@@ -16,7 +16,7 @@ from plant_emulator.diagnosis.relations import base_speed
 from plant_emulator.effects import from_file
 from plant_emulator.equation_error import start_values
 from plant_emulator.estimates import Unknown
-from plant_emulator.identify import free_parameters, unknowns
+from plant_emulator.free_parameters import free_parameters, unknowns
 from plant_emulator.kernel import kernel, know
 from plant_emulator.parameters import UNITS
 from plant_emulator.search import GAP_POSITION, Search
@@ -74,6 +74,9 @@ def candidate(effect: Effect) -> Candidate:
         units={f"{effect.name}_{key}": d.unit for key, d in effect.parameters.items()},
         title=effect.description.partition("\n")[0].rstrip("."),
         needs=effect.needs,
+        untold=any(
+            d.per_run and d.std is None and d.measured is None for d in effect.parameters.values()
+        ),
     )
 
 

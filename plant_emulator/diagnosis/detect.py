@@ -4,7 +4,8 @@ From the same signatures as the contest, at a run's own fit or, for a run that i
 the nominal parameters: the drift-free signature of an effect at its plausible size, in the noise.
 An effect is detectable from the size on at which its signature reaches DETECTABLE; two effects are
 of one class where the cosine between their signatures is above ALIKE, or where the evidence that
-separates them at their plausible sizes is under MARGIN.
+separates them at their plausible sizes is under MARGIN. An effect whose course in a run is chance
+has no signature that a fit could find again.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.contest import Point, linearised
 from plant_emulator.diagnosis.explain import DETECTABLE, MARGIN
-from plant_emulator.diagnosis.signature import signature
+from plant_emulator.diagnosis.signature import SIZES, bounded, signature
 from plant_emulator.diagnosis.tangents import Tangents
 
 if TYPE_CHECKING:
@@ -49,7 +50,10 @@ class Detectability:
 def detectability(model: Model, where: Point, runs: Sequence[int]) -> list[Detectability]:
     """For every effect of the library, at a fit without effects."""
     tangents = Tangents(linearised(model, where, runs))
-    found = {n: signature(model, n, where, runs, tangents) for n in model.candidates}
+    found = {
+        name: None if candidate.untold else signature(model, name, where, runs, tangents)
+        for name, candidate in model.candidates.items()
+    }
     seen = {name: s for name, s in found.items() if s is not None}
     return [
         Detectability(effect=name, norm=0.0, raw=0.0, smallest=inf, imitated_by="", alike=(name,))
@@ -58,7 +62,7 @@ def detectability(model: Model, where: Point, runs: Sequence[int]) -> list[Detec
             effect=name,
             norm=s.norm,
             raw=s.raw,
-            smallest=smallest(s.norms),
+            smallest=smallest([(reached(model.candidates[name], f), norm) for f, norm in s.norms]),
             imitated_by=s.imitated_by,
             alike=alike(name, seen),
         )
@@ -78,6 +82,15 @@ def smallest(norms: Sequence[tuple[float, float]]) -> float:
             return size_before + share * (size - size_before)
         size_before, norm_before = size, norm
     return inf
+
+
+def reached(candidate: Candidate, factor: float) -> float:
+    """What of so many plausible sizes the bounds of an effect leave, in plausible sizes."""
+    return max(
+        (bounded(u, neutral, factor) - neutral) / (u.start - neutral)
+        for u in candidate.sizes
+        for neutral in (candidate.neutral[u.name],)
+    )
 
 
 def alike(name: str, seen: Mapping[str, Signature]) -> tuple[str, ...]:
@@ -100,19 +113,34 @@ def alike(name: str, seen: Mapping[str, Signature]) -> tuple[str, ...]:
 
 def as_answer(found: Detectability, candidate: Candidate) -> dict[str, Any]:
     """One entry of the answer, schema detectability/1."""
-    sizes = {u.name: u.start - candidate.neutral[u.name] for u in candidate.sizes}
+    prefix = f"{candidate.name}_"
+    seen = isfinite(found.smallest)
     least = {
-        name.removeprefix(f"{candidate.name}_"): candidate.neutral[name] + found.smallest * size
-        for name, size in sizes.items()
+        u.name.removeprefix(prefix): (
+            bounded(u, candidate.neutral[u.name], found.smallest) if seen else None
+        )
+        for u in candidate.sizes
     }
     return {
         "effect": found.effect,
         "subsystem": candidate.subsystem,
-        "smallest_size": {k: v if isfinite(v) else None for k, v in least.items()},
-        "units": {k.removeprefix(f"{candidate.name}_"): v for k, v in candidate.units.items()},
+        "smallest_size": least,
+        "hidden_up_to": {} if seen else _hidden_up_to(found, candidate),
+        "units": {k.removeprefix(prefix): v for k, v in candidate.units.items()},
         "evidence_at_plausible_size": found.norm**2,
         "class": list(found.alike),
         "needs": _needs(found, candidate),
+    }
+
+
+def _hidden_up_to(found: Detectability, candidate: Candidate) -> dict[str, float]:
+    """The largest sizes that were tried of an effect that acts, where its bounds allow more."""
+    tried = {u.name: bounded(u, candidate.neutral[u.name], SIZES[-1]) for u in candidate.sizes}
+    ends = {u.name: bounded(u, candidate.neutral[u.name], inf) for u in candidate.sizes}
+    return {
+        name.removeprefix(f"{candidate.name}_"): value
+        for name, value in tried.items()
+        if found.raw > 0.0 and value != ends[name]
     }
 
 

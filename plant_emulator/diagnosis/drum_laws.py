@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.hats import hats, of_time
-from plant_emulator.diagnosis.phases import smooth
 from plant_emulator.diagnosis.relations import NOISES, Measured, turned
+from plant_emulator.smoothing import smooth
 
 if TYPE_CHECKING:
     from plant_emulator.estimates import Array

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.hats import hats, of_time
-from plant_emulator.diagnosis.phases import smooth
 from plant_emulator.diagnosis.relations import (
     DRIVE,
     GEAR,
@@ -28,6 +27,7 @@ from plant_emulator.diagnosis.relations import (
     middle,
     turned,
 )
+from plant_emulator.smoothing import smooth
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

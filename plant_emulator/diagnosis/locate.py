@@ -60,11 +60,6 @@ class Location:
     gain: float
     cells: tuple[Cell, ...]
 
-    @property
-    def found(self) -> bool:
-        """Whether any block is worth naming."""
-        return self.gain > WORTH
-
     def entries(self, axis: str = "phase") -> list[dict[str, Any]]:
         """The map's entries along one axis."""
         return [cell.as_entry() for cell in self.cells if cell.axis == axis]

@@ -38,6 +38,7 @@ class Candidate:
     fixed : values of the rest while the effect is there
     units : of all its parameters, by name
     title : what it is, in one line; needs : what a log must have to show it, empty: nothing special
+    untold : whether its course in a run is chance that no fit and no measurement tells
     terms : what else it is known by, made of its own values and the machine's
     """
 
@@ -51,6 +52,7 @@ class Candidate:
     units: Mapping[str, str]
     title: str
     needs: str = ""
+    untold: bool = False
     terms: tuple[Term, ...] = ()
 
 

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.smoothing import smooth
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -25,21 +27,6 @@ RAMP = 3.0
 MOVING = 1.0
 # How long leaving standstill takes: the gap is crossed within it [s].
 BREAKAWAY_TIME = 0.5
-
-
-def window(time: Array, seconds: float) -> int:
-    """Odd number of samples nearest to a length of time, at least 5."""
-    interval = float(np.median(np.diff(time)))
-    return max(5, 2 * round(seconds / interval / 2) + 1)
-
-
-def smooth(time: Array, channel: Array, seconds: float, order: int = 0) -> Array:
-    """A channel, or its derivative of an order, from parabolas over windows of a length [s]."""
-    from scipy.signal import savgol_filter
-
-    length = min(window(time, seconds), len(time) - (1 - len(time) % 2))
-    interval = float(np.median(np.diff(time)))
-    return np.asarray(savgol_filter(channel, length, 2, deriv=order, delta=interval))
 
 
 def phases(time: Array, reference: Array, motor_speed: Array) -> NDArray[np.int_]:

@@ -1,7 +1,7 @@
 """How the steps of a diagnosis are run, one after the other or (see `workers`) side by side.
 
-A step is a function of a model and one item. The model goes to each worker once, as the recipe that
-builds it.
+A step is a function of a model and one item. The model goes to a worker as the recipe that builds
+it; a worker builds it once.
 """
 
 from __future__ import annotations
@@ -33,10 +33,12 @@ _MODELS: dict[str, Model] = {}
 def model_of(recipe: Recipe) -> Model:
     """The recipe's model, built once in this process; older ones are let go."""
     key = recipe.digest()
-    if key not in _MODELS:
+    model = _MODELS.get(key)
+    if model is None:
+        model = recipe.build()
         _MODELS.clear()
-        _MODELS[key] = recipe.build()
-    return _MODELS[key]
+        _MODELS[key] = model
+    return model  # not what stands there by now: a worker may have several threads
 
 
 class Pool(Protocol):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from plant_emulator.diagnosis.markup import Markup, join, tag
+from plant_emulator.diagnosis.phases import PHASES
 from plant_emulator.diagnosis.report_parts import bar, cell, code, right, row_head, table
 from plant_emulator.diagnosis.report_traces import residuals, rms
 from plant_emulator.diagnosis.wording import (
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.details import Trace
 
-PHASES = ("standstill", "breakaway", "acceleration", "cruise", "deceleration", "field_weakening")
 # From which multiple of the noise a cell of the map takes which tint.
 HEAT = ((10.0, "heat4"), (5.0, "heat3"), (2.0, "heat2"), (1.2, "heat1"))
 # Half width of a 95 % interval in standard errors.

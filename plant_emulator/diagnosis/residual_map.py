@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from plant_emulator.diagnosis.phases import PHASES, field_weakened, phases, smooth
+from plant_emulator.diagnosis.phases import PHASES, field_weakened, phases
+from plant_emulator.smoothing import smooth
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

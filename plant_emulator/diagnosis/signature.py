@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.tangents import gain_along
-
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -37,8 +35,6 @@ class Signature:
     far : the same at a larger size, if there is one
     norm : of the part that drift cannot imitate, at the plausible size
     raw : of the whole, at the plausible size
-    gain : fall of the sum of squares that the linear picture expects at the best size
-    tangent_gain : the same at whatever size, from the signature of the smallest
     imitated_by : the parameter that follows it most
     norms : of the part that drift cannot imitate, by size in plausible sizes, ascending
     direction : the part that drift cannot imitate over its norm, all runs and channels
@@ -50,8 +46,6 @@ class Signature:
     far: tuple[Mapping[str, float], tuple[Mapping[str, float], ...]] | None
     norm: float
     raw: float
-    gain: float
-    tangent_gain: float
     norms: tuple[tuple[float, float], ...]
     imitated_by: str
     direction: Array
@@ -84,8 +78,6 @@ def signature(
         far=None if larger is None else _start(larger, tangents, own),
         norm=plausible.norm,
         raw=float(np.linalg.norm(plausible.change)),
-        gain=best.gain,
-        tangent_gain=max(_tangent_gain(t, tangents) for t in trials if abs(t.size) == SIZES[0]),
         norms=tuple((t.size, t.norm) for t in trials if t.size > 0.0),
         imitated_by=names[int(np.argmax(follows))],
         direction=plausible.rest / max(plausible.norm, 1e-12),
@@ -130,11 +122,6 @@ def _start(
     return {**values, **trial.sizes}, tuple(
         {**state, **more} for state, more in zip(states, own, strict=True)
     )
-
-
-def _tangent_gain(trial: _Trial, tangents: Tangents) -> float:
-    """Fall of the sum of squares at the best multiple of a signature, 0 where that is negative."""
-    return gain_along(trial.rest, tangents.residual)
 
 
 def _lengths(found: Estimate) -> Array:

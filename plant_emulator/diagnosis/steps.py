@@ -80,7 +80,9 @@ _last: dict[tuple[int, tuple[object, ...]], Tangents] = {}
 
 def _tangents(model: Model, task: Task) -> Tangents:
     key = (id(model), task.base.key)
-    if key not in _last:
+    tangents = _last.get(key)
+    if tangents is None:
+        tangents = Tangents(linearised(model, task.base, task.runs))
         _last.clear()
-        _last[key] = Tangents(linearised(model, task.base, task.runs))
-    return _last[key]
+        _last[key] = tangents
+    return tangents  # not what stands there by now: a worker may have several threads

@@ -20,17 +20,28 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import pkgutil
+from itertools import combinations
+from keyword import iskeyword
 from typing import TYPE_CHECKING
 
 from plant_emulator.effects.declaration import Effect, EffectParameter, Memory, effect_of
 from plant_emulator.errors import ParameterError, place_in
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
     from types import ModuleType
 
-__all__ = ["Effect", "EffectParameter", "Memory", "from_file", "load", "names", "parse"]
+__all__ = [
+    "Effect",
+    "EffectParameter",
+    "Memory",
+    "from_file",
+    "from_files",
+    "load",
+    "names",
+    "parse",
+]
 
 
 def names() -> list[str]:
@@ -46,8 +57,29 @@ def load(name: str) -> Effect:
     return effect_of(name, importlib.import_module(f"{__name__}.{name}"))
 
 
+def from_files(paths: Sequence[Path]) -> list[Effect]:
+    """A user's own effects; ParameterError where two would have one name."""
+    for first, second in combinations(paths, 2):
+        if first.stem == second.stem:
+            raise ParameterError(
+                f"{second}: an effect is called by its file, and {first} is called "
+                f"{first.stem} too; give it another name"
+            )
+    return [from_file(path) for path in paths]
+
+
 def from_file(path: Path) -> Effect:
     """A user's own effect; its name is the file's. A fault in it is told by file and line."""
+    if not path.stem.isidentifier() or iskeyword(path.stem):
+        raise ParameterError(
+            f"{path}: an effect is called by its file, and {path.stem!r} is no name in Python; "
+            "letters, digits and _ are, not beginning with a digit"
+        )
+    if path.stem in names():
+        raise ParameterError(
+            f"{path}: an effect is called by its file, and {path.stem} is one of the library; "
+            "give it another name"
+        )
     spec = importlib.util.spec_from_file_location(path.stem, path)
     if spec is None or spec.loader is None or not path.is_file():
         raise ParameterError(f"{path}: no Python file with an effect")

@@ -3,18 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
+from math import inf, isfinite
 from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
 from plant_emulator import laws
 from plant_emulator.errors import ParameterError
+from plant_emulator.parameters import UNITS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from types import ModuleType
 
     from plant_emulator.kernel_types import Record
+
+SUBSYSTEMS = (
+    "drive",
+    "motor",
+    "motor_shaft",
+    "gear",
+    "backlash_shaft",
+    "drum",
+    "torque_sensor",
+    "speed_sensor",
+    "wheel_contact",
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,6 +107,11 @@ def effect_of(name: str, module: ModuleType) -> Effect:
     for needed in ("SUBSYSTEM", "PARAMETERS"):
         if not hasattr(module, needed):
             raise ParameterError(f"effect {name}: {module.__file__} declares no {needed}")
+    if module.SUBSYSTEM not in SUBSYSTEMS:
+        raise ParameterError(
+            f"effect {name}: {module.__file__}: SUBSYSTEM is {module.SUBSYSTEM!r}; one of "
+            f"{', '.join(SUBSYSTEMS)} is expected"
+        )
     own = {law.__name__: getattr(module, law.__name__, None) for law in laws.LAWS}
     changed = {key: function for key, function in own.items() if function is not None}
     if not changed:
@@ -104,6 +122,7 @@ def effect_of(name: str, module: ModuleType) -> Effect:
                 f"effect {name}: {module.__file__}: {key} is no function of (value, s, p)"
             )
     _check_table(name, module, "PARAMETERS", EffectParameter)
+    _check_numbers(name, module)
     _check_table(name, module, "MEMORIES", Memory)
     _check_memories(name, module)
     return Effect(
@@ -125,6 +144,28 @@ def _check_table(name: str, module: ModuleType, table: str, kind: type) -> None:
         raise ParameterError(
             f"effect {name}: {module.__file__}: {table} is no dict of names to {kind.__name__}"
         )
+
+
+def _check_numbers(name: str, module: ModuleType) -> None:
+    """Refuse a parameter whose values are no numbers within its bounds, or whose name is taken."""
+    for key, one in module.PARAMETERS.items():
+        place = f"effect {name}: {module.__file__}: parameter {key}"
+        if not str(key).isidentifier() or f"{name}_{key}" in UNITS:
+            raise ParameterError(f"{place}: another name is needed; {name}_{key} cannot be used")
+        for what, value, low, high in (
+            ("lower", one.lower, -inf, inf),
+            ("upper", one.upper, one.lower, inf),
+            ("neutral", one.neutral, one.lower, one.upper),
+            ("plausible", one.plausible, one.lower, one.upper),
+            ("std", 1.0 if one.std is None else one.std, 0.0, inf),
+        ):
+            if isinstance(value, bool) or not isinstance(value, (int, float)):
+                raise ParameterError(f"{place}: {what} is {value!r}; a number is expected")
+            if not isfinite(value) or not low <= value <= high:
+                raise ParameterError(
+                    f"{place}: {what} is {value:g}; a finite number from {low:g} to {high:g} is "
+                    "expected"
+                )
 
 
 def _check_memories(name: str, module: ModuleType) -> None:

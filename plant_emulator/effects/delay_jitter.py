@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from plant_emulator.kernel_types import Record
 
 SUBSYSTEM = "drive"
+NEEDS = "a known course of the dead time: a drive's own cannot be reproduced, it shows as unrest"
 PARAMETERS = {
     "amplitude": EffectParameter(
         neutral=0.0, lower=0.0, upper=0.05, plausible=0.005, unit="s", meaning="A"
@@ -26,7 +27,13 @@ PARAMETERS = {
         neutral=0.01, lower=0.001, upper=0.1, plausible=0.01, unit="s", meaning="T_s"
     ),
     "sequence": EffectParameter(
-        neutral=0.0, lower=0.0, upper=1000.0, plausible=0.0, unit="1", meaning="which sequence"
+        neutral=0.0,
+        lower=0.0,
+        upper=1000.0,
+        plausible=0.0,
+        unit="1",
+        meaning="which sequence",
+        per_run=True,
     ),
 }
 

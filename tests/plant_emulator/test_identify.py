@@ -10,7 +10,8 @@ import pytest
 from plant_emulator.equation_error import start_values
 from plant_emulator.errors import IdentificationError
 from plant_emulator.experiments import experiments
-from plant_emulator.identify import Identification, free_parameters, identify
+from plant_emulator.free_parameters import free_parameters
+from plant_emulator.identify import Identification, identify
 from plant_emulator.log import COMPARED, Log
 from plant_emulator.parameters import ParameterSet
 from plant_emulator.preflight import preflight

@@ -6,8 +6,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 from plant_emulator import compiler, effects, parameter_sets
+from plant_emulator.cli import main
 from plant_emulator.errors import ParameterError
 from plant_emulator.kernel import build
 from tests.plant_emulator.runs import linear, needs_compiler, simulate
@@ -186,6 +188,58 @@ def test_declaration_of_a_wrong_kind_is_refused(tmp_path: Path, text: str, said:
     path = written(tmp_path, f"{FORCE}\n\n{text}\n")
     with pytest.raises(ParameterError, match=rf"effect own: {path}: {said}"):
         effects.from_file(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("neutral=0.0", 'neutral="0"', "parameter factor: neutral is '0'; a number is expected"),
+        ("neutral=0.0", "neutral=-1.0", "parameter factor: neutral is -1; .* from 0 to 100"),
+        ("plausible=20.0", "plausible=101.0", "parameter factor: plausible is 101; .* 0 to 100"),
+        ("upper=100.0", "upper=float('inf')", "parameter factor: upper is inf; a finite number"),
+        ("lower=0.0", "lower=200.0", "parameter factor: upper is 100; .* from 200 to inf"),
+        ('"factor":', '"a factor":', "parameter a factor: another name is needed"),
+        ('SUBSYSTEM = "gear"', 'SUBSYSTEM = "nonsense"', "SUBSYSTEM is 'nonsense'; one of drive,"),
+    ],
+)
+def test_declaration_that_cannot_be_is_refused(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    path = written(tmp_path, FORCE.replace(old, new))
+    with pytest.raises(ParameterError, match=rf"effect own: {path}: {said}"):
+        effects.from_file(path)
+
+
+def test_parameter_of_the_bench_is_not_declared_again(tmp_path: Path) -> None:
+    path = tmp_path / "gear.py"
+    path.write_text(OIL_DRAG.replace("factor", "inertia"), encoding="utf-8")
+    with pytest.raises(ParameterError, match="gear_inertia cannot be used"):
+        effects.from_file(path)
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (("2nd.py",), "'2nd' is no name in Python"),
+        (("class.py",), "'class' is no name in Python"),
+        (("stribeck.py",), "stribeck is one of the library"),
+        (("a/drag.py", "b/drag.py"), "a/drag.py is called drag too"),
+    ],
+)
+def test_name_that_cannot_be_is_refused_in_one_line(
+    tmp_path: Path, names: tuple[str, ...], said: str
+) -> None:
+    command = ["diagnose", str(tmp_path / "run.csv")]
+    for name in names:
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(OIL_DRAG.replace("oil_drag", path.stem), encoding="utf-8")
+        command += ["--effects", str(path)]
+    result = CliRunner().invoke(main, command)
+    (line,) = result.stderr.splitlines()
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert line.startswith(f"error: {path}: ")
+    assert said in line
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -11,7 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from plant_emulator.errors import EmulatorError
+from plant_emulator.workers import Cluster
 from tests.plant_emulator.diagnosis import axis_truth
+from tests.plant_emulator.test_workers import Number
 
 pytestmark = pytest.mark.slow
 
@@ -88,3 +92,29 @@ def test_a_scheduler_that_does_not_answer_is_told(logs: list[str]) -> None:
     assert done.returncode == 1
     assert "--scheduler tcp://127.0.0.1:1: no scheduler answers" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def dies(_model: Any, _item: int) -> int:
+    os._exit(9)
+
+
+def test_a_worker_that_is_lost_is_told_in_one_line(
+    monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
+    monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES", "0")
+    address = request.getfixturevalue("scheduler")
+    cluster = Cluster(address)
+    try:
+        with pytest.raises(EmulatorError, match=f"--scheduler {address}: a worker .* ended"):
+            list(cluster.map(dies, Number(3), [1, 2]))
+    finally:
+        cluster.close()
+
+
+def test_an_address_that_cannot_be_is_wrong_usage(logs: list[str]) -> None:
+    command = [sys.executable, "-m", "plant_emulator", "diagnose", "--model", "axis", *logs]
+    command += ["--scheduler", "nonsense"]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("error: --scheduler nonsense: missing port number")

@@ -72,6 +72,7 @@ def test_another_name_of_its_class_is_right_but_not_first() -> None:
     classes = [["torque_sensor_drift", "torque_sensor_offset"]]
     one = unsealed(answer("effect", "torque_sensor_drift", classes=classes), OFFSET)
     assert right(one)
+    assert not detail(one, {})["top1"]
 
 
 def test_class_of_four_is_no_answer() -> None:

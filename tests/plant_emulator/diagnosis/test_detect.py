@@ -2,12 +2,16 @@
 
 import json
 from collections.abc import Callable
+from math import inf
+from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
 
+from plant_emulator import effects
 from plant_emulator.cli import main
-from plant_emulator.diagnosis.detect import smallest
+from plant_emulator.diagnosis.bench import candidate
+from plant_emulator.diagnosis.detect import Detectability, as_answer, reached, smallest
 
 
 def test_smallest_size_lies_where_the_signature_reaches_seven_times_the_noise() -> None:
@@ -21,6 +25,44 @@ def test_limit_that_does_not_bite_when_small_is_not_seen_when_small() -> None:
 
 def test_effect_that_never_reaches_it_has_no_smallest_size() -> None:
     assert smallest(((0.03, 0.1), (2.0, 3.0))) == float("inf")
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "left"),
+    [
+        ("current_limit", 2.0, 1.42),  # 50 A is plausible, 71 A the bound
+        ("current_limit", 1.2, 1.2),
+        ("integrator_windup", 2.0, 1.0),
+        ("armature_reaction", 2.0, 2.0),
+    ],
+)
+def test_size_beyond_its_bound_was_not_tried(name: str, factor: float, left: float) -> None:
+    assert reached(candidate(effects.load(name)), factor) == pytest.approx(left)
+
+
+def answer_of(name: str, smallest_: float, raw: float = 5.0) -> dict[str, Any]:
+    found = Detectability(
+        effect=name, norm=0.0, raw=raw, smallest=smallest_, imitated_by="", alike=(name,)
+    )
+    return as_answer(found, candidate(effects.load(name)))
+
+
+def test_no_size_beyond_the_bounds_is_promised() -> None:
+    assert answer_of("current_limit", 1.8)["smallest_size"] == {"reduction": 71.0}
+
+
+def test_effect_that_might_show_in_a_size_not_tried_is_not_said_to_be_hidden() -> None:
+    """10 N m s/rad is plausible and 1000 the bound; twice the plausible size is tried."""
+    entry = answer_of("shaft_damping", inf)
+    assert entry["smallest_size"] == {"damping": None}
+    assert entry["hidden_up_to"] == {"damping": 20.0}
+    assert answer_of("integrator_windup", inf)["hidden_up_to"] == {}
+    assert answer_of("wheel_slip", inf, raw=0.0)["hidden_up_to"] == {}
+
+
+def test_chance_is_told_of_jitter_and_of_nothing_else() -> None:
+    untold = [name for name in effects.names() if candidate(effects.load(name)).untold]
+    assert untold == ["delay_jitter"]
 
 
 @pytest.fixture(scope="module")
@@ -52,6 +94,16 @@ def test_effect_of_the_trucks_wheel_needs_a_truck(
     entry = planned("wheel_slip")
     assert entry["evidence_at_plausible_size"] == 0
     assert "truck" in str(entry["needs"])
+
+
+@pytest.mark.slow
+def test_course_of_a_drives_jitter_is_not_promised(
+    planned: Callable[[str], dict[str, object]],
+) -> None:
+    entry = planned("delay_jitter")
+    assert entry["smallest_size"] == {"amplitude": None}
+    assert entry["evidence_at_plausible_size"] == 0
+    assert "cannot be reproduced" in str(entry["needs"])
 
 
 @pytest.mark.slow

@@ -1,0 +1,80 @@
+"""Which logs are taken together: read, without their own answer, each run once, of one bench."""
+
+from __future__ import annotations
+
+import re
+from itertools import combinations
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from plant_emulator import logs
+from plant_emulator.errors import DiagnosisError
+from plant_emulator.one_bench import one_bench
+from plant_emulator.preflight import preflight
+from plant_emulator.recording import Recording, recording
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from plant_emulator.diagnosis.axis_signals import AxisLog
+    from plant_emulator.log import Array, Log
+    from plant_emulator.parameters import ParameterSet
+    from plant_emulator.simulate import Hold
+
+# Columns that tell the answer, by how a word of their name begins: nobody may see them before.
+TELLING = re.compile(
+    "label|effect(?!ive)|fault|class|answer|anomal|scenario|cause|truth|drift|verdict|diagnos"
+)
+# Words of a name: parted by what is no letter, or by a capital.
+WORD = re.compile("[A-Z]?[a-z]+|[A-Z]+")
+# What formats may round off a sample [SI].
+ROUNDED = 1e-4
+# Signals that every log of the bench has.
+NEEDED = ("speed_reference", "motor_speed", "drum_speed", "shaft_torque")
+
+
+def admitted(
+    paths: Sequence[str], parameters: ParameterSet, hold: str | None
+) -> tuple[list[Recording], list[str]]:
+    """The logs of one bench ready to be fitted, and what the user should know of them.
+
+    DiagnosisError or LogError says what cannot be used.
+    """
+    recordings: list[Recording] = []
+    notes: list[str] = []
+    for path in paths:
+        log = logs.read(path)
+        untold(log)
+        checked = preflight(log, parameters.value("gear_ratio"))
+        recordings.append(recording(log, cast("Hold | None", hold), checked.use))
+        notes += checked.notes
+    taken = [r.log for r in recordings]
+    distinct([(log.source, samples(log)) for log in taken])
+    one_bench(taken, parameters.values())
+    return recordings, notes
+
+
+def untold(log: Log | AxisLog) -> None:
+    """Refuse a log that carries its own answer."""
+    for column in log.other:
+        if any(TELLING.match(word.lower()) for word in WORD.findall(column)):
+            raise DiagnosisError(
+                f"{log.source}: line 1: column {column} looks like the answer; a diagnosis must "
+                "not see it: take it out"
+            )
+
+
+def samples(log: Log) -> Array:
+    """What makes a log of the bench the run that it is, shape (signals, samples)."""
+    return np.stack([log.time - log.time[0], *(log[name] for name in NEEDED)])
+
+
+def distinct(runs: Sequence[tuple[str, Array]]) -> None:
+    """Refuse the same run twice: its samples tell, whatever file holds them.
+
+    runs : what errors call it, and its samples
+    """
+    for (name, first), (other, second) in combinations(runs, 2):
+        if first.shape == second.shape and np.allclose(first, second, rtol=0.0, atol=ROUNDED):
+            raise DiagnosisError(f"{other}: the same run as {name}; give every run once")
