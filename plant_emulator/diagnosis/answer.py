@@ -99,6 +99,8 @@ def undetectable(
 
 def hidden(contender: Contender, candidate: Candidate) -> str:
     """Why an effect does not show."""
+    if candidate.untold:
+        return candidate.needs
     if contender.raw < DETECTABLE:
         reason = "too small in these channels and runs at its plausible size"
     else:

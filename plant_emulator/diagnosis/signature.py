@@ -35,6 +35,7 @@ class Signature:
     far : the same at a larger size, if there is one
     norm : of the part that drift cannot imitate, at the plausible size
     raw : of the whole, at the plausible size
+    gain : fall of the sum of squares that the linear picture expects at the best size
     imitated_by : the parameter that follows it most
     norms : of the part that drift cannot imitate, by size in plausible sizes, ascending
     direction : the part that drift cannot imitate over its norm, all runs and channels
@@ -46,6 +47,7 @@ class Signature:
     far: tuple[Mapping[str, float], tuple[Mapping[str, float], ...]] | None
     norm: float
     raw: float
+    gain: float
     norms: tuple[tuple[float, float], ...]
     imitated_by: str
     direction: Array
@@ -78,6 +80,7 @@ def signature(
         far=None if larger is None else _start(larger, tangents, own),
         norm=plausible.norm,
         raw=float(np.linalg.norm(plausible.change)),
+        gain=best.gain,
         norms=tuple((t.size, t.norm) for t in trials if t.size > 0.0),
         imitated_by=names[int(np.argmax(follows))],
         direction=plausible.rest / max(plausible.norm, 1e-12),

@@ -36,7 +36,9 @@ def start(model: Model, runs: tuple[int, ...]) -> Point:
 
 
 def show(model: Model, task: Task) -> Signature | None:
-    """The signature of an effect; None where it changes nothing."""
+    """The signature of an effect; None where it changes nothing, or nothing that a fit can tell."""
+    if model.candidates[task.effect].untold:
+        return None
     return signature(model, task.effect, task.base, task.runs, _tangents(model, task))
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis import rounds as engine
+from plant_emulator.diagnosis.answer import undetectable
 from plant_emulator.diagnosis.contest import Point, fit, linearised, null_fit
 from plant_emulator.diagnosis.explain import Explanation, adequate, excess
 from plant_emulator.diagnosis.looks import from_nominal, glance, glance_far, look
@@ -180,6 +181,26 @@ def test_two_effects_lie_where_the_larger_share_is() -> None:
     for larger, smaller in (("wave", "cube"), ("cube", "wave")):
         shares = {f"part of {larger}": 0.6, f"part of {smaller}": 0.4}
         assert subsystem(found, model.candidates, shares) == f"part of {larger}"
+
+
+def test_effect_whose_values_of_the_runs_explain_all_is_not_named_without_a_size() -> None:
+    model = Line([noisy(2.0 + 3.0 * TIME + 0.8 * np.sin(20.0 * TIME))], ["wave"])
+    found = explained(model)
+    for states, error, kind in (((), 0.3, "effect"), ((linear("phase"),), 0.3, "unknown")):
+        model.candidates["wave"] = replace(model.candidates["wave"], states=states)
+        final = replace(found.final, errors={**found.final.errors, "wave_size": error})
+        assert decide(model, replace(found, final=final)).kind == kind
+    sure = replace(found.final, errors={**found.final.errors, "wave_size": 0.2})
+    assert decide(model, replace(found, final=sure)).kind == "effect"
+
+
+def test_effect_of_chance_course_is_not_tried() -> None:
+    model = Line([noisy(2.0 + 3.0 * TIME + 0.8 * np.sin(20.0 * TIME))], ["wave"])
+    model.candidates["wave"] = replace(model.candidates["wave"], untold=True, needs="its course")
+    found = explained(model)
+    assert found.final.effects == ()
+    assert [c.point for c in found.contenders] == [None]
+    assert undetectable(found, model.candidates) == [{"effect": "wave", "reason": "its course"}]
 
 
 class Stuck(Line):
