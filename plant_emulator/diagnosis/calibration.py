@@ -18,15 +18,21 @@ class Case:
     right: bool
 
 
-def confidence(cases: Sequence[Case], kind: str, evidence: float) -> float:
-    """Share of right answers among the cases of this kind with at least this evidence.
+# Cases that a share is taken of at least, if there are so many of a kind.
+FEWEST = 20
 
-    Laplace's rule of succession, (right + 1) / (cases + 2): few cases give no certainty. More
-    evidence than any case had counts as much as the most that one had. The evidence of a verdict
-    that names nothing says nothing: all cases of its kind count.
+
+def confidence(cases: Sequence[Case], kind: str, evidence: float) -> float | None:
+    """Share of right answers among the cases of this kind with at least this evidence; None: there
+    are none of this kind.
+
+    Laplace's rule of succession, (right + 1) / (cases + 2): few cases give no certainty. Of an
+    effect with more evidence than FEWEST cases had, these count. The evidence of a verdict that
+    names nothing says nothing: all cases of its kind count.
     """
-    same = [case for case in cases if case.kind == kind]
-    most = max((case.evidence for case in same), default=0.0)
+    same = sorted((c for c in cases if c.kind == kind), key=lambda c: -c.evidence)
+    if not same:
+        return None
     if kind == "effect":
-        same = [case for case in same if case.evidence >= min(evidence, most)]
-    return (sum(case.right for case in same) + 1.0) / (len(same) + 2.0)
+        same = [c for k, c in enumerate(same) if k < FEWEST or c.evidence >= evidence]
+    return (sum(c.right for c in same) + 1.0) / (len(same) + 2.0)

@@ -104,7 +104,7 @@ def _verdict(answer: Mapping[str, Any], units: Mapping[str, str]) -> Markup:
 def _confidence(share: float | None) -> str | None:
     if share is None:
         return None
-    return f"{percent(share)} of the simulated cases with at least this evidence were right"
+    return f"{percent(share)}: so often were answers of this kind right where the truth was known"
 
 
 def _shrinkage(answer: Mapping[str, Any], details: Details) -> Markup:

@@ -120,7 +120,7 @@ def test_verdict_place_and_shrinkage_stand_first():
         "Effect found",
         "gear (81 % of the residual), armature current in field weakening: 1.25 A, noise 0.25 A",
         "98 % (95 % interval 96 % to 99 %)",
-        "98 % of the simulated cases",
+        "98 %: so often were answers of this kind right",
         "2 logs fitted, 1 log held out",
         "Next experiment: drive program1 in reverse from a cold start",
     ):
