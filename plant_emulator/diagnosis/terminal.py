@@ -110,10 +110,10 @@ def _verdict(answer: Mapping[str, Any], width: int) -> list[str]:
 
 def _ranking(answer: Mapping[str, Any], room: int, width: int) -> list[str]:
     """Head of the ranking, and the accepted effects with what there is room for."""
-    if not answer["ranking"]:
+    accepted = [r for r in answer["ranking"] if r["accepted"]]
+    if not accepted and not _runners_up(answer["ranking"]):
         return []
     classes = indistinguishable(answer["verdict"])
-    accepted = [r for r in answer["ranking"] if r["accepted"]]
     room -= 1 + len(accepted)
     rows = [f"{'  effect':{NAME}}{'evidence':>{CELL}}{'gain':>7}  size +- standard error"]
     for entry in accepted:

@@ -99,6 +99,12 @@ def test_effect_without_evidence_is_no_runner_up():
     assert [row for row in lines(answer) if row.startswith("  stribeck")]
 
 
+def test_ranking_without_evidence_has_no_head():
+    answer = answers.none()
+    answer["ranking"] = [answers.ranked("stribeck", "gear", 0.01)]
+    assert not [row for row in lines(answer) if row.split()[:1] == ["effect"]]
+
+
 def test_runners_up_give_way_to_the_lines_between_the_sections():
     answer = answers.effect()
     answer["verdict"]["next_experiment"] = None
