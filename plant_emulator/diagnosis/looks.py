@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.contest import WORTH, Point, fit, template
-from plant_emulator.diagnosis.signature import STATES, signs, sized, tried
+from plant_emulator.diagnosis.signature import FAR, STATES, signs, sized, tried
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -25,6 +25,8 @@ GLANCE = 10
 # Steps of a fit that only has to show whether it is worth more: without and with states of its
 # own, which make a long curved valley of the cost.
 FEW, FEW_WITH_STATES = 8, 24
+# Steps of a fit through where drift follows an effect along a curve.
+PATIENT = 25
 # The same from some way off, and how far off that is [standard errors].
 FEW_SHAKEN, SHAKE = 12, 30.0
 # The same from the nominal parameters, where a step goes far.
@@ -59,6 +61,24 @@ def glance_far(
     if found.far is None:
         return None
     return fit(model, (*base.effects, found.effect), runs, *found.far, GLANCE, near)
+
+
+def patient(model: Model, found: Signature, base: Point, runs: Sequence[int]) -> Point:
+    """The joint fit of one more effect from a size on either side, the drift as it is, and with
+    steps enough to come through where drift follows the effect along a curve.
+    """
+    candidate = model.candidates[found.effect]
+    own = {u.name for u in candidate.states}
+    states = [
+        {**state, **{name: value for name, value in more.items() if name in own}}
+        for state, more in zip(base.states, found.states, strict=True)
+    ]
+    effects = (*base.effects, found.effect)
+    tries = [
+        fit(model, effects, runs, {**base.values, **sized(candidate, sign * FAR)}, states, PATIENT)
+        for sign in signs(candidate.sizes)
+    ]
+    return min(tries, key=lambda p: p.cost)
 
 
 def look(model: Model, effects: Sequence[str], runs: Sequence[int], start: Point) -> Point:

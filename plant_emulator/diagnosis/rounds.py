@@ -22,7 +22,7 @@ from plant_emulator.diagnosis.contenders import (
     with_point,
 )
 from plant_emulator.diagnosis.contest import WORTH
-from plant_emulator.diagnosis.explain import NOISE_LEFT
+from plant_emulator.diagnosis.explain import NOISE_LEFT, THRESHOLD
 from plant_emulator.diagnosis.rules import SECOND, noise_only
 from plant_emulator.diagnosis.steps import (
     Task,
@@ -30,6 +30,7 @@ from plant_emulator.diagnosis.steps import (
     contend_far,
     follow,
     once_more,
+    plod,
     refit,
     shake,
     show,
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.explain import Contender
     from plant_emulator.diagnosis.model import Model
     from plant_emulator.diagnosis.pool import Pool, Recipe
+    from plant_emulator.diagnosis.signature import Signature
 
     Progress = Callable[[str, float], None]
 
@@ -124,7 +126,13 @@ class Rounds:
             if base.cost - _least(contenders) < SECOND:
                 return contenders
         contenders = self._taken_further(contenders, base, stage)
-        if explained(contenders) or base.chi_squared <= NOISE_LEFT:
+        if base.chi_squared <= NOISE_LEFT:
+            if not base.effects and base.cost - _least(contenders) < THRESHOLD:
+                signatures = [one for one in shown.values() if one is not None]
+                contenders = self._patiently(contenders, signatures, base)
+                contenders = self._fitted(contenders, base, 1, refit, stage)
+            return contenders
+        if explained(contenders):
             return contenders
         if thorough and not closed(contenders, base, MOST):
             far = self._told(stage, tasks, self._pool.map(contend_far, self._recipe, tasks))
@@ -138,6 +146,16 @@ class Rounds:
             return contenders
         alone = not thorough or closed(contenders, base, MOST)
         return self._moved(contenders, base, 1 if alone else SHAKEN)
+
+    def _patiently(
+        self, contenders: Sequence[Contender], signatures: Sequence[Signature], base: Point
+    ) -> list[Contender]:
+        """Effects whose signature promises nothing, but may be wrong, fitted all the same."""
+        wrong = {one.effect: one for one in signatures if one.concentrated}
+        tasks = [Task(base=base, runs=self._runs, signature=one) for one in wrong.values()]
+        points = dict(zip(wrong, self._pool.map(plod, self._recipe, tasks), strict=True))
+        again = [replace(c, point=points.get(c.effect)) for c in contenders]
+        return better_of(contenders, again)
 
     def _sighted(self, contenders: Sequence[Contender], base: Point, stage: str) -> list[Contender]:
         """The best effect on top of noise fitted to convergence, where it is worth that."""

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 SIZES = (0.03, 0.1, 0.3, 0.6, 1.0, 2.0)
 # From which of these on a fit may begin besides the best one.
 FAR = 0.3
+# Norm of a change of the residual that the noise does not hide, and the samples, of equal squares,
+# that are few.
+RESOLVED, FEW_SAMPLES = 2.0, 30.0
 # Values of a state that are tried.
 STATES = 9
 
@@ -36,6 +39,8 @@ class Signature:
     norm : of the part that drift cannot imitate, at the plausible size
     raw : of the whole, at the plausible size
     gain : fall of the sum of squares that the linear picture expects at the best size
+    concentrated : whether that part sits in a few samples already at the smallest size, as where a
+        contact begins a little earlier: drift may follow there all the same, not in proportion
     imitated_by : the parameter that follows it most
     norms : of the part that drift cannot imitate, by size in plausible sizes, ascending
     direction : the part that drift cannot imitate over its norm, all runs and channels
@@ -48,6 +53,7 @@ class Signature:
     norm: float
     raw: float
     gain: float
+    concentrated: bool
     norms: tuple[tuple[float, float], ...]
     imitated_by: str
     direction: Array
@@ -81,10 +87,17 @@ def signature(
         norm=plausible.norm,
         raw=float(np.linalg.norm(plausible.change)),
         gain=best.gain,
+        concentrated=any(_concentrated(t.rest) for t in trials if abs(t.size) == SIZES[0]),
         norms=tuple((t.size, t.norm) for t in trials if t.size > 0.0),
         imitated_by=names[int(np.argmax(follows))],
         direction=plausible.rest / max(plausible.norm, 1e-12),
     )
+
+
+def _concentrated(rest: Array) -> bool:
+    """Whether a change well above the noise sits in a few samples."""
+    square = float(rest @ rest)
+    return square > RESOLVED**2 and square**2 < FEW_SAMPLES * float(np.sum(rest**4))
 
 
 def _own_states(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.contest import Point, again, linearised, null_fit
-from plant_emulator.diagnosis.looks import from_nominal, glance, glance_far, look, shaken
+from plant_emulator.diagnosis.looks import from_nominal, glance, glance_far, look, patient, shaken
 from plant_emulator.diagnosis.signature import signature
 from plant_emulator.diagnosis.tangents import Tangents
 
@@ -54,6 +54,12 @@ def contend_far(model: Model, task: Task) -> Point | None:
     assert task.signature is not None
     near = _tangents(model, task).found
     return glance_far(model, task.signature, task.base, task.runs, near)
+
+
+def plod(model: Model, task: Task) -> Point:
+    """The same with more steps, from a size on either side."""
+    assert task.signature is not None
+    return patient(model, task.signature, task.base, task.runs)
 
 
 def follow(model: Model, task: Task) -> Point:

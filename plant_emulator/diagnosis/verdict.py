@@ -21,6 +21,8 @@ Kind = Literal["effect", "parameter", "none", "unknown"]
 
 # A parameter has shifted from so many of its own standard errors on.
 SHIFTED = 3.0
+# The same of a shift that is none by chance, of some ten parameters in a hundred diagnoses.
+SURE = 4.0
 # Mean square of the whitened residual up to which a model without effects leaves nothing but noise.
 NOISE_ONLY = 1.1
 
@@ -36,6 +38,11 @@ class Shift:
     unit: str
     subsystem: str
     surprise: float
+
+    @property
+    def sure(self) -> bool:
+        """Whether chance does not explain it."""
+        return abs(self.estimated - self.nominal) > SURE * self.standard_error
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,7 +94,7 @@ def decide(model: Model, explained: Explanation) -> Verdict:
         return Verdict(kind="effect", effects=final.effects, shifts=moved, reason="")
     moved = shifts(model, null)
     if not final.effects and null.chi_squared <= NOISE_ONLY:
-        kind: Kind = "parameter" if moved else "none"
+        kind: Kind = "parameter" if any(shift.sure for shift in moved) else "none"
         return Verdict(kind=kind, effects=(), shifts=moved, reason="")
     return Verdict(
         kind="unknown",
