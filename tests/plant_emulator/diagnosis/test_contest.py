@@ -371,6 +371,63 @@ def test_first_look_orders_effects_as_their_fits_do() -> None:
     assert sorted(looks, key=lambda n: looks[n].cost) == sorted(fits, key=lambda n: fits[n].cost)
 
 
+class Contact(Line):
+    """The line, and two samples of 1e4 (c + size of the wave)^2 and ^3: when a contact begins,
+    which drift of c puts right for any size of the wave, but not in proportion.
+    """
+
+    parameters = (*Line.parameters, linear("c", 0.5, prior=0.5, std=1.0))
+    powers: Mapping[int, int] = {700: 2, 701: 3}
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+        others = super().residual(run, effects)
+
+        def residual(v: Mapping[str, float]) -> Array:
+            begins = v["c"] + (v["wave_size"] if "wave" in effects else 0.0)
+            left = others(v)
+            for sample, power in self.powers.items():
+                left[0, sample] -= 1e4 * begins**power
+            return left
+
+        return residual
+
+    def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
+        """See `Model`."""
+        return {"a": 0.0, "b": 0.0, "c": 0.5}, [{} for _ in runs]
+
+
+def test_effect_that_moves_a_contact_is_found_though_its_signature_promises_nothing() -> None:
+    """By hand: the wave of 0.3 takes 0.3^2 n / 2 = 90 from the squares of 2000 samples. At the
+    smallest size, 0.03, drift leaves 1e4 0.03^2 of (1, 3 / 2) across (1, 3 / 4), which is 5.4 in
+    two samples, and 5.4^2 > 2 (0.3 0.03) n / 2 = 18.
+    """
+    y = 2.0 + 3.0 * TIME + 0.3 * np.sin(20.0 * TIME)
+    for sample, power in Contact.powers.items():
+        y[sample] += 1e4 * 0.5**power
+    model = Contact([noisy(y)], ["wave"])
+    base = null_fit(model, [0])
+    assert base.chi_squared < 1.1
+    found = signature(model, "wave", base, [0], Tangents(linearised(model, base, [0])))
+    assert found is not None
+    assert found.gain < 0.0
+    assert found.concentrated
+    final = explained(model).final
+    assert final.effects == ("wave",)
+    assert final.values["wave_size"] == pytest.approx(0.3, abs=0.1)
+
+
+def test_signature_over_many_samples_is_not_concentrated() -> None:
+    """The wave's own norm at the smallest size, by hand: 0.03 sqrt(n / 2) = 9 / 10; of 300: 280."""
+    for measure in (1.0, 300.0):
+        model = Line([noisy(2.0 + 3.0 * TIME)], ["wave"])
+        model.candidates["wave"] = effect("wave", measure)
+        base = null_fit(model, [0])
+        found = signature(model, "wave", base, [0], Tangents(linearised(model, base, [0])))
+        assert found is not None
+        assert not found.concentrated
+
+
 def test_second_look_starts_from_a_larger_size_with_the_drift_moved_for_it() -> None:
     """By hand: the best line through x^3 is 3/5 x; at three times the size b is 1.8 less."""
     model = Line([noisy(2.4 * TIME + 0.96 * TIME**3)], ["cube"])
