@@ -88,7 +88,7 @@ def decide(model: Model, explained: Explanation) -> Verdict:
         return Verdict(kind="unknown", effects=(), shifts=moved, reason=reason)
     of_runs = [name for name in final.effects if not _sized(model.candidates[name], final)]
     if of_runs:
-        reason = f"what differs between the runs explains it, as {of_runs[0]} of no certain size"
+        reason = f"it differs between the runs; {of_runs[0]} would do, but no size of it is certain"
         return Verdict(kind="unknown", effects=(), shifts=moved, reason=reason)
     if final.effects and (adequate(final, null) or not model.reaches_noise):
         return Verdict(kind="effect", effects=final.effects, shifts=moved, reason="")
