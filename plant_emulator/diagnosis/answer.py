@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from plant_emulator.diagnosis.explain import DETECTABLE, THRESHOLD
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from plant_emulator.diagnosis.contest import Point
     from plant_emulator.diagnosis.explain import Contender, Explanation
     from plant_emulator.diagnosis.model import Candidate, Run
     from plant_emulator.diagnosis.shrink import Gap, Prediction
@@ -50,8 +52,16 @@ def ranked(explained: Explanation) -> list[Contender]:
     order = sorted(explained.contenders, key=explained.evidence, reverse=True)
     counting = [c for c in order if explained.evidence(c) > THRESHOLD]
     shown = max(SHOWN, len(counting))
-    accepted = [c for c in order[shown:] if c.effect in explained.final.effects]
+    accepted = [c for c in order[shown:] if c.effect in explained.named]
     return [*order[:shown], *accepted]
+
+
+def with_chance(explained: Explanation) -> Point:
+    """The final fit with the sizes of effects whose course is chance."""
+    values = {one.name: one.size for one in explained.chance}
+    errors = {one.name: one.error for one in explained.chance}
+    final = explained.final
+    return replace(final, values={**final.values, **values}, errors={**final.errors, **errors})
 
 
 def rank(
@@ -63,7 +73,7 @@ def rank(
 ) -> dict[str, Any]:
     """One line of the ranking; sizes and errors of an accepted effect from the final fit."""
     name = contender.effect
-    point = explained.final if name in accepted else contender.point
+    point = with_chance(explained) if name in accepted else contender.point
     names = [u.name for u in (*candidate.sizes, *candidate.shapes)]
     return {
         "effect": name,
@@ -92,7 +102,7 @@ def undetectable(
         {"effect": c.effect, "reason": hidden(c, candidates[c.effect])}
         for c in explained.contenders
         if c.norm < DETECTABLE
-        and c.effect not in explained.final.effects
+        and c.effect not in explained.named
         and explained.evidence(c) <= THRESHOLD
     ]
 

@@ -45,6 +45,7 @@ def candidate(effect: Effect) -> Candidate:
     sizes: list[Unknown] = []
     shapes: list[Unknown] = []
     states: list[Unknown] = []
+    untold: list[Unknown] = []
     for key, declared in effect.parameters.items():
         unknown = Unknown(
             name=f"{effect.name}_{key}",
@@ -58,7 +59,9 @@ def candidate(effect: Effect) -> Candidate:
         )
         if declared.std is not None:
             (states if declared.per_run else shapes).append(unknown)
-        elif declared.plausible != declared.neutral and not declared.per_run:
+        elif declared.per_run:
+            untold += [unknown] if declared.measured is None else []
+        elif declared.plausible != declared.neutral:
             sizes.append(unknown)
     free = {u.name for u in (*sizes, *shapes, *states)}
     neutral = {f"{effect.name}_{k}": d.neutral for k, d in effect.parameters.items()}
@@ -74,9 +77,7 @@ def candidate(effect: Effect) -> Candidate:
         units={f"{effect.name}_{key}": d.unit for key, d in effect.parameters.items()},
         title=effect.description.partition("\n")[0].rstrip("."),
         needs=effect.needs,
-        untold=any(
-            d.per_run and d.std is None and d.measured is None for d in effect.parameters.values()
-        ),
+        untold=tuple(untold),
     )
 
 

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from plant_emulator.diagnosis import answer as parts
-from plant_emulator.diagnosis import apart, place, shrink, verdict
+from plant_emulator.diagnosis import place, shrink, verdict
 from plant_emulator.diagnosis.advice import Advice
 from plant_emulator.diagnosis.calibration import confidence
 from plant_emulator.diagnosis.details import Details
 from plant_emulator.diagnosis.held_out import NOMINAL, HeldOut
+from plant_emulator.diagnosis.inquiry import Inquiry
 from plant_emulator.diagnosis.pool import model_of
 from plant_emulator.diagnosis.rest import rest_of
 from plant_emulator.diagnosis.steps import Task
-from plant_emulator.diagnosis.stepwise import Contest
 from plant_emulator.diagnosis.terms import in_terms
 
 if TYPE_CHECKING:
@@ -69,17 +69,14 @@ class Diagnose:
 
     def diagnose(self) -> Diagnosis:
         """Contest, verdict, held-out runs, place."""
-        names = tuple(self.model.candidates)
-        contest = Contest(
-            self.pool,
-            self.recipe,
-            names,
-            self.plan.fitted,
-            self.progress,
-            reaches_noise=self.model.reaches_noise,
+        inquiry = Inquiry(
+            pool=self.pool,
+            recipe=self.recipe,
+            model=self.model,
+            runs=self.plan.fitted,
+            progress=self.progress,
         )
-        explained = contest.explain()
-        found = self._between(explained, verdict.decide(self.model, explained))
+        explained, found = inquiry.found()
         held_out = HeldOut(
             pool=self.pool,
             recipe=self.recipe,
@@ -87,22 +84,12 @@ class Diagnose:
             plan=self.plan,
             progress=self.progress,
         )
-        self.folds, notes = held_out.usable(explained, found)
+        followed = _followed(explained, found)
+        self.folds, notes = held_out.usable(explained, followed)
         self.notes += notes
-        predicted = held_out.predictions(explained, found, self.folds)
+        predicted = held_out.predictions(explained, followed, self.folds)
         self.notes += held_out.unsettled(self.folds, predicted)
         return self._answered(explained, found, predicted)
-
-    def _between(self, explained: Explanation, found: Verdict) -> Verdict:
-        """The verdict; where nothing explains runs that each alone agree, with that reason."""
-        runs = self.plan.fitted
-        unexplained = found.kind == "unknown" and not explained.unconverged
-        if not unexplained or len(runs) < 2 or not self.model.reaches_noise:
-            return found
-        tasks = [Task(base=explained.null, runs=(run,)) for run in runs]
-        points = list(self.pool.map(apart.alone, self.recipe, tasks))
-        reason = apart.between(self.model, runs, points)
-        return replace(found, reason=reason) if reason else found
 
     def _answered(
         self,
@@ -114,13 +101,14 @@ class Diagnose:
         lengths = shrink.block_lengths(predicted[()])
         gaps = {key: shrink.gap(runs, some, lengths) for key, some in predicted.items()}
         location = self._location(explained, found)
-        final = explained.final if found.effects else explained.null
-        traces = parts.traces(runs, predicted[()], predicted[found.effects])
+        final = parts.with_chance(explained) if found.effects else explained.null
+        followed = _followed(explained, found)
+        traces = parts.traces(runs, predicted[()], predicted[followed])
         terms = in_terms(self.model, final, self.plan.fitted)
         rest = None
         if not self.model.reaches_noise:
             rest = rest_of(self.model, final, self.plan.fitted, traces)
-        closed, interval = self._closed(found, gaps)
+        closed, interval = self._closed(found, followed, gaps)
         hidden = parts.undetectable(explained, self.model.candidates)
         advice = Advice(self.pool, self.recipe, self.model, self.plan.fitted)
         answer = {
@@ -149,7 +137,7 @@ class Diagnose:
             "gap": {
                 "nominal": parts.ranged(gaps[NOMINAL], runs),
                 "recalibrated": parts.ranged(gaps[()], runs),
-                "explained": parts.ranged(gaps[found.effects], runs),
+                "explained": parts.ranged(gaps[followed], runs),
                 "noise_floor": parts.noise_floor(gaps[()], runs),
                 "closed_fraction": closed,
                 "closed_fraction_ci95": interval,
@@ -161,7 +149,7 @@ class Diagnose:
         }
         details = Details(
             traces=traces,
-            waterfall=parts.waterfall(gaps, found.effects),
+            waterfall=parts.waterfall(gaps, followed),
             settings=self.settings,
             notes=self.notes,
             rest=rest,
@@ -187,14 +175,17 @@ class Diagnose:
         return place.location(where, shares, located)
 
     def _closed(
-        self, found: Verdict, gaps: Mapping[tuple[str, ...], Gap]
+        self, found: Verdict, followed: tuple[str, ...], gaps: Mapping[tuple[str, ...], Gap]
     ) -> tuple[float | None, list[float] | None]:
-        """The closed fraction with its interval, where the verdict names a cause."""
-        if found.kind not in {"effect", "parameter"}:
+        """The closed fraction with its interval, where the verdict names a cause.
+
+        None where the cause is chance alone: nothing predicts its course.
+        """
+        if found.kind not in {"effect", "parameter"} or (found.effects and not followed):
             return None, None
         reference = gaps[NOMINAL] if found.kind == "parameter" else gaps[()]
-        interval = shrink.interval(reference, gaps[found.effects])
-        closed = shrink.closed_fraction(reference, gaps[found.effects])
+        interval = shrink.interval(reference, gaps[followed])
+        closed = shrink.closed_fraction(reference, gaps[followed])
         return closed, None if interval is None else list(interval)
 
     def _rank(
@@ -222,3 +213,8 @@ class Diagnose:
         by_name = {c.effect: explained.evidence(c) for c in explained.contenders}
         named = [by_name[name] for name in found.effects]
         return min(named) if named else max(by_name.values(), default=0.0)
+
+
+def _followed(explained: Explanation, found: Verdict) -> tuple[str, ...]:
+    """The effects named that a simulation can follow."""
+    return explained.final.effects if found.effects else ()

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from plant_emulator.diagnosis.chance import Unrest
     from plant_emulator.diagnosis.contest import Point
 
 # Evidence from which on an effect counts.
@@ -56,6 +57,7 @@ class Explanation:
     contenders : of the first round, all effects of the library
     rivals : for every accepted effect the costs of all that took its place
     unconverged : why the answer cannot be trusted; empty where it can
+    chance : effects whose course is chance, beside those of `final`
     """
 
     null: Point
@@ -63,9 +65,18 @@ class Explanation:
     contenders: tuple[Contender, ...]
     rivals: dict[str, dict[str, float]]
     unconverged: str
+    chance: tuple[Unrest, ...] = ()
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """All effects accepted."""
+        return (*(one.effect for one in self.chance), *self.final.effects)
 
     def evidence(self, contender: Contender) -> float:
         """Evidence of an effect alone."""
+        for one in self.chance:
+            if one.effect == contender.effect:
+                return one.evidence
         if contender.point is None:
             return 0.0
         best = min(self.final, contender.point, key=lambda p: p.chi_squared)
@@ -73,7 +84,7 @@ class Explanation:
 
     def classes(self) -> list[list[str]]:
         """For every accepted effect those that these logs cannot tell from it, itself first."""
-        found = []
+        found = [[one.effect] for one in self.chance]
         for name in self.final.effects:
             costs = sorted(self.rivals.get(name, {}).items(), key=lambda pair: pair[1])
             near = [

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.pool import Pool, Recipe
     from plant_emulator.diagnosis.rounds import Progress
     from plant_emulator.diagnosis.shrink import Prediction
-    from plant_emulator.diagnosis.verdict import Verdict
 
 # Effects whose held-out gain is computed: the best ones only, each takes a fit a fold.
 TRIED = 3
@@ -54,14 +53,16 @@ class HeldOut:
     plan: Plan
     progress: Progress | None = None
 
-    def usable(self, explained: Explanation, found: Verdict) -> tuple[Folds, tuple[str, ...]]:
+    def usable(
+        self, explained: Explanation, followed: tuple[str, ...]
+    ) -> tuple[Folds, tuple[str, ...]]:
         """The folds whose fitted runs show all named effects, and a note on every other.
 
         Runs that do not show an effect cannot predict it; should no fold be left, all are
         predicted, and one note tells it.
         """
         tasks = [self._fold(explained.final, *fold, refitted=False) for fold in self.plan.folds]
-        if not found.effects or len(tasks) < 2:
+        if not followed or len(tasks) < 2:
             return self.plan.folds, ()
         usable, notes = [], []
         for fold, norms in zip(
@@ -78,15 +79,15 @@ class HeldOut:
         return tuple(usable), tuple(notes)
 
     def predictions(
-        self, explained: Explanation, found: Verdict, folds: Folds
+        self, explained: Explanation, followed: tuple[str, ...], folds: Folds
     ) -> dict[tuple[str, ...], list[Prediction]]:
         """Held-out residuals of every model that is compared, by its effects.
 
         ("nominal",) : the parameter set as given, or the fold's own where none is.
         """
         points: dict[tuple[str, ...], Point] = {(): explained.null}
-        for count in range(1, len(found.effects) + 1):
-            some = found.effects[:count]
+        for count in range(1, len(followed) + 1):
+            some = followed[:count]
             points[some] = replace(explained.final, effects=some)
         for contender in _best(explained):
             assert contender.point is not None
@@ -137,6 +138,7 @@ class HeldOut:
 
 def _best(explained: Explanation) -> list[Contender]:
     """Those that count, and come somewhere near the best."""
-    ranked = sorted(explained.contenders, key=explained.evidence, reverse=True)[:TRIED]
+    fitted = [c for c in explained.contenders if c.point is not None]
+    ranked = sorted(fitted, key=explained.evidence, reverse=True)[:TRIED]
     least = max([THRESHOLD, *(NEAR * explained.evidence(c) for c in ranked[:1])])
     return [c for c in ranked if explained.evidence(c) > least]

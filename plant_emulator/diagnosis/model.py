@@ -38,7 +38,7 @@ class Candidate:
     fixed : values of the rest while the effect is there
     units : of all its parameters, by name
     title : what it is, in one line; needs : what a log must have to show it, empty: nothing special
-    untold : whether its course in a run is chance that no fit and no measurement tells
+    untold : its unknowns of one run that no fit and no measurement tells: its course is chance
     terms : what else it is known by, made of its own values and the machine's
     """
 
@@ -52,7 +52,7 @@ class Candidate:
     units: Mapping[str, str]
     title: str
     needs: str = ""
-    untold: bool = False
+    untold: tuple[Unknown, ...] = ()
     terms: tuple[Term, ...] = ()
 
 

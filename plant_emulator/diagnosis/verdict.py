@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from plant_emulator.diagnosis.explain import STRUCTURED, adequate
@@ -79,6 +79,13 @@ def shifts(model: Model, found: Point) -> tuple[Shift, ...]:
 
 def decide(model: Model, explained: Explanation) -> Verdict:
     """The verdict of a contest."""
+    found = _of_contest(model, explained)
+    if explained.chance and found.kind != "unknown":
+        return replace(found, kind="effect", effects=explained.named)
+    return found
+
+
+def _of_contest(model: Model, explained: Explanation) -> Verdict:
     null, final = explained.null, explained.final
     moved = shifts(model, final)
     if explained.unconverged:
@@ -121,7 +128,8 @@ def _structured(explained: Explanation) -> bool:
     """
     null, final = explained.null, explained.final
     small = adequate(final, null) if final.effects else null.chi_squared <= NOISE_ONLY
-    return small and final.structure > max(STRUCTURED, null.cost - final.cost)
+    gained = null.cost - final.cost + sum(one.evidence for one in explained.chance)
+    return small and final.structure > max(STRUCTURED, gained)
 
 
 def statement(
@@ -170,7 +178,8 @@ def _named(
     values = ", ".join(
         f"{number(t['value'], 4)} {t['unit']} {t['name']}" for t in terms.get(name, ())
     )
-    return f"{name} ({title}{': ' if values else ''}{values})"
+    chance = ", by chance, so that no simulation follows it" if candidate.untold else ""
+    return f"{name} ({title}{chance}{': ' if values else ''}{values})"
 
 
 def as_answer(

@@ -196,7 +196,9 @@ def test_effect_whose_values_of_the_runs_explain_all_is_not_named_without_a_size
 
 def test_effect_of_chance_course_is_not_tried() -> None:
     model = Line([noisy(2.0 + 3.0 * TIME + 0.8 * np.sin(20.0 * TIME))], ["wave"])
-    model.candidates["wave"] = replace(model.candidates["wave"], untold=True, needs="its course")
+    model.candidates["wave"] = replace(
+        model.candidates["wave"], untold=(linear("course"),), needs="its course"
+    )
     found = explained(model)
     assert found.final.effects == ()
     assert [c.point for c in found.contenders] == [None]

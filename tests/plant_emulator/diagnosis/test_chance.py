@@ -1,0 +1,118 @@
+"""Effects of chance course, on a line that shakes in proportion to a known slope."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from plant_emulator.diagnosis.chance import Weighted, unrest
+from plant_emulator.diagnosis.contest import null_fit
+from plant_emulator.diagnosis.inquiry import Inquiry
+from plant_emulator.diagnosis.pool import Here
+from plant_emulator.diagnosis.steps import Task
+from plant_emulator.estimates import Array
+from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, effect, linear, noisy
+
+# How much a shake of the size 1 moves each sample (standard deviation): nothing in the first half.
+SLOPE = np.maximum(0.0, TIME) * 6.0
+
+
+class Shaken(Line):
+    """The line; `shake` adds to every sample what its slope and a drawn sequence say."""
+
+    def __init__(self, measured: Sequence[Array], names: Sequence[str] = ("wave",)) -> None:
+        super().__init__(measured, [*names, "shake"])
+        course = replace(linear("shake_sequence", 0.0), lower=0.0, upper=1e6)
+        shaking = effect("shake")
+        sizes = tuple(replace(u, lower=0.0) for u in shaking.sizes)
+        self.candidates["shake"] = replace(shaking, sizes=sizes, untold=(course,))
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+        plain = super().residual(run, [name for name in effects if name != "shake"])
+
+        def residual(v: Mapping[str, float]) -> Array:
+            if "shake" not in effects:
+                return plain(v)
+            drawn = np.random.default_rng(int(v["shake_sequence"])).standard_normal(len(TIME))
+            return plain(v) - v["shake_size"] * SLOPE * drawn
+
+        return residual
+
+
+def shaken(size: float, seed: int = 5) -> Array:
+    """What a machine's own course adds."""
+    drawn = np.random.default_rng(seed).standard_normal(len(TIME))
+    return np.asarray(size * SLOPE * drawn)
+
+
+def found(y: Array):  # type: ignore[no-untyped-def]
+    """The unrest of the shake on the line's fit."""
+    model = Shaken([y])
+    return unrest(model, Task(base=null_fit(model, [0]), runs=(0,), effect="shake"))
+
+
+def test_size_and_evidence_of_an_unrest() -> None:
+    """By hand: evidence is the sum of a^2 v - log(1 + a^2 v) over the samples, on average."""
+    line = 2.0 + 3.0 * TIME
+    one = found(noisy(line) + shaken(0.8))
+    assert one.holds
+    assert one.size == pytest.approx(0.8, rel=0.15)
+    assert one.size == pytest.approx(0.8, abs=4.0 * one.error)
+    added = (0.8 * SLOPE) ** 2
+    assert one.evidence == pytest.approx(float(np.sum(added - np.log1p(added))), rel=0.3)
+    (weights,) = one.weights
+    assert weights[0, 0] == 1.0
+    assert weights[0, -1] == pytest.approx(1.0 / np.hypot(1.0, 0.8 * 6.0), rel=0.5)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_unrest_in_noise(seed: int) -> None:
+    assert found(noisy(2.0 + 3.0 * TIME, seed)).evidence < 12.0
+
+
+def test_gap_that_is_as_large_but_not_random_is_no_unrest() -> None:
+    ordered = 0.8 * SLOPE * np.sign(np.sin(40.0 * TIME))
+    one = found(noisy(2.0 + 3.0 * TIME) + ordered)
+    assert one.evidence > 1000.0
+    assert not one.holds
+
+
+def test_gap_that_is_random_elsewhere_is_no_unrest() -> None:
+    """As restless at small slopes as at large ones, as a coarse signal is whenever it moves."""
+    drawn = np.random.default_rng(3).standard_normal(len(TIME))
+    one = found(noisy(2.0 + 3.0 * TIME) + 3.0 * (TIME > 0.0) * drawn)
+    assert one.evidence > 1000.0
+    assert not one.holds
+
+
+def test_effect_beside_an_unrest_is_named_with_it() -> None:
+    y = noisy(2.0 + 3.0 * TIME + 0.5 * np.sin(20.0 * TIME)) + shaken(0.8)
+    model = Shaken([y])
+    inquiry = Inquiry(pool=Here(), recipe=Given(model), model=model, runs=(0,))
+    explained, verdict = inquiry.found()
+    assert (verdict.kind, verdict.effects) == ("effect", ("shake", "wave"))
+    assert explained.classes() == [["shake"], ["wave"]]
+    assert explained.final.values["wave_size"] == pytest.approx(0.5, abs=0.15)
+
+
+def test_unrest_alone_is_an_effect() -> None:
+    model = Shaken([noisy(2.0 + 3.0 * TIME) + shaken(0.8)])
+    inquiry = Inquiry(pool=Here(), recipe=Given(model), model=model, runs=(0,))
+    assert inquiry.found()[1].effects == ("shake",)
+
+
+def test_weighted_model_is_another_recipe() -> None:
+    model = Shaken([noisy(2.0 + 3.0 * TIME)])
+    halves = Weighted(Given(model), (np.full((1, len(TIME)), 0.5),))
+    values = {"a": 0.0, "b": 0.0}
+    plain = model.residual(0, ())(values)
+    assert halves.build().residual(0, ())(values) == pytest.approx(0.5 * plain)
+    assert halves.build().runs is model.runs
+    others = {
+        halves.digest(),
+        Given(model).digest(),
+        Weighted(Given(model), (np.ones(1),)).digest(),
+    }
+    assert len(others) == 3
