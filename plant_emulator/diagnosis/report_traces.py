@@ -191,11 +191,11 @@ def thinned(x: Array, y: Array, pitch: float) -> NDArray[np.intp]:
 
 
 def _polyline(x: Array, y: Array) -> str:
-    """Tenths of a pixel, each point relative to the one before: short."""
+    """Tenths of a pixel, each point relative to the one before: short. One alone is a dot."""
     points = np.rint(10.0 * np.column_stack([x, y])).astype(int)
     steps = np.diff(points, axis=0)
     start = f"M{points[0, 0] / 10:g} {points[0, 1] / 10:g}"
-    return start + "l" + " ".join(f"{dx / 10:g} {dy / 10:g}" for dx, dy in steps)
+    return start + "l" + (" ".join(f"{dx / 10:g} {dy / 10:g}" for dx, dy in steps) or "0 0")
 
 
 def _scale(low: float, high: float, start: float, end: float) -> Axis:

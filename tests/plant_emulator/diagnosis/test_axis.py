@@ -19,7 +19,6 @@ from plant_emulator.diagnosis.looks import glance, look
 from plant_emulator.diagnosis.pool import Here
 from plant_emulator.diagnosis.signature import signature
 from plant_emulator.diagnosis.tangents import Tangents
-from plant_emulator.diagnosis.verdict import Verdict
 from plant_emulator.errors import LogError
 
 spec = importlib.util.spec_from_file_location(
@@ -266,9 +265,8 @@ def test_nominal_axis_of_a_held_out_run_is_that_of_the_other_runs() -> None:
     plan = Plan(fitted=(0, 1), folds=(((1,), (0,)), ((0,), (1,))))
     null = null_fit(model, (0, 1))
     nothing = Explanation(null=null, final=null, contenders=(), rivals={}, unconverged="")
-    none = Verdict(kind="none", effects=(), shifts=(), reason="")
 
     held_out = HeldOut(pool=Here(), recipe=recipe, model=model, plan=plan)
-    found = held_out.predictions(nothing, none, plan.folds)[NOMINAL]
+    found = held_out.predictions(nothing, (), plan.folds)[NOMINAL]
     left = [one.residuals[0][0] * model.runs[k].noise[0] for k, one in enumerate(found)]
     assert [float(e[e != 0.0].mean()) for e in left] == pytest.approx([-20.0, 20.0], abs=1.0)

@@ -243,6 +243,12 @@ def test_curve_is_broken_where_a_sample_is_not_finite():
     assert "nan" not in path(np.arange(10.0), y, 300)
 
 
+def test_sample_between_two_that_are_not_drawn_is_a_dot():
+    """A line to of SVG needs a pair of numbers."""
+    alone = np.array([np.nan, 2.0, np.nan])
+    assert path(np.arange(3.0), alone, 300) == "M1 2l0 0"
+
+
 def rough(trace: Trace, name: str) -> Trace:
     """The trace with predictions as noisy as the measurement, which thin out least."""
     noise = trace.noise * np.random.default_rng(5).standard_normal((2, len(trace.time)))
