@@ -220,14 +220,14 @@ class BenchRecipe:
     without: tuple[str, ...] = ()
     own: tuple[Path, ...] = ()
 
-    def library(self) -> dict[str, Effect]:
+    def contestants(self) -> dict[str, Effect]:
         """The effects in the contest by name, of those that this process knows."""
         return {n: effect for n, effect in kernel().effects.items() if n not in self.without}
 
     def build(self) -> BenchModel:
         """The model; this process then knows the user's own effects."""
         know(*(from_file(path) for path in self.own))
-        return BenchModel(self.recordings, self.parameters, self.library())
+        return BenchModel(self.recordings, self.parameters, self.contestants())
 
     def digest(self) -> str:
         """Hash of all that the model is made of."""

@@ -57,6 +57,11 @@ def cost_of(contender: Contender) -> float:
     return contender.point.cost if contender.point is not None else float("inf")
 
 
+def least_cost(contenders: Sequence[Contender]) -> float:
+    """Of all; infinite where none shows."""
+    return min(map(cost_of, contenders), default=float("inf"))
+
+
 def with_point(contenders: Sequence[Contender]) -> list[Contender]:
     """Those that show."""
     return [c for c in contenders if c.point is not None]

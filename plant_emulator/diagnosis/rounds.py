@@ -18,6 +18,7 @@ from plant_emulator.diagnosis.contenders import (
     contender_of,
     cost_of,
     explained,
+    least_cost,
     points_of,
     with_point,
 )
@@ -123,13 +124,13 @@ class Rounds:
         contenders = [contender_of(name, one, seen.get(name)) for name, one in shown.items()]
         if base.effects and noise_only(base):
             contenders = self._sighted(contenders, base, stage)
-            if base.cost - _least(contenders) < SECOND:
+            if base.cost - least_cost(contenders) < SECOND:
                 return contenders
         contenders = self._taken_further(contenders, base, stage)
         if base.chi_squared <= NOISE_LEFT:
-            if not base.effects and base.cost - _least(contenders) < THRESHOLD:
+            if not base.effects and base.cost - least_cost(contenders) < THRESHOLD:
                 signatures = [one for one in shown.values() if one is not None]
-                contenders = self._patiently(contenders, signatures, base)
+                contenders = self._patiently(contenders, signatures, base, stage)
                 contenders = self._fitted(contenders, base, 1, refit, stage)
             return contenders
         if explained(contenders):
@@ -148,12 +149,17 @@ class Rounds:
         return self._moved(contenders, base, 1 if alone else SHAKEN)
 
     def _patiently(
-        self, contenders: Sequence[Contender], signatures: Sequence[Signature], base: Point
+        self,
+        contenders: Sequence[Contender],
+        signatures: Sequence[Signature],
+        base: Point,
+        stage: str,
     ) -> list[Contender]:
         """Effects whose signature promises nothing, but may be wrong, fitted all the same."""
         wrong = {one.effect: one for one in signatures if one.concentrated}
         tasks = [Task(base=base, runs=self._runs, signature=one) for one in wrong.values()]
-        points = dict(zip(wrong, self._pool.map(plod, self._recipe, tasks), strict=True))
+        found = self._told(stage, tasks, self._pool.map(plod, self._recipe, tasks))
+        points = dict(zip(wrong, found, strict=True))
         again = [replace(c, point=points.get(c.effect)) for c in contenders]
         return better_of(contenders, again)
 
@@ -161,7 +167,7 @@ class Rounds:
         """The best effect on top of noise fitted to convergence, where it is worth that."""
         found = list(contenders)
         for step in (follow, refit):
-            if base.cost - _least(found) < SIGHT:
+            if base.cost - least_cost(found) < SIGHT:
                 break
             found = self._fitted(found, base, 1, step, stage)
         return found
@@ -243,7 +249,3 @@ class Rounds:
                 self._progress(stage, (done + 1) / len(tasks))
             every.append(one)
         return every
-
-
-def _least(contenders: Sequence[Contender]) -> float:
-    return min(map(cost_of, contenders), default=inf)
