@@ -160,8 +160,7 @@ class Rounds:
         tasks = [Task(base=base, runs=self._runs, signature=one) for one in wrong.values()]
         found = self._told(stage, tasks, self._pool.map(plod, self._recipe, tasks))
         points = dict(zip(wrong, found, strict=True))
-        again = [replace(c, point=points.get(c.effect)) for c in contenders]
-        return better_of(contenders, again)
+        return better_of(contenders, [replace(c, point=points.get(c.effect)) for c in contenders])
 
     def _sighted(self, contenders: Sequence[Contender], base: Point, stage: str) -> list[Contender]:
         """The best effect on top of noise fitted to convergence, where it is worth that."""
