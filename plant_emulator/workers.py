@@ -74,17 +74,23 @@ class Cluster:
     def __init__(self, address: str) -> None:
         try:
             import distributed
+            from distributed.comm.addressing import parse_address, parse_host_port
             from distributed.comm.core import CommClosedError
+            from distributed.comm.registry import get_backend
         except ImportError as error:
             raise EmulatorError(
                 f"--scheduler {address}: {error}; pip install 'road-load-bench[cluster]' brings it"
             ) from error
-        try:
-            self._client: Any = distributed.Client(address, timeout=10)  # type: ignore[no-untyped-call]
+        try:  # before a client starts its thread, which an error would leave behind
+            scheme, place = parse_address(address)
+            get_backend(scheme)
+            parse_host_port(place)
         except ValueError as error:
             raise InputError(
                 f"--scheduler {address}: {error}; an address like tcp://host:8786 is expected"
             ) from error
+        try:
+            self._client: Any = distributed.Client(address, timeout=10)  # type: ignore[no-untyped-call]
         except OSError as error:
             raise EmulatorError(f"--scheduler {address}: no scheduler answers ({error})") from error
         self._recipes: dict[str, Any] = {}
