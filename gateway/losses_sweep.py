@@ -47,6 +47,7 @@ def update(params: Params, state: State, window: Window) -> tuple[State, Demand]
     return after, Demand(speed=target)
 
 
+# Every regulator is asked with the same arguments.
 def follow(params: Params, state: State, demand: float, setpoint: float) -> State:  # noqa: ARG001
     """The sweep goes on from what the limits passed."""
     return replace(state, motor_speed=setpoint)

@@ -140,7 +140,7 @@ class TcpLink:
         """End the connection, and any attempt."""
         self._connector.close()
         if self._client is not None:
-            self._client.close()  # type: ignore[no-untyped-call]
+            self._client.close()  # type: ignore[no-untyped-call]  # pymodbus declares none here
             self._client = None
 
     def _connected(self) -> "_Client":

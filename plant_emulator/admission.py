@@ -45,7 +45,7 @@ def admitted(
     notes: list[str] = []
     for path in paths:
         log = logs.read(path)
-        untold(log)
+        unlabelled(log)
         checked = preflight(log, parameters.value("gear_ratio"))
         recordings.append(recording(log, cast("Hold | None", hold), checked.use))
         notes += checked.notes
@@ -55,7 +55,7 @@ def admitted(
     return recordings, notes
 
 
-def untold(log: Log | AxisLog) -> None:
+def unlabelled(log: Log | AxisLog) -> None:
     """Refuse a log that carries its own answer."""
     for column in log.other:
         if any(TELLING.match(word.lower()) for word in WORD.findall(column)):

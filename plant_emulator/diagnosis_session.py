@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator import axis_log, effects
-from plant_emulator.admission import admitted, distinct, untold
+from plant_emulator.admission import admitted, distinct, unlabelled
 from plant_emulator.diagnosis.axis import AxisRecipe
 from plant_emulator.diagnosis.axis_effects import EFFECTS as AXIS_EFFECTS
 from plant_emulator.diagnosis.bench import BenchRecipe
 from plant_emulator.diagnosis.calibration import Case
 from plant_emulator.diagnosis.held_out import Plan
+from plant_emulator.diagnosis.law_error import Sized, law_errors
 from plant_emulator.errors import DiagnosisError
 from plant_emulator.kernel import kernel
 from plant_emulator.preflight import LEAST_MOTION
@@ -96,13 +97,28 @@ def calibration() -> list[Case]:
         ]
 
 
+def laws_apart() -> dict[str, float]:
+    """Standard errors that other laws make in the sizes of effects, relative, by name."""
+    with (Path(__file__).parent / "diagnosis" / "law_errors.csv").open(newline="") as file:
+        numbers = ("true", "estimated", "standard_error")
+        return law_errors(
+            [
+                Sized(
+                    name=f"{row['effect']}_{row['parameter']}",
+                    **{key: float(row[key]) for key in numbers},
+                )
+                for row in csv.DictReader(file)
+            ]
+        )
+
+
 def axis_loaded(
     paths: Sequence[str], held_out: Sequence[str], *, without: Sequence[str] = ()
 ) -> Loaded:
     """Logs of a single axis as a recipe and a plan."""
     axis_logs = [axis_log.read(path) for path in (*paths, *held_out)]
     for log in axis_logs:
-        untold(log)
+        unlabelled(log)
     distinct([(log.source, np.stack([log.time, log.position, log.force])) for log in axis_logs])
     if len(axis_logs) < 2:
         raise DiagnosisError(

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from plant_emulator import logs
-from plant_emulator.admission import untold
+from plant_emulator.admission import unlabelled
 from plant_emulator.cli import main
 from plant_emulator.diagnosis_session import planned
 from plant_emulator.errors import DiagnosisError
@@ -40,14 +40,14 @@ def refused(*arguments: str | Path) -> str:
 def test_column_that_tells_the_answer_is_refused(column: str) -> None:
     log = Log(np.zeros(1), {}, "run.csv", other=(column,))
     with pytest.raises(DiagnosisError, match=f"run.csv: line 1: column {column} looks like"):
-        untold(log)
+        unlabelled(log)
 
 
 @pytest.mark.parametrize(
     "column", [*LOG_COLUMNS, "effective_voltage_V", "brake_defined", "clock_s"]
 )
 def test_measured_column_is_no_answer(column: str) -> None:
-    untold(Log(np.zeros(1), {}, "run.csv", other=(column,)))
+    unlabelled(Log(np.zeros(1), {}, "run.csv", other=(column,)))
 
 
 @pytest.mark.parametrize("command", ["diagnose", "detectability"])
