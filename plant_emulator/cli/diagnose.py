@@ -89,7 +89,13 @@ def command(
     from plant_emulator.cli._progress import progress
     from plant_emulator.diagnosis.diagnose import Diagnose
     from plant_emulator.diagnosis.terminal import lines
-    from plant_emulator.diagnosis_session import axis_loaded, calibration, loaded, parameter_set
+    from plant_emulator.diagnosis_session import (
+        axis_loaded,
+        calibration,
+        laws_apart,
+        loaded,
+        parameter_set,
+    )
     from plant_emulator.workers import pool_of
 
     given = parameter_sets.load(parameters)
@@ -108,6 +114,7 @@ def command(
                 run.plan,
                 settings=settings,
                 cases=None if model == "axis" else calibration(),
+                law_errors=None if model == "axis" else laws_apart(),
                 notes=run.notes,
                 progress=tell,
             ).diagnose()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import hypot
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -70,8 +71,12 @@ def rank(
     accepted: Sequence[str],
     candidate: Candidate,
     gain: float | None,
+    law_errors: Mapping[str, float],
 ) -> dict[str, Any]:
-    """One line of the ranking; sizes and errors of an accepted effect from the final fit."""
+    """One line of the ranking; sizes and errors of an accepted effect from the final fit.
+
+    law_errors : standard errors by name that other laws of an effect make, relative
+    """
     name = contender.effect
     point = with_chance(explained) if name in accepted else contender.point
     names = [u.name for u in (*candidate.sizes, *candidate.shapes)]
@@ -84,7 +89,9 @@ def rank(
             {
                 "name": full.removeprefix(f"{name}_"),
                 "value": point.values[full],
-                "standard_error": point.errors[full],
+                "standard_error": hypot(
+                    point.errors[full], law_errors.get(full, 0.0) * point.values[full]
+                ),
                 "unit": candidate.units[full],
             }
             for full in names

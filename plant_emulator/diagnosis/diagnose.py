@@ -48,6 +48,7 @@ class Diagnose:
     """The steps from a plan to a diagnosis.
 
     cases : a blind trial's, for the confidence; None: there are none of this machine
+    law_errors : of sizes by name, relative, see `law_error`
     """
 
     def __init__(
@@ -58,6 +59,7 @@ class Diagnose:
         *,
         settings: Mapping[str, str],
         cases: Sequence[Case] | None = None,
+        law_errors: Mapping[str, float] | None = None,
         notes: Sequence[str] = (),
         progress: Progress | None = None,
     ) -> None:
@@ -65,6 +67,7 @@ class Diagnose:
         self.model: Model = model_of(recipe)
         self.settings, self.notes, self.progress = settings, tuple(notes), progress
         self.cases = None if cases is None else tuple(cases)
+        self.law_errors = law_errors or {}
         self.folds = plan.folds
 
     def diagnose(self) -> Diagnosis:
@@ -199,7 +202,8 @@ class Diagnose:
         alone = gaps.get((contender.effect,))
         gain = None if alone is None else shrink.closed_fraction(gaps[()], alone)
         candidate = self.model.candidates[contender.effect]
-        entry = parts.rank(contender, explained, found.effects, candidate, gain)
+        errors = self.law_errors
+        entry = parts.rank(contender, explained, found.effects, candidate, gain, errors)
         entry["parameters"] += terms.get(contender.effect, [])
         return entry
 

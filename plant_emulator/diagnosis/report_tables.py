@@ -136,7 +136,8 @@ def ranking(entries: Sequence[Mapping[str, Any]]) -> Markup:
     most = max([1e-9, *(e["evidence"] or 0.0 for e in entries)])
     return table(
         "Evidence: fall of the penalised cost, corrected for autocorrelation. Held-out gain: "
-        "share of the gap that the effect closes alone on runs it was not fitted to.",
+        "share of the gap that the effect closes alone on runs it was not fitted to. Standard "
+        "error: with what another law of the same effect would make of its size, where known.",
         [
             "effect",
             "subsystem",

@@ -1,0 +1,93 @@
+"""How far an effect's size is off where the machine follows another law of it than the library.
+
+    tools/law_errors.py --seed 11 --cases 360 > plant_emulator/diagnosis/law_errors.csv
+
+Each single effect of the blind trial's cases is fitted alone, by the contest of a diagnosis, to
+logs made with the trial's own law of it.
+"""
+
+from __future__ import annotations
+
+import csv
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from multiprocessing import get_context
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import click
+from threadpoolctl import threadpool_limits
+
+from plant_emulator import effects, logs, parameter_sets
+from plant_emulator.blind import draw, laws, score
+from plant_emulator.blind.generate import measured, true_logs
+from plant_emulator.diagnosis import answer
+from plant_emulator.diagnosis.bench import BenchRecipe
+from plant_emulator.diagnosis.pool import Here, model_of
+from plant_emulator.diagnosis.stepwise import Contest
+from plant_emulator.kernel import kernel, know
+from plant_emulator.recording import recording
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from plant_emulator.blind.case import Case
+    from plant_emulator.parameters import ParameterSet
+    from plant_emulator.recording import Recording
+
+COLUMNS = ("effect", "parameter", "true", "estimated", "standard_error")
+
+
+def sizes(seed: int, only: tuple[str, ...], number: int) -> list[dict[str, Any]]:
+    """True and estimated sizes of a case's effect; none of a case without one of another law."""
+    if draw.kinds(seed, number + 1)[-1] != "effect":
+        return []
+    know(*(laws.load(name) for name in laws.names()))
+    known, nominal = kernel().effects, parameter_sets.load()
+    case = draw.draw(seed, number, nominal, known)
+    (hidden,) = case.hidden
+    if hidden.law == hidden.effect or (only and hidden.effect not in only):
+        return []
+    others = tuple(name for name in known if name != hidden.effect)
+    recipe = BenchRecipe(tuple(_recordings(case, nominal)), nominal, others)
+    with threadpool_limits(1):
+        found = Contest(Here(), recipe, (hidden.effect,), range(len(case.programs))).explain()
+    if not found.named:
+        return []
+    (contender,) = found.contenders
+    candidate = model_of(recipe).candidates[hidden.effect]
+    told = {
+        "verdict": {"kind": "effect", "effects": [hidden.effect]},
+        "ranking": [answer.rank(contender, found, found.named, candidate, None, {})],
+    }
+    unsealed = score.Unsealed(case=case, norms={}, answer=told, closed=None)
+    return score.sizes(unsealed, known)
+
+
+def _recordings(case: Case, nominal: ParameterSet) -> Iterator[Recording]:
+    """The logs of a case as a diagnosis reads them."""
+    with TemporaryDirectory() as folder:
+        for run, log in enumerate(true_logs(case, nominal)):
+            path = f"{folder}/{case.programs[run]}.csv.gz"
+            logs.write(measured(case, log, run), path)
+            yield recording(logs.read(path))
+
+
+@click.command()
+@click.option("--seed", type=click.IntRange(min=0), required=True)
+@click.option("--cases", type=click.IntRange(min=1), required=True, help="So many of the seed.")
+@click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True)
+@click.option("--only", multiple=True, type=click.Choice(effects.names()), help="Of these effects.")
+def main(seed: int, cases: int, workers: int, only: tuple[str, ...]) -> None:
+    """Print a table of true and estimated sizes under other laws."""
+    table = csv.DictWriter(sys.stdout, COLUMNS, extrasaction="ignore", lineterminator="\n")
+    table.writeheader()
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+        for found in pool.map(partial(sizes, seed, only), range(cases)):
+            table.writerows(found)
+            sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()
