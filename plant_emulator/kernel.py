@@ -174,11 +174,16 @@ def chain(law: str, effects: Iterable[Effect]) -> str:
 
 
 def followed(known: Mapping[str, Effect]) -> Iterator[str]:
-    """What the advance of each memory takes besides: the value of the law that it follows."""
+    """What the advance of each memory takes besides: the value of the law that it follows, and the
+    base of the memory beside it.
+    """
+    number = {name: stage.FIRST_MEMORY + k for k, name in enumerate(memory_names(known))}
     for k, effect in enumerate(known.values()):
         for memory in effect.memories.values():
             before = islice(known.values(), k)
-            yield "" if memory.follows is None else f"{chain(memory.follows, before)}, "
+            value = "" if memory.follows is None else f"{chain(memory.follows, before)}, "
+            beside = f"{effect.name}_{memory.beside}"
+            yield value + ("" if memory.beside is None else f"base[{number[beside]}], ")
 
 
 def build(known: Mapping[str, Effect]) -> Kernel:

@@ -68,7 +68,8 @@ def _calls(
     for memory in effect.memories.values():
         yield memory.start, (p,)
         value = () if memory.follows is None else (0.0,)
-        yield memory.advance, (0.0, SHORT, *value, s, p)
+        base = () if memory.beside is None else (0.0,)
+        yield memory.advance, (0.0, SHORT, *value, *base, s, p)
 
 
 def raise_in_effects(error: Exception, known: Mapping[str, Effect]) -> None:

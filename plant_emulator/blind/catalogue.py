@@ -81,7 +81,7 @@ INSIDE = (
     Entry(effect="drum_imbalance", law="drum_imbalance", starts={"start_angle": ANY_ANGLE}),
     Entry(effect="torque_sensor_offset", law="torque_sensor_offset"),
     Entry(effect="torque_sensor_gain", law="torque_sensor_gain"),
-    Entry(effect="torque_sensor_lag", law="two_lag_torque_sensor"),
+    Entry(effect="torque_sensor_lag", law="bessel_torque_sensor"),
     Entry(effect="torque_sensor_drift", law="creeping_torque_drift"),
     Entry(effect="drum_speed_scale", law="drum_speed_scale"),
     Entry(effect="drum_speed_lag", law="two_lag_drum_speed"),

@@ -63,11 +63,14 @@ class Memory:
               implicit stage; it must be finite for a time constant of 0
     follows : name of a law of which the memory takes in the value, as the effects before this one
               leave it (a filter, a lag); advance then is (base, a, value, s, p) -> x
+    beside  : another memory of the effect whose base it takes in, before s, where the two stages
+              have to be solved together (an oscillation)
     """
 
     start: Callable[[Record], float]
     advance: Callable[..., float]
     follows: str | None = None
+    beside: str | None = None
 
 
 @dataclass(frozen=True, eq=False)  # compared and hashed as the one object that was loaded
@@ -169,7 +172,7 @@ def _check_numbers(name: str, module: ModuleType) -> None:
 
 
 def _check_memories(name: str, module: ModuleType) -> None:
-    """Refuse a memory that follows what is no law."""
+    """Refuse a memory that follows what is no law, or is beside what is no other memory."""
     memories: dict[str, Memory] = getattr(module, "MEMORIES", {})
     known = [law.__name__ for law in laws.LAWS]
     for key, memory in memories.items():
@@ -177,4 +180,9 @@ def _check_memories(name: str, module: ModuleType) -> None:
             raise ParameterError(
                 f"effect {name}: {module.__file__}: memory {key} follows {memory.follows!r}, "
                 f"which is no law; known: {', '.join(known)}"
+            )
+        if memory.beside is not None and memory.beside not in memories.keys() - {key}:
+            raise ParameterError(
+                f"effect {name}: {module.__file__}: memory {key} is beside {memory.beside!r}, "
+                "which is no other memory of the effect"
             )

@@ -1,9 +1,12 @@
-"""The torque sensor follows the shaft's torque as a first-order lag.
+"""The torque sensor follows the shaft's torque as a lag of first order, or nearly so.
 
-    tau dT_s/dt = T_meas - T_s
+    q >= 0:   q tau^2 T_meas'' + tau T_meas' + T_meas = T
+    q < 0:    (1 - q) tau T_meas' + T_meas = T - q tau T'
 
-Source: first-order response of a measuring chain, e.g. K. Ogata, Modern Control Engineering,
-chapter on first-order systems. At tau = 0 the sensor shows the torque itself.
+Source: K. Ogata, Modern Control Engineering, on systems of first and second order and on lead and
+lag. tau is the delay of a slow change, whatever q is. q = 0: first order; 0.25: two equal lags;
+more: the sensor begins to swing; less than 0: the share -q / (1 - q) of the torque shows at once.
+To first order in q both forms are the same. tau = 0: the torque itself.
 """
 
 from __future__ import annotations
@@ -20,27 +23,56 @@ PARAMETERS = {
     "time_constant": EffectParameter(
         neutral=0.0, lower=0.0, upper=1.0, plausible=0.05, unit="s", meaning="tau"
     ),
+    "second_order": EffectParameter(
+        neutral=0.0, lower=-1.0, upper=1.0, plausible=0.0, unit="1", meaning="q", std=0.2
+    ),
 }
 
 
 def start(p: Record) -> float:
-    """The bench starts at rest, without torque [N m]."""
+    """The bench starts at rest: no torque [N m], no slope of it [N m/s]."""
     return 0.0
 
 
-def advance(base: float, a: float, value: float, s: Record, p: Record) -> float:
-    """Shown torque at the end of an implicit stage of size a [N m]; at tau = 0 of no use."""
+def slope_of(shown: float, slope: float, a: float, value: float, p: Record) -> float:
+    """Slope of the shown torque at the end of an implicit stage of size a, q > 0 [N m/s].
+
+    shown, slope : bases of the stage
+    """
     tau = p.torque_sensor_lag_time_constant
+    bend = p.torque_sensor_lag_second_order * tau * tau
+    return (bend * slope + a * (value - shown)) / (bend + tau * a + a * a)
+
+
+def advance(base: float, a: float, value: float, slope: float, s: Record, p: Record) -> float:
+    """Shown torque at the end of an implicit stage [N m]; at tau = 0 of no use."""
+    tau, q = p.torque_sensor_lag_time_constant, p.torque_sensor_lag_second_order
     if tau == 0.0:
         return base
-    return value + (base - value) * (tau / (tau + a))
+    if q > 0.0:
+        return base + a * slope_of(base, slope, a, value, p)
+    lag = (1.0 - q) * tau
+    return value + (base - value) * (lag / (lag + a))
 
 
-MEMORIES = {"shown": Memory(start, advance, follows="measured_shaft_torque")}
+def advance_slope(base: float, a: float, value: float, shown: float, s: Record, p: Record) -> float:
+    """Its slope at the end of an implicit stage [N m/s]; for q > 0 only."""
+    if p.torque_sensor_lag_time_constant == 0.0 or p.torque_sensor_lag_second_order <= 0.0:
+        return base
+    return slope_of(shown, base, a, value, p)
+
+
+MEMORIES = {
+    "shown": Memory(start, advance, follows="measured_shaft_torque", beside="slope"),
+    "slope": Memory(start, advance_slope, follows="measured_shaft_torque", beside="shown"),
+}
 
 
 def measured_shaft_torque(value: float, s: Record, p: Record) -> float:
     """What the sensor shows [N m]."""
     if p.torque_sensor_lag_time_constant == 0.0:
         return value
+    at_once = max(0.0, -p.torque_sensor_lag_second_order)
+    if at_once > 0.0:
+        return (at_once * value + s.torque_sensor_lag_shown) / (1.0 + at_once)
     return s.torque_sensor_lag_shown

@@ -146,6 +146,7 @@ def test_memory_with_a_step_of_zero_keeps_its_value_or_is_without_inertia(
         s = SimpleNamespace(**dict.fromkeys((*STAGE, *own), 0.0))
         p = SimpleNamespace(**{**nominal.values(), **neutral})
         value = () if memory.follows is None else (1.0,)
+        value += () if memory.beside is None else (1.0,)
         assert np.isfinite(memory.start(p))
         assert np.isfinite(memory.advance(1.0, 1e-9, *value, s, p))
 

@@ -107,7 +107,9 @@ def test_effects_are_chained_in_the_order_of_the_list() -> None:
     text = glue({"torque_sensor_lag": lag, "gear_oil_temperature": oil})
     assert "torque_sensor_lag__measured_shaft_torque(nominal_measured_shaft_torque(s, p)" in text
     assert "x[8] = s.torque_sensor_lag_shown" in text
-    assert "x[9] = s.gear_oil_temperature_oil" in text
+    assert "x[10] = s.gear_oil_temperature_oil" in text
+    taken = "nominal_measured_shaft_torque(s, p), base[9]"
+    assert f"torque_sensor_lag_shown__advance(base[8], a, {taken}, s, p)" in text
 
 
 def test_memory_takes_in_the_law_it_follows_as_the_effects_before_it_leave_it(

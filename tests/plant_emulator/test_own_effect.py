@@ -146,6 +146,7 @@ FORCE = OIL_DRAG.replace("factor * speed", "BODY").replace("oil_drag", "own")
 FOLLOWS = """from plant_emulator.effects import Memory
 
 MEMORIES = {"oil": Memory(float, float, follows="ghost")}"""
+BESIDE = FOLLOWS.replace("follows", "beside")
 
 
 def written(folder: Path, text: str) -> Path:
@@ -182,6 +183,7 @@ def test_mistake_in_the_file_is_told_with_its_line(
         ("PARAMETERS['other'] = 1.0", "PARAMETERS is no dict of names to EffectParameter"),
         ("MEMORIES = ['oil']", "MEMORIES is no dict of names to Memory"),
         (FOLLOWS, "memory oil follows 'ghost', which is no law; known: dead_time, .*flux"),
+        (BESIDE, "memory oil is beside 'ghost', which is no other memory of the effect"),
     ],
 )
 def test_declaration_of_a_wrong_kind_is_refused(tmp_path: Path, text: str, said: str) -> None:
