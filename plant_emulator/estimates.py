@@ -13,6 +13,8 @@ from plant_emulator.covariance import data_errors
 Array = NDArray[np.float64]
 # From the values by name to one run's whitened residual, shape (channels, samples).
 Residual = Callable[[Mapping[str, float]], Array]
+# Values that the start of a state is looked for among.
+STARTS = 9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,6 +25,8 @@ class Unknown:
     scale : of what is not: a change that matters [its unit]
     prior, std : mean and standard deviation of what is known beforehand; std None: nothing
     run : the run whose state it is; None: a parameter of all runs
+    step : between the starts that it is looked for among; None: of a state there are STARTS
+    angle : whether it is an angle, of which a small effect is a cosine
     """
 
     name: str
@@ -34,6 +38,17 @@ class Unknown:
     prior: float = 0.0
     std: float | None = None
     run: int | None = None
+    step: float | None = None
+    angle: bool = False
+
+    def starts(self) -> list[float]:
+        """Values of a state, evenly over its prior, or over its bounds where it has none."""
+        low, high = self.lower, self.upper
+        if self.std is not None:
+            reach = np.sqrt(3.0) * self.std  # of an even spread
+            low, high = max(low, self.prior - reach), min(high, self.prior + reach)
+        count = STARTS if self.step is None else 1 + int(np.ceil((high - low) / self.step))
+        return [float(value) for value in np.linspace(low, high, count)]
 
     def scaled(self, value: float) -> float:
         """The value on the scale of the estimation."""

@@ -55,7 +55,11 @@ INSIDE = (
         programs=("program4",),
         ranges={"source_resistance": (0.4, 1.1)},
     ),
-    Entry(effect="converter_dead_time", law="tanh_converter", ranges={"mains": (49.95, 50.05)}),
+    Entry(
+        effect="converter_dead_time",
+        law="tanh_converter",
+        starts={"mains": (49.95, 50.05), "phase": ANY_ANGLE},
+    ),
     Entry(
         effect="integrator_windup",
         law="fading_windup",

@@ -21,7 +21,7 @@ from plant_emulator.kernel import kernel, know
 from plant_emulator.parameters import UNITS
 from plant_emulator.search import GAP_POSITION, Search
 from plant_emulator.simulate import TOLERANCE, values_of
-from plant_emulator.start_states import GAP, with_own
+from plant_emulator.start_states import GAP, scanned, with_own
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -56,6 +56,8 @@ def candidate(effect: Effect) -> Candidate:
             scale=declared.std or abs(declared.plausible - declared.neutral) or 1.0,
             prior=declared.plausible,
             std=declared.std,
+            step=declared.step,
+            angle=declared.angle,
         )
         if declared.std is not None:
             (states if declared.per_run else shapes).append(unknown)
@@ -176,11 +178,14 @@ class BenchModel:
         self, run: int, effects: Sequence[str], values: Mapping[str, float]
     ) -> dict[str, float]:
         """See `Model`."""
-        own = {u.name: u.start for name in effects for u in self.candidates[name].states}
+        states = [u for name in effects for u in self.candidates[name].states]
+        own = {u.name: u.start for u in states}
         everything = {**self._fixed(run, effects), **own, **values}
         search = Search([self._recordings[run]], everything, ())
         search.scan_gaps(GAPS)
-        return {GAP_POSITION: search.gaps[0], **own}
+        found = {GAP_POSITION: search.gaps[0], **own}
+        residual = self.residual(run, effects)
+        return scanned(lambda trial: residual({**values, **trial}), found, states)
 
     def located(self, where: Point, runs: Sequence[int]) -> Mapping[str, Any] | None:
         """See `Model`."""

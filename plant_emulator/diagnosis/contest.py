@@ -42,6 +42,8 @@ SETTLED = 1e-6
 GLANCE_SETTLED = 1e-4
 # Mean square from which on a fit may lie in a wrong valley.
 ASTRAY = 1.5
+# What is known beforehand of a size that a prediction needs [plausible sizes].
+SHY = 2.0
 # A fit that is to be improved by starting again has to fall by more than this [chi squared].
 WORTH = 1.0
 
@@ -51,10 +53,12 @@ class Point:
     """Where a joint fit has come to.
 
     values : parameters, sizes and shapes by name; states : of every run of the fit, by name
-    cost : sum of squares with the priors; squares : of the residuals alone; samples : counted
+    cost : sum of squares with the priors, and what the looks cost; squares : of the residuals
+        alone; samples : counted
     share : of the samples that are independent, from the residual's autocorrelation time
     errors : standard errors by name of `values`
     structure : of the residuals, beyond white noise, see `covariance.structure`
+    looks : of the cost, what the choice of the states has gained by chance, see `looks_of`
     """
 
     effects: tuple[str, ...]
@@ -67,6 +71,7 @@ class Point:
     errors: Mapping[str, float]
     converged: bool
     structure: float = 0.0
+    looks: float = 0.0
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -79,12 +84,23 @@ class Point:
         return self.squares / self.samples
 
 
-def template(model: Model, effects: Sequence[str], runs: Sequence[int]) -> list[Unknown]:
-    """All unknowns of a joint fit: drift, effects, states of every run (numbered from 0)."""
+def template(
+    model: Model, effects: Sequence[str], runs: Sequence[int], *, shy: bool = False
+) -> list[Unknown]:
+    """All unknowns of a joint fit: drift, effects, states of every run (numbered from 0).
+
+    shy : sizes are absent where these runs do not show them, not anywhere
+    """
     own = [model.candidates[name] for name in effects]
     states = (*model.states, *(u for c in own for u in c.states))
-    shared = (*model.parameters, *(u for c in own for u in (*c.sizes, *c.shapes)))
+    sizes = [_shy(u, c.neutral[u.name]) if shy else u for c in own for u in c.sizes]
+    shared = (*model.parameters, *sizes, *(u for c in own for u in c.shapes))
     return [*shared, *(replace(u, run=k) for k in range(len(runs)) for u in states)]
+
+
+def _shy(size: Unknown, neutral: float) -> Unknown:
+    """A size near its neutral value beforehand, as far as it usually leaves it."""
+    return replace(size, prior=neutral, std=SHY * abs(size.start - neutral))
 
 
 def started(
@@ -106,12 +122,15 @@ def fit(
     states: Sequence[Mapping[str, float]],
     iterations: int | None = None,
     near: Estimate | None = None,
+    *,
+    shy: bool = False,
 ) -> Point:
     """Joint fit of drift, states and these effects, from these values.
 
     near : see `estimate`'s `follow`; a first look only
+    shy : see `template`
     """
-    unknowns = started(template(model, effects, runs), values, states)
+    unknowns = started(template(model, effects, runs, shy=shy), values, states)
     residuals = [model.residual(k, effects) for k in runs]
     settled = SETTLED if near is None else GLANCE_SETTLED
     found = estimate(unknowns, residuals, settled=settled, iterations=iterations, follow=near)
@@ -132,11 +151,12 @@ def linearised(model: Model, where: Point, runs: Sequence[int]) -> Estimate:
 def point(effects: Sequence[str], found: Estimate, runs: int) -> Point:
     """An estimate as plain data."""
     errors = zip(found.unknowns, found.z, found.standard_errors, strict=True)
+    looks = sum(looks_of(found, k) for k in range(runs))
     return Point(
         effects=tuple(effects),
         values=found.parameters(),
         states=tuple(found.states(k) for k in range(runs)),
-        cost=found.cost + found.penalty,
+        cost=found.cost + found.penalty + looks,
         squares=found.cost,
         samples=found.samples,
         share=independent_share(found),
@@ -145,7 +165,24 @@ def point(effects: Sequence[str], found: Estimate, runs: int) -> Point:
         },
         converged=found.converged,
         structure=sum(structure(channel) for run in found.residuals for channel in run),
+        looks=looks,
     )
+
+
+def looks_of(found: Estimate, run: int) -> float:
+    """What the states of a run gain by being chosen among all that could be.
+
+    - log det (P C), of those with a prior: P its precision, C the covariance after the fit, so that
+    the cost falls as twice the logarithm of the probability with the states integrated out
+    (Laplace's approximation: D. MacKay, Neural Computation 4 (1992) 415, his Occam factor). A phase
+    and a frequency fit any noise a little; what they explain has to be more than that.
+    """
+    own = [j for j, u in enumerate(found.unknowns) if u.run == run and u.std is not None]
+    if not own:
+        return 0.0
+    deviations = np.array([found.unknowns[j].scaled_std for j in own])
+    narrowed = found.covariance[np.ix_(own, own)] / np.outer(deviations, deviations)
+    return max(0.0, -float(np.linalg.slogdet(narrowed).logabsdet))
 
 
 def independent_share(found: Estimate) -> float:

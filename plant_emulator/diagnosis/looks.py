@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.contest import WORTH, Point, fit, template
-from plant_emulator.diagnosis.signature import FAR, STATES, signs, sized, tried
+from plant_emulator.diagnosis.signature import FAR, signs, sized
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -31,6 +31,8 @@ PATIENT = 25
 FEW_SHAKEN, SHAKE = 12, 30.0
 # The same from the nominal parameters, where a step goes far.
 FEW_FAR, FEW_FAR_WITH_STATES = 4, 8
+# How far sizes of many valleys are looked for, in plausible sizes.
+WIDEST = 3.0
 # Sizes that a start from the nominal parameters is tried at, in plausible sizes.
 FAR_SIZES = (0.25, 0.4, 0.6, 0.8, 1.0, 1.4, 2.0)
 
@@ -87,7 +89,8 @@ def look(model: Model, effects: Sequence[str], runs: Sequence[int], start: Point
     if not with_states:
         return fit(model, effects, runs, start.values, start.states, FEW)
     states = _scanned(model, effects, runs, start.values, start.states)
-    return fit(model, effects, runs, start.values, states, FEW_WITH_STATES)
+    values = _sizes_scanned(model, effects, runs, start.values, states)
+    return fit(model, effects, runs, values, states, FEW_WITH_STATES)
 
 
 def shaken(
@@ -116,17 +119,42 @@ def _scanned(
     values: Mapping[str, float],
     states: Sequence[Mapping[str, float]],
 ) -> tuple[dict[str, float], ...]:
-    """States of every run, each the best of some values while the others stay, two times over."""
-    own = (*model.states, *(u for name in effects for u in model.candidates[name].states))
+    """States of every run, each the best of some values while the others stay, two times over.
+
+    One of many narrow valleys is where its signature has found it, and stays.
+    """
+    every = (*model.states, *(u for name in effects for u in model.candidates[name].states))
+    own = [u for u in every if u.step is None]
     found = []
     for k, state in zip(runs, states, strict=True):
         best = dict(state)
         for u in (*own, *own):
-            trials = [{**best, u.name: value} for value in (best[u.name], *tried(u, STATES))]
+            trials = [{**best, u.name: value} for value in (best[u.name], *u.starts())]
             losses = [_loss(model, effects, [k], values, [trial]) for trial in trials]
             best = trials[int(np.argmin(losses))]
         found.append(best)
     return tuple(found)
+
+
+def _sizes_scanned(
+    model: Model,
+    effects: Sequence[str],
+    runs: Sequence[int],
+    values: Mapping[str, float],
+    states: Sequence[Mapping[str, float]],
+) -> dict[str, float]:
+    """The values, sizes of many valleys the best of many while all else stays."""
+    best = dict(values)
+    for candidate in (model.candidates[name] for name in effects):
+        for u in candidate.sizes:
+            if u.step is None:
+                continue
+            neutral = candidate.neutral[u.name]
+            sizes = np.arange(neutral, neutral + WIDEST * (u.start - neutral), u.step)
+            trials = [{**best, u.name: float(size)} for size in (best[u.name], *sizes)]
+            losses = [_loss(model, effects, runs, trial, states) for trial in trials]
+            best = trials[int(np.argmin(losses))]
+    return best
 
 
 def from_nominal(model: Model, effect: str, base: Point, runs: Sequence[int]) -> Point:

@@ -101,7 +101,7 @@ def apart(model: Model, asked: Asked) -> float:
         return raw
     runs = (*asked.runs, asked.planned)
     found = fit(model, where.effects, runs, where.values, where.states, FEW_WITH_STATES)
-    return min(raw, sqrt(max(0.0, found.cost - where.cost)))
+    return min(raw, sqrt(max(0.0, found.cost - found.looks - where.cost + where.looks)))
 
 
 def seen(model: Model, asked: Asked) -> dict[str, float]:

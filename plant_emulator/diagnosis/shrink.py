@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis import resample
-from plant_emulator.diagnosis.contest import Point, again, linearised
+from plant_emulator.diagnosis.contest import Point, fit, linearised
 from plant_emulator.diagnosis.tangents import Tangents
 from plant_emulator.estimation import estimate
 
@@ -69,10 +69,13 @@ def predict(model: Model, fold: Fold) -> Prediction:
 
 
 def refitted(model: Model, fold: Fold) -> Point:
-    """The fold's model fitted on its runs, taken up again where it ran out of steps."""
+    """The fold's model fitted on its runs, taken up again where it ran out of steps.
+
+    What these runs tell nothing of, as a pause that none of them has, would end anywhere.
+    """
     point = fold.start
     for _ in range(1 + PATIENCE):
-        point = again(model, point.effects, fold.fitted, point)
+        point = fit(model, point.effects, fold.fitted, point.values, point.states, shy=True)
         if point.converged:
             break
     return point

@@ -7,9 +7,13 @@ the tangents of the drifting parameters (Basseville and Nikiforov, INRIA RR-4438
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import pi
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from plant_emulator.diagnosis.tangents import gain_along, gain_turned
+from plant_emulator.start_states import combinations
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -26,8 +30,6 @@ FAR = 0.3
 # Norm of a change of the residual that the noise does not hide, and the samples, of equal squares,
 # that are few.
 RESOLVED, FEW_SAMPLES = 2.0, 30.0
-# Values of a state that are tried.
-STATES = 9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,28 +108,29 @@ def _own_states(
     """An effect's states of every run: those whose small signature explains most of that run.
 
     Where an angle or a temperature at the start is unknown, a fit from a wrong one ends anywhere.
+    All are tried together; of an angle two values tell the rest.
     """
     candidate = model.candidates[name]
-    own = [{u.name: u.start for u in candidate.states} for _ in runs]
+    if not candidate.states:
+        return [{} for _ in runs]
     sizes = sized(candidate, SIZES[1])
-    for unknown in candidate.states:
-        best = [-1.0] * len(runs)
-        for value in tried(unknown, STATES):
-            trial = [{**state, unknown.name: value} for state in own]
-            change = _residual(model, candidate, where, runs, trial, sizes) - tangents.residual
-            for k, gain in enumerate(tangents.gains(change)):
-                if gain > best[k]:
-                    best[k], own[k] = gain, trial[k]
-    return own
 
+    def parts(state: Mapping[str, float]) -> list[Array]:
+        """What each run's small signature with this state leaves that drift cannot imitate."""
+        residual = _residual(model, candidate, where, runs, [state] * len(runs), sizes)
+        return tangents.parts(residual - tangents.residual)
 
-def tried(unknown: Unknown, count: int) -> list[float]:
-    """Values of a state, evenly over its prior, or over its bounds where it has none."""
-    low, high = unknown.lower, unknown.upper
-    if unknown.std is not None:
-        reach = np.sqrt(3.0) * unknown.std  # of an even spread
-        low, high = max(low, unknown.prior - reach), min(high, unknown.prior + reach)
-    return [float(value) for value in np.linspace(low, high, count)]
+    found: list[list[tuple[float, dict[str, float]]]] = [[] for _ in runs]
+    for state, angle in combinations(candidate.states):
+        if angle is None:
+            for k, part in enumerate(parts(state)):
+                found[k].append((gain_along(part, tangents.residual), state))
+            continue
+        turned = zip(parts({**state, angle: 0.0}), parts({**state, angle: pi / 2}), strict=True)
+        for k, pair in enumerate(turned):
+            gain, best = gain_turned(*pair, tangents.residual)
+            found[k].append((gain, {**state, angle: best}))
+    return [max(of_run, key=lambda one: one[0])[1] for of_run in found]
 
 
 def _start(

@@ -29,14 +29,14 @@ class Tangents:
         """The change of the residual that remains when drift follows it."""
         return np.asarray(change + self._slopes @ self.imitation(change))
 
-    def gains(self, change: Array) -> list[float]:
-        """Fall of every run's sum of squares at the best multiple of a change of that run alone."""
+    def parts(self, change: Array) -> list[Array]:
+        """What remains of a change of each run alone."""
         found, first = [], 0
         for residual in self.found.residuals:
             part = np.zeros_like(change)
             part[first : first + residual.size] = change[first : first + residual.size]
             first += residual.size
-            found.append(gain_along(self.rest(part), self.residual))
+            found.append(self.rest(part))
         return found
 
     def moved(self, shift: Array, runs: int) -> tuple[dict[str, float], list[dict[str, float]]]:
@@ -53,3 +53,11 @@ def gain_along(rest: Array, residual: Array) -> float:
     """Fall of the sum of squares at the best multiple of a signature, 0 where that is negative."""
     along = min(0.0, float(rest @ residual))
     return along**2 / max(float(rest @ rest), 1e-12)
+
+
+def gain_turned(cosine: Array, sine: Array, residual: Array) -> tuple[float, float]:
+    """Fall of the sum of squares at the best multiple of cos(a) cosine + sin(a) sine, and a."""
+    both = np.stack([cosine, sine])
+    along = both @ residual
+    best = -np.linalg.pinv(both @ both.T, hermitian=True) @ along
+    return float(-best @ along), float(np.arctan2(best[1], best[0]))

@@ -41,6 +41,8 @@ class EffectParameter:
     measured : the signal of a log whose mean is its value in that run, where the log has it
     std : standard deviation of what is known beforehand of a shape or a value per run; None: a fit
         leaves it free if it is a size, and else where it is
+    step : how far apart the starts of a fit may lie so that one of them finds the right valley;
+        None: of a value per run a few over what is known beforehand do, of others one
     """
 
     neutral: float
@@ -52,6 +54,12 @@ class EffectParameter:
     per_run: bool = False
     measured: str | None = None
     std: float | None = None
+    step: float | None = None
+
+    @property
+    def angle(self) -> bool:
+        """Whether it is an angle of a run, of which a small effect is a cosine."""
+        return self.per_run and self.unit == "rad"
 
 
 @dataclass(frozen=True)
@@ -161,6 +169,7 @@ def _check_numbers(name: str, module: ModuleType) -> None:
             ("neutral", one.neutral, one.lower, one.upper),
             ("plausible", one.plausible, one.lower, one.upper),
             ("std", 1.0 if one.std is None else one.std, 0.0, inf),
+            ("step", 1.0 if one.step is None else one.step, 0.0, inf),
         ):
             if isinstance(value, bool) or not isinstance(value, (int, float)):
                 raise ParameterError(f"{place}: {what} is {value!r}; a number is expected")

@@ -184,3 +184,15 @@ def test_ripple_of_six_pulses_alternates_when_sampled_at_600_hertz(nominal: Para
     sign = np.where(np.arange(len(log.time))[-100:] % 2 == 0, 1.0, -1.0)
     np.testing.assert_allclose(ripple, sign * 0.8 * current / (current + 2.0), atol=1e-6)
     np.testing.assert_array_equal(log["motor_speed"], plain["motor_speed"])
+
+
+def test_ripple_of_mains_off_50_hertz_beats_in_a_log_of_100_hertz(nominal: ParameterSet) -> None:
+    """By hand: 6 x 50.02 Hz sampled at 100 Hz is 0.12 Hz."""
+    inputs = linear((0.2, 0.0), (2.0, 150.0), duration=12.0, period=0.01)
+    plain = simulate(inputs, nominal.values())
+    sizes = {"ripple": 0.8, "discontinuous_below": 2.0, "mains": 50.02, "phase": 0.3}
+    log = simulate(inputs, effect(nominal, "converter_dead_time", **sizes))
+    ripple = (log["armature_current"] - plain["armature_current"])[-800:]
+    current = plain["armature_current"][-800:]
+    wave = np.cos(2.0 * np.pi * 0.12 * log.time[-800:] + 0.3)
+    np.testing.assert_allclose(ripple, wave * 0.8 * current / (current + 2.0), atol=1e-6)

@@ -2,16 +2,18 @@
 
     u_a = u - U tanh(i / i_g)
     i = 0 for t_0 where it would change sign
-    i_meas = i + I cos(2 pi 6 f t) tanh^2(i / i_g)         f: the mains, near 50 Hz but not on it
+    i_meas = i + I cos(6 psi + phi) tanh^2(i / i_g)
+    psi = 2 pi f t + (D / f_s) sin(2 pi f_s t)        the mains: f(t) = f + D cos(2 pi f_s t)
 
 Sources: W. Leonhard, Control of Electrical Drives, chapter on line-commutated converters; the
-smooth drop after J. J. Slotine, W. Li, Applied Nonlinear Control (tanh for a sign). U, t_0, I = 0:
-an ideal converter.
+smooth drop after J. J. Slotine, W. Li, Applied Nonlinear Control (tanh for a sign). The mains are
+near 50 Hz but not on it, and swing: P. Kundur, Power System Stability and Control, chapter on
+small-signal stability (inter-area modes, 0.1 to 0.7 Hz). U, t_0, I = 0: an ideal converter.
 """
 
 from __future__ import annotations
 
-from math import cos, pi, tanh
+from math import cos, pi, sin, tanh
 from typing import TYPE_CHECKING
 
 from plant_emulator.effects.declaration import EffectParameter, Memory
@@ -34,10 +36,18 @@ PARAMETERS = {
         neutral=2.0, lower=0.5, upper=20.0, plausible=2.0, unit="A", meaning="i_g"
     ),
     "mains": EffectParameter(
-        neutral=50.02, lower=49.8, upper=50.2, plausible=50.02, unit="Hz", meaning="f"
+        neutral=50.02, lower=49.8, upper=50.2, plausible=50.02, unit="Hz", meaning="f", per_run=True
+    ),
+    "phase": EffectParameter(
+        neutral=0.0, lower=-6.3, upper=6.3, plausible=0.0, unit="rad", meaning="phi", per_run=True
+    ),
+    "swing": EffectParameter(
+        neutral=0.0, lower=0.0, upper=0.1, plausible=0.005, unit="Hz", meaning="D"
     ),
 }
 
+# Frequency of the swing [Hz].
+SWINGING = 0.25
 # Resistance of blocked thyristors [ohm].
 OPEN = 1e5
 
@@ -84,7 +94,7 @@ def measured_armature_current(value: float, s: Record, p: Record) -> float:
     if p.tanh_converter_ripple == 0.0:
         return value
     share = tanh(s.armature_current / p.tanh_converter_discontinuous_below)
-    return (
-        value
-        + p.tanh_converter_ripple * cos(12.0 * pi * p.tanh_converter_mains * s.time) * share * share
-    )
+    mains = 2.0 * pi * p.tanh_converter_mains * s.time
+    mains += p.tanh_converter_swing / SWINGING * sin(2.0 * pi * SWINGING * s.time)
+    wave = cos(6.0 * mains + p.tanh_converter_phase)
+    return value + p.tanh_converter_ripple * wave * share * share

@@ -1,0 +1,151 @@
+"""An effect with a frequency and a phase of its own in every run, on the smallest machine."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+
+from plant_emulator.diagnosis.contest import fit, null_fit
+from plant_emulator.diagnosis.looks import look
+from plant_emulator.diagnosis.model import Candidate
+from plant_emulator.diagnosis.shrink import Fold, refitted
+from plant_emulator.estimates import Array, Unknown
+from plant_emulator.start_states import scanned
+from tests.plant_emulator.diagnosis.test_contest import TIME, Line, explained, linear, noisy
+
+# One that the samples of a run of 2 s tell from others 0.5 Hz off, anywhere within 5.2 Hz.
+RATE = linear("beat_rate", 0.0, scale=3.0, std=3.0, step=0.1)
+PHASE = linear("beat_phase", 0.0, std=pi / 3.0**0.5, angle=True)
+BEAT = Candidate(
+    name="beat",
+    subsystem="part of beat",
+    sizes=(linear("beat_size", 1.0),),
+    shapes=(),
+    states=(RATE, PHASE),
+    neutral={"beat_size": 0.0},
+    fixed={},
+    units={"beat_size": "1", "beat_rate": "Hz", "beat_phase": "rad"},
+    title="The beat",
+)
+
+
+def wave(size: float, rate: float, phase: float) -> Array:
+    """Of a run."""
+    return size * np.cos(2.0 * pi * rate * TIME + phase)
+
+
+class Beating(Line):
+    """Its only effect is the beat."""
+
+    def __init__(self, measured: Sequence[Array]) -> None:
+        super().__init__(measured, ())
+        self.candidates = {"beat": BEAT}
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+        plain = super().residual(run, ())
+
+        def residual(v: Mapping[str, float]) -> Array:
+            if not effects:
+                return plain(v)
+            return plain(v) - wave(v["beat_size"], v["beat_rate"], v["beat_phase"])
+
+        return residual
+
+
+RUNS = ((3.37, 2.0), (-1.62, -0.7), (4.81, 0.4))
+
+
+def test_beat_of_another_frequency_and_phase_in_every_run_is_found() -> None:
+    """By hand: each run of 2000 samples loses 2000 0.5^2 / 2 = 250."""
+    model = Beating([noisy(2.0 + wave(0.5, *own), seed) for seed, own in enumerate(RUNS)])
+    final = explained(model).final
+    assert final.effects == ("beat",)
+    assert abs(final.values["beat_size"]) == pytest.approx(0.5, abs=0.05)
+    for states, (rate, _) in zip(final.states, RUNS, strict=True):
+        assert abs(states["beat_rate"]) == pytest.approx(abs(rate), abs=0.05)
+
+
+def test_beat_that_noise_alone_shows_is_not_named() -> None:
+    """The best of some 20 frequencies takes 2 (1 + 1/2 + ... + 1/20) = 7 from a run's squares."""
+    model = Beating([noisy(np.full_like(TIME, 2.0), seed) for seed in range(8)])
+    found = explained(model)
+    (beat,) = found.contenders
+    assert beat.point is not None
+    assert found.null.squares - beat.point.squares > 30.0
+    assert found.final.effects == ()
+
+
+def test_looks_make_the_cost_the_probability_of_the_data() -> None:
+    """Linear and Gaussian, y = p t + noise, p ~ N(0, s^2): y ~ N(0, 1 + s^2 t t')."""
+
+    class Slope(Line):
+        states = (Unknown(name="p", start=0.0, lower=-50, upper=50, logarithmic=False, std=0.4),)
+        parameters = ()
+
+        def residual(self, run: int, effects: Sequence[str]) -> Callable[..., Array]:
+            return lambda v: (self.measured[run] - v["p"] * TIME)[None, :]
+
+    model = Slope([noisy(0.3 * TIME)], ())
+    found = fit(model, (), [0], {}, [{"p": 0.0}])
+    covariance = np.eye(len(TIME)) + 0.4**2 * np.outer(TIME, TIME)
+    y = model.measured[0]
+    expected = y @ np.linalg.solve(covariance, y) + np.linalg.slogdet(covariance).logabsdet
+    assert found.looks == pytest.approx(np.log1p(0.4**2 * np.sum(TIME**2)), abs=0.2)
+    assert found.cost == pytest.approx(expected, abs=0.2)
+
+
+def test_held_out_run_starts_in_the_valley_of_its_own_beat() -> None:
+    y = noisy(wave(0.5, 3.37, 2.0))
+    found = scanned(
+        lambda v: (y - wave(0.5, v["beat_rate"], v["beat_phase"]))[None, :],
+        {"beat_rate": 0.0, "beat_phase": 0.0},
+        BEAT.states,
+    )
+    folded = np.sign(found["beat_rate"]) * np.array([found["beat_rate"], found["beat_phase"]])
+    np.testing.assert_allclose(folded, [3.37, 2.0], atol=0.3)
+
+
+class Spike(Line):
+    """A spike 5 ms wide, at a time that is its size: away from there nothing leads to it."""
+
+    def __init__(self, measured: Sequence[Array], step: float | None) -> None:
+        super().__init__(measured, ("cube",))
+        plain = self.candidates["cube"]
+        size = replace(plain.sizes[0], start=0.3, scale=0.3, step=step)
+        state = linear("warmth", 0.0, std=1.0)
+        self.candidates = {"cube": replace(plain, sizes=(size,), states=(state,))}
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+        plain = super().residual(run, ())
+        return lambda v: plain(v) - (spike(v["cube_size"]) if effects else 0.0)
+
+
+def spike(time: float) -> Array:
+    """At this time."""
+    return 40.0 * np.exp(-(((TIME - time) / 0.005) ** 2))
+
+
+@pytest.mark.parametrize(("step", "found"), [(0.005, True), (None, False)])
+def test_size_of_many_valleys_is_looked_for_step_by_step(step: float | None, found: bool) -> None:
+    model = Spike([noisy(2.0 + spike(0.617))], step)
+    base = null_fit(model, [0])
+    start = replace(base, values={**base.values, "cube_size": 0.3}, states=({"warmth": 0.0},))
+    size = look(model, ("cube",), [0], start).values["cube_size"]
+    assert (size == pytest.approx(0.617, abs=1e-3)) is found
+
+
+def test_prediction_has_no_more_of_an_effect_than_the_fitted_runs_show() -> None:
+    """By hand: n x^6 / 7 tell the cube of 3 where it shows, and x^3 follows no line by 4/25 of it;
+    where it does not show it is absent, though the fit of all runs had it.
+    """
+    model = Line([noisy(2.0 + 3.0 * TIME**3)], ["cube", "kink"])
+    start = fit(model, ("cube",), [0], {"a": 0.0, "b": 0.0, "cube_size": 1.0}, [{}])
+    shown = refitted(model, Fold(fitted=(0,), predicted=(), start=start))
+    assert shown.values["cube_size"] == pytest.approx(start.values["cube_size"], rel=0.02)
+    model.residual = lambda run, effects: Line.residual(model, run, ())  # type: ignore[method-assign]
+    hidden = refitted(model, Fold(fitted=(0,), predicted=(), start=start))
+    assert hidden.values["cube_size"] == pytest.approx(0.0, abs=1e-3)
