@@ -51,9 +51,9 @@ INSIDE = (
     # Beyond it a braking current takes away the voltage that limits it, and runs away.
     Entry(
         effect="voltage_sag",
-        law="lagging_voltage_sag",
+        law="progressive_voltage_sag",
         programs=("program4",),
-        ranges={"source_resistance": (0.4, 1.1)},
+        ranges={"source_resistance": (0.35, 0.9)},
     ),
     Entry(
         effect="converter_dead_time",

@@ -158,8 +158,8 @@ def _sizes_scanned(
 
 
 def from_nominal(model: Model, effect: str, base: Point, runs: Sequence[int]) -> Point:
-    """Joint fit of one more effect, a few steps only: the drift from its nominal values, the effect
-    from the size that fits them best.
+    """Joint fit of one more effect, a few steps a run: the drift from its nominal values, the
+    effect from the size that fits them best.
     """
     effects = (*base.effects, effect)
     candidate = model.candidates[effect]
@@ -175,10 +175,32 @@ def from_nominal(model: Model, effect: str, base: Point, runs: Sequence[int]) ->
     # A size at which nothing happens, as of a limit that is not reached, is no start.
     without = _loss(model, base.effects, runs, nominal, base.states)
     losses[losses == without] = np.inf
-    best = starts[int(np.argmin(losses))]
-    found = [model.start_states(k, effects, best) for k in runs]
     few = FEW_FAR_WITH_STATES if candidate.states else FEW_FAR
-    return fit(model, effects, runs, best, found, few)
+    return run_by_run(model, effects, runs, starts[int(np.argmin(losses))], few)
+
+
+def run_by_run(
+    model: Model,
+    effects: Sequence[str],
+    runs: Sequence[int],
+    values: Mapping[str, float],
+    few: int,
+) -> Point:
+    """Joint fit from values far off: the runs come in one by one, the nearest first, a few steps
+    after each. A run with much contact, whose cost has many valleys, comes in when the others have
+    brought the values near.
+    """
+    found: dict[int, Mapping[str, float]] = {}
+    while True:
+        waiting = {k: model.start_states(k, effects, values) for k in runs if k not in found}
+        losses = {k: _loss(model, effects, [k], values, [one]) for k, one in waiting.items()}
+        nearest = min(waiting, key=lambda k: losses[k])
+        found[nearest] = waiting[nearest]
+        used = [k for k in runs if k in found]
+        reached = fit(model, effects, used, values, [found[k] for k in used], few)
+        if len(used) == len(runs):
+            return reached
+        values, found = reached.values, dict(zip(used, reached.states, strict=True))
 
 
 def _loss(

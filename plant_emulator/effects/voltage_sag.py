@@ -1,17 +1,18 @@
 """The available armature voltage falls under load.
 
-    |u_a| <= u_max - R_s |i|
+    |u_a| <= u_max - U_s,   tau dU_s/dt = R_s |i| - U_s
 
 Source: N. Mohan, T. M. Undeland, W. P. Robbins, Power Electronics, chapter on line-frequency
 controlled rectifiers: their direct voltage falls in proportion to the current, for commutation and
-supply. R_s is that ratio.
+supply; R_s is that ratio. W. Leonhard, Control of Electrical Drives, chapter on line-commutated
+converters: the supply's inductance delays it by tau. tau = 0: it falls at once.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plant_emulator.effects.declaration import EffectParameter
+from plant_emulator.effects.declaration import EffectParameter, Memory
 
 if TYPE_CHECKING:
     from plant_emulator.kernel_types import Record
@@ -22,9 +23,37 @@ PARAMETERS = {
     "source_resistance": EffectParameter(
         neutral=0.0, lower=0.0, upper=4.0, plausible=1.5, unit="ohm", meaning="R_s"
     ),
+    "time_constant": EffectParameter(
+        neutral=0.0, lower=0.0, upper=1.0, plausible=0.0, unit="s", meaning="tau", std=0.05
+    ),
 }
+
+
+def start(p: Record) -> float:
+    """The bench starts without current [V]."""
+    return 0.0
+
+
+def drop(s: Record, p: Record) -> float:
+    """Sag under a current that lasts [V]."""
+    return p.voltage_sag_source_resistance * abs(s.armature_current)
+
+
+def advance(base: float, a: float, s: Record, p: Record) -> float:
+    """Sag at the end of an implicit stage of size a [V]; at tau = 0 of no use."""
+    tau = p.voltage_sag_time_constant
+    if tau == 0.0:
+        return base
+    lasting = drop(s, p)
+    return lasting + (base - lasting) * (tau / (tau + a))
+
+
+MEMORIES = {"sag": Memory(start, advance)}
 
 
 def voltage_limit(value: float, s: Record, p: Record) -> float:
     """Largest armature voltage [V]."""
-    return max(0.0, value - p.voltage_sag_source_resistance * abs(s.armature_current))
+    if p.voltage_sag_source_resistance == 0.0:
+        return value
+    sag = drop(s, p) if p.voltage_sag_time_constant == 0.0 else s.voltage_sag_sag
+    return max(0.0, value - sag)

@@ -134,6 +134,19 @@ def test_sagging_voltage_sets_the_top_speed(nominal: ParameterSet) -> None:
     assert log["motor_speed"][-1] < 450.0
 
 
+def test_voltage_limit_follows_the_current_through_the_lag_of_the_supply(
+    nominal: ParameterSet,
+) -> None:
+    """|u| <= 400 - U_s, U_s being 2 |i| through a lag of 0.1 s; the current is the log's own."""
+    inputs = linear((0.2, 0.0), (0.25, 400.0), (3.0, 400.0), duration=3.0, period=0.001)
+    lagging = effect(nominal, "voltage_sag", source_resistance=2.0, time_constant=0.1)
+    log = simulate(inputs, lagging)
+    sag = lsim(([2.0], [0.1, 1.0]), np.abs(log["armature_current"]), log.time - log.time[0])[1]
+    room = 400.0 - sag - np.abs(log["armature_voltage"])
+    assert room.min() > -0.2
+    assert np.count_nonzero(room < 0.2) > 500
+
+
 def test_wound_up_integrator_holds_the_whole_integral_of_the_error(nominal: ParameterSet) -> None:
     """With conditional integration it holds less, since it waited while the current was limited."""
     held, whole = {}, {}

@@ -314,6 +314,27 @@ def test_effect_behind_a_fit_in_a_wrong_valley_is_found_from_the_nominal_paramet
     assert right.values["b"] == pytest.approx(5.3, abs=0.05)
 
 
+class Waves(Wave):
+    """The same b in a slow wave, and in one ten times as fast: ten times as many valleys."""
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+        others = Line.residual(self, run, effects)
+        speed = (1.0, 10.0)[run]
+        return lambda v: others({**v, "b": 0.0}) - 8.0 * np.sin(speed * v["b"] * TIME)
+
+
+def test_run_of_many_valleys_comes_in_when_the_others_have_brought_the_values_near() -> None:
+    waves = [8.0 * np.sin(5.7 * TIME), 8.0 * np.sin(57.0 * TIME)]
+    model = Waves([noisy(y + 2.0 * np.abs(TIME), k) for k, y in enumerate(waves)])
+    runs = [0, 1]
+    nominal = {"a": 0.0, "b": 5.0, "kink_size": 2.0}
+    assert fit(model, ("kink",), runs, nominal, [{}, {}]).chi_squared > 10.0
+    right = from_nominal(model, "kink", fit(model, (), runs, nominal, [{}, {}]), runs)
+    assert right.chi_squared < 1.1
+    assert right.values["b"] == pytest.approx(5.7, abs=0.01)
+
+
 def test_fit_without_effects_in_a_wrong_valley_is_left_for_a_better_one() -> None:
     model = Wave([noisy(8.0 * np.sin(5.3 * TIME))], [])
     assert fit(model, (), [0], *model.search([0])).chi_squared > 10.0
