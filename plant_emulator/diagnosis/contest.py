@@ -11,8 +11,9 @@
     signature and the start: the joint fit then starts once more from the nominal parameters and
     the size that fits these best.
  5. What leaves more than noise starts again from a larger size, for the linear picture is wrong
-    where drift has gone far to imitate the effect; and the best from some way off (3 times): where
-    contact comes and goes, the cost is rough, and a fit may have stopped in a small hollow.
+    where drift has gone far to imitate the effect; and the best from the best values of each of
+    its unknowns by a loss that forgives, and from some way off (3 times): where contact comes and
+    goes, the cost is rough, and a fit may have stopped in a small hollow or in another valley.
  6. The fit without effects starts again from every joint fit's drift: should it get as low, there
     was no effect, only a better valley.
 

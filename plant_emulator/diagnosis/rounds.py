@@ -24,6 +24,7 @@ from plant_emulator.diagnosis.contenders import (
 )
 from plant_emulator.diagnosis.contest import WORTH
 from plant_emulator.diagnosis.explain import NOISE_LEFT, THRESHOLD
+from plant_emulator.diagnosis.restarts import Restarts
 from plant_emulator.diagnosis.rules import SECOND, noise_only
 from plant_emulator.diagnosis.steps import (
     Task,
@@ -33,7 +34,6 @@ from plant_emulator.diagnosis.steps import (
     once_more,
     plod,
     refit,
-    shake,
     show,
     start,
 )
@@ -63,8 +63,8 @@ MOST = 0.9
 GLIMPSE = 5.0
 # Fall of the cost at first look that makes one more effect on top of noise worth a fit.
 SIGHT = 20.0
-# Best of a round that start again from some way off, and how often.
-SHAKEN, SHAKES = 3, 3
+# Best of a round that start again from elsewhere.
+SHAKEN = 3
 
 
 class Rounds:
@@ -83,12 +83,13 @@ class Rounds:
     ) -> None:
         self._pool, self._recipe, self._names = pool, recipe, tuple(names)
         self._runs, self._progress = tuple(runs), progress
+        self._restarts = Restarts(pool=pool, recipe=recipe, runs=self._runs)
 
     def without_effects(self) -> Point:
         """The fit without effects."""
         (null,) = self._pool.map(start, self._recipe, [self._runs])
         if null.chi_squared > NOISE_LEFT:
-            (null,) = self._shaken([null])
+            (null,) = self._restarts.shaken([null])
         return null
 
     def refitted(self, point: Point) -> Point:
@@ -206,24 +207,10 @@ class Rounds:
     def _moved(self, contenders: Sequence[Contender], base: Point, most: int) -> list[Contender]:
         """The best of a round started again from some way off."""
         best = best_few(contenders, base, most)
-        points = self._shaken([c.point for c in best if c.point is not None])
+        points = self._restarts.sifted([c.point for c in best if c.point is not None])
+        points = self._restarts.shaken(points)
         again = [replace(c, point=p) for c, p in zip(best, points, strict=True)]
         return better_of(contenders, again)
-
-    def _shaken(self, points: Sequence[Point]) -> list[Point]:
-        """Fits, each the best of itself and those from some way off."""
-        tasks = [
-            Task(base=point, runs=self._runs, number=k) for point in points for k in range(SHAKES)
-        ]
-        found = list(self._pool.map(shake, self._recipe, tasks))
-        best = [
-            min(found[SHAKES * k : SHAKES * (k + 1)], key=lambda p: p.cost)
-            for k in range(len(points))
-        ]
-        lower = {k: new for k, new in enumerate(best) if new.cost < points[k].cost - WORTH}
-        tasks = [Task(base=new, runs=self._runs) for new in lower.values()]
-        ended = dict(zip(lower, self._pool.map(refit, self._recipe, tasks), strict=True))
-        return [ended.get(k, point) for k, point in enumerate(points)]
 
     def _fitted(
         self,

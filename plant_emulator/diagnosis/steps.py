@@ -6,7 +6,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.contest import Point, again, linearised, null_fit
-from plant_emulator.diagnosis.looks import from_nominal, glance, glance_far, look, patient, shaken
+from plant_emulator.diagnosis.looks import (
+    from_nominal,
+    glance,
+    glance_far,
+    look,
+    patient,
+    shaken,
+    sifted,
+)
 from plant_emulator.diagnosis.signature import signature
 from plant_emulator.diagnosis.tangents import Tangents
 
@@ -70,6 +78,11 @@ def follow(model: Model, task: Task) -> Point:
 def shake(model: Model, task: Task) -> Point:
     """The fit of `task.base` from some way off its values."""
     return shaken(model, task.base.effects, task.runs, task.base, task.number)
+
+
+def sift(model: Model, task: Task) -> Point:
+    """The fit of `task.base` from the best values of each of its unknowns."""
+    return sifted(model, task.base.effects, task.runs, task.base)
 
 
 def once_more(model: Model, task: Task) -> Point:

@@ -1,10 +1,11 @@
 """The measuring wheel slips on the drum, the more the harder the drum accelerates.
 
-    omega_meas = (1 - k omega_d') omega_d
+    omega_meas = (1 - k omega_d' (|omega_d'| / (1 rad/s^2))^(n - 1)) omega_d
 
 Source: H. B. Pacejka, Tyre and Vehicle Dynamics, on longitudinal slip: small slip is in proportion
-to the force, here the one that accelerates the wheel's own inertia J_w, so that
-k = J_w r_d / (C r_w^2) with its radius r_w and slip stiffness C. While the drum brakes the wheel
+to the force (n = 1), here the one that accelerates the wheel's own inertia J_w, so that
+k = J_w r_d / (C r_w^2) with its radius r_w and slip stiffness C; a larger one grows faster where
+the contact slides (n > 1), slower where the tread stiffens (n < 1). While the drum brakes the wheel
 runs ahead.
 """
 
@@ -22,7 +23,13 @@ PARAMETERS = {
     "slip_per_acceleration": EffectParameter(
         neutral=0.0, lower=0.0, upper=0.2, plausible=0.01, unit="s^2/rad", meaning="k"
     ),
+    "exponent": EffectParameter(
+        neutral=1.0, lower=0.3, upper=1.5, plausible=1.0, unit="1", meaning="n", std=0.25
+    ),
 }
+
+# Below this acceleration slip is in proportion [rad/s^2]; its slope stays finite.
+SLOW = 0.02
 
 
 def acceleration(s: Record, p: Record) -> float:
@@ -38,4 +45,6 @@ def measured_drum_speed(value: float, s: Record, p: Record) -> float:
     k = p.drum_speed_slip_slip_per_acceleration
     if k == 0.0:
         return value
-    return value * (1.0 - k * acceleration(s, p))
+    rate = acceleration(s, p)
+    bent: float = (abs(rate) + SLOW) ** (p.drum_speed_slip_exponent - 1.0)
+    return value * (1.0 - k * rate * bent)

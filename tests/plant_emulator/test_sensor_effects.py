@@ -94,6 +94,18 @@ def test_slipping_measuring_wheel_falls_behind_by_the_acceleration(
     others_unchanged(log, plain, "drum_speed")
 
 
+def test_slip_that_bends_grows_with_a_power_of_the_acceleration(
+    nominal: ParameterSet, plain: Log
+) -> None:
+    """n = 1/2, k = 0.02: at 1.597 rad/s^2 it shows 0.02 sqrt(1.597) = 2.53 % too little."""
+    sizes = {"slip_per_acceleration": 0.02, "exponent": 0.5}
+    log = simulate(INPUTS, effect(nominal, "drum_speed_slip", **sizes))
+    ramp = (INPUTS.time > 0.9) & (INPUTS.time < 1.2)
+    share = log["drum_speed"][ramp] / plain["drum_speed"][ramp]
+    assert share.mean() == pytest.approx(1.0 - 0.02 * (100.0 / 62.6) ** 0.5, abs=2e-3)
+    others_unchanged(log, plain, "drum_speed")
+
+
 def test_motor_turns_slower_where_its_tachometer_shows_too_much(nominal: ParameterSet) -> None:
     """The read speed is held at the reference; the drum turns at 1 / (1 + e) of it, over xi."""
     inputs = linear((0.5, 0.0), (2.0, 200.0), duration=30.0)

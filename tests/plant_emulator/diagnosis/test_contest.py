@@ -10,7 +10,7 @@ from plant_emulator.diagnosis import rounds as engine
 from plant_emulator.diagnosis.answer import undetectable
 from plant_emulator.diagnosis.contest import Point, fit, linearised, null_fit
 from plant_emulator.diagnosis.explain import Explanation, adequate, excess
-from plant_emulator.diagnosis.looks import from_nominal, glance, glance_far, look
+from plant_emulator.diagnosis.looks import from_nominal, glance, glance_far, look, sifted
 from plant_emulator.diagnosis.model import Candidate, Run
 from plant_emulator.diagnosis.place import subsystem
 from plant_emulator.diagnosis.pool import Here
@@ -485,3 +485,31 @@ def test_what_takes_but_a_part_of_the_rest_is_no_second_effect() -> None:
     y = 2.0 + 3.0 * TIME + 2.0 * np.abs(TIME) + first
     assert explained(Line([noisy(y + second)], ["kink", "wave"])).final.effects == ("kink",)
     assert explained(Line([noisy(y)], ["kink", "wave"])).final.effects == ("kink", "wave")
+
+
+class Pulse(Line):
+    """A pulse that comes somewhere; where it does not meet the measured one the cost is flat."""
+
+    parameters = (linear("a", 0.0, std=0.5),)
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+
+        def residual(v: Mapping[str, float]) -> Array:
+            return (self.measured[run] - pulse(v["a"]))[None, :]
+
+        return residual
+
+
+def pulse(when: float) -> Array:
+    """A pulse, 2 % of the time wide."""
+    return 50.0 * np.exp(-(((TIME - when) / 0.02) ** 2))
+
+
+def test_a_fit_in_another_valley_gets_out_by_trying_the_values_of_each_unknown() -> None:
+    model = Pulse([pulse(0.19) + np.random.default_rng(1).standard_normal(len(TIME))])
+    stuck = fit(model, (), [0], {"a": -0.3}, [{}])
+    assert stuck.chi_squared > 10.0
+    found = sifted(model, (), [0], stuck)
+    assert found.values["a"] == pytest.approx(0.19, abs=1e-3)
+    assert found.chi_squared == pytest.approx(1.0, abs=0.1)

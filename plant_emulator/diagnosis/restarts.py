@@ -1,0 +1,55 @@
+"""Fits started again from elsewhere: where contact comes and goes, the cost has many valleys."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from plant_emulator.diagnosis.contest import ASTRAY, WORTH
+from plant_emulator.diagnosis.steps import Task, refit, shake, sift
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.diagnosis.contest import Point
+    from plant_emulator.diagnosis.pool import Pool, Recipe
+
+# How often a fit starts again from some way off.
+SHAKES = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Restarts:
+    """The restarts of one diagnosis on its pool; runs : by number."""
+
+    pool: Pool
+    recipe: Recipe
+    runs: tuple[int, ...]
+
+    def sifted(self, points: Sequence[Point]) -> list[Point]:
+        """Fits; of those that leave much the better of itself and that from the best values of
+        each of its unknowns.
+        """
+        far = {k: point for k, point in enumerate(points) if point.chi_squared > ASTRAY}
+        tasks = [Task(base=point, runs=self.runs) for point in far.values()]
+        found = dict(zip(far, self.pool.map(sift, self.recipe, tasks), strict=True))
+        return self._ended(points, found)
+
+    def shaken(self, points: Sequence[Point]) -> list[Point]:
+        """Fits, each the best of itself and those from some way off."""
+        tasks = [
+            Task(base=point, runs=self.runs, number=k) for point in points for k in range(SHAKES)
+        ]
+        found = list(self.pool.map(shake, self.recipe, tasks))
+        best = [
+            min(found[SHAKES * k : SHAKES * (k + 1)], key=lambda p: p.cost)
+            for k in range(len(points))
+        ]
+        return self._ended(points, dict(enumerate(best)))
+
+    def _ended(self, points: Sequence[Point], found: Mapping[int, Point]) -> list[Point]:
+        """Fits, or what was found in their place where that is better, to convergence."""
+        lower = {k: new for k, new in found.items() if new.cost < points[k].cost - WORTH}
+        tasks = [Task(base=new, runs=self.runs) for new in lower.values()]
+        ended = dict(zip(lower, self.pool.map(refit, self.recipe, tasks), strict=True))
+        return [ended.get(k, point) for k, point in enumerate(points)]
