@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 
 from plant_emulator import estimation
 from plant_emulator.equation_error import start_values
+from plant_emulator.fed_noise import loud
 from plant_emulator.free_parameters import free_parameters, unknowns
 from plant_emulator.search import FINE_SCANS, GAP_POSITION, Search
 from plant_emulator.simulate import TOLERANCE, values_of
@@ -142,6 +143,10 @@ def least_squares(
 
     wanted = unknowns(parameters, free, search.values, search.gaps, states)
     first = estimation.estimate(wanted, coarse, progress=tell)
+    fine = [
+        _quieted(r, f, k, first, search)
+        for k, (r, f) in enumerate(zip(recordings, fine, strict=True))
+    ]
     outdone = [
         replace(u, start=u.value(float(z)), std=None if error < u.scaled_std else u.std)
         for u, z, error in zip(first.unknowns, first.z, first.data_errors, strict=True)
@@ -167,6 +172,17 @@ def residual_functions(
         return residual
 
     return [of(recording) for recording in recordings]
+
+
+def _quieted(
+    recording: Recording, residual: Residual, run: int, near: Estimate, search: Search
+) -> Residual:
+    """The residual of a run with the noise of its fed input as it is near a fit."""
+    values = {**search.values, **recording.own, **near.parameters(), **near.states(run)}
+    found = loud(recording, values, values.pop(GAP_POSITION))
+    if found is None:
+        return residual
+    return lambda trial: found.quieted(residual(trial))
 
 
 def _next_valley(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,6 +46,10 @@ class Recording:
             return np.where(self.use, IMPOSSIBLE, 0.0)
         difference = np.stack([self.log[name] - found[name] for name in self.channels])
         return np.where(self.use, difference / self.noise[:, None], 0.0)
+
+    def fed(self, wheel_torque: Array) -> Recording:
+        """The same log simulated with another wheel torque [N m], shape (n,)."""
+        return replace(self, run=replace(self.run, wheel_torque=wheel_torque))
 
 
 def recording(

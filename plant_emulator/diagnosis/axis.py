@@ -109,6 +109,10 @@ class AxisModel:
 
         return residual
 
+    def loud(self, run: int, where: Point, state: Mapping[str, float]) -> None:  # noqa: ARG002
+        """See `Model`: the motion is fed, but smoothed."""
+        return
+
     def nominal(self, runs: Sequence[int]) -> dict[str, float]:
         """See `Model`: an axis has no data sheet; least squares of these runs."""
         return self._least_squares(runs, self.parameters)

@@ -16,6 +16,7 @@ from plant_emulator.diagnosis.relations import base_speed
 from plant_emulator.effects import from_file
 from plant_emulator.equation_error import start_values
 from plant_emulator.estimates import Unknown
+from plant_emulator.fed_noise import loud
 from plant_emulator.free_parameters import free_parameters, unknowns
 from plant_emulator.kernel import kernel, know
 from plant_emulator.parameters import UNITS
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.effects import Effect
     from plant_emulator.estimates import Array, Residual
+    from plant_emulator.fed_noise import Loud
     from plant_emulator.parameters import ParameterSet
     from plant_emulator.recording import Recording
 
@@ -138,6 +140,7 @@ class BenchModel:
                 time=r.log.time,
                 measured=np.stack([r.log[name] for name in r.channels]),
                 noise=r.noise,
+                fed=r.run.truck,
             )
             for r in recordings
         ]
@@ -158,6 +161,11 @@ class BenchModel:
             return recording.residual(trial, trial.pop(GAP_POSITION), tolerance)
 
         return residual
+
+    def loud(self, run: int, where: Point, state: Mapping[str, float]) -> Loud | None:
+        """See `Model`."""
+        values = {**self._fixed(run, where.effects), **where.values, **state}
+        return loud(self._recordings[run], values, values.pop(GAP_POSITION))
 
     def nominal(self, runs: Sequence[int]) -> dict[str, float]:  # noqa: ARG002
         """See `Model`: the parameter set's."""

@@ -16,12 +16,14 @@ large as it says at every level of v, and nearly white.
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from plant_emulator.covariance import structure
+from plant_emulator.diagnosis.contest import again
+from plant_emulator.diagnosis.explain import THRESHOLD
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -63,7 +65,20 @@ class Unrest:
 
 
 def unrest(model: Model, task: Task) -> Unrest:
-    """Step of a diagnosis: the unrest that `task.effect` explains of a fit's residual."""
+    """Step of a diagnosis: the unrest that `task.effect` explains of a fit's residual.
+
+    Where it does not hold, once more on the fit with its weights: restless samples, taken at the
+    sensors' noise, draw a fit to their chance course, and what that leaves elsewhere is not random.
+    """
+    first = _unrest(model, task)
+    if first.holds or first.evidence <= THRESHOLD:
+        return first
+    weighted = cast("Model", _Weighted(model, dict(zip(task.runs, first.weights, strict=True))))
+    moved = again(weighted, task.base.effects, task.runs, task.base)
+    return _unrest(model, replace(task, base=moved))
+
+
+def _unrest(model: Model, task: Task) -> Unrest:
     where, (size,) = task.base, model.candidates[task.effect].sizes
     residuals = [
         model.residual(run, where.effects)({**where.values, **states})
@@ -143,7 +158,7 @@ def _even(squares: Array, added: Array) -> bool:
 class _Weighted:
     """A model whose residuals are weighted; all else as it is."""
 
-    def __init__(self, model: Model, weights: Sequence[Array]) -> None:
+    def __init__(self, model: Model, weights: Sequence[Array] | Mapping[int, Array]) -> None:
         self._model, self._weights = model, weights
 
     def __getattr__(self, name: str) -> Any:

@@ -79,7 +79,7 @@ class Diagnose:
             runs=self.plan.fitted,
             progress=self.progress,
         )
-        explained, found = inquiry.found()
+        explained, found = inquiry.with_quiet_inputs().found()
         held_out = HeldOut(
             pool=self.pool,
             recipe=self.recipe,

@@ -10,6 +10,7 @@ import numpy as np
 from plant_emulator.diagnosis import apart, verdict
 from plant_emulator.diagnosis.chance import Weighted, unrest
 from plant_emulator.diagnosis.explain import THRESHOLD
+from plant_emulator.diagnosis.quieted import quieted
 from plant_emulator.diagnosis.steps import Task
 from plant_emulator.diagnosis.stepwise import Contest
 
@@ -34,6 +35,11 @@ class Inquiry:
     model: Model
     runs: tuple[int, ...]
     progress: Progress | None = None
+
+    def with_quiet_inputs(self) -> Inquiry:
+        """The same with the noise of fed inputs as part of the noise."""
+        recipe = quieted(self.pool, self.recipe, self.model, self.runs)
+        return replace(self, recipe=recipe)
 
     def found(self) -> tuple[Explanation, Verdict]:
         """What the contest came to, and the verdict."""

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.estimates import Array, Residual, Unknown
+    from plant_emulator.fed_noise import Loud
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,6 +63,7 @@ class Run:
 
     time : of its samples [s], shape (n,); measured : shape (channels, n) [units]
     noise : standard deviation of each channel's noise, shape (channels,) [units]
+    fed : whether an input of its simulation is a measurement with noise of its own
     """
 
     source: str
@@ -70,6 +72,7 @@ class Run:
     time: Array
     measured: Array
     noise: Array
+    fed: bool = False
 
 
 class Model(Protocol):
@@ -112,6 +115,9 @@ class Model(Protocol):
 
         Measured minus simulated over the noise, shape (channels, samples); 0: does not count.
         """
+
+    def loud(self, run: int, where: Point, state: Mapping[str, float]) -> Loud | None:
+        """What the noise of the run's fed inputs does to it at a fit; see `fed_noise`."""
 
     def nominal(self, runs: Sequence[int]) -> Mapping[str, float]:
         """The parameters as given; of a machine without such, what these runs tell of them."""

@@ -87,6 +87,14 @@ def test_gap_that_is_random_elsewhere_is_no_unrest() -> None:
     assert not one.holds
 
 
+def test_unrest_that_draws_the_fit_to_its_course_is_told_all_the_same() -> None:
+    """All shakes of the last eighth go one way, and the line follows them until they weigh less."""
+    course = np.where(TIME > 0.75, 8.0 * SLOPE, shaken(8.0))
+    one = found(noisy(2.0 + 3.0 * TIME) + course)
+    assert one.holds
+    assert one.size == pytest.approx(8.0, rel=0.05)
+
+
 def test_effect_beside_an_unrest_is_named_with_it() -> None:
     y = noisy(2.0 + 3.0 * TIME + 0.5 * np.sin(20.0 * TIME)) + shaken(0.8)
     model = Shaken([y])

@@ -19,6 +19,7 @@ from plant_emulator.diagnosis.stepwise import Contest
 from plant_emulator.diagnosis.tangents import Tangents
 from plant_emulator.diagnosis.verdict import decide
 from plant_emulator.estimates import Array, Unknown
+from plant_emulator.fed_noise import Loud
 
 TIME = np.linspace(-1.0, 1.0, 2000)
 
@@ -85,6 +86,10 @@ class Line:
             return (self.measured[run] - y)[None, :]
 
         return residual
+
+    def loud(self, run: int, where: Point, state: Mapping[str, float]) -> Loud | None:
+        """See `Model`: nothing is fed."""
+        return None
 
     def nominal(self, runs: Sequence[int]) -> dict[str, float]:
         """See `Model`."""

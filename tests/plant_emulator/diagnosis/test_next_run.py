@@ -16,6 +16,7 @@ from plant_emulator.diagnosis.model import Candidate, Run
 from plant_emulator.diagnosis.pool import Here
 from plant_emulator.diagnosis.verdict import Verdict
 from plant_emulator.estimates import Array, Unknown
+from plant_emulator.fed_noise import Loud
 from plant_emulator.recording import recording
 from plant_emulator.search import GAP_POSITION
 from plant_emulator.sensors import noisy
@@ -94,6 +95,9 @@ class Slope:
     def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
         x, y = self.speeds[run], self.measured[run]
         return lambda v: ((y - self.foretold(x, effects, v)) / 0.01)[None, :]
+
+    def loud(self, run: int, where: Point, state: Mapping[str, float]) -> Loud | None:
+        return None
 
     def nominal(self, runs: Sequence[int]) -> dict[str, float]:
         return {u.name: u.prior for u in self.parameters}

@@ -1,0 +1,84 @@
+"""The noise of fed inputs as part of the noise, in every fit of a contest; see `fed_noise`.
+
+Its directions are those at the fit without effects, which is where a gap closes when it does in the
+log. They are the same for all fits, whose costs are compared.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
+
+from plant_emulator.diagnosis.steps import Task, start
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.diagnosis.model import Model
+    from plant_emulator.diagnosis.pool import Pool, Recipe
+    from plant_emulator.estimates import Array, Residual
+    from plant_emulator.fed_noise import Loud
+
+
+def quieted(pool: Pool, recipe: Recipe, model: Model, runs: tuple[int, ...]) -> Recipe:
+    """The recipe of a model whose residuals have white noise also where inputs are fed.
+
+    The recipe itself where these runs feed none, or none that counts.
+    """
+    if not any(model.runs[run].fed for run in runs):
+        return recipe
+    (null,) = pool.map(start, recipe, [runs])
+    (found,) = pool.map(louds, recipe, [Task(base=null, runs=runs)])
+    return Quieted(recipe, found) if found else recipe
+
+
+def louds(model: Model, task: Task) -> dict[int, Loud]:
+    """Step of a diagnosis: what the noise of fed inputs does to the runs of a fit, by run."""
+    fed = [
+        (run, model.loud(run, task.base, state))
+        for run, state in zip(task.runs, task.base.states, strict=True)
+        if model.runs[run].fed
+    ]
+    return {run: found for run, found in fed if found is not None}
+
+
+class _Quieted:
+    """A model whose residuals are quieted; all else as it is."""
+
+    def __init__(self, model: Model, louds: Mapping[int, Loud]) -> None:
+        self._model, self._louds = model, louds
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._model, name)
+
+    def residual(self, run: int, effects: Sequence[str]) -> Residual:
+        """See `Model`."""
+        plain, found = self._model.residual(run, effects), self._louds.get(run)
+        if found is None:
+            return plain
+
+        def residual(values: Mapping[str, float]) -> Array:
+            return found.quieted(plain(values))
+
+        return residual
+
+
+@dataclass(frozen=True)
+class Quieted:
+    """What builds a model whose residuals are quieted; louds : by run."""
+
+    recipe: Recipe
+    louds: Mapping[int, Loud]
+
+    def build(self) -> Model:
+        """The model."""
+        return cast("Model", _Quieted(self.recipe.build(), self.louds))
+
+    def digest(self) -> str:
+        """The same for the same model only."""
+        own = hashlib.sha256(self.recipe.digest().encode())
+        for run, found in sorted(self.louds.items()):
+            own.update(f"{run} {found.directions.shape}".encode())
+            own.update(found.directions.tobytes() + found.deviations.tobytes())
+        return own.hexdigest()

@@ -1,0 +1,69 @@
+"""The noise of fed inputs in a contest, on a line one direction of which is fed with noise."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from plant_emulator.diagnosis.contest import Point, null_fit
+from plant_emulator.diagnosis.inquiry import Inquiry
+from plant_emulator.diagnosis.pool import Here
+from plant_emulator.diagnosis.quieted import Quieted, quieted
+from plant_emulator.estimates import Array
+from plant_emulator.fed_noise import Loud
+from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, noisy
+
+# What the fed input's noise adds to every sample by its one standard deviation.
+FED = np.where(TIME > 0.95, 20.0, 0.0)
+NORM = float(np.linalg.norm(FED))
+
+
+class Fed(Line):
+    """The line, of which an input is a measurement."""
+
+    def __init__(self, measured: Sequence[Array]) -> None:
+        super().__init__(measured)
+        self.runs = [replace(run, fed=True) for run in self.runs]
+
+    def loud(self, run: int, where: Point, state: Mapping[str, float]) -> Loud:
+        """See `Model`."""
+        return Loud(directions=FED[None, None] / NORM, deviations=np.array([NORM]))
+
+
+def test_fits_do_not_follow_the_noise_of_a_fed_input() -> None:
+    """By hand: without the fed samples a and b are those of the line, within their errors."""
+    y = noisy(2.0 + 3.0 * TIME) + FED
+    model = Fed([y])
+    recipe = quieted(Here(), Given(model), model, (0,))
+    there, plain = null_fit(recipe.build(), [0]), null_fit(model, [0])
+    for name, value in (("a", 2.0), ("b", 3.0)):
+        assert abs(there.values[name] - value) < 3.0 * there.errors[name]
+    assert plain.values["b"] > 4.0
+
+
+def test_inquiry_with_quiet_inputs_finds_no_gap_in_their_noise() -> None:
+    model = Fed([noisy(2.0 + 3.0 * TIME) + FED])
+    inquiry = Inquiry(pool=Here(), recipe=Given(model), model=model, runs=(0,))
+    assert inquiry.found()[1].kind == "unknown"
+    assert inquiry.with_quiet_inputs().found()[1].kind == "parameter"
+
+
+def test_machine_that_is_fed_nothing_keeps_its_recipe() -> None:
+    model = Line([noisy(2.0 + 3.0 * TIME)])
+    recipe = Given(model)
+    assert quieted(Here(), recipe, model, (0,)) is recipe
+
+
+def test_quieted_model_is_another_recipe() -> None:
+    model = Fed([noisy(2.0 + 3.0 * TIME)])
+    one = model.loud(0, null_fit(model, [0]), {})
+    louder = replace(one, deviations=2.0 * one.deviations)
+    digests = {Quieted(Given(model), {0: loud}).digest() for loud in (one, louder)}
+    assert len({*digests, Given(model).digest()}) == 3
+    values = {"a": 0.0, "b": 0.0}
+    built = Quieted(Given(model), {0: one}).build()
+    assert built.runs is model.runs
+    assert built.residual(0, ())(values)[0, TIME <= 0.95] == pytest.approx(
+        model.residual(0, ())(values)[0, TIME <= 0.95]
+    )

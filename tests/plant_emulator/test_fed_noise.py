@@ -1,0 +1,90 @@
+"""The noise of a fed wheel torque, against draws of it, and what it does to an identification."""
+
+import numpy as np
+import pytest
+
+from plant_emulator.fed_noise import Loud, loud
+from plant_emulator.identify import identify
+from plant_emulator.log import Log
+from plant_emulator.parameters import ParameterSet
+from plant_emulator.programs import TravelProgram, program
+from plant_emulator.recording import Recording, recording
+from plant_emulator.sensors import SENSORS, noisy
+from plant_emulator.travel import travel
+
+GAP = 0.3
+
+
+@pytest.fixture(scope="module")
+def true_log(nominal: ParameterSet) -> Log:
+    """Program 6 without noise."""
+    known = program("program6")
+    assert isinstance(known, TravelProgram)
+    return travel(known, nominal, gap_position=GAP)
+
+
+@pytest.fixture(scope="module")
+def measured(true_log: Log) -> Recording:
+    return recording(noisy(true_log, 1))
+
+
+def test_direction_of_deviation_three_comes_out_with_variance_one() -> None:
+    direction = np.zeros((2, 50))
+    direction[0, 10], direction[1, 11] = 0.6, 0.8
+    random = np.random.default_rng(1)
+    draws = [
+        random.standard_normal((2, 50)) + 3.0 * random.standard_normal() * direction
+        for _ in range(4000)
+    ]
+    one = Loud(directions=direction[None], deviations=np.array([3.0]))
+    along = [float(np.sum(direction * one.quieted(r))) for r in draws]
+    assert np.var(along) == pytest.approx(1.0, abs=0.1)
+    across = one.quieted(draws[0]) - draws[0]
+    assert np.count_nonzero(across) == 2, "all else stays"
+
+
+def test_directions_hold_what_drawn_noise_of_the_wheel_torque_does(
+    measured: Recording, true_log: Log, nominal: ParameterSet
+) -> None:
+    """Two gaps close while the truck drives: at its start, and when it brakes."""
+    found = loud(measured, nominal.values(), GAP)
+    assert found is not None
+    spikes = np.abs(found.directions).max(axis=1).argmax(axis=1)
+    assert sorted(np.round(true_log.time[spikes], 1).tolist()) == [2.4, 22.6]
+    random, torque = np.random.default_rng(2), true_log["wheel_torque"]
+    base = measured.fed(torque).residual(nominal.values(), GAP)
+    deviation = SENSORS["wheel_torque"][0]
+    raw, quiet = [], []
+    for _ in range(20):
+        fed = measured.fed(torque + deviation * random.standard_normal(len(torque)))
+        change = fed.residual(nominal.values(), GAP) - base
+        raw.append(np.tensordot(found.directions, change, axes=2))
+        quiet.append(np.tensordot(found.directions, found.quieted(change), axes=2))
+    assert np.mean(np.square(raw)) > 20.0
+    assert np.mean(np.square(quiet)) < 2.0
+
+
+def test_samples_that_do_not_count_stay_zero(true_log: Log, nominal: ParameterSet) -> None:
+    counted = true_log.time < 22.55
+    log = noisy(true_log, 1)
+    part = recording(log, use={"armature_current": counted})
+    found = loud(part, nominal.values(), GAP)
+    assert found is not None
+    row = part.channels.index("armature_current")
+    quiet = found.quieted(part.residual(nominal.values(), GAP))
+    assert not quiet[row, ~counted].any()
+
+
+def test_log_without_a_truck_feeds_nothing(nominal: ParameterSet, true_log: Log) -> None:
+    signals = {k: v for k, v in noisy(true_log, 1).signals.items() if k != "wheel_torque"}
+    alone = recording(Log(true_log.time, signals, true_log.source))
+    assert loud(alone, nominal.values(), GAP) is None
+
+
+def test_drum_inertia_of_a_noisy_log_lies_within_its_standard_error(
+    true_log: Log, nominal: ParameterSet
+) -> None:
+    """With the sensors' noise alone it is 21 standard errors off."""
+    answer = identify([recording(noisy(true_log, 4000))], nominal, ["drum_inertia"])
+    (inertia,) = answer.parameters
+    assert abs(inertia.value - 312.69) < 3.5 * inertia.standard_error
