@@ -6,6 +6,7 @@ effects that the others missed.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +19,8 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.model import Model
     from plant_emulator.diagnosis.signature import Signature
-    from plant_emulator.estimates import Estimate
+    from plant_emulator.diagnosis.tangents import Tangents
+    from plant_emulator.estimates import Array, Estimate
 
 # Steps of a first look, whose drift follows by secants.
 GLANCE = 10
@@ -34,6 +36,8 @@ FEW_SHAKEN, SHAKE = 12, 30.0
 SIFTED, SIFT, SIFT_SIZE = 11, 1.0, 0.1
 # The same from the nominal parameters, where a step goes far.
 FEW_FAR, FEW_FAR_WITH_STATES = 4, 8
+# Sizes in another's place, which follow that one's size.
+PLACES = (0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.4, 1.7, 2.0, 3.0)
 # Sizes that a start from the nominal parameters is tried at, in plausible sizes.
 FAR_SIZES = (0.25, 0.4, 0.6, 0.8, 1.0, 1.4, 2.0)
 
@@ -150,6 +154,57 @@ def _scanned(
             best = trials[int(np.argmin(losses))]
         found.append(best)
     return tuple(found)
+
+
+def in_place(
+    model: Model, effect: str, found: Point, runs: Sequence[int], tangents: Tangents
+) -> tuple[float, Point]:
+    """A start with an effect in the place of a fit's last, at the size that fits best there, the
+    drift as it is or moved to make up for the difference; and the loss there.
+
+    tangents : of the drift there, see `vacated`
+    """
+    effects, candidate = (*found.effects[:-1], effect), model.candidates[effect]
+    before = _whole(model, found.effects, runs, found.values, found.states)
+    place = vacated(model, found)
+    own = {u.name: u.start for u in candidate.states}
+    states = [{**state, **own} for state in place.states]
+    starts = []
+    for size in (sign * z for z in PLACES for sign in signs(candidate.sizes)):
+        sizes = sized(candidate, size)
+        values = {**place.values, **sizes}
+        change = _whole(model, effects, runs, values, states) - before
+        moved, after = tangents.moved(tangents.imitation(change), len(states))
+        starts.append((values, states))
+        starts.append(
+            ({**values, **moved}, [{**s, **t} for s, t in zip(states, after, strict=True)])
+        )
+    losses = [_loss(model, effects, runs, *start) for start in starts]
+    values, states = starts[int(np.argmin(losses))]
+    return min(losses), replace(found, effects=effects, values=values, states=tuple(states))
+
+
+def vacated(model: Model, found: Point) -> Point:
+    """Where a fit has come to, less its last effect."""
+    last = model.candidates[found.effects[-1]]
+    gone = {u.name for u in (*last.sizes, *last.shapes)}
+    values = {name: value for name, value in found.values.items() if name not in gone}
+    return replace(found, effects=found.effects[:-1], values=values)
+
+
+def _whole(
+    model: Model,
+    effects: Sequence[str],
+    runs: Sequence[int],
+    values: Mapping[str, float],
+    states: Sequence[Mapping[str, float]],
+) -> Array:
+    """Residual of all runs."""
+    every = [
+        model.residual(k, effects)({**values, **state})
+        for k, state in zip(runs, states, strict=True)
+    ]
+    return np.concatenate([residual.ravel() for residual in every])
 
 
 def from_nominal(model: Model, effect: str, base: Point, runs: Sequence[int]) -> Point:
