@@ -6,6 +6,7 @@ effects that the others missed.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +19,8 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.model import Model
     from plant_emulator.diagnosis.signature import Signature
-    from plant_emulator.estimates import Estimate
+    from plant_emulator.diagnosis.tangents import Tangents
+    from plant_emulator.estimates import Array, Estimate
 
 # Steps of a first look, whose drift follows by secants.
 GLANCE = 10
@@ -36,6 +38,8 @@ SIFTED, SIFT, SIFT_SIZE = 11, 1.0, 0.1
 FEW_FAR, FEW_FAR_WITH_STATES = 4, 8
 # How far sizes of many valleys are looked for, in plausible sizes.
 WIDEST = 3.0
+# Sizes in another's place, which follow that one's size.
+PLACES = (0.1, 0.2, 0.4, 0.7, 1.0, 1.4, 2.0, 3.0)
 # Sizes that a start from the nominal parameters is tried at, in plausible sizes.
 FAR_SIZES = (0.25, 0.4, 0.6, 0.8, 1.0, 1.4, 2.0)
 
@@ -180,6 +184,54 @@ def _sizes_scanned(
     return best
 
 
+def in_place(
+    model: Model, effect: str, found: Point, runs: Sequence[int], tangents: Tangents
+) -> tuple[float, Point]:
+    """A start with an effect in the place of a fit's last, at the size that fits best there, the
+    drift as it is or moved to make up for the difference; and the loss there.
+
+    tangents : of the drift there, see `vacated`
+    """
+    effects, candidate = (*found.effects[:-1], effect), model.candidates[effect]
+    before = _whole(model, found.effects, runs, found.values, found.states)
+    place = vacated(model, found)
+    own = {u.name: u.start for u in candidate.states}
+    states = [{**state, **own} for state in place.states]
+    tries = []
+    for size in (sign * z for z in PLACES for sign in signs(candidate.sizes)):
+        values = {**place.values, **sized(candidate, size)}
+        there = _whole(model, effects, runs, values, states)
+        tries.append((_forgiven(there), values, states))
+        moved, after = tangents.moved(tangents.imitation(there - before), len(states))
+        far = {**values, **moved}, [{**s, **t} for s, t in zip(states, after, strict=True)]
+        tries.append((_loss(model, effects, runs, *far), *far))
+    loss, values, states = min(tries, key=lambda one: one[0])
+    return loss, replace(found, effects=effects, values=values, states=tuple(states))
+
+
+def vacated(model: Model, found: Point) -> Point:
+    """Where a fit has come to, less its last effect."""
+    last = model.candidates[found.effects[-1]]
+    gone = {u.name for u in (*last.sizes, *last.shapes)}
+    values = {name: value for name, value in found.values.items() if name not in gone}
+    return replace(found, effects=found.effects[:-1], values=values)
+
+
+def _whole(
+    model: Model,
+    effects: Sequence[str],
+    runs: Sequence[int],
+    values: Mapping[str, float],
+    states: Sequence[Mapping[str, float]],
+) -> Array:
+    """Residual of all runs."""
+    every = [
+        model.residual(k, effects)({**values, **state})
+        for k, state in zip(runs, states, strict=True)
+    ]
+    return np.concatenate([residual.ravel() for residual in every])
+
+
 def from_nominal(model: Model, effect: str, base: Point, runs: Sequence[int]) -> Point:
     """Joint fit of one more effect, a few steps a run: the drift from its nominal values, the
     effect from the size that fits them best.
@@ -233,8 +285,10 @@ def _loss(
     values: Mapping[str, float],
     states: Sequence[Mapping[str, float]],
 ) -> float:
+    """Loss of all runs that forgives."""
+    return _forgiven(_whole(model, effects, runs, values, states))
+
+
+def _forgiven(residual: Array) -> float:
     """Sum of log(1 + r^2): what lies far off counts, but little more than near."""
-    return sum(
-        float(np.sum(np.log1p(model.residual(k, effects)({**values, **state}) ** 2)))
-        for k, state in zip(runs, states, strict=True)
-    )
+    return float(np.sum(np.log1p(residual**2)))

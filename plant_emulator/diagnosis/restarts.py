@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.contest import ASTRAY, WORTH
-from plant_emulator.diagnosis.steps import Task, refit, shake, sift
+from plant_emulator.diagnosis.steps import Task, follow, refit, shake, sift, swap
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 # How often a fit starts again from some way off.
 SHAKES = 3
+# Effects that are fitted in the place of another, and steps that the best of them goes further.
+SWAPPED, SIFTS = 2, 3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +48,23 @@ class Restarts:
             for k in range(len(points))
         ]
         return self._ended(points, dict(enumerate(best)))
+
+    def swapped(self, point: Point, names: Sequence[str]) -> Point:
+        """The fit with the likeliest of these effects in the place of the last, from that fit.
+
+        Drift that has followed the wrong effect goes a long way back, through many valleys.
+        """
+        tasks = [Task(base=point, runs=self.runs, effect=name) for name in names]
+        found = sorted(self.pool.map(swap, self.recipe, tasks), key=lambda pair: pair[0])
+        likely = [start for _, start in found[:SWAPPED]]
+        for step in (follow, sift):
+            tasks = [Task(base=p, runs=self.runs) for p in likely]
+            likely = list(self.pool.map(step, self.recipe, tasks))
+        best = min(likely, key=lambda p: p.cost)
+        for step in (*[sift] * SIFTS, refit):
+            (again,) = self.pool.map(step, self.recipe, [Task(base=best, runs=self.runs)])
+            best = min(best, again, key=lambda p: p.cost)
+        return best
 
     def _ended(self, points: Sequence[Point], found: Mapping[int, Point]) -> list[Point]:
         """Fits, or what was found in their place where that is better, to convergence."""

@@ -22,7 +22,7 @@ from plant_emulator.diagnosis.contenders import (
     points_of,
     with_point,
 )
-from plant_emulator.diagnosis.contest import WORTH
+from plant_emulator.diagnosis.contest import ASTRAY, WORTH
 from plant_emulator.diagnosis.explain import NOISE_LEFT, THRESHOLD
 from plant_emulator.diagnosis.restarts import Restarts
 from plant_emulator.diagnosis.rules import SECOND, noise_only
@@ -203,6 +203,18 @@ class Rounds:
         tasks = [Task(base=p, runs=self._runs) for p in starts]
         again = self._pool.map(refit, self._recipe, tasks)
         return min([base, *again], key=lambda p: p.cost)
+
+    def in_place(self, contenders: Sequence[Contender], best: Point) -> list[Contender]:
+        """A round's effects, the likeliest in the best one's place fitted from there.
+
+        Where a round's fits stop in valleys, an effect's near twin may have been left behind.
+        """
+        names = [c.effect for c in with_point(contenders) if c.effect != best.effects[-1]]
+        if best.chi_squared <= ASTRAY or not names:
+            return list(contenders)
+        found = self._restarts.swapped(best, names)
+        again = [replace(c, point=found) for c in contenders if c.effect == found.effects[-1]]
+        return better_of(contenders, again)
 
     def _moved(self, contenders: Sequence[Contender], base: Point, most: int) -> list[Contender]:
         """The best of a round started again from some way off."""

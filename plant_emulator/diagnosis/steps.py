@@ -10,10 +10,12 @@ from plant_emulator.diagnosis.looks import (
     from_nominal,
     glance,
     glance_far,
+    in_place,
     look,
     patient,
     shaken,
     sifted,
+    vacated,
 )
 from plant_emulator.diagnosis.signature import signature
 from plant_emulator.diagnosis.tangents import Tangents
@@ -83,6 +85,12 @@ def shake(model: Model, task: Task) -> Point:
 def sift(model: Model, task: Task) -> Point:
     """The fit of `task.base` from the best values of each of its unknowns."""
     return sifted(model, task.base.effects, task.runs, task.base)
+
+
+def swap(model: Model, task: Task) -> tuple[float, Point]:
+    """The start of `task.effect` in the place of the last of `task.base`, and its loss."""
+    place = Task(base=vacated(model, task.base), runs=task.runs)
+    return in_place(model, task.effect, task.base, task.runs, _tangents(model, place))
 
 
 def once_more(model: Model, task: Task) -> Point:

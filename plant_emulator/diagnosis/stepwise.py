@@ -1,8 +1,10 @@
 """Which effects the logs ask for: forward and backward steps through the contest.
 
 Forward: the effect whose joint fit lowers the cost most comes in, as long as its evidence counts
-and the gap is not closed. After every addition each earlier effect has to stand the contest again,
-with all others in its place; and at the end each has to be missed when it is taken out.
+and the gap is not closed. Of a second, which stands on a fit that may have gone astray without it,
+the likeliest others are fitted once more in its place. After every addition each earlier effect has
+to stand the contest again, with all others in its place; and at the end each has to be missed when
+it is taken out.
 """
 
 from __future__ import annotations
@@ -61,6 +63,9 @@ class Contest:
             best = best_of(found)
             if best is None or not counts(best, final, null, self._reaches_noise):
                 break
+            if final.effects:
+                found = self._rounds.in_place(found, best)
+                best = best_of(found) or best
             final, rivals = self._stand(best, found)
             final = self._missed(final, null)
             if len(final.effects) == 1:

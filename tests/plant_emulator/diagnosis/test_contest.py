@@ -10,7 +10,15 @@ from plant_emulator.diagnosis import rounds as engine
 from plant_emulator.diagnosis.answer import undetectable
 from plant_emulator.diagnosis.contest import Point, fit, linearised, null_fit
 from plant_emulator.diagnosis.explain import Explanation, adequate, excess
-from plant_emulator.diagnosis.looks import from_nominal, glance, glance_far, look, sifted
+from plant_emulator.diagnosis.looks import (
+    from_nominal,
+    glance,
+    glance_far,
+    in_place,
+    look,
+    sifted,
+    vacated,
+)
 from plant_emulator.diagnosis.model import Candidate, Run
 from plant_emulator.diagnosis.place import subsystem
 from plant_emulator.diagnosis.pool import Here
@@ -483,13 +491,28 @@ def test_second_effect_in_what_looks_like_noise_needs_its_own_evidence(
     assert set(explained(Line([noisy(y)], ["kink", "wave"])).final.effects) == named
 
 
-def test_what_takes_but_a_part_of_the_rest_is_no_second_effect() -> None:
-    """By hand, of 2000 samples: the kink closes 4 / 12, a ripple of the library 0.09 / 2, and one
-    that is not in it 0.16 / 2: what the first takes of both is less than three quarters."""
-    first, second = 0.3 * np.sin(20.0 * TIME), 0.4 * np.sin(50.0 * TIME)
-    y = 2.0 + 3.0 * TIME + 2.0 * np.abs(TIME) + first
-    assert explained(Line([noisy(y + second)], ["kink", "wave"])).final.effects == ("kink",)
-    assert explained(Line([noisy(y)], ["kink", "wave"])).final.effects == ("kink", "wave")
+def test_effect_in_the_place_of_its_twin_begins_at_the_twins_size() -> None:
+    model = Line([noisy(2.0 + 3.0 * TIME + 2.0 * np.abs(TIME))])
+    found = fit(model, ("near kink",), [0], {}, [{}])
+    tangents = Tangents(linearised(model, vacated(model, found), [0]))
+    _, start = in_place(model, "kink", found, [0], tangents)
+    assert start.effects == ("kink",)
+    assert set(start.values) == {"a", "b", "kink_size"}
+    assert start.values["kink_size"] == 2.0
+
+
+@pytest.mark.parametrize(
+    ("beside", "named"), [(0.0, {"kink", "wave"}), (0.25, {"kink", "wave"}), (0.4, {"kink"})]
+)
+def test_what_takes_but_a_part_of_the_rest_is_no_second_effect(
+    beside: float, named: set[str]
+) -> None:
+    """By hand, in parts of 2000 samples: the kink closes 4 / 12, a ripple of the library 0.09 / 2,
+    and one that is not in it 0.0625 / 2 or 0.16 / 2: the first takes 59 or 36 % of both.
+    """
+    ripple = 0.3 * np.sin(20.0 * TIME) + beside * np.sin(50.0 * TIME)
+    y = 2.0 + 3.0 * TIME + 2.0 * np.abs(TIME) + ripple
+    assert set(explained(Line([noisy(y)], ["kink", "wave"])).final.effects) == named
 
 
 class Pulse(Line):
