@@ -6,17 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.contest import Point, again, linearised, null_fit
-from plant_emulator.diagnosis.looks import (
-    from_nominal,
-    glance,
-    glance_far,
-    in_place,
-    look,
-    patient,
-    shaken,
-    sifted,
-    vacated,
-)
+from plant_emulator.diagnosis.elsewhere import from_nominal, in_place, shaken, sifted, vacated
+from plant_emulator.diagnosis.looks import glance, glance_far, look, patient
 from plant_emulator.diagnosis.signature import signature
 from plant_emulator.diagnosis.tangents import Tangents
 

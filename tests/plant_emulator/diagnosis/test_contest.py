@@ -9,16 +9,9 @@ import pytest
 from plant_emulator.diagnosis import rounds as engine
 from plant_emulator.diagnosis.answer import undetectable
 from plant_emulator.diagnosis.contest import Point, fit, linearised, null_fit
+from plant_emulator.diagnosis.elsewhere import from_nominal, in_place, sifted, vacated
 from plant_emulator.diagnosis.explain import Explanation, adequate, excess
-from plant_emulator.diagnosis.looks import (
-    from_nominal,
-    glance,
-    glance_far,
-    in_place,
-    look,
-    sifted,
-    vacated,
-)
+from plant_emulator.diagnosis.looks import glance, glance_far, look
 from plant_emulator.diagnosis.model import Candidate, Run
 from plant_emulator.diagnosis.place import subsystem
 from plant_emulator.diagnosis.pool import Here
