@@ -1,4 +1,6 @@
-"""The torque sensor follows the shaft's torque as a lag of first order, or nearly so.
+"""The torque sensor follows the shaft's torque as a first-order lag.
+
+With a term of second order where it is not quite of first:
 
     q >= 0:   q tau^2 T_meas'' + tau T_meas' + T_meas = T
     q < 0:    (1 - q) tau T_meas' + T_meas = T - q tau T'

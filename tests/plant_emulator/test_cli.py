@@ -175,7 +175,8 @@ def test_effects_as_json_hold_every_parameter_with_its_unit(command: Command) ->
     assert [entry["effect"] for entry in answer["effects"]] == effects.names()
     lag = next(e for e in answer["effects"] if e["effect"] == "torque_sensor_lag")
     assert lag["subsystem"] == "torque_sensor"
-    assert [(p["name"], p["unit"]) for p in lag["parameters"]] == [("time_constant", "s")]
+    own = [(p["name"], p["unit"]) for p in lag["parameters"]]
+    assert own == [("time_constant", "s"), ("second_order", "1")]
 
 
 # --- refusals ---------------------------------------------------------------------------------

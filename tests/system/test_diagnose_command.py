@@ -86,9 +86,10 @@ def test_hidden_lag_is_found_with_its_size_and_place(diagnosed: Diagnosed) -> No
     verdict, first = diagnosed.answer["verdict"], diagnosed.answer["ranking"][0]
     assert (verdict["kind"], verdict["effects"]) == ("effect", ["torque_sensor_lag"])
     assert diagnosed.answer["location"]["subsystem"] == "torque_sensor"
-    (size,) = first["parameters"]
-    # 0.1 s, with which the logs were made
+    size, shape = first["parameters"]
+    # 0.1 s and first order, with which the logs were made
     assert abs(size["value"] - 0.1) < 4.0 * size["standard_error"] < 0.004
+    assert abs(shape["value"]) < 4.0 * shape["standard_error"] < 0.02
     assert diagnosed.answer["gap"]["closed_fraction"] > 0.98
     assert diagnosed.errors == ""
 
