@@ -12,13 +12,14 @@ import numpy as np
 
 from plant_emulator.diagnosis.contest import WORTH, Point, fit, template
 from plant_emulator.diagnosis.signature import FAR, signs, sized
+from plant_emulator.start_states import scanned
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.model import Model
     from plant_emulator.diagnosis.signature import Signature
-    from plant_emulator.estimates import Estimate
+    from plant_emulator.estimates import Estimate, Unknown
 
 # Steps of a first look, whose drift follows by secants.
 GLANCE = 10
@@ -121,10 +122,12 @@ def _scanned(
 ) -> tuple[dict[str, float], ...]:
     """States of every run, each the best of some values while the others stay, two times over.
 
-    One of many narrow valleys is where its signature has found it, and stays.
+    Those of many narrow valleys are then tried together: a signature at a fit that lacks the effect
+    may have found the wrong one.
     """
-    every = (*model.states, *(u for name in effects for u in model.candidates[name].states))
-    own = [u for u in every if u.step is None]
+    of_effects = [u for name in effects for u in model.candidates[name].states]
+    own = [u for u in (*model.states, *of_effects) if u.step is None]
+    together = of_effects if any(u.step is not None for u in of_effects) else []
     found = []
     for k, state in zip(runs, states, strict=True):
         best = dict(state)
@@ -132,8 +135,22 @@ def _scanned(
             trials = [{**best, u.name: value} for value in (best[u.name], *u.starts())]
             losses = [_loss(model, effects, [k], values, [trial]) for trial in trials]
             best = trials[int(np.argmin(losses))]
-        found.append(best)
+        found.append(_together(model, effects, k, values, best, together))
     return tuple(found)
+
+
+def _together(
+    model: Model,
+    effects: Sequence[str],
+    run: int,
+    values: Mapping[str, float],
+    state: Mapping[str, float],
+    unknowns: Sequence[Unknown],
+) -> dict[str, float]:
+    """States of a run with these tried all together, or as they are where that is better."""
+    residual = model.residual(run, effects)
+    anew = scanned(lambda v: residual({**values, **v}), state, unknowns)
+    return min(dict(state), anew, key=lambda s: _loss(model, effects, [run], values, [s]))
 
 
 def _sizes_scanned(
