@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.start_states import scanned
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.model import Model
-    from plant_emulator.estimates import Array
+    from plant_emulator.estimates import Array, Unknown
 
 # How far sizes of many valleys are looked for, in plausible sizes.
 WIDEST = 3.0
@@ -28,10 +30,12 @@ def best_states(
 ) -> tuple[dict[str, float], ...]:
     """States of every run, each the best of some values while the others stay, two times over.
 
-    One of many narrow valleys is where its signature has found it, and stays.
+    Those of many narrow valleys are then tried together: a signature at a fit that lacks the effect
+    may have found the wrong one.
     """
-    every = (*model.states, *(u for name in effects for u in model.candidates[name].states))
-    own = [u for u in every if u.step is None]
+    of_effects = [u for name in effects for u in model.candidates[name].states]
+    own = [u for u in (*model.states, *of_effects) if u.step is None]
+    together = of_effects if any(u.step is not None for u in of_effects) else []
     found = []
     for k, state in zip(runs, states, strict=True):
         best = dict(state)
@@ -39,8 +43,22 @@ def best_states(
             trials = [{**best, u.name: value} for value in (best[u.name], *u.starts())]
             losses = [loss_of(model, effects, [k], values, [trial]) for trial in trials]
             best = trials[int(np.argmin(losses))]
-        found.append(best)
+        found.append(_together(model, effects, k, values, best, together))
     return tuple(found)
+
+
+def _together(
+    model: Model,
+    effects: Sequence[str],
+    run: int,
+    values: Mapping[str, float],
+    state: Mapping[str, float],
+    unknowns: Sequence[Unknown],
+) -> dict[str, float]:
+    """States of a run with these tried all together, or as they are where that is better."""
+    residual = model.residual(run, effects)
+    anew = scanned(lambda v: residual({**values, **v}), state, unknowns)
+    return min(dict(state), anew, key=lambda s: loss_of(model, effects, [run], values, [s]))
 
 
 def best_sizes(
