@@ -163,7 +163,8 @@ def test_all_effects_at_once_settle(nominal: ParameterSet, inputs: dict[str, Log
 
 
 def test_name_alone_takes_the_plausible_size() -> None:
-    assert effects.parse(["torque_sensor_lag"]) == {"torque_sensor_lag": {"time_constant": 0.05}}
+    wanted = {"torque_sensor_lag": {"time_constant": 0.05, "second_order": 0.0}}
+    assert effects.parse(["torque_sensor_lag"]) == wanted
 
 
 def test_given_parameter_replaces_its_plausible_size_only() -> None:
