@@ -15,7 +15,7 @@
     its unknowns by a loss that forgives, and from some way off (3 times): where contact comes and
     goes, the cost is rough, and a fit may have stopped in a small hollow or in another valley.
  6. The fit without effects starts again from every joint fit's drift: should it get as low, there
-    was no effect, only a better valley.
+    was no effect, only a better valley. One that has come to such is followed down it.
 
 Every step is a function of a model and plain data, so that steps run side by side on other
 processes.

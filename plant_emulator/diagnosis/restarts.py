@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.contest import ASTRAY, WORTH
+from plant_emulator.diagnosis.rules import noise_only
 from plant_emulator.diagnosis.steps import Task, follow, refit, shake, sift, swap
 
 if TYPE_CHECKING:
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 
 # How often a fit starts again from some way off.
 SHAKES = 3
+# How far a valley is followed beyond a step along it [such steps], and how often.
+STRIDES, FOLLOWED = (1.0, 3.0, 7.0), 6
 # Effects that are fitted in the place of another, and steps that the best of them goes further.
 SWAPPED, SIFTS = 2, 3
 
@@ -66,9 +69,37 @@ class Restarts:
             best = min(best, again, key=lambda p: p.cost)
         return best
 
+    def followed(self, point: Point) -> Point:
+        """The fit followed down a long valley, in whose rough bottom fits stop on the way.
+
+        From where it has come to and where a start from some way off has, further the same way, as
+        a pattern move (R. Hooke, T. A. Jeeves, J. ACM 8 (1961) 212).
+        """
+        for _ in range(FOLLOWED):
+            if noise_only(point):
+                break
+            (moved,) = self.shaken([point])
+            if moved is point:
+                break
+            starts = [further(point, moved, stride) for stride in STRIDES]
+            tasks = [Task(base=start, runs=self.runs) for start in starts]
+            ahead = list(self.pool.map(refit, self.recipe, tasks))
+            point = min([moved, *ahead], key=lambda p: p.cost)
+        return point
+
     def _ended(self, points: Sequence[Point], found: Mapping[int, Point]) -> list[Point]:
         """Fits, or what was found in their place where that is better, to convergence."""
         lower = {k: new for k, new in found.items() if new.cost < points[k].cost - WORTH}
         tasks = [Task(base=new, runs=self.runs) for new in lower.values()]
         ended = dict(zip(lower, self.pool.map(refit, self.recipe, tasks), strict=True))
         return [ended.get(k, point) for k, point in enumerate(points)]
+
+
+def further(first: Point, second: Point, stride: float) -> Point:
+    """A start that goes on from one fit through another, by so many times their difference."""
+
+    def beyond(before: Mapping[str, float], after: Mapping[str, float]) -> dict[str, float]:
+        return {name: value + stride * (value - before[name]) for name, value in after.items()}
+
+    states = [beyond(a, b) for a, b in zip(first.states, second.states, strict=True)]
+    return replace(second, values=beyond(first.values, second.values), states=tuple(states))

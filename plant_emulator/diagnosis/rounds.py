@@ -83,13 +83,13 @@ class Rounds:
     ) -> None:
         self._pool, self._recipe, self._names = pool, recipe, tuple(names)
         self._runs, self._progress = tuple(runs), progress
-        self._restarts = Restarts(pool=pool, recipe=recipe, runs=self._runs)
+        self.restarts = Restarts(pool=pool, recipe=recipe, runs=self._runs)
 
     def without_effects(self) -> Point:
         """The fit without effects."""
         (null,) = self._pool.map(start, self._recipe, [self._runs])
         if null.chi_squared > NOISE_LEFT:
-            (null,) = self._restarts.shaken([null])
+            (null,) = self.restarts.shaken([null])
         return null
 
     def refitted(self, point: Point) -> Point:
@@ -212,15 +212,15 @@ class Rounds:
         names = [c.effect for c in with_point(contenders) if c.effect != best.effects[-1]]
         if best.chi_squared <= ASTRAY or not names:
             return list(contenders)
-        found = self._restarts.swapped(best, names)
+        found = self.restarts.swapped(best, names)
         again = [replace(c, point=found) for c in contenders if c.effect == found.effects[-1]]
         return better_of(contenders, again)
 
     def _moved(self, contenders: Sequence[Contender], base: Point, most: int) -> list[Contender]:
         """The best of a round started again from some way off."""
         best = best_few(contenders, base, most)
-        points = self._restarts.sifted([c.point for c in best if c.point is not None])
-        points = self._restarts.shaken(points)
+        points = self.restarts.sifted([c.point for c in best if c.point is not None])
+        points = self.restarts.shaken(points)
         again = [replace(c, point=p) for c, p in zip(best, points, strict=True)]
         return better_of(contenders, again)
 

@@ -92,11 +92,15 @@ class Contest:
         stage = "contest"
         contenders = self._rounds.contend(null, stage, thorough=True)
         better = self._rounds.restarted(null, contenders)
+        moved = null.cost - better.cost > max(THRESHOLD, MOVED * excess(null))
+        if moved:
+            better = self._rounds.restarts.followed(better)
         if explained(contenders) or closed(contenders, better, MOST):
             return better, contenders
-        if null.cost - better.cost > max(THRESHOLD, MOVED * excess(null)):
+        if moved:
             again = self._rounds.contend(better, stage, thorough=True)
             contenders = better_of(contenders, again)
+            better = self._rounds.restarted(better, contenders)
         if better.chi_squared > ASTRAY and not closed(contenders, better, HALF):
             again = self._rounds.from_nominal(better, contenders, stage)
             contenders = better_of(contenders, again)

@@ -15,6 +15,7 @@ from plant_emulator.diagnosis.looks import glance, glance_far, look
 from plant_emulator.diagnosis.model import Candidate, Run
 from plant_emulator.diagnosis.place import subsystem
 from plant_emulator.diagnosis.pool import Here
+from plant_emulator.diagnosis.restarts import Restarts
 from plant_emulator.diagnosis.signature import signature
 from plant_emulator.diagnosis.stepwise import Contest
 from plant_emulator.diagnosis.tangents import Tangents
@@ -534,3 +535,28 @@ def test_a_fit_in_another_valley_gets_out_by_trying_the_values_of_each_unknown()
     found = sifted(model, (), [0], stuck)
     assert found.values["a"] == pytest.approx(0.19, abs=1e-3)
     assert found.chi_squared == pytest.approx(1.0, abs=0.1)
+
+
+class Washboard(Line):
+    """A long valley, far steeper across than along, whose bottom is a washboard."""
+
+    parameters = (linear("a", 0.0, std=2.0), linear("b", 0.0, std=2.0))
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+
+        def residual(v: Mapping[str, float]) -> Array:
+            across = 30.0 * (v["b"] - v["a"])
+            along = 4.0 * (v["a"] - 2.5) + np.sin(10.0 * v["a"])
+            return (self.measured[run] + across * TIME + along)[None, :]
+
+        return residual
+
+
+def test_fit_that_stops_on_the_way_down_a_valley_is_followed_further() -> None:
+    """By hand: along is 0 near a = 2.5 only, where sin(25) = -0.13 moves it to 2.51."""
+    model = Washboard([noisy(np.zeros_like(TIME))])
+    stopped = fit(model, (), [0], {"a": -1.0, "b": -1.0}, [{}])
+    assert stopped.values["a"] < 1.5
+    restarts = Restarts(pool=Here(), recipe=Given(model), runs=(0,))
+    assert restarts.followed(stopped).values["a"] == pytest.approx(2.51, abs=0.02)
