@@ -8,8 +8,8 @@
     moved by what the linear picture says: of every effect a cheap first look, whose drift follows
     by secants; of the best a few full steps; of the best of these to convergence.
  4. Where the fit without effects leaves much, it may lie in a wrong valley, and mislead both the
-    signature and the start: the joint fit then starts once more from the nominal parameters and
-    the size that fits these best.
+    signature and the start: where the best joint fit leaves much as well, it starts once more from
+    the nominal parameters and the size that fits these best, the runs taken in one by one.
  5. What leaves more than noise starts again from a larger size, for the linear picture is wrong
     where drift has gone far to imitate the effect; and the best from the best values of each of
     its unknowns by a loss that forgives, and from some way off (3 times): where contact comes and

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.diagnosis.pool import Pool, Recipe
 
+# Times that a fit that ran out of steps is taken up again.
+PATIENCE = 3
 # How often a fit starts again from some way off.
 SHAKES = 3
 # How far a valley is followed beyond a step along it [such steps], and how often.
@@ -30,6 +32,19 @@ class Restarts:
     pool: Pool
     recipe: Recipe
     runs: tuple[int, ...]
+
+    def refitted(self, point: Point) -> Point:
+        """A fit to convergence from where another has come to."""
+        (found,) = self.pool.map(refit, self.recipe, [Task(base=point, runs=self.runs)])
+        return found
+
+    def settled(self, final: Point) -> Point:
+        """The fit taken up again where it ran out of steps."""
+        for _ in range(PATIENCE):
+            if final.converged:
+                break
+            final = self.refitted(final)
+        return final
 
     def sifted(self, points: Sequence[Point]) -> list[Point]:
         """Fits; of those that leave much the better of itself and that from the best values of

@@ -52,8 +52,6 @@ if TYPE_CHECKING:
 Found = TypeVar("Found")
 
 RESTARTS = 3
-# Times that a fit that ran out of steps is taken up again.
-PATIENCE = 3
 # Best of a round's first looks that are fitted, and best of these that are fitted to convergence.
 CHOSEN, POLISHED = 8, 4
 # Share of the gap that an effect closes where no other is likely to close more.
@@ -91,19 +89,6 @@ class Rounds:
         if null.chi_squared > NOISE_LEFT:
             (null,) = self.restarts.shaken([null])
         return null
-
-    def refitted(self, point: Point) -> Point:
-        """A fit to convergence from where another has come to."""
-        (found,) = self._pool.map(refit, self._recipe, [Task(base=point, runs=self._runs)])
-        return found
-
-    def settled(self, final: Point) -> Point:
-        """The fit taken up again where it ran out of steps."""
-        for _ in range(PATIENCE):
-            if final.converged:
-                break
-            final = self.refitted(final)
-        return final
 
     def contend(self, base: Point, stage: str, *, thorough: bool) -> list[Contender]:
         """All effects on top of a fit: a first look at each, the best of them fitted.
@@ -147,7 +132,7 @@ class Rounds:
         if explained(contenders):
             return contenders
         alone = not thorough or closed(contenders, base, MOST)
-        return self._moved(contenders, base, 1 if alone else SHAKEN)
+        return self._moved(contenders, base, 1 if alone else SHAKEN, stage)
 
     def _patiently(
         self,
@@ -216,9 +201,16 @@ class Rounds:
         again = [replace(c, point=found) for c in contenders if c.effect == found.effects[-1]]
         return better_of(contenders, again)
 
-    def _moved(self, contenders: Sequence[Contender], base: Point, most: int) -> list[Contender]:
-        """The best of a round started again from some way off."""
+    def _moved(
+        self, contenders: Sequence[Contender], base: Point, most: int, stage: str
+    ) -> list[Contender]:
+        """The best of a round started again from the nominal parameters and from some way off."""
         best = best_few(contenders, base, most)
+        if any(c.point.chi_squared > ASTRAY for c in best[:1] if c.point):
+            contenders = better_of(contenders, self.from_nominal(base, best, stage))
+            if explained(contenders):
+                return list(contenders)
+            best = best_few(contenders, base, most)
         points = self.restarts.sifted([c.point for c in best if c.point is not None])
         points = self.restarts.shaken(points)
         again = [replace(c, point=p) for c, p in zip(best, points, strict=True)]

@@ -52,7 +52,7 @@ class Contest:
     def explain(self) -> Explanation:
         """Go through the contest."""
         null, contenders = self._first(self._rounds.without_effects())
-        null = self._rounds.settled(null)
+        null = self._rounds.restarts.settled(null)
         final = null
         rivals: dict[str, dict[str, float]] = {}
         tried: set[frozenset[str]] = set()
@@ -73,7 +73,7 @@ class Contest:
             if frozenset(final.effects) in tried:
                 break  # each makes the other needless, in turn
             tried.add(frozenset(final.effects))
-        final = self._rounds.settled(final)
+        final = self._rounds.restarts.settled(final)
         return Explanation(
             null=null,
             final=final,
@@ -125,7 +125,7 @@ class Contest:
             if not waiting:
                 break
             rest = tuple(e for e in final.effects if e != waiting[0])
-            without = self._rounds.refitted(replace(final, effects=rest))
+            without = self._rounds.restarts.refitted(replace(final, effects=rest))
             without, found = self._further(without, "standing again")
             best = best_of(found)
             if best is not None and best.cost < final.cost - MARGIN:
@@ -140,7 +140,7 @@ class Contest:
             return final
         for name in final.effects:
             rest = tuple(e for e in final.effects if e != name)
-            without = self._rounds.refitted(replace(final, effects=rest))
+            without = self._rounds.restarts.refitted(replace(final, effects=rest))
             if not counts(final, without, null, self._reaches_noise):
                 return without
         return final
