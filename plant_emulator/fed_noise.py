@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.errors import UnsettledError
 from plant_emulator.noise import noise
 
 if TYPE_CHECKING:
@@ -66,11 +67,13 @@ def loud(recording: Recording, values: Mapping[str, float], gap_position: float)
     """
     if not recording.run.truck:
         return None
-    base = recording.residual(values, gap_position, TOLERANCE)
-    answers = [
-        recording.fed(torque).residual(values, gap_position, TOLERANCE) - base
-        for torque in _disturbed(recording)
-    ]
+    base = _settled(recording, values, gap_position)
+    if base is None:
+        return None
+    every = (
+        _settled(recording.fed(torque), values, gap_position) for torque in _disturbed(recording)
+    )
+    answers = [found - base for found in every if found is not None]
     if not answers:
         return None
     columns = np.stack([answer.ravel() for answer in answers], axis=1)
@@ -86,12 +89,26 @@ def loud(recording: Recording, values: Mapping[str, float], gap_position: float)
     )
 
 
+def _settled(
+    recording: Recording, values: Mapping[str, float], gap_position: float
+) -> Array | None:
+    """The whitened residual; None where the simulation does not settle, which tells nothing."""
+    try:
+        return recording.settled(values, gap_position, TOLERANCE)
+    except UnsettledError:
+        return None
+
+
 def _disturbed(recording: Recording) -> list[Array]:
-    """The wheel torque with the mean of a window off by a standard deviation, for each window."""
+    """The wheel torque with the mean of a window off by a standard deviation, for each window that
+    a sample which counts comes after.
+    """
     run = recording.run
     length = max(1, round(WINDOW / run.interval))
     step = noise(recording.log["wheel_torque"]) / np.sqrt(length)
     starts = range(0, len(run.time), length)
-    acts = [k for k in starts if not run.parked[k : k + length].all()]
+    acts = [
+        k for k in starts if recording.use[:, k:].any() and not run.parked[k : k + length].all()
+    ]
     places = np.arange(len(run.time))
     return [run.wheel_torque + step * ((places >= k) & (places < k + length)) for k in acts]

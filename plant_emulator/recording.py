@@ -41,9 +41,15 @@ class Recording:
     ) -> Array:
         """Measured minus simulated over the noise, shape (channels, samples)."""
         try:
-            found = simulate(self.run, values, gap_position=gap_position, tolerance=tolerance)
+            return self.settled(values, gap_position, tolerance)
         except UnsettledError:
             return np.where(self.use, IMPOSSIBLE, 0.0)
+
+    def settled(
+        self, values: Mapping[str, float], gap_position: float, tolerance: float = TOLERANCE
+    ) -> Array:
+        """The same; UnsettledError where the model cannot be simulated at these values."""
+        found = simulate(self.run, values, gap_position=gap_position, tolerance=tolerance)
         difference = np.stack([self.log[name] - found[name] for name in self.channels])
         return np.where(self.use, difference / self.noise[:, None], 0.0)
 

@@ -62,7 +62,8 @@ def sizes(seed: int, only: tuple[str, ...], number: int) -> list[dict[str, Any]]
         "ranking": [answer.rank(contender, found, found.named, candidate, None, {})],
     }
     unsealed = score.Unsealed(case=case, norms={}, answer=told, closed=None)
-    return score.sizes(unsealed, known)
+    # A size of 0 is no size: the effect was found by its others.
+    return [one for one in score.sizes(unsealed, known) if one["estimated"] != 0.0]
 
 
 def _recordings(case: Case, nominal: ParameterSet) -> Iterator[Recording]:

@@ -186,14 +186,16 @@ class BenchModel:
         self, run: int, effects: Sequence[str], values: Mapping[str, float]
     ) -> dict[str, float]:
         """See `Model`."""
-        states = [u for name in effects for u in self.candidates[name].states]
-        own = {u.name: u.start for u in states}
+        own = {u.name: u.start for name in effects for u in self.candidates[name].states}
         everything = {**self._fixed(run, effects), **own, **values}
         search = Search([self._recordings[run]], everything, ())
         search.scan_gaps(GAPS)
         found = {GAP_POSITION: search.gaps[0], **own}
         residual = self.residual(run, effects)
-        return scanned(lambda trial: residual({**values, **trial}), found, states)
+        for name in effects:  # each effect's alone: all of several together are too many
+            states = self.candidates[name].states
+            found = scanned(lambda trial: residual({**values, **trial}), found, states)
+        return found
 
     def located(self, where: Point, runs: Sequence[int]) -> Mapping[str, Any] | None:
         """See `Model`."""

@@ -79,7 +79,8 @@ class Diagnose:
             runs=self.plan.fitted,
             progress=self.progress,
         )
-        explained, found = inquiry.with_quiet_inputs().found()
+        inquiry = inquiry.with_quiet_inputs()
+        explained, found = inquiry.found()
         held_out = HeldOut(
             pool=self.pool,
             recipe=self.recipe,
@@ -92,13 +93,14 @@ class Diagnose:
         self.notes += notes
         predicted = held_out.predictions(explained, followed, self.folds)
         self.notes += held_out.unsettled(self.folds, predicted)
-        return self._answered(explained, found, predicted)
+        return self._answered(explained, found, predicted, inquiry.recipe)
 
     def _answered(
         self,
         explained: Explanation,
         found: Verdict,
         predicted: Mapping[tuple[str, ...], list[Prediction]],
+        quiet: Recipe,
     ) -> Diagnosis:
         runs = [self.model.runs[run] for _, some in self.folds for run in some]
         lengths = shrink.block_lengths(predicted[()])
@@ -113,7 +115,7 @@ class Diagnose:
             rest = rest_of(self.model, final, self.plan.fitted, traces)
         closed, interval = self._closed(found, followed, gaps)
         hidden = parts.undetectable(explained, self.model.candidates)
-        advice = Advice(self.pool, self.recipe, self.model, self.plan.fitted)
+        advice = Advice(self.pool, quiet, self.model, self.plan.fitted)
         answer = {
             "schema": "gap-diagnosis/1",
             "logs": {

@@ -15,6 +15,7 @@ from plant_emulator.diagnosis.steps import Task, start
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from plant_emulator.diagnosis.contest import Point
     from plant_emulator.diagnosis.model import Model
     from plant_emulator.diagnosis.pool import Pool, Recipe
     from plant_emulator.estimates import Array, Residual
@@ -51,6 +52,10 @@ class _Quieted:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._model, name)
+
+    def with_planned(self, where: Point, runs: Sequence[int]) -> Model:
+        """See `Model`; the planned runs come behind its own, whose noise stays as it is."""
+        return cast("Model", _Quieted(self._model.with_planned(where, runs), self._louds))
 
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
         """See `Model`."""

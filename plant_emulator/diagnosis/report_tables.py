@@ -137,7 +137,7 @@ def ranking(entries: Sequence[Mapping[str, Any]]) -> Markup:
     return table(
         "Evidence: fall of the penalised cost, corrected for autocorrelation. Held-out gain: "
         "share of the gap that the effect closes alone on runs it was not fitted to. Standard "
-        "error: with what another law of the same effect would make of its size, where known.",
+        "error: with that of the effect's law.",
         [
             "effect",
             "subsystem",

@@ -35,7 +35,8 @@ def best_states(
     """
     of_effects = [u for name in effects for u in model.candidates[name].states]
     own = [u for u in (*model.states, *of_effects) if u.step is None]
-    together = of_effects if any(u.step is not None for u in of_effects) else []
+    groups = [model.candidates[name].states for name in effects]
+    together = [g for g in groups if any(u.step is not None for u in g)]
     found = []
     for k, state in zip(runs, states, strict=True):
         best = dict(state)
@@ -43,7 +44,9 @@ def best_states(
             trials = [{**best, u.name: value} for value in (best[u.name], *u.starts())]
             losses = [loss_of(model, effects, [k], values, [trial]) for trial in trials]
             best = trials[int(np.argmin(losses))]
-        found.append(_together(model, effects, k, values, best, together))
+        for group in together:
+            best = _together(model, effects, k, values, best, group)
+        found.append(best)
     return tuple(found)
 
 

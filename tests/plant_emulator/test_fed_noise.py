@@ -1,8 +1,12 @@
 """The noise of a fed wheel torque, against draws of it, and what it does to an identification."""
 
+from itertools import count
+from typing import Any
+
 import numpy as np
 import pytest
 
+from plant_emulator.errors import UnsettledError
 from plant_emulator.fed_noise import Loud, loud
 from plant_emulator.identify import identify
 from plant_emulator.log import Log
@@ -88,3 +92,30 @@ def test_drum_inertia_of_a_noisy_log_lies_within_its_standard_error(
     answer = identify([recording(noisy(true_log, 4000))], nominal, ["drum_inertia"])
     (inertia,) = answer.parameters
     assert abs(inertia.value - 312.69) < 3.5 * inertia.standard_error
+
+
+def test_window_whose_simulation_does_not_settle_tells_nothing(
+    measured: Recording, nominal: ParameterSet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain, settled, calls = loud(measured, nominal.values(), GAP), Recording.settled, count()
+
+    def unsettled(self: Recording, *values: Any) -> Any:
+        if next(calls) == 5:
+            raise UnsettledError("does not settle")
+        return settled(self, *values)
+
+    monkeypatch.setattr(Recording, "settled", unsettled)
+    found = loud(measured, nominal.values(), GAP)
+    assert plain is not None
+    assert found is not None
+    np.testing.assert_allclose(found.deviations, plain.deviations, rtol=0.05)
+
+
+def test_run_that_cannot_be_simulated_has_no_directions(
+    measured: Recording, nominal: ParameterSet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unsettled(self: Recording, *values: Any) -> Any:
+        raise UnsettledError("does not settle")
+
+    monkeypatch.setattr(Recording, "settled", unsettled)
+    assert loud(measured, nominal.values(), GAP) is None

@@ -200,6 +200,11 @@ def test_declaration_of_a_wrong_kind_is_refused(tmp_path: Path, text: str, said:
         ("plausible=20.0", "plausible=101.0", "parameter factor: plausible is 101; .* 0 to 100"),
         ("upper=100.0", "upper=float('inf')", "parameter factor: upper is inf; a finite number"),
         ("lower=0.0", "lower=200.0", "parameter factor: upper is 100; .* from 200 to inf"),
+        (
+            "neutral=0.0",
+            "step=0.0, neutral=0.0",
+            "parameter factor: step is 0; .* from 0.01 to inf",
+        ),
         ('"factor":', '"a factor":', "parameter a factor: another name is needed"),
         ('SUBSYSTEM = "gear"', 'SUBSYSTEM = "nonsense"', "SUBSYSTEM is 'nonsense'; one of drive,"),
     ],
