@@ -47,7 +47,6 @@ def update(params: Params, state: State, window: Window) -> tuple[State, Demand]
     return after, Demand(speed=target)
 
 
-# Every regulator is asked with the same arguments.
-def follow(params: Params, state: State, demand: float, setpoint: float) -> State:  # noqa: ARG001
+def follow(params: Params, state: State, demand: float, setpoint: float) -> State:  # noqa: ARG001 - a regulator's
     """The sweep goes on from what the limits passed."""
     return replace(state, motor_speed=setpoint)

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.scans import cauchy_loss
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
@@ -57,10 +59,9 @@ class Search:
         self.simulations = 0
 
     def loss(self, run: int, values: Mapping[str, float], gap: float) -> float:
-        """Sum of log(1 + r^2) of a run: what lies far off counts, but little more than near."""
+        """Cauchy's loss of a run."""
         self.simulations += 1
-        residual = self.recordings[run].residual(values, gap, SCAN_TOLERANCE)
-        return float(np.sum(np.log1p(residual**2)))
+        return cauchy_loss(self.recordings[run].residual(values, gap, SCAN_TOLERANCE))
 
     def total(self, values: Mapping[str, float]) -> float:
         """Loss of all runs at the starts in the gap found so far."""

@@ -6,8 +6,6 @@ A run that is predicted keeps all parameters; only these states are fitted to it
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
-from math import cos, pi, sin
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,19 +13,18 @@ import numpy as np
 from plant_emulator.estimates import Unknown
 from plant_emulator.estimation import estimate
 from plant_emulator.kernel import kernel
+from plant_emulator.scans import scanned
 from plant_emulator.search import GAP_POSITION, Search
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from plant_emulator.effects import Effect
-    from plant_emulator.estimates import Array, Residual
+    from plant_emulator.estimates import Array
     from plant_emulator.recording import Recording
 
     Effects = Mapping[str, Mapping[str, float]]
 
-# Angles that are tried [rad].
-ANGLES = np.linspace(-pi, pi, 24, endpoint=False)
 GAP = Unknown(name=GAP_POSITION, start=0.0, lower=-1.0, upper=1.0, logarithmic=False)
 
 
@@ -92,40 +89,3 @@ def fit_states(
     starts = scanned(residual, starts, [u for u in states if u.name != GAP_POSITION])
     unknowns = [replace(u, start=starts[u.name], run=0) for u in states]
     return estimate(unknowns, [residual]).states(0)
-
-
-def combinations(states: Sequence[Unknown]) -> Iterator[tuple[dict[str, float], str | None]]:
-    """Starts of all states of a run together by name, but for an angle among them, and its name."""
-    angle = next((u.name for u in states if u.angle), None)
-    others = [u for u in states if u.name != angle]
-    for values in product(*(u.starts() for u in others)):
-        yield {u.name: value for u, value in zip(others, values, strict=True)}, angle
-
-
-def scanned(
-    residual: Residual, found: Mapping[str, float], states: Sequence[Unknown]
-) -> dict[str, float]:
-    """States of a run where what has many valleys and angles starts in the best, all else as found.
-
-    With a loss that forgives spikes at the wrong time, as `Search`; three values of an angle tell
-    the others.
-    """
-    narrow = [u for u in states if u.step is not None or u.angle]
-    if not narrow:
-        return dict(found)
-    trials: list[tuple[float, dict[str, float]]] = []
-    for state, angle in combinations(narrow):
-        trial = {**found, **state}
-        if angle is None:
-            trials.append((_loss(residual(trial)), trial))
-            continue
-        ahead, aside, behind = (residual({**trial, angle: a}) for a in (0.0, pi / 2, pi))
-        middle = 0.5 * (ahead + behind)
-        for a in ANGLES:
-            turned = middle + cos(a) * (ahead - middle) + sin(a) * (aside - middle)
-            trials.append((_loss(turned), {**trial, angle: float(a)}))
-    return min(trials, key=lambda one: one[0])[1]
-
-
-def _loss(residual: Array) -> float:
-    return float(np.sum(np.log1p(residual**2)))

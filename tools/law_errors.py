@@ -1,6 +1,6 @@
 """How far an effect's size is off where the machine follows another law of it than the library.
 
-    tools/law_errors.py --seed 11 --cases 360 > plant_emulator/diagnosis/law_errors.csv
+    .venv/bin/python tools/law_errors.py --seed 11 --cases 300 > sizes.csv
 
 Each single effect of the blind trial's cases is fitted alone, by the contest of a diagnosis, to
 logs made with the trial's own law of it.

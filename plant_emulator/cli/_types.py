@@ -125,8 +125,7 @@ def files(value: Any) -> Iterator[Path]:
     elif isinstance(value, (str, Path)):
         text = str(value)
         names = {text, text.partition("=")[2].strip("\"'"), text.partition(":")[0]}
-        # Path.is_file raises where a text is too long for the name of a file.
-        yield from (Path(name) for name in names if os.path.isfile(name))  # noqa: PTH113
+        yield from (Path(name) for name in names if os.path.isfile(name))  # noqa: PTH113 - Path.is_file raises where a text is too long for a name
 
 
 def is_same(first: Path, second: Path) -> bool:

@@ -20,9 +20,10 @@ from plant_emulator.fed_noise import loud
 from plant_emulator.free_parameters import free_parameters, unknowns
 from plant_emulator.kernel import kernel, know
 from plant_emulator.parameters import UNITS
+from plant_emulator.scans import scanned
 from plant_emulator.search import GAP_POSITION, Search
 from plant_emulator.simulate import TOLERANCE, values_of
-from plant_emulator.start_states import GAP, scanned, with_own
+from plant_emulator.start_states import GAP, with_own
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -22,6 +22,7 @@ from plant_emulator.diagnosis.relations import (
     middle,
     told_reference,
 )
+from plant_emulator.scans import cauchy_loss
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -120,7 +121,7 @@ def dead_time(runs: Sequence[Measured], p: Mapping[str, float], known: Parameter
         trial = factor * nominal
         away = 0.5 * ((trial - nominal) / std) ** 2
         return away + sum(
-            float(np.log1p(((t - delayed_reference(m, trial)) / m.noise[0]) ** 2).sum())
+            cauchy_loss((t - delayed_reference(m, trial)) / m.noise[0])
             for t, m in zip(told, runs, strict=True)
         )
 

@@ -16,6 +16,7 @@ from plant_emulator.diagnosis.driven_drum import compiled, drum_speed
 from plant_emulator.diagnosis.relations import NOISES, smoothed_speed
 from plant_emulator.estimates import Unknown
 from plant_emulator.estimation import at, estimate
+from plant_emulator.scans import cauchy_loss
 from plant_emulator.search import GAP_POSITION
 from plant_emulator.start_states import GAP
 
@@ -84,8 +85,8 @@ class DrumSide:
         return np.asarray(left / m.noise[NOISES.index("drum_speed")])
 
     def loss(self, run: int, found: Mapping[str, float]) -> float:
-        """Sum of log(1 + r^2): what lies far off counts, but little more than near."""
-        return float(np.log1p(self.residual(run, found) ** 2).sum())
+        """Cauchy's loss of a run."""
+        return cauchy_loss(self.residual(run, found))
 
     def scan(self, found: Mapping[str, float]) -> list[float]:
         """Start in the gap of every run, the best of a few."""

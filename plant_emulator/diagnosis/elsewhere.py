@@ -11,7 +11,8 @@ import numpy as np
 
 from plant_emulator.diagnosis.contest import Point, fit, template
 from plant_emulator.diagnosis.signature import signs, sized
-from plant_emulator.diagnosis.valleys import best_states, forgiven, loss_of, whole
+from plant_emulator.diagnosis.valleys import best_states, loss_of, whole
+from plant_emulator.scans import cauchy_loss
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -55,7 +56,7 @@ def sifted(model: Model, effects: Sequence[str], runs: Sequence[int], start: Poi
     """A few steps of a joint fit from where another has come to, each unknown moved to the best of
     some values while the others stay, two times over.
 
-    By a loss that forgives: contact that comes at the wrong time makes valleys of the squares, that
+    By Cauchy's loss: contact that comes at the wrong time makes valleys of the squares, that
     a start from some way off seldom leaves where several unknowns have to go with each other.
     """
     values, states = dict(start.values), start.states
@@ -66,8 +67,7 @@ def sifted(model: Model, effects: Sequence[str], runs: Sequence[int], start: Poi
             far = SIFT * u.std if u.std is not None else SIFT_SIZE * abs(own)
             around = np.clip(np.linspace(own - far, own + far, SIFTED), u.lower, u.upper)
             trials = [{**values, u.name: value} for value in (own, *map(float, around))]
-            losses = [loss_of(model, effects, runs, trial, states) for trial in trials]
-            values = trials[int(np.argmin(losses))]
+            values = min(trials, key=lambda v: loss_of(model, effects, runs, v, states))
     return fit(model, effects, runs, values, states, FEW_SHAKEN)
 
 
@@ -88,7 +88,7 @@ def in_place(
     for size in (sign * z for z in PLACES for sign in signs(candidate.sizes)):
         values = {**place.values, **sized(candidate, size)}
         there = whole(model, effects, runs, values, states)
-        tries.append((forgiven(there), values, states))
+        tries.append((cauchy_loss(there), values, states))
         moved, after = tangents.moved(tangents.imitation(there - before), len(states))
         far = {**values, **moved}, [{**s, **t} for s, t in zip(states, after, strict=True)]
         tries.append((loss_of(model, effects, runs, *far), *far))

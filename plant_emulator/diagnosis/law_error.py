@@ -25,7 +25,7 @@ PROBABILITY = 0.975
 class Sized:
     """A size hidden by another law, and what the library's law took it for, both in its unit.
 
-    name : of the parameter, the effect's name before it
+    name : of the parameter, the effect's name before it; estimated : not 0
     """
 
     name: str

@@ -69,6 +69,7 @@ class Rounds:
     """The rounds of one diagnosis on its pool.
 
     names : of the effects; runs : by number; progress : told the stage and its done share
+    restarts : of single fits
     """
 
     def __init__(

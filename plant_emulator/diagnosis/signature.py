@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.tangents import gain_along, gain_turned
-from plant_emulator.start_states import combinations
+from plant_emulator.scans import combinations
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""The best of several values of an unknown while the others stay, by a loss that forgives.
+"""The best of several values of an unknown while the others stay, by Cauchy's loss.
 
 Where contact comes and goes the squares have many valleys, and a slope leads only to the next.
 """
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.start_states import scanned
+from plant_emulator.scans import cauchy_loss, scanned
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -42,8 +42,7 @@ def best_states(
         best = dict(state)
         for u in (*own, *own):
             trials = [{**best, u.name: value} for value in (best[u.name], *u.starts())]
-            losses = [loss_of(model, effects, [k], values, [trial]) for trial in trials]
-            best = trials[int(np.argmin(losses))]
+            best = min(trials, key=lambda s: loss_of(model, effects, [k], values, [s]))
         for group in together:
             best = _together(model, effects, k, values, best, group)
         found.append(best)
@@ -80,8 +79,7 @@ def best_sizes(
             neutral = candidate.neutral[u.name]
             sizes = np.arange(neutral, neutral + WIDEST * (u.start - neutral), u.step)
             trials = [{**best, u.name: float(size)} for size in (best[u.name], *sizes)]
-            losses = [loss_of(model, effects, runs, trial, states) for trial in trials]
-            best = trials[int(np.argmin(losses))]
+            best = min(trials, key=lambda v: loss_of(model, effects, runs, v, states))
     return best
 
 
@@ -92,8 +90,8 @@ def loss_of(
     values: Mapping[str, float],
     states: Sequence[Mapping[str, float]],
 ) -> float:
-    """Loss of all runs that forgives."""
-    return forgiven(whole(model, effects, runs, values, states))
+    """Cauchy's loss of all runs."""
+    return cauchy_loss(whole(model, effects, runs, values, states))
 
 
 def whole(
@@ -109,8 +107,3 @@ def whole(
         for k, state in zip(runs, states, strict=True)
     ]
     return np.concatenate([residual.ravel() for residual in every])
-
-
-def forgiven(residual: Array) -> float:
-    """Sum of log(1 + r^2): what lies far off counts, but little more than near."""
-    return float(np.sum(np.log1p(residual**2)))

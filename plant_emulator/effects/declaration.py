@@ -160,28 +160,19 @@ def _check_table(name: str, module: ModuleType, table: str, kind: type) -> None:
         )
 
 
-def _range(one: EffectParameter) -> float:
-    """What its bounds leave; 1 where they are no bounds."""
-    try:
-        return max(1e-9, float(one.upper - one.lower))
-    except TypeError:
-        return 1.0
-
-
 def _check_numbers(name: str, module: ModuleType) -> None:
     """Refuse a parameter whose values are no numbers within its bounds, or whose name is taken."""
     for key, one in module.PARAMETERS.items():
         place = f"effect {name}: {module.__file__}: parameter {key}"
         if not str(key).isidentifier() or f"{name}_{key}" in UNITS:
             raise ParameterError(f"{place}: another name is needed; {name}_{key} cannot be used")
-        most = _range(one)
         for what, value, low, high in (
             ("lower", one.lower, -inf, inf),
             ("upper", one.upper, one.lower, inf),
             ("neutral", one.neutral, one.lower, one.upper),
             ("plausible", one.plausible, one.lower, one.upper),
             ("std", 1.0 if one.std is None else one.std, 0.0, inf),
-            ("step", most if one.step is None else one.step, most / MOST_STARTS, inf),
+            ("step", 1.0 if one.step is None else one.step, 0.0, inf),
         ):
             if isinstance(value, bool) or not isinstance(value, (int, float)):
                 raise ParameterError(f"{place}: {what} is {value!r}; a number is expected")
@@ -190,6 +181,9 @@ def _check_numbers(name: str, module: ModuleType) -> None:
                     f"{place}: {what} is {value:g}; a finite number from {low:g} to {high:g} is "
                     "expected"
                 )
+        least = (one.upper - one.lower) / MOST_STARTS
+        if one.step is not None and one.step <= least:
+            raise ParameterError(f"{place}: step is {one.step:g}; more than {least:g} is expected")
 
 
 def _check_memories(name: str, module: ModuleType) -> None:

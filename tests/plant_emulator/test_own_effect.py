@@ -203,7 +203,7 @@ def test_declaration_of_a_wrong_kind_is_refused(tmp_path: Path, text: str, said:
         (
             "neutral=0.0",
             "step=0.0, neutral=0.0",
-            "parameter factor: step is 0; .* from 0.01 to inf",
+            "parameter factor: step is 0; more than 0.01",
         ),
         ('"factor":', '"a factor":', "parameter a factor: another name is needed"),
         ('SUBSYSTEM = "gear"', 'SUBSYSTEM = "nonsense"', "SUBSYSTEM is 'nonsense'; one of drive,"),

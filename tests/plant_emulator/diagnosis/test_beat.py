@@ -12,7 +12,7 @@ from plant_emulator.diagnosis.looks import look
 from plant_emulator.diagnosis.model import Candidate
 from plant_emulator.diagnosis.shrink import Fold, refitted
 from plant_emulator.estimates import Array, Unknown
-from plant_emulator.start_states import scanned
+from plant_emulator.scans import scanned
 from tests.plant_emulator.diagnosis.test_contest import TIME, Line, explained, linear, noisy
 
 # One that the samples of a run of 2 s tell from others 0.5 Hz off, anywhere within 5.2 Hz.
