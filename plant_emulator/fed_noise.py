@@ -24,18 +24,22 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.sparse import block_diag, csr_array
 
 from plant_emulator.errors import UnsettledError
 from plant_emulator.noise import noise
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from plant_emulator.log import Array
     from plant_emulator.recording import Recording
 
 # Shorter than a gap takes to close [s]; its noise changes nothing within it.
 WINDOW = 0.25
+# A log is taken in stretches, whose noise comes from within and from what was fed shortly before:
+# one twice as long takes twice as long, not four times [s].
+STRETCH, MEMORY = 10.0, 5.0
 # Standard deviation along a direction from which on it counts, in the noise of the sensors.
 LOUD = 1.0
 # Of the simulations: a direction need not be known better.
@@ -46,69 +50,81 @@ TOLERANCE = 1e-4
 class Loud:
     """Directions of a run's whitened residual in which a fed input is louder than the sensors.
 
-    directions : orthonormal, 0 where a sample does not count, shape (k, channels, samples)
+    directions : orthonormal, 0 where a sample does not count, shape (k, samples * channels), the
+        channels of a sample side by side
     deviations : of the fed input's noise along them, over that of the sensors, shape (k,)
     """
 
-    directions: Array
+    directions: csr_array
     deviations: Array
+
+    def along(self, residual: Array) -> Array:
+        """Components of a residual, shape (channels, samples), along the directions, shape (k,)."""
+        return np.asarray(self.directions @ residual.T.ravel())
 
     def quieted(self, residual: Array) -> Array:
         """The residual with noise of variance 1 in every direction, shape (channels, samples)."""
         taken = 1.0 - 1.0 / np.sqrt(1.0 + self.deviations**2)
-        along = np.tensordot(self.directions, residual, axes=2)
-        return np.asarray(residual - np.tensordot(taken * along, self.directions, axes=1))
+        much = self.directions.T @ (taken * self.along(residual))
+        return np.asarray(residual - much.reshape(residual.shape[::-1]).T)
 
 
 def loud(recording: Recording, values: Mapping[str, float], gap_position: float) -> Loud | None:
     """What the noise of the wheel torque does to a run at these values; None: nothing that counts.
 
-    The slopes are differences over one standard deviation: contact makes them uneven.
+    The slopes are differences over one standard deviation: contact makes them uneven. Windows too
+    far apart to meet in a stretch are simulated together.
     """
     if not recording.run.truck:
         return None
-    base = _settled(recording, values, gap_position)
-    if base is None:
-        return None
-    every = (
-        _settled(recording.fed(torque), values, gap_position) for torque in _disturbed(recording)
-    )
-    answers = [found - base for found in every if found is not None]
-    if not answers:
-        return None
-    columns = np.stack([answer.ravel() for answer in answers], axis=1)
-    _, deviations, windows = np.linalg.svd(columns, full_matrices=False)
-    counted = deviations > LOUD
-    if not counted.any():
-        return None
-    # Not the decomposition's own left vectors: a sample that does not count stays exactly 0.
-    directions = (columns @ windows[counted].T / deviations[counted]).T
-    return Loud(
-        directions=directions.reshape(-1, *base.shape),
-        deviations=np.asarray(deviations[counted]),
-    )
-
-
-def _settled(
-    recording: Recording, values: Mapping[str, float], gap_position: float
-) -> Array | None:
-    """The whitened residual; None where the simulation does not settle, which tells nothing."""
     try:
-        return recording.settled(values, gap_position, TOLERANCE)
+        base = recording.settled(values, gap_position, TOLERANCE)
     except UnsettledError:
         return None
+    length = max(1, round(WINDOW / recording.run.interval))
+    stretch, memory = (length * round(span / WINDOW) for span in (STRETCH, MEMORY))
+    answers = [
+        _answer(recording.fed(torque), values, gap_position, base)
+        for torque in _disturbed(recording, length, stretch + memory)
+    ]
+    parts = []
+    for first in range(0, base.shape[1], stretch):
+        windows = range(max(0, first - memory) // length, (first + stretch) // length)
+        samples = slice(first, first + stretch)
+        parts.append(_loudest([answers[k % len(answers)][:, samples] for k in windows]))
+    if not any(len(deviations) for _, deviations in parts):
+        return None
+    return Loud(
+        directions=csr_array(block_diag([directions for directions, _ in parts])),
+        deviations=np.concatenate([deviations for _, deviations in parts]),
+    )
 
 
-def _disturbed(recording: Recording) -> list[Array]:
-    """The wheel torque with the mean of a window off by a standard deviation, for each window that
-    a sample which counts comes after.
+def _answer(
+    recording: Recording, values: Mapping[str, float], gap_position: float, base: Array
+) -> Array:
+    """Change of the whitened residual; 0 where the simulation does not settle: it tells nothing."""
+    try:
+        return recording.settled(values, gap_position, TOLERANCE) - base
+    except UnsettledError:
+        return np.zeros_like(base)
+
+
+def _disturbed(recording: Recording, length: int, every: int) -> list[Array]:
+    """The wheel torque with the mean of the first window of every so many samples off by a standard
+    deviation, then that of the second, and so on; not where the truck is parked.
     """
     run = recording.run
-    length = max(1, round(WINDOW / run.interval))
     step = noise(recording.log["wheel_torque"]) / np.sqrt(length)
-    starts = range(0, len(run.time), length)
-    acts = [
-        k for k in starts if recording.use[:, k:].any() and not run.parked[k : k + length].all()
-    ]
-    places = np.arange(len(run.time))
-    return [run.wheel_torque + step * ((places >= k) & (places < k + length)) for k in acts]
+    window = np.arange(len(run.time)) % every // length
+    acts = np.logical_not(run.parked)
+    return [run.wheel_torque + step * ((window == k) & acts) for k in range(every // length)]
+
+
+def _loudest(answers: Sequence[Array]) -> tuple[Array, Array]:
+    """Directions in which answers, each of shape (channels, n), are louder than the sensors."""
+    columns = np.stack([answer.T.ravel() for answer in answers], axis=1)
+    _, deviations, windows = np.linalg.svd(columns, full_matrices=False)
+    counted = deviations > LOUD
+    # Not the decomposition's own left vectors: a sample that does not count stays exactly 0.
+    return (columns @ windows[counted].T / deviations[counted]).T, deviations[counted]

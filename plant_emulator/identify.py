@@ -20,17 +20,16 @@ from typing import TYPE_CHECKING
 
 from plant_emulator import estimation
 from plant_emulator.equation_error import start_values
-from plant_emulator.fed_noise import loud
 from plant_emulator.free_parameters import free_parameters, unknowns
+from plant_emulator.run_residuals import quieted_functions, residual_functions
 from plant_emulator.search import FINE_SCANS, GAP_POSITION, Search
 from plant_emulator.simulate import TOLERANCE, values_of
 from plant_emulator.start_states import GAP, states_of, with_own
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
-    from plant_emulator.estimates import Estimate, Residual, Unknown
-    from plant_emulator.log import Array
+    from plant_emulator.estimates import Estimate, Unknown
     from plant_emulator.parameters import ParameterSet
     from plant_emulator.recording import Recording
     from plant_emulator.search import Progress
@@ -118,6 +117,7 @@ def identify(
         other = least_squares(recordings, parameters, free, again, states, progress)
         search.simulations += again.simulations
         best = min(best, other, key=lambda e: e.cost + e.penalty)
+    best = _with_fed_noise(recordings, search.values, free, best, progress)
     best = replace(best, simulations=best.simulations + search.simulations)
     return answer(best, parameters, free, len(recordings))
 
@@ -135,18 +135,9 @@ def least_squares(
     truck = any(recording.run.truck for recording in recordings)
     tolerance = TOLERANCE if truck else FINAL_TOLERANCE
     fine = residual_functions(recordings, search.values, free, tolerance)
-    counted = sum(int(r.use.sum()) for r in recordings)
-
-    def tell(cost: float) -> None:
-        if progress is not None:  # chi^2 falls to 1: half way is where it has fallen to 2
-            progress("least squares", min(1.0, counted / max(cost, 1.0)))
-
+    tell = _telling(recordings, progress)
     wanted = unknowns(parameters, free, search.values, search.gaps, states)
     first = estimation.estimate(wanted, coarse, progress=tell)
-    fine = [
-        _quieted(r, f, k, first, search)
-        for k, (r, f) in enumerate(zip(recordings, fine, strict=True))
-    ]
     outdone = [
         replace(u, start=u.value(float(z)), std=None if error < u.scaled_std else u.std)
         for u, z, error in zip(first.unknowns, first.z, first.data_errors, strict=True)
@@ -155,34 +146,32 @@ def least_squares(
     return replace(last, simulations=first.simulations + last.simulations)
 
 
-def residual_functions(
+def _with_fed_noise(
     recordings: Sequence[Recording],
     values: Mapping[str, float],
     free: Sequence[str],
-    tolerance: float = TOLERANCE,
-) -> list[Residual]:
-    """For every run the residual as a function of the unknowns; the rest stays at `values`."""
-    fixed = {n: v for n, v in values.items() if n not in free}
+    best: Estimate,
+    progress: Progress | None,
+) -> Estimate:
+    """The fit again with the noise of what is fed, known near the best one; see `fed_noise`."""
+    residuals = quieted_functions(recordings, values, free, best)
+    if residuals is None:
+        return best
+    again = [
+        replace(u, start=u.value(float(z))) for u, z in zip(best.unknowns, best.z, strict=True)
+    ]
+    last = estimation.estimate(again, residuals, progress=_telling(recordings, progress))
+    return replace(last, simulations=best.simulations + last.simulations)
 
-    def of(recording: Recording) -> Residual:
-        def residual(found: Mapping[str, float]) -> Array:
-            trial = {**fixed, **recording.own, **found}
-            return recording.residual(trial, trial.pop(GAP_POSITION), tolerance)
 
-        return residual
-
-    return [of(recording) for recording in recordings]
-
-
-def _quieted(
-    recording: Recording, residual: Residual, run: int, near: Estimate, search: Search
-) -> Residual:
-    """The residual of a run with the noise of its fed input as it is near a fit."""
-    values = {**search.values, **recording.own, **near.parameters(), **near.states(run)}
-    found = loud(recording, values, values.pop(GAP_POSITION))
-    if found is None:
-        return residual
-    return lambda trial: found.quieted(residual(trial))
+def _telling(
+    recordings: Sequence[Recording], progress: Progress | None
+) -> Callable[[float], None] | None:
+    """What tells how far a fit has come; chi^2 falls to 1: half way is where it has fallen to 2."""
+    if progress is None:
+        return None
+    counted = sum(int(r.use.sum()) for r in recordings)
+    return lambda cost: progress("least squares", min(1.0, counted / max(cost, 1.0)))
 
 
 def _next_valley(

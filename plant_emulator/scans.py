@@ -7,7 +7,7 @@ leads only to the next.
 from __future__ import annotations
 
 from itertools import product
-from math import cos, pi, sin
+from math import pi
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,6 +36,19 @@ def combinations(states: Sequence[Unknown]) -> Iterator[tuple[dict[str, float], 
         yield {u.name: value for u, value in zip(others, values, strict=True)}, angle
 
 
+def turning(ahead: Array, aside: Array, behind: Array) -> Array:
+    """Mean, cosine and sine of what turns with an angle, from its values at 0, pi/2 and pi; shape
+    (3, ...).
+    """
+    middle = 0.5 * (ahead + behind)
+    return np.stack([middle, ahead - middle, aside - middle])
+
+
+def turns(angles: Array) -> Array:
+    """Weights of mean, cosine and sine at angles [rad], shape (n, 3)."""
+    return np.stack([np.ones_like(angles), np.cos(angles), np.sin(angles)], axis=1)
+
+
 def scanned(
     residual: Residual, found: Mapping[str, float], states: Sequence[Unknown]
 ) -> dict[str, float]:
@@ -53,9 +66,8 @@ def scanned(
         if angle is None:
             trials.append((cauchy_loss(residual(trial)), trial))
             continue
-        ahead, aside, behind = (residual({**trial, angle: a}) for a in (0.0, pi / 2, pi))
-        middle = 0.5 * (ahead + behind)
-        for a in ANGLES:
-            turned = middle + cos(a) * (ahead - middle) + sin(a) * (aside - middle)
+        basis = turning(*(residual({**trial, angle: a}) for a in (0.0, pi / 2, pi)))
+        for a, weights in zip(ANGLES, turns(ANGLES), strict=True):
+            turned = np.tensordot(weights, basis, axes=1)
             trials.append((cauchy_loss(turned), {**trial, angle: float(a)}))
     return min(trials, key=lambda one: one[0])[1]

@@ -84,6 +84,8 @@ class Quieted:
         """The same for the same model only."""
         own = hashlib.sha256(self.recipe.digest().encode())
         for run, found in sorted(self.louds.items()):
-            own.update(f"{run} {found.directions.shape}".encode())
-            own.update(found.directions.tobytes() + found.deviations.tobytes())
+            sparse = found.directions
+            own.update(f"{run} {sparse.shape}".encode())
+            for part in (sparse.data, sparse.indices, sparse.indptr, found.deviations):
+                own.update(part.tobytes())
         return own.hexdigest()

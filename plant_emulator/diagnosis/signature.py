@@ -108,7 +108,7 @@ def _own_states(
     """An effect's states of every run: those whose small signature explains most of that run.
 
     Where an angle or a temperature at the start is unknown, a fit from a wrong one ends anywhere.
-    All are tried together; of an angle two values tell the rest.
+    All are tried together; of an angle three values tell the rest.
     """
     candidate = model.candidates[name]
     if not candidate.states:
@@ -126,11 +126,11 @@ def _own_states(
             for k, part in enumerate(parts(state)):
                 found[k].append((gain_along(part, tangents.residual), state))
             continue
-        turned = zip(parts({**state, angle: 0.0}), parts({**state, angle: pi / 2}), strict=True)
-        for k, pair in enumerate(turned):
-            gain, best = gain_turned(*pair, tangents.residual)
+        turned = [parts({**state, angle: value}) for value in (0.0, pi / 2, pi)]
+        for k, (ahead, aside, behind) in enumerate(zip(*turned, strict=True)):
+            gain, best = gain_turned(ahead, aside, behind, tangents.residual)
             found[k].append((gain, {**state, angle: best}))
-    return [max(of_run, key=lambda one: one[0])[1] for of_run in found]
+    return [max(trials, key=lambda one: one[0])[1] for trials in found]
 
 
 def _start(

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.scans import ANGLES, turning, turns
+
 if TYPE_CHECKING:
     from plant_emulator.estimates import Array, Estimate
 
@@ -55,9 +57,14 @@ def gain_along(rest: Array, residual: Array) -> float:
     return along**2 / max(float(rest @ rest), 1e-12)
 
 
-def gain_turned(cosine: Array, sine: Array, residual: Array) -> tuple[float, float]:
-    """Fall of the sum of squares at the best multiple of cos(a) cosine + sin(a) sine, and a."""
-    both = np.stack([cosine, sine])
-    along = both @ residual
-    best = -np.linalg.pinv(both @ both.T, hermitian=True) @ along
-    return float(-best @ along), float(np.arctan2(best[1], best[0]))
+def gain_turned(ahead: Array, aside: Array, behind: Array, residual: Array) -> tuple[float, float]:
+    """Fall of the sum of squares at the best multiple of a signature that turns with an angle, and
+    that angle; ahead, aside, behind : at 0, pi/2 and pi.
+    """
+    basis = turning(ahead, aside, behind)
+    gram, along = basis @ basis.T, basis @ residual
+    weights = turns(ANGLES)
+    squares = np.maximum(np.einsum("ai,ij,aj->a", weights, gram, weights), 1e-12)
+    gains = np.minimum(0.0, weights @ along) ** 2 / squares
+    best = int(np.argmax(gains))
+    return float(gains[best]), float(ANGLES[best])

@@ -14,7 +14,7 @@ from plant_emulator.scans import cauchy_loss, scanned
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.model import Model
+    from plant_emulator.diagnosis.model import Candidate, Model
     from plant_emulator.estimates import Array, Unknown
 
 # How far sizes of many valleys are looked for, in plausible sizes.
@@ -70,17 +70,25 @@ def best_sizes(
     values: Mapping[str, float],
     states: Sequence[Mapping[str, float]],
 ) -> dict[str, float]:
-    """The values, sizes of many valleys the best of many while all else stays."""
+    """The values, sizes and shapes of many valleys the best of many while all else stays."""
     best = dict(values)
     for candidate in (model.candidates[name] for name in effects):
-        for u in candidate.sizes:
+        for u in (*candidate.sizes, *candidate.shapes):
             if u.step is None:
                 continue
-            neutral = candidate.neutral[u.name]
-            sizes = np.arange(neutral, neutral + WIDEST * (u.start - neutral), u.step)
-            trials = [{**best, u.name: float(size)} for size in (best[u.name], *sizes)]
+            trials = [{**best, u.name: value} for value in (best[u.name], *_spread(candidate, u))]
             best = min(trials, key=lambda v: loss_of(model, effects, runs, v, states))
     return best
+
+
+def _spread(candidate: Candidate, unknown: Unknown) -> list[float]:
+    """Values of a size about neutral, or of a shape over what is known of it, within its bounds."""
+    if unknown.name not in candidate.neutral:
+        return unknown.starts()
+    neutral = candidate.neutral[unknown.name]
+    reach = WIDEST * abs(unknown.start - neutral)
+    low, high = max(unknown.lower, neutral - reach), min(unknown.upper, neutral + reach)
+    return [float(value) for value in np.arange(low, high, unknown.step)]
 
 
 def loss_of(

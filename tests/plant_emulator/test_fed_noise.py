@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 from plant_emulator.errors import UnsettledError
 from plant_emulator.fed_noise import Loud, loud
@@ -40,7 +41,7 @@ def test_direction_of_deviation_three_comes_out_with_variance_one() -> None:
         random.standard_normal((2, 50)) + 3.0 * random.standard_normal() * direction
         for _ in range(4000)
     ]
-    one = Loud(directions=direction[None], deviations=np.array([3.0]))
+    one = Loud(directions=csr_array(direction.T.reshape(1, -1)), deviations=np.array([3.0]))
     along = [float(np.sum(direction * one.quieted(r))) for r in draws]
     assert np.var(along) == pytest.approx(1.0, abs=0.1)
     across = one.quieted(draws[0]) - draws[0]
@@ -53,7 +54,8 @@ def test_directions_hold_what_drawn_noise_of_the_wheel_torque_does(
     """Two gaps close while the truck drives: at its start, and when it brakes."""
     found = loud(measured, nominal.values(), GAP)
     assert found is not None
-    spikes = np.abs(found.directions).max(axis=1).argmax(axis=1)
+    shape = (-1, len(true_log.time), len(measured.channels))
+    spikes = np.abs(found.directions.toarray().reshape(shape)).max(axis=2).argmax(axis=1)
     assert sorted(np.round(true_log.time[spikes], 1).tolist()) == [2.4, 22.6]
     random, torque = np.random.default_rng(2), true_log["wheel_torque"]
     base = measured.fed(torque).residual(nominal.values(), GAP)
@@ -62,8 +64,8 @@ def test_directions_hold_what_drawn_noise_of_the_wheel_torque_does(
     for _ in range(20):
         fed = measured.fed(torque + deviation * random.standard_normal(len(torque)))
         change = fed.residual(nominal.values(), GAP) - base
-        raw.append(np.tensordot(found.directions, change, axes=2))
-        quiet.append(np.tensordot(found.directions, found.quieted(change), axes=2))
+        raw.append(found.along(change))
+        quiet.append(found.along(found.quieted(change)))
     assert np.mean(np.square(raw)) > 20.0
     assert np.mean(np.square(quiet)) < 2.0
 
@@ -109,6 +111,21 @@ def test_window_whose_simulation_does_not_settle_tells_nothing(
     assert plain is not None
     assert found is not None
     np.testing.assert_allclose(found.deviations, plain.deviations, rtol=0.05)
+
+
+def test_long_log_needs_no_more_simulations_than_a_short_one(
+    true_log: Log, nominal: ParameterSet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """60 windows of 0.25 s in 15 s, and the run itself; 30 s alone hold 120 windows."""
+    settled, calls = Recording.settled, count()
+
+    def counting(self: Recording, *values: Any) -> Any:
+        next(calls)
+        return settled(self, *values)
+
+    monkeypatch.setattr(Recording, "settled", counting)
+    assert loud(recording(noisy(true_log, 1)), nominal.values(), GAP) is not None
+    assert next(calls) == 61
 
 
 def test_run_that_cannot_be_simulated_has_no_directions(

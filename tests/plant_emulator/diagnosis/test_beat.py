@@ -11,6 +11,7 @@ from plant_emulator.diagnosis.contest import fit, null_fit
 from plant_emulator.diagnosis.looks import look
 from plant_emulator.diagnosis.model import Candidate
 from plant_emulator.diagnosis.shrink import Fold, refitted
+from plant_emulator.diagnosis.tangents import gain_turned
 from plant_emulator.estimates import Array, Unknown
 from plant_emulator.scans import scanned
 from tests.plant_emulator.diagnosis.test_contest import TIME, Line, explained, linear, noisy
@@ -109,33 +110,52 @@ def test_held_out_run_starts_in_the_valley_of_its_own_beat() -> None:
 
 
 class Spike(Line):
-    """A spike 5 ms wide, at a time that is its size: away from there nothing leads to it."""
+    """A spike 5 ms wide, at a time that is unknown: away from there nothing leads to it."""
 
-    def __init__(self, measured: Sequence[Array], step: float | None) -> None:
+    def __init__(self, measured: Sequence[Array], **kind: Sequence[Unknown]) -> None:
         super().__init__(measured, ("cube",))
-        plain = self.candidates["cube"]
-        size = replace(plain.sizes[0], start=0.3, scale=0.3, step=step)
-        state = linear("warmth", 0.0, std=1.0)
-        self.candidates = {"cube": replace(plain, sizes=(size,), states=(state,))}
+        plain, state = self.candidates["cube"], linear("warmth", 0.0, std=1.0)
+        neutral = {u.name: 0.0 for u in kind["sizes"]}
+        self.candidates = {"cube": replace(plain, states=(state,), neutral=neutral, **kind)}
 
     def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
         """See `Model`."""
         plain = super().residual(run, ())
-        return lambda v: plain(v) - (spike(v["cube_size"]) if effects else 0.0)
+        return lambda v: plain(v) - (spike(v["cube_time"], v["cube_size"]) if effects else 0.0)
 
 
-def spike(time: float) -> Array:
-    """At this time."""
-    return 40.0 * np.exp(-(((TIME - time) / 0.005) ** 2))
+def spike(time: float, size: float = 40.0) -> Array:
+    """At this time, of this size."""
+    return size * np.exp(-(((TIME - time) / 0.005) ** 2))
 
 
-@pytest.mark.parametrize(("step", "found"), [(0.005, True), (None, False)])
-def test_size_of_many_valleys_is_looked_for_step_by_step(step: float | None, found: bool) -> None:
-    model = Spike([noisy(2.0 + spike(0.617))], step)
+@pytest.mark.parametrize(
+    ("time", "step", "found"), [(0.617, 0.005, True), (-0.617, 0.005, True), (0.617, None, False)]
+)
+@pytest.mark.parametrize("kind", ["sizes", "shapes"])
+def test_what_has_many_valleys_is_looked_for_step_by_step(
+    kind: str, time: float, step: float | None, found: bool
+) -> None:
+    at = linear("cube_time", 0.3, scale=0.3, step=step, prior=0.3, std=0.6)
+    size = linear("cube_size", 40.0, scale=40.0)
+    unknowns = {"sizes": (size, replace(at, std=None)), "shapes": ()}
+    if kind == "shapes":
+        unknowns = {"sizes": (size,), "shapes": (at,)}
+    model = Spike([noisy(2.0 + spike(time))], **unknowns)
     base = null_fit(model, [0])
-    start = replace(base, values={**base.values, "cube_size": 0.3}, states=({"warmth": 0.0},))
-    size = look(model, ("cube",), [0], start).values["cube_size"]
-    assert (size == pytest.approx(0.617, abs=1e-3)) is found
+    sizes = {"cube_size": 40.0, "cube_time": 0.3}
+    start = replace(base, values={**base.values, **sizes}, states=({"warmth": 0.0},))
+    where = look(model, ("cube",), [0], start).values["cube_time"]
+    assert (where == pytest.approx(time, abs=1e-3)) is found
+
+
+def test_angle_of_a_signature_that_is_more_than_a_cosine() -> None:
+    """By hand: 2 times mean, cosine and sine of 1 rad along three axes fit a residual in full."""
+    mean, cosine, sine = np.eye(3)
+    residual = -2.0 * (mean + np.cos(1.0) * cosine + np.sin(1.0) * sine)
+    gain, angle = gain_turned(mean + cosine, mean + sine, mean - cosine, residual)
+    assert angle == pytest.approx(1.0, abs=pi / 24.0)
+    assert gain == pytest.approx(8.0, rel=0.01)
 
 
 def test_prediction_has_no_more_of_an_effect_than_the_fitted_runs_show() -> None:

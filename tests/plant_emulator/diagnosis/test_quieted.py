@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 from plant_emulator.diagnosis.contest import Point, null_fit
 from plant_emulator.diagnosis.inquiry import Inquiry
@@ -28,7 +29,7 @@ class Fed(Line):
 
     def loud(self, run: int, where: Point, state: Mapping[str, float]) -> Loud:
         """See `Model`."""
-        return Loud(directions=FED[None, None] / NORM, deviations=np.array([NORM]))
+        return Loud(directions=csr_array(FED[None] / NORM), deviations=np.array([NORM]))
 
 
 def test_fits_do_not_follow_the_noise_of_a_fed_input() -> None:
