@@ -78,7 +78,7 @@ INSIDE = (
     Entry(effect="gear_oil_temperature", law="vogel_oil", ranges=WARM_OIL, starts=OIL),
     Entry(effect="stribeck", law="lorentzian_stribeck"),
     Entry(effect="presliding", law="elastoplastic_presliding"),
-    Entry(effect="load_dependent_gear_loss", law="two_efficiencies", programs=("program6",)),
+    Entry(effect="load_dependent_gear_loss", law="mixed_film_gear", programs=("program6",)),
     Entry(effect="gear_eccentricity", law="runout_two_harmonics", starts={"phase": ANY_ANGLE}),
     Entry(effect="friction_asymmetry", law="coulomb_asymmetry"),
     Entry(effect="drum_bearing_friction", law="shear_thinning_drum"),

@@ -1,11 +1,12 @@
 """Friction of the gear proportional to the torque that it transmits.
 
-    T_l = a |T_gd|,   friction = that of the table + T_l
+    T_l = a (1 + d) |T_gd| driving,   a (1 - d) |T_gd| driven,   friction = that of the table + T_l
 
 Source: ISO/TR 14179-1 (2001), load-dependent losses: sliding in the meshes takes a share of the
-transmitted power. |T_gd|: the loss is against the motion, whichever side drives. Driving, the motor
-side gives (1 + a) T_gd, an efficiency of 1 / (1 + a); driven back, it receives (1 - a) |T_gd|.
-One mesh of ground teeth takes 0.01 to 0.02; this gear has three, and its bearings.
+transmitted power; G. Niemann, H. Winter, Maschinenelemente, vol. 2: not the same share in both
+directions of the power. The loss is against the motion, whichever side drives: at d = 0 the motor
+side gives (1 + a) T_gd driving, an efficiency of 1 / (1 + a), and receives (1 - a) |T_gd| driven
+back. One mesh of ground teeth takes 0.01 to 0.02; this gear has three, and its bearings.
 """
 
 from __future__ import annotations
@@ -22,6 +23,9 @@ PARAMETERS = {
     "share": EffectParameter(
         neutral=0.0, lower=0.0, upper=0.5, plausible=0.05, unit="1", meaning="a"
     ),
+    "difference": EffectParameter(
+        neutral=0.0, lower=-0.9, upper=0.9, plausible=0.0, unit="1", meaning="d", std=0.2
+    ),
 }
 
 
@@ -30,4 +34,6 @@ def gear_load_friction(value: float, s: Record, p: Record) -> float:
     share = p.load_dependent_gear_loss_share
     if share == 0.0:
         return value
-    return value + share * abs(s.drum_shaft_torque)
+    torque = s.drum_shaft_torque
+    side = 1.0 if torque * s.gear_direction > 0.0 else -1.0
+    return value + share * (1.0 + side * p.load_dependent_gear_loss_difference) * abs(torque)

@@ -14,7 +14,8 @@ from plant_emulator.simulate import fit_start, run_of, whitened
 from tests.plant_emulator.runs import GEAR, Piecewise, linear, simulate
 from tests.plant_emulator.test_plant import energy
 
-LOSS = {"load_dependent_gear_loss_share": 0.1}
+SHARE, DIFFERENCE = "load_dependent_gear_loss_share", "load_dependent_gear_loss_difference"
+LOSS = {SHARE: 0.1}
 # What a torque at the truck's wheel is at the drum: radii of 0.645 and 0.1715 m.
 AT_DRUM = 0.645 / 0.1715
 # How far the drifted parameters of practice_009 lie from the table [%], from its label.
@@ -33,17 +34,24 @@ def table(omega: float) -> float:
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 @pytest.mark.parametrize(
-    ("power", "wheel_torque", "through_gear"),
+    ("power", "wheel_torque", "difference", "through_gear"),
     [
-        ("driving", -100.0, 1.1 * 100.0 * AT_DRUM),
-        ("driven back", 100.0, -0.9 * 100.0 * AT_DRUM),
+        ("driving", -100.0, 0.0, 1.1 * 100.0 * AT_DRUM),
+        ("driven back", 100.0, 0.0, -0.9 * 100.0 * AT_DRUM),
+        ("driving", -100.0, 0.5, 1.15 * 100.0 * AT_DRUM),
+        ("driven back", 100.0, 0.5, -0.95 * 100.0 * AT_DRUM),
     ],
 )
 def test_motor_side_gives_more_and_receives_less_than_the_drum_side(
-    nominal: ParameterSet, direction: float, power: str, wheel_torque: float, through_gear: float
+    nominal: ParameterSet,
+    direction: float,
+    power: str,
+    wheel_torque: float,
+    difference: float,
+    through_gear: float,
 ) -> None:
-    """(1 + a) T_gd while the motor drives, (1 - a) |T_gd| while the drum does."""
-    bench = Piecewise({**nominal.values(), **LOSS})
+    """(1 + a (1 + d)) T_gd while the motor drives, (1 - a (1 - d)) |T_gd| while the drum does."""
+    bench = Piecewise({**nominal.values(), **LOSS, DIFFERENCE: difference})
     bench.to(2.0, direction * 120.0)
     bench.to(30.0, direction * 120.0, wheel_torque=direction * wheel_torque)
     torque = -62.6 * bench.to(31.0, direction * 120.0, wheel_torque=direction * wheel_torque)[-1, 3]
@@ -79,11 +87,16 @@ def test_mirrored_reference_gives_mirrored_run(nominal: ParameterSet) -> None:
     speeds=st.tuples(*[st.floats(-2.0, 2.0)] * 2),
     gap=st.floats(-0.155, 0.155),
     share=st.sampled_from([0.05, 0.5]),
+    difference=st.sampled_from([-0.9, 0.0, 0.9]),
 )
 def test_free_bench_only_loses_energy(
-    nominal: ParameterSet, speeds: tuple[float, float], gap: float, share: float
+    nominal: ParameterSet,
+    speeds: tuple[float, float],
+    gap: float,
+    share: float,
+    difference: float,
 ) -> None:
-    values = {**nominal.values(), "load_dependent_gear_loss_share": share}
+    values = {**nominal.values(), SHARE: share, DIFFERENCE: difference}
     bench = Piecewise({**values, "voltage_limit": 1e-12})
     bench.x[:8] = [0.0, 0.0, 0.0, 62.6 * speeds[0], 0.0, speeds[0], gap, speeds[1]]
     before = first = energy(bench.x)
@@ -112,7 +125,7 @@ def test_loss_of_an_independent_bench_is_told_to_the_noise(
     log = bench_log(f"bench_practice/practice_009/{program}")
     run, values = run_of(log), nominal.values()
     values |= {key: (1.0 + percent / 100.0) * values[key] for key, percent in DRIFT.items()}
-    lossy = {**values, "load_dependent_gear_loss_share": 0.14}
+    lossy = {**values, SHARE: 0.14}
     start = fit_start(log, run, lossy)
 
     def misfit(of: dict[str, float]) -> float:
