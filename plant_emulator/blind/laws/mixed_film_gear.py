@@ -38,4 +38,5 @@ def gear_load_friction(value: float, s: Record, p: Record) -> float:
         return value
     torque = abs(s.drum_shaft_torque)
     film = 1.0 + abs(s.gear_speed) / p.mixed_film_gear_film_speed
-    return value + share * torque * (torque / USUAL_TORQUE / film) ** p.mixed_film_gear_exponent
+    loss: float = share * torque * (torque / USUAL_TORQUE / film) ** p.mixed_film_gear_exponent
+    return value + loss
