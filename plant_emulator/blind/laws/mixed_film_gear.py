@@ -1,9 +1,10 @@
 """The gear loses a share of the torque it transmits that rises with it and falls with the speed.
 
-    T_l = a |T_gd| ((|T_gd| / T_0) / (1 + |omega_g| / omega_0))^n,   T_0 = 500 N m
+    T_l = a |T_gd| ((|T_gd| / T_0) 2 / (1 + |omega_g| / omega_0))^n,   T_0 = 500 N m
 
 Source: ISO/TR 14179-2 (2001), the coefficient of friction of a mesh: the power n = 0.2 of the load
-over the speed, with a mixed film between the teeth. a = 0: a gear without losses by load.
+over the speed, with a mixed film between the teeth. a: the share at T_0 and omega_0; a = 0: a gear without losses
+by load.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ PARAMETERS = {
         neutral=0.2, lower=0.0, upper=0.5, plausible=0.2, unit="1", meaning="n"
     ),
     "film_speed": EffectParameter(
-        neutral=1.0, lower=0.01, upper=100.0, plausible=1.0, unit="rad/s", meaning="omega_0"
+        neutral=2.0, lower=0.01, upper=100.0, plausible=2.0, unit="rad/s", meaning="omega_0"
     ),
 }
 # Of the drum while a truck of 3 t accelerates by 0.26 m/s^2 [N m].
@@ -37,6 +38,6 @@ def gear_load_friction(value: float, s: Record, p: Record) -> float:
     if share == 0.0:
         return value
     torque = abs(s.drum_shaft_torque)
-    film = 1.0 + abs(s.gear_speed) / p.mixed_film_gear_film_speed
+    film = 0.5 * (1.0 + abs(s.gear_speed) / p.mixed_film_gear_film_speed)
     loss: float = share * torque * (torque / USUAL_TORQUE / film) ** p.mixed_film_gear_exponent
     return value + loss
