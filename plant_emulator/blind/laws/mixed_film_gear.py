@@ -3,8 +3,8 @@
     T_l = a |T_gd| ((|T_gd| / T_0) 2 / (1 + |omega_g| / omega_0))^n,   T_0 = 500 N m
 
 Source: ISO/TR 14179-2 (2001), the coefficient of friction of a mesh: the power n = 0.2 of the load
-over the speed, with a mixed film between the teeth. a: the share at T_0 and omega_0; 0: a gear without losses by
-load.
+over the speed, with a mixed film between the teeth. a: the share at T_0 and omega_0; a = 0: a gear
+without losses by load.
 """
 
 from __future__ import annotations
