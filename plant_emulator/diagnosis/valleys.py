@@ -27,24 +27,26 @@ def best_states(
     runs: Sequence[int],
     values: Mapping[str, float],
     states: Sequence[Mapping[str, float]],
+    *,
+    anew: bool = True,
 ) -> tuple[dict[str, float], ...]:
     """States of every run, each the best of some values while the others stay, two times over.
 
-    Those of many narrow valleys are then tried together: a signature at a fit that lacks the effect
-    may have found the wrong one.
+    anew : those of many narrow valleys, of the last effect, are then tried together: a signature at
+        a fit that lacks the effect may have found the wrong one
     """
     of_effects = [u for name in effects for u in model.candidates[name].states]
     own = [u for u in (*model.states, *of_effects) if u.step is None]
-    groups = [model.candidates[name].states for name in effects]
-    together = [g for g in groups if any(u.step is not None for u in g)]
+    last = model.candidates[effects[-1]].states if anew and effects else ()
+    narrow = any(u.step is not None for u in last)
     found = []
     for k, state in zip(runs, states, strict=True):
         best = dict(state)
         for u in (*own, *own):
             trials = [{**best, u.name: value} for value in (best[u.name], *u.starts())]
             best = min(trials, key=lambda s: loss_of(model, effects, [k], values, [s]))
-        for group in together:
-            best = _together(model, effects, k, values, best, group)
+        if narrow:
+            best = _together(model, effects, k, values, best, last)
         found.append(best)
     return tuple(found)
 
@@ -70,14 +72,15 @@ def best_sizes(
     values: Mapping[str, float],
     states: Sequence[Mapping[str, float]],
 ) -> dict[str, float]:
-    """The values, sizes and shapes of many valleys the best of many while all else stays."""
-    best = dict(values)
-    for candidate in (model.candidates[name] for name in effects):
-        for u in (*candidate.sizes, *candidate.shapes):
-            if u.step is None:
-                continue
-            trials = [{**best, u.name: value} for value in (best[u.name], *_spread(candidate, u))]
-            best = min(trials, key=lambda v: loss_of(model, effects, runs, v, states))
+    """The values, of the last effect's sizes and shapes of many valleys the best of many while all
+    else stays.
+    """
+    best, candidate = dict(values), model.candidates[effects[-1]]
+    for u in (*candidate.sizes, *candidate.shapes):
+        if u.step is None:
+            continue
+        trials = [{**best, u.name: value} for value in (best[u.name], *_spread(candidate, u))]
+        best = min(trials, key=lambda v: loss_of(model, effects, runs, v, states))
     return best
 
 
