@@ -48,7 +48,7 @@ def shaken(
             moved[u.name] += far * float(random.standard_normal())
     states = start.states
     if any(model.candidates[name].states for name in effects):
-        states = best_states(model, effects, runs, moved, states, anew=False)
+        states = best_states(model, effects, runs, moved, states, anew=effects)
     return fit(model, effects, runs, moved, states, FEW_SHAKEN)
 
 
@@ -60,7 +60,7 @@ def sifted(model: Model, effects: Sequence[str], runs: Sequence[int], start: Poi
     a start from some way off seldom leaves where several unknowns have to go with each other.
     """
     values, states = dict(start.values), start.states
-    for anew in (True, False):
+    for anew in (effects, ()):
         states = best_states(model, effects, runs, values, states, anew=anew)
         for u in (u for u in template(model, effects, runs) if u.run is None):
             own = values[u.name]

@@ -75,10 +75,12 @@ def patient(model: Model, found: Signature, base: Point, runs: Sequence[int]) ->
 
 
 def look(model: Model, effects: Sequence[str], runs: Sequence[int], start: Point) -> Point:
-    """A few steps of a joint fit, from where another fit has come to."""
+    """A few steps of a joint fit, from where another fit has come to; what the last effect has of
+    many valleys is looked for anew.
+    """
     with_states = any(model.candidates[name].states for name in effects)
     if not with_states:
         return fit(model, effects, runs, start.values, start.states, FEW)
-    states = best_states(model, effects, runs, start.values, start.states)
+    states = best_states(model, effects, runs, start.values, start.states, anew=effects[-1:])
     values = best_sizes(model, effects, runs, start.values, states)
     return fit(model, effects, runs, values, states, FEW_WITH_STATES)

@@ -28,25 +28,25 @@ def best_states(
     values: Mapping[str, float],
     states: Sequence[Mapping[str, float]],
     *,
-    anew: bool = True,
+    anew: Sequence[str],
 ) -> tuple[dict[str, float], ...]:
     """States of every run, each the best of some values while the others stay, two times over.
 
-    anew : those of many narrow valleys, of the last effect, are then tried together: a signature at
-        a fit that lacks the effect may have found the wrong one
+    anew : effects whose states of many narrow valleys are then tried together: a signature at a fit
+        that lacks an effect may have found the wrong one
     """
     of_effects = [u for name in effects for u in model.candidates[name].states]
     own = [u for u in (*model.states, *of_effects) if u.step is None]
-    last = model.candidates[effects[-1]].states if anew and effects else ()
-    narrow = any(u.step is not None for u in last)
+    groups = [model.candidates[name].states for name in anew]
+    together = [g for g in groups if any(u.step is not None for u in g)]
     found = []
     for k, state in zip(runs, states, strict=True):
         best = dict(state)
         for u in (*own, *own):
             trials = [{**best, u.name: value} for value in (best[u.name], *u.starts())]
             best = min(trials, key=lambda s: loss_of(model, effects, [k], values, [s]))
-        if narrow:
-            best = _together(model, effects, k, values, best, last)
+        for group in together:
+            best = _together(model, effects, k, values, best, group)
         found.append(best)
     return tuple(found)
 
