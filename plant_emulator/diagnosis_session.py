@@ -98,18 +98,27 @@ def calibration() -> list[Case]:
 
 
 def laws_apart() -> dict[str, float]:
-    """Standard errors that other laws make in the sizes of effects, relative, by name."""
+    """Standard errors that other laws make in the sizes of effects, relative, by name; see
+    `law_error`.
+    """
     with (Path(__file__).parent / "diagnosis" / "law_errors.csv").open(newline="") as file:
         numbers = ("true", "estimated", "standard_error")
         return law_errors(
             [
                 Sized(
                     name=f"{row['effect']}_{row['parameter']}",
+                    plausible=_plausible(row["effect"], row["parameter"]),
                     **{key: float(row[key]) for key in numbers},
                 )
                 for row in csv.DictReader(file)
             ]
         )
+
+
+def _plausible(effect: str, parameter: str) -> float:
+    """Size of an effect of the library that is usual, from neutral [its unit]."""
+    declared = effects.load(effect).parameters[parameter]
+    return abs(declared.plausible - declared.neutral)
 
 
 def axis_loaded(

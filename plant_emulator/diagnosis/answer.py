@@ -11,6 +11,7 @@ import numpy as np
 from plant_emulator.diagnosis import shrink
 from plant_emulator.diagnosis.details import Step, Trace
 from plant_emulator.diagnosis.explain import DETECTABLE, THRESHOLD
+from plant_emulator.diagnosis.law_error import scale
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -75,9 +76,10 @@ def rank(
 ) -> dict[str, Any]:
     """One line of the ranking; sizes and errors of an accepted effect from the final fit.
 
-    law_errors : standard errors by name that other laws of an effect make, relative
+    law_errors : standard errors by name that other laws of an effect make; see `law_error`
     """
     name = contender.effect
+    usual = {u.name: abs(u.start - candidate.neutral[u.name]) for u in candidate.sizes}
     point = with_chance(explained) if name in accepted else contender.point
     names = [u.name for u in (*candidate.sizes, *candidate.shapes)]
     return {
@@ -90,7 +92,8 @@ def rank(
                 "name": full.removeprefix(f"{name}_"),
                 "value": point.values[full],
                 "standard_error": hypot(
-                    point.errors[full], law_errors.get(full, 0.0) * point.values[full]
+                    point.errors[full],
+                    law_errors.get(full, 0.0) * scale(point.values[full], usual.get(full, 0.0)),
                 ),
                 "unit": candidate.units[full],
             }

@@ -6,7 +6,16 @@ from plant_emulator.diagnosis.law_error import Sized, law_errors
 
 
 def sized(true: float, estimated: float, standard_error: float, name: str = "lag") -> Sized:
-    return Sized(name=name, true=true, estimated=estimated, standard_error=standard_error)
+    return Sized(
+        name=name, true=true, estimated=estimated, standard_error=standard_error, plausible=1.0
+    )
+
+
+def test_small_estimate_is_off_by_a_part_of_the_plausible_size() -> None:
+    """By hand: 0.9 of the usual 1, though 9 times the estimate."""
+    assert law_errors([sized(1.0, 0.1, 0.0)])["lag"] == pytest.approx(
+        0.9 * 12.706 / 1.960, rel=1e-4
+    )
 
 
 def test_one_case_is_widened_by_students_t_of_one_degree_of_freedom() -> None:
