@@ -73,7 +73,8 @@ def loud(recording: Recording, values: Mapping[str, float], gap_position: float)
     """What the noise of the wheel torque does to a run at these values; None: nothing that counts.
 
     The slopes are differences over one standard deviation: contact makes them uneven. Windows too
-    far apart to meet in a stretch are simulated together.
+    far apart to meet in a stretch are simulated together: an answer has to end within MEMORY, else
+    what is left of it adds to that of the next.
     """
     if not recording.run.truck:
         return None
@@ -87,11 +88,12 @@ def loud(recording: Recording, values: Mapping[str, float], gap_position: float)
         _answer(recording.fed(torque), values, gap_position, base)
         for torque in _disturbed(recording, length, stretch + memory)
     ]
-    parts = []
-    for first in range(0, base.shape[1], stretch):
-        windows = range(max(0, first - memory) // length, (first + stretch) // length)
-        samples = slice(first, first + stretch)
-        parts.append(_loudest([answers[k % len(answers)][:, samples] for k in windows]))
+    if not answers:
+        return None
+    parts = [
+        _loudest([answer[:, first : first + stretch] for answer in answers])
+        for first in range(0, base.shape[1], stretch)
+    ]
     if not any(len(deviations) for _, deviations in parts):
         return None
     return Loud(
@@ -103,7 +105,9 @@ def loud(recording: Recording, values: Mapping[str, float], gap_position: float)
 def _answer(
     recording: Recording, values: Mapping[str, float], gap_position: float, base: Array
 ) -> Array:
-    """Change of the whitened residual; 0 where the simulation does not settle: it tells nothing."""
+    """Change of the whitened residual; 0 where the simulation does not settle, which tells nothing
+    of these windows.
+    """
     try:
         return recording.settled(values, gap_position, TOLERANCE) - base
     except UnsettledError:
@@ -112,13 +116,16 @@ def _answer(
 
 def _disturbed(recording: Recording, length: int, every: int) -> list[Array]:
     """The wheel torque with the mean of the first window of every so many samples off by a standard
-    deviation, then that of the second, and so on; not where the truck is parked.
+    deviation, then that of the second, and so on; only where the truck is not parked and a sample
+    that counts comes after.
     """
     run = recording.run
     step = noise(recording.log["wheel_torque"]) / np.sqrt(length)
-    window = np.arange(len(run.time)) % every // length
-    acts = np.logical_not(run.parked)
-    return [run.wheel_torque + step * ((window == k) & acts) for k in range(every // length)]
+    places = np.arange(len(run.time))
+    last = np.flatnonzero(recording.use.any(axis=0)).max(initial=-1)
+    acts = np.logical_not(run.parked) & (places <= last)
+    masks = [(places % every // length == k) & acts for k in range(every // length)]
+    return [run.wheel_torque + step * mask for mask in masks if mask.any()]
 
 
 def _loudest(answers: Sequence[Array]) -> tuple[Array, Array]:

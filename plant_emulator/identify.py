@@ -6,6 +6,7 @@
  3. Bounded least squares on all simulated channels of all logs at once, whitened by the noise
     measured in the logs (`estimation`), with the start in the gap as a free state of each run.
     Should the residual stay above the noise, it starts again from the next best valleys.
+ 4. Of logs with a truck the best fit once more with the noise of the wheel torque (`fed_noise`).
 
 Prior knowledge is the value and standard deviation of each parameter in the set. It holds what the
 logs do not determine, and is given up for a parameter that the data alone determine better, so that
@@ -117,7 +118,8 @@ def identify(
         other = least_squares(recordings, parameters, free, again, states, progress)
         search.simulations += again.simulations
         best = min(best, other, key=lambda e: e.cost + e.penalty)
-    best = _with_fed_noise(recordings, search.values, free, best, progress)
+    wanted = unknowns(parameters, free, search.values, search.gaps, states)
+    best = _with_fed_noise(recordings, search.values, free, wanted, best, progress)
     best = replace(best, simulations=best.simulations + search.simulations)
     return answer(best, parameters, free, len(recordings))
 
@@ -138,30 +140,39 @@ def least_squares(
     tell = _telling(recordings, progress)
     wanted = unknowns(parameters, free, search.values, search.gaps, states)
     first = estimation.estimate(wanted, coarse, progress=tell)
-    outdone = [
+    last = estimation.estimate(_outdone(first), fine, progress=tell)
+    return replace(last, simulations=first.simulations + last.simulations)
+
+
+def _outdone(first: Estimate) -> list[Unknown]:
+    """The unknowns from where a fit has come to, without the priors that its data outdo."""
+    return [
         replace(u, start=u.value(float(z)), std=None if error < u.scaled_std else u.std)
         for u, z, error in zip(first.unknowns, first.z, first.data_errors, strict=True)
     ]
-    last = estimation.estimate(outdone, fine, progress=tell)
-    return replace(last, simulations=first.simulations + last.simulations)
 
 
 def _with_fed_noise(
     recordings: Sequence[Recording],
     values: Mapping[str, float],
     free: Sequence[str],
+    wanted: Sequence[Unknown],
     best: Estimate,
     progress: Progress | None,
 ) -> Estimate:
-    """The fit again with the noise of what is fed, known near the best one; see `fed_noise`."""
+    """The fit again with the noise of what is fed, known near the best one; see `fed_noise`.
+
+    wanted : the unknowns with all priors, which the data outdo less easily then
+    """
     residuals = quieted_functions(recordings, values, free, best)
     if residuals is None:
         return best
-    again = [
-        replace(u, start=u.value(float(z))) for u, z in zip(best.unknowns, best.z, strict=True)
-    ]
-    last = estimation.estimate(again, residuals, progress=_telling(recordings, progress))
-    return replace(last, simulations=best.simulations + last.simulations)
+    tell = _telling(recordings, progress)
+    near = [replace(u, start=u.value(float(z))) for u, z in zip(wanted, best.z, strict=True)]
+    first = estimation.estimate(near, residuals, progress=tell)
+    last = estimation.estimate(_outdone(first), residuals, progress=tell)
+    simulations = best.simulations + first.simulations + last.simulations
+    return replace(last, simulations=simulations)
 
 
 def _telling(

@@ -23,7 +23,7 @@ processes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,7 +34,7 @@ from plant_emulator.estimation import at, estimate
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.model import Model
+    from plant_emulator.diagnosis.model import Candidate, Model
     from plant_emulator.estimates import Estimate, Unknown
 
 # Relative fall of the cost that ends a fit here: a few hundredths in units of chi squared.
@@ -60,6 +60,7 @@ class Point:
     errors : standard errors by name of `values`
     structure : of the residuals, beyond white noise, see `covariance.structure`
     looks : of the cost, what the choice of the states has gained by chance, see `looks_of`
+    sizes : the largest size of every effect, in plausible sizes
     """
 
     effects: tuple[str, ...]
@@ -73,6 +74,7 @@ class Point:
     converged: bool
     structure: float = 0.0
     looks: float = 0.0
+    sizes: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -135,7 +137,18 @@ def fit(
     residuals = [model.residual(k, effects) for k in runs]
     settled = SETTLED if near is None else GLANCE_SETTLED
     found = estimate(unknowns, residuals, settled=settled, iterations=iterations, follow=near)
-    return point(effects, found, len(runs))
+    reached = point(effects, found, len(runs))
+    sizes = {name: _largest(model.candidates[name], reached.values) for name in effects}
+    return replace(reached, sizes=sizes)
+
+
+def _largest(candidate: Candidate, values: Mapping[str, float]) -> float:
+    """The largest of an effect's sizes in plausible sizes; 0 of one that has none."""
+    neutral = candidate.neutral
+    sizes = (
+        (values[u.name] - neutral[u.name]) / (u.start - neutral[u.name]) for u in candidate.sizes
+    )
+    return max(map(abs, sizes), default=0.0)
 
 
 def again(model: Model, effects: Sequence[str], runs: Sequence[int], start: Point) -> Point:

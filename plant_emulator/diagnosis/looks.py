@@ -78,9 +78,9 @@ def look(model: Model, effects: Sequence[str], runs: Sequence[int], start: Point
     """A few steps of a joint fit, from where another fit has come to; what the last effect has of
     many valleys is looked for anew.
     """
-    with_states = any(model.candidates[name].states for name in effects)
-    if not with_states:
-        return fit(model, effects, runs, start.values, start.states, FEW)
-    states = best_states(model, effects, runs, start.values, start.states, anew=effects[-1:])
+    states, few = start.states, FEW
+    if any(model.candidates[name].states for name in effects):
+        states = best_states(model, effects, runs, start.values, states, anew=effects[-1:])
+        few = FEW_WITH_STATES
     values = best_sizes(model, effects, runs, start.values, states)
-    return fit(model, effects, runs, values, states, FEW_WITH_STATES)
+    return fit(model, effects, runs, values, states, few)

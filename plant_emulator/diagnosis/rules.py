@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.explain import NOISE_LEFT, STRUCTURED, THRESHOLD, excess, weighed
+from plant_emulator.diagnosis.explain import (
+    LEFT,
+    NOISE_LEFT,
+    STRUCTURED,
+    THRESHOLD,
+    excess,
+    weighed,
+)
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.contest import Point
@@ -17,6 +24,10 @@ SECOND = 60.0
 # And the share of the whole gap that the first's own law may have left: the square of an error of
 # 3 % in it.
 LAW = 0.001
+# Size of a second, in plausible sizes, below which it may be what another law of the first has left
+# (such had 0.1 to 0.35), and the share of the gap that it has to close then: the square of an error
+# of 10 %, where the first leaves noise.
+SMALL, COARSE_LAW = 0.4, 0.01
 # Elsewhere the share of what the first leaves that a second has to close, of the squares and of the
 # structure. What the first's own law leaves stays: beside real seconds up to half of either. What
 # seemed a second there closed up to 0.4 of the squares, but no more than 0.15 of the structure.
@@ -52,10 +63,11 @@ def counts(best: Point, base: Point, null: Point, reaches_noise: bool) -> bool:
         gap = excess(null)
         closes = gap > THRESHOLD and fall > max(THRESHOLD, PART_OF_GAP * gap)
         return closes or evidence > THRESHOLD
+    small = any(best.sizes[name] < SMALL for name in best.effects if name not in base.effects)
     if noise_only(base):
-        return evidence > SECOND and fall > LAW * excess(null)
+        return evidence > SECOND and fall > (COARSE_LAW if small else LAW) * excess(null)
     orderly = _ordered(best) <= (1.0 - REST) * _ordered(base)
-    most = fall > REST * (base.squares - base.samples)
+    most = fall > max(REST * (base.squares - base.samples), LEFT * excess(null) if small else 0.0)
     return evidence > THRESHOLD and orderly and most
 
 

@@ -30,10 +30,11 @@ def best_states(
     *,
     anew: Sequence[str],
 ) -> tuple[dict[str, float], ...]:
-    """States of every run, each the best of some values while the others stay, two times over.
+    """States of every run, each but those of many narrow valleys the best of some values while the
+    others stay, two times over.
 
-    anew : effects whose states of many narrow valleys are then tried together: a signature at a fit
-        that lacks an effect may have found the wrong one
+    anew : effects whose states of many valleys are then tried together: a signature at a fit that
+        lacks an effect may have found the wrong one
     """
     of_effects = [u for name in effects for u in model.candidates[name].states]
     own = [u for u in (*model.states, *of_effects) if u.step is None]

@@ -59,23 +59,26 @@ def test_motor_side_gives_more_and_receives_less_than_the_drum_side(
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
+@pytest.mark.parametrize(("difference", "share_driven"), [(0.0, 0.1), (0.8, 0.02)])
 def test_gear_at_rest_holds_its_load_with_the_load_itself(
-    nominal: ParameterSet, direction: float
+    nominal: ParameterSet, direction: float, difference: float, share_driven: float
 ) -> None:
-    """The drum alone pushes: T_gd = f_gc + a T_gd where it moves the gear, f_gc / (1 - a)."""
-    bench = Piecewise({**nominal.values(), **LOSS}, gap_position=-direction)
+    """The drum alone pushes: T_gd = f_gc + a (1 - d) T_gd where it moves the gear."""
+    values = {**nominal.values(), **LOSS, DIFFERENCE: difference}
+    bench = Piecewise(values, gap_position=-direction)
     for k in range(1, 4001):
         bench.to(5e-3 * k, 0.0, wheel_torque=direction * 3e-3 * k)
         if bench.x[GEAR] != 0.0:
             assert np.sign(bench.x[GEAR]) == direction
-            assert 3e-3 * k * AT_DRUM == pytest.approx(35.989 / 0.9, rel=0.01)
+            assert 3e-3 * k * AT_DRUM == pytest.approx(35.989 / (1.0 - share_driven), rel=0.01)
             return
     raise AssertionError("the gear did not move")
 
 
-def test_mirrored_reference_gives_mirrored_run(nominal: ParameterSet) -> None:
+@pytest.mark.parametrize("difference", [0.0, 0.9])
+def test_mirrored_reference_gives_mirrored_run(nominal: ParameterSet, difference: float) -> None:
     corners = ((0.1, 0.0), (1.0, 150.0), (1.5, 150.0), (2.5, -120.0), (3.5, 0.0))
-    values = {**nominal.values(), **LOSS}
+    values = {**nominal.values(), **LOSS, DIFFERENCE: difference}
     run = simulate(linear(*corners, duration=5.0), values)
     other = simulate(linear(*((t, -w) for t, w in corners), duration=5.0), values)
     for name in ("motor_speed", "drum_speed", "armature_current", "shaft_torque"):
@@ -107,9 +110,12 @@ def test_free_bench_only_loses_energy(
         before = now
 
 
-@pytest.mark.parametrize("share", [0.05, 0.5])
-def test_running_bench_settles_through_a_reversal(nominal: ParameterSet, share: float) -> None:
-    bench = Bench(nominal, {"load_dependent_gear_loss": {"share": share}})
+@pytest.mark.parametrize(("share", "difference"), [(0.05, 0.0), (0.5, 0.0), (0.5, 0.9)])
+def test_running_bench_settles_through_a_reversal(
+    nominal: ParameterSet, share: float, difference: float
+) -> None:
+    loss = {"share": share, "difference": difference}
+    bench = Bench(nominal, {"load_dependent_gear_loss": loss})
     bench.advance([30.0 * np.sin(4e-3 * k) for k in range(4000)])
     assert bench.unsettled == 0
 

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 SUBSYSTEM = "gear"
 PARAMETERS = {
     "share": EffectParameter(
-        neutral=0.0, lower=0.0, upper=0.5, plausible=0.05, unit="1", meaning="a"
+        neutral=0.0, lower=0.0, upper=0.2, plausible=0.05, unit="1", meaning="a"
     ),
     "exponent": EffectParameter(
-        neutral=0.2, lower=0.0, upper=0.5, plausible=0.2, unit="1", meaning="n"
+        neutral=0.2, lower=0.0, upper=0.3, plausible=0.2, unit="1", meaning="n"
     ),
     "film_speed": EffectParameter(
         neutral=2.0, lower=0.01, upper=100.0, plausible=2.0, unit="rad/s", meaning="omega_0"

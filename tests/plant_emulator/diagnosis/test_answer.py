@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.answer import noise_floor, ranged, ranked, traces
+from plant_emulator.diagnosis.answer import noise_floor, ranged, rank, ranked, traces
 from plant_emulator.diagnosis.contest import Point
 from plant_emulator.diagnosis.explain import Contender, Explanation
 from plant_emulator.diagnosis.model import Run
 from plant_emulator.diagnosis.report_traces import path, rms
 from plant_emulator.diagnosis.shrink import Prediction, gap
 from plant_emulator.estimates import Array
+from tests.plant_emulator.diagnosis.test_contest import effect
 
 POINT = Point(
     effects=(),
@@ -47,6 +48,18 @@ def test_accepted_effect_without_evidence_alone_is_ranked() -> None:
     falls = {"f": 1.0, "a": 300.0, "b": 20.0, "c": 15.0, "d": 10.0, "e": 5.0}
     names = [c.effect for c in ranked(explanation(falls, ("a", "f")))]
     assert names == ["a", "b", "c", "d", "e", "f"]
+
+
+@pytest.mark.parametrize(("size", "law"), [(4.0, 2.0), (-4.0, 2.0), (0.1, 0.5)])
+def test_standard_error_of_a_size_holds_that_of_its_law(size: float, law: float) -> None:
+    """By hand: half of the estimate, or of the plausible size 1 where the estimate is smaller."""
+    found = explanation({"cube": 300.0}, ("cube",))
+    sized = {"values": {"cube_size": size}, "errors": {"cube_size": 0.3}}
+    found = replace(found, final=replace(found.final, **sized))
+    (one,) = found.contenders
+    row = rank(one, found, found.named, effect("cube"), None, {"cube_size": 0.5})
+    (told,) = row["parameters"]
+    assert told["standard_error"] == pytest.approx((0.3**2 + law**2) ** 0.5)
 
 
 def test_effects_of_no_account_beyond_a_few_are_not_ranked() -> None:

@@ -114,9 +114,8 @@ class Spike(Line):
 
     def __init__(self, measured: Sequence[Array], **kind: Sequence[Unknown]) -> None:
         super().__init__(measured, ("cube",))
-        plain, state = self.candidates["cube"], linear("warmth", 0.0, std=1.0)
         neutral = {u.name: 0.0 for u in kind["sizes"]}
-        self.candidates = {"cube": replace(plain, states=(state,), neutral=neutral, **kind)}
+        self.candidates = {"cube": replace(self.candidates["cube"], neutral=neutral, **kind)}
 
     def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
         """See `Model`."""
@@ -132,19 +131,20 @@ def spike(time: float, size: float = 40.0) -> Array:
 @pytest.mark.parametrize(
     ("time", "step", "found"), [(0.617, 0.005, True), (-0.617, 0.005, True), (0.617, None, False)]
 )
+@pytest.mark.parametrize("states", [(), (linear("warmth", 0.0, std=1.0),)])
 @pytest.mark.parametrize("kind", ["sizes", "shapes"])
 def test_what_has_many_valleys_is_looked_for_step_by_step(
-    kind: str, time: float, step: float | None, found: bool
+    kind: str, states: tuple[Unknown, ...], time: float, step: float | None, found: bool
 ) -> None:
     at = linear("cube_time", 0.3, scale=0.3, step=step, prior=0.3, std=0.6)
     size = linear("cube_size", 40.0, scale=40.0)
-    unknowns = {"sizes": (size, replace(at, std=None)), "shapes": ()}
+    unknowns = {"sizes": (size, replace(at, std=None)), "shapes": (), "states": states}
     if kind == "shapes":
-        unknowns = {"sizes": (size,), "shapes": (at,)}
+        unknowns |= {"sizes": (size,), "shapes": (at,)}
     model = Spike([noisy(2.0 + spike(time))], **unknowns)
     base = null_fit(model, [0])
     sizes = {"cube_size": 40.0, "cube_time": 0.3}
-    start = replace(base, values={**base.values, **sizes}, states=({"warmth": 0.0},))
+    start = replace(base, values={**base.values, **sizes}, states=({u.name: 0.0 for u in states},))
     where = look(model, ("cube",), [0], start).values["cube_time"]
     assert (where == pytest.approx(time, abs=1e-3)) is found
 

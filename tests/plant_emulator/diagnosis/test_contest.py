@@ -476,13 +476,32 @@ def test_second_look_starts_from_a_larger_size_with_the_drift_moved_for_it() -> 
     assert second.cost == pytest.approx(glance(model, found, base, [0], near).cost, abs=0.1)
 
 
-@pytest.mark.parametrize(("amplitude", "named"), [(0.35, {"kink", "wave"}), (0.2, {"kink"})])
+def rippled(kink: float, ripple: Array, plausible: float = 0.3) -> Line:
+    """A kink and a ripple; plausible : size of the wave, which the ripple may be."""
+    model = Line([noisy(2.0 + 3.0 * TIME + kink * np.abs(TIME) + ripple)], ["kink", "wave"])
+    model.candidates["wave"] = effect("wave", plausible)
+    return model
+
+
+@pytest.mark.parametrize(
+    ("kink", "amplitude", "plausible", "named"),
+    [
+        (2.0, 0.35, 0.3, {"kink", "wave"}),
+        (2.0, 0.2, 0.3, {"kink"}),
+        # Small, and less or more than what an error of 10 % in the kink would leave.
+        (15.0, 0.25, 0.3, {"kink", "wave"}),
+        (15.0, 0.25, 3.0, {"kink"}),
+        (5.0, 0.25, 3.0, {"kink", "wave"}),
+    ],
+)
 def test_second_effect_in_what_looks_like_noise_needs_its_own_evidence(
-    amplitude: float, named: set[str]
+    kink: float, amplitude: float, plausible: float, named: set[str]
 ) -> None:
-    """By hand: a ripple of amplitude A takes n A^2 / 2 from the squares: 122 of 2000, or 40."""
-    y = 2.0 + 3.0 * TIME + 2.0 * np.abs(TIME) + amplitude * np.sin(20.0 * TIME)
-    assert set(explained(Line([noisy(y)], ["kink", "wave"])).final.effects) == named
+    """By hand: a ripple of amplitude A takes n A^2 / 2 from the squares, 122, 40 or 62 of 2000,
+    and with this noise 85; the kink n k^2 / 12, of which 0.01 are 375 or 42.
+    """
+    model = rippled(kink, amplitude * np.sin(20.0 * TIME), plausible)
+    assert set(explained(model).final.effects) == named
 
 
 def test_effect_in_the_place_of_its_twin_begins_at_the_twins_size() -> None:
@@ -505,8 +524,16 @@ def test_what_takes_but_a_part_of_the_rest_is_no_second_effect(
     and one that is not in it 0.0625 / 2 or 0.16 / 2: the first takes 59 or 36 % of both.
     """
     ripple = 0.3 * np.sin(20.0 * TIME) + beside * np.sin(50.0 * TIME)
-    y = 2.0 + 3.0 * TIME + 2.0 * np.abs(TIME) + ripple
-    assert set(explained(Line([noisy(y)], ["kink", "wave"])).final.effects) == named
+    assert set(explained(rippled(2.0, ripple)).final.effects) == named
+
+
+@pytest.mark.parametrize(("plausible", "named"), [(1.0, {"kink", "wave"}), (2.5, {"kink"})])
+def test_small_second_of_what_is_no_noise_closes_much_of_the_gap(
+    plausible: float, named: set[str]
+) -> None:
+    """By hand: a ripple of 0.5 closes 250, less than a fifth of 1500 + 250."""
+    ripple = 0.5 * np.sin(20.0 * TIME)
+    assert set(explained(rippled(3.0, ripple, plausible)).final.effects) == named
 
 
 class Pulse(Line):
