@@ -50,7 +50,7 @@ class Inquiry:
             found = self._between(explained, verdict.decide(self.model, explained))
         return explained, found
 
-    def _contest(self, recipe: Recipe) -> Explanation:
+    def _contest(self, recipe: Recipe, by_chance: float = 0.0) -> Explanation:
         contest = Contest(
             self.pool,
             recipe,
@@ -58,6 +58,7 @@ class Inquiry:
             self.runs,
             self.progress,
             reaches_noise=self.model.reaches_noise,
+            by_chance=by_chance,
         )
         return contest.explain()
 
@@ -71,7 +72,7 @@ class Inquiry:
             return explained
         weights = dict(zip(self.runs, first.weights, strict=True))
         every = tuple(weights.get(k, np.ones(1)) for k in range(len(self.model.runs)))
-        again = self._contest(Weighted(self.recipe, every))
+        again = self._contest(Weighted(self.recipe, every), first.evidence)
         last = self._unrest(again.final, [first.effect])
         return replace(again, chance=tuple(last)) if last else explained
 

@@ -48,14 +48,20 @@ def enough(final: Point, null: Point, reaches_noise: bool) -> bool:
     return left <= max(LITTLE * gap, THRESHOLD)
 
 
-def counts(best: Point, base: Point, null: Point, reaches_noise: bool) -> bool:
+def counts(
+    best: Point, base: Point, null: Point, reaches_noise: bool, by_chance: float = 0.0
+) -> bool:
     """Whether one more effect earns its place.
 
     What a law slightly other than the library's leaves is no second effect. It is not white, and
     its evidence says nothing.
+
+    by_chance : evidence of an effect of chance course, whose unrest all these fits have
     """
     fall = base.cost - best.cost
     evidence = weighed(fall, best, null)
+    if evidence <= LAW * by_chance:
+        return False
     if not reaches_noise:
         return evidence > THRESHOLD
     if not base.effects:

@@ -34,7 +34,10 @@ MOST_EFFECTS = 2
 
 
 class Contest:
-    """One diagnosis on its pool; see the module's text."""
+    """One diagnosis on its pool; see the module's text.
+
+    by_chance : evidence of an effect of chance course, if the recipe's noise holds one
+    """
 
     def __init__(
         self,
@@ -45,8 +48,9 @@ class Contest:
         progress: Progress | None = None,
         *,
         reaches_noise: bool = True,
+        by_chance: float = 0.0,
     ) -> None:
-        self._reaches_noise = reaches_noise
+        self._reaches_noise, self._by_chance = reaches_noise, by_chance
         self._rounds = Rounds(pool, recipe, names, runs, progress)
 
     def explain(self) -> Explanation:
@@ -61,7 +65,7 @@ class Contest:
             if final.effects:
                 final, found = self._further(final, "further effects")
             best = best_of(found)
-            if best is None or not counts(best, final, null, self._reaches_noise):
+            if best is None or not self._counts(best, final, null):
                 break
             if final.effects:
                 found = self._rounds.in_place(found, best)
@@ -134,6 +138,10 @@ class Contest:
                 rivals[waiting[0]] = _costs(found)
         return final, rivals
 
+    def _counts(self, best: Point, base: Point, null: Point) -> bool:
+        """Whether one more effect earns its place."""
+        return counts(best, base, null, self._reaches_noise, self._by_chance)
+
     def _missed(self, final: Point, null: Point) -> Point:
         """Without an effect that another has made needless."""
         if len(final.effects) < 2:
@@ -141,7 +149,7 @@ class Contest:
         for name in final.effects:
             rest = tuple(e for e in final.effects if e != name)
             without = self._rounds.restarts.refitted(replace(final, effects=rest))
-            if not counts(final, without, null, self._reaches_noise):
+            if not self._counts(final, without, null):
                 return without
         return final
 

@@ -105,6 +105,16 @@ def test_effect_beside_an_unrest_is_named_with_it() -> None:
     assert explained.final.values["wave_size"] == pytest.approx(0.5, abs=0.15)
 
 
+def test_what_is_little_beside_a_great_unrest_may_be_its_law() -> None:
+    """By hand: evidence of some n / 2 8^2 12 = 768e3, of which the wave's 125 are less than 0.001;
+    alone it is found.
+    """
+    y = noisy(2.0 + 3.0 * TIME + 0.5 * np.sin(20.0 * TIME)) + shaken(8.0)
+    model = Shaken([y])
+    inquiry = Inquiry(pool=Here(), recipe=Given(model), model=model, runs=(0,))
+    assert inquiry.found()[1].effects == ("shake",)
+
+
 def test_unrest_alone_is_an_effect() -> None:
     model = Shaken([noisy(2.0 + 3.0 * TIME) + shaken(0.8)])
     inquiry = Inquiry(pool=Here(), recipe=Given(model), model=model, runs=(0,))
