@@ -25,7 +25,7 @@ class State:
     motor_speed: float
 
 
-def seed(params: Params, motor_speed: float, drum_speed: float) -> State:  # noqa: ARG001 - a regulator's
+def seed(params: Params, motor_speed: float, drum_speed: float) -> State:  # noqa: ARG001 - all regulators have these arguments
     """The sweep before its first speed."""
     return State(number=0, held=0.0, motor_speed=max(motor_speed, 0.0))
 
@@ -47,6 +47,6 @@ def update(params: Params, state: State, window: Window) -> tuple[State, Demand]
     return after, Demand(speed=target)
 
 
-def follow(params: Params, state: State, demand: float, setpoint: float) -> State:  # noqa: ARG001 - a regulator's
+def follow(params: Params, state: State, demand: float, setpoint: float) -> State:  # noqa: ARG001 - all regulators have these arguments
     """The sweep goes on from what the limits passed."""
     return replace(state, motor_speed=setpoint)
