@@ -48,6 +48,7 @@ class Trial:
         """Do what is not done yet; the details of all cases."""
         left = [k for k in range(self.count) if self.folder.kept(k) is None]
         executor = ThreadPoolExecutor(workers)
+        left.sort(key=self._logs, reverse=True)  # long ones last would leave workers idle
         waiting = [executor.submit(self._do, number) for number in left]
         try:
             for done, future in enumerate(as_completed(waiting)):
@@ -58,6 +59,10 @@ class Trial:
             self._examiner.stop()
             executor.shutdown(cancel_futures=True)
         return self._closed()
+
+    def _logs(self, number: int) -> int:
+        """How many logs a case has."""
+        return len(draw(self.seed, number, self.nominal, kernel().effects).programs)
 
     def _do(self, number: int) -> None:
         """One case from its logs to its score."""

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 
 # Effects whose held-out gain is computed: the best ones only, each takes a fit a fold.
 TRIED = 3
-# Share of the best one's evidence that another has at least.
-NEAR = 0.1
+# Share of the best one's evidence that another has at least: with less it is no rival, and its fits
+# stop in valleys, so that the share that it closes tells of these.
+NEAR = 0.5
 # The model "as given" among those that are compared by their effects.
 NOMINAL = ("nominal",)
 NONE_SHOWS = "no choice of fitted runs shows all effects; every run is predicted nevertheless"

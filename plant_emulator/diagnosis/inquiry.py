@@ -28,18 +28,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Inquiry:
-    """One diagnosis up to its verdict; runs : that are fitted, by number."""
+    """One diagnosis up to its verdict.
+
+    runs : that are fitted, by number; null : a fit without effects to start from, if there is one
+    """
 
     pool: Pool
     recipe: Recipe
     model: Model
     runs: tuple[int, ...]
     progress: Progress | None = None
+    null: Point | None = None
 
     def with_quiet_inputs(self) -> Inquiry:
         """The same with the noise of fed inputs as part of the noise."""
-        recipe = quieted(self.pool, self.recipe, self.model, self.runs)
-        return replace(self, recipe=recipe)
+        recipe, null = quieted(self.pool, self.recipe, self.model, self.runs)
+        return replace(self, recipe=recipe, null=null)
 
     def found(self) -> tuple[Explanation, Verdict]:
         """What the contest came to, and the verdict."""
@@ -59,6 +63,7 @@ class Inquiry:
             self.progress,
             reaches_noise=self.model.reaches_noise,
             by_chance=by_chance,
+            null=self.null,
         )
         return contest.explain()
 

@@ -22,16 +22,19 @@ if TYPE_CHECKING:
     from plant_emulator.fed_noise import Loud
 
 
-def quieted(pool: Pool, recipe: Recipe, model: Model, runs: tuple[int, ...]) -> Recipe:
+def quieted(
+    pool: Pool, recipe: Recipe, model: Model, runs: tuple[int, ...]
+) -> tuple[Recipe, Point | None]:
     """The recipe of a model whose residuals have white noise also where inputs are fed.
 
-    The recipe itself where these runs feed none, or none that counts.
+    The recipe itself where these runs feed none, or none that counts; and the fit without effects
+    that told, None where none was needed.
     """
     if not any(model.runs[run].fed for run in runs):
-        return recipe
+        return recipe, None
     (null,) = pool.map(start, recipe, [runs])
     (found,) = pool.map(louds, recipe, [Task(base=null, runs=runs)])
-    return Quieted(recipe, found) if found else recipe
+    return Quieted(recipe, found) if found else recipe, null
 
 
 def louds(model: Model, task: Task) -> dict[int, Loud]:

@@ -37,6 +37,7 @@ class Contest:
     """One diagnosis on its pool; see the module's text.
 
     by_chance : evidence of an effect of chance course, if the recipe's noise holds one
+    null : a fit without effects by another noise, to start from, if there is one
     """
 
     def __init__(
@@ -49,13 +50,14 @@ class Contest:
         *,
         reaches_noise: bool = True,
         by_chance: float = 0.0,
+        null: Point | None = None,
     ) -> None:
-        self._reaches_noise, self._by_chance = reaches_noise, by_chance
+        self._reaches_noise, self._by_chance, self._null = reaches_noise, by_chance, null
         self._rounds = Rounds(pool, recipe, names, runs, progress)
 
     def explain(self) -> Explanation:
         """Go through the contest."""
-        null, contenders = self._first(self._rounds.without_effects())
+        null, contenders = self._first(self._rounds.without_effects(self._null))
         null = self._rounds.restarts.settled(null)
         final = null
         rivals: dict[str, dict[str, float]] = {}

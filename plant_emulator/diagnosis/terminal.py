@@ -35,6 +35,8 @@ MOST_RANKED = 6
 NAME, CELL = 29, 9
 LABEL = 13
 EVIDENCE_DECIMALS = 1
+# Lines of the statement, and with effects that have much to tell beside them.
+STATEMENT, LEAST_STATEMENT = 4, 3
 # Runners-up beyond so many give way to the empty lines between the sections.
 LEAST_OTHERS = 2
 # Spaces within "2.83 N m" at which no line ends.
@@ -54,6 +56,9 @@ def lines(answer: Mapping[str, Any], width: int = 80) -> list[str]:
     shrinkage = _shrinkage(answer["gap"], width)
     rest = _rest(answer, width)
     room = HEIGHT - len(head) - len(shrinkage) - len(rest)
+    if len(_ranking(answer, room, width)) < len(_ranking(answer, HEIGHT, width)):
+        head = _verdict(answer, width, LEAST_STATEMENT)
+        room = HEIGHT - len(head) - len(shrinkage) - len(rest)
     ranking, others = _ranking(answer, room, width), _runners_up(answer["ranking"])
     room -= len(ranking)
     breaks = sum(map(bool, (ranking, shrinkage, rest)))
@@ -94,7 +99,7 @@ def _listed(
     return _paragraph("; ".join(items), width, most, label) if items else []
 
 
-def _verdict(answer: Mapping[str, Any], width: int) -> list[str]:
+def _verdict(answer: Mapping[str, Any], width: int, most: int = STATEMENT) -> list[str]:
     verdict = answer["verdict"]
     parts = [KINDS[verdict["kind"]].upper()]
     if verdict["confidence"] is not None:
@@ -103,7 +108,7 @@ def _verdict(answer: Mapping[str, Any], width: int) -> list[str]:
     where = place(answer["location"], UNITS)
     return [
         ", ".join(parts),
-        *_paragraph(verdict["statement"], width, 3 if len(verdict["effects"]) > 1 else 4),
+        *_paragraph(verdict["statement"], width, most),
         *(_paragraph(where, width, 2, "where") if where else []),
     ]
 

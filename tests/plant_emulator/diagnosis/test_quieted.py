@@ -36,7 +36,7 @@ def test_fits_do_not_follow_the_noise_of_a_fed_input() -> None:
     """By hand: without the fed samples a and b are those of the line, within their errors."""
     y = noisy(2.0 + 3.0 * TIME) + FED
     model = Fed([y])
-    recipe = quieted(Here(), Given(model), model, (0,))
+    recipe, _ = quieted(Here(), Given(model), model, (0,))
     there, plain = null_fit(recipe.build(), [0]), null_fit(model, [0])
     for name, value in (("a", 2.0), ("b", 3.0)):
         assert abs(there.values[name] - value) < 3.0 * there.errors[name]
@@ -50,10 +50,28 @@ def test_inquiry_with_quiet_inputs_finds_no_gap_in_their_noise() -> None:
     assert inquiry.with_quiet_inputs().found()[1].kind == "parameter"
 
 
+def test_contest_starts_from_the_fit_that_told_the_noise() -> None:
+    """A line that is searched for once only: the second time would be a fault."""
+
+    class Once(Fed):
+        searched = False
+
+        def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
+            assert not self.searched
+            self.searched = True
+            return super().search(runs)
+
+    model = Once([noisy(2.0 + 3.0 * TIME) + FED])
+    inquiry = Inquiry(pool=Here(), recipe=Given(model), model=model, runs=(0,))
+    explained, _ = inquiry.with_quiet_inputs().found()
+    for name, value in (("a", 2.0), ("b", 3.0)):
+        assert abs(explained.null.values[name] - value) < 3.0 * explained.null.errors[name]
+
+
 def test_machine_that_is_fed_nothing_keeps_its_recipe() -> None:
     model = Line([noisy(2.0 + 3.0 * TIME)])
     recipe = Given(model)
-    assert quieted(Here(), recipe, model, (0,)) is recipe
+    assert quieted(Here(), recipe, model, (0,)) == (recipe, None)
 
 
 def test_quieted_model_is_another_recipe() -> None:

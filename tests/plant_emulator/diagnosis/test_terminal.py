@@ -56,6 +56,14 @@ def test_longest_answer_keeps_verdict_place_ranking_shrinkage_and_what_is_next()
         assert told in text
 
 
+def test_statement_of_two_effects_is_whole_where_no_class_needs_its_line():
+    answer = answers.two_effects()
+    answer["verdict"] |= {"class": [], "statement": 39 * "seven. " + "end"}  # 276 of 4 * 80
+    rows = lines(answer)
+    assert [row for row in rows if row.endswith("end")]
+    assert len(rows) <= 23
+
+
 def test_shrinkage_is_the_rms_over_the_channels_in_the_noise():
     rows = {row[:12].strip(): row for row in lines(answers.effect())}
     # sqrt(mean((61/8)^2, (44/5)^2, (41/3)^2, (52/12)^2)) = 9.23, and 1.09, by hand
