@@ -38,13 +38,13 @@ def planned_run(name: str, parameters: ParameterSet) -> Recording:
 
 def prepared(
     names: Sequence[str], parameters: ParameterSet, hold: str | None = None
-) -> tuple[BenchModel, Point]:
-    """A model of these logs and programs, and the fit at which they are judged.
+) -> tuple[BenchModel, Point, tuple[str, ...]]:
+    """A model of these logs and programs, the fit at which they are judged, and what was noted.
 
     Logs are fitted; programs are simulated at what the logs say, or at the set as given.
     """
     recorded = [name for name in names if name not in PROGRAMS or Path(name).is_file()]
-    recordings, _ = admitted(recorded, parameters, hold)
+    recordings, notes = admitted(recorded, parameters, hold)
     values = parameters.values()
     states: tuple[dict[str, float], ...] = ()
     if recordings:
@@ -66,4 +66,4 @@ def prepared(
         errors={},
         converged=True,
     )
-    return model, point
+    return model, point, tuple(notes)

@@ -31,7 +31,9 @@ def command(
     from plant_emulator.diagnosis.detect import as_answer, detectability
     from plant_emulator.planning import prepared
 
-    model, point = prepared(runs, parameter_sets.load(parameters), reference)
+    model, point, notes = prepared(runs, parameter_sets.load(parameters), reference)
+    for note in notes:
+        click.echo(f"note: {note}", err=True)
     found = detectability(model, point, range(len(runs)))
     rows = sorted(found, key=lambda d: -d.norm)
     effects = [as_answer(d, model.candidates[d.effect]) for d in rows]

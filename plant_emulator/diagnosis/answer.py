@@ -120,7 +120,7 @@ def undetectable(
 def hidden(contender: Contender, candidate: Candidate) -> str:
     """Why an effect does not show."""
     if candidate.untold:
-        return candidate.needs
+        return candidate.needs or "its course is chance, and too small here to be seen"
     if contender.raw < DETECTABLE:
         reason = "too small in these channels and runs at its plausible size"
     else:

@@ -10,6 +10,7 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.contest import null_fit
+from plant_emulator.diagnosis.explain import LEFT
 from plant_emulator.diagnosis.wording import size
 
 if TYPE_CHECKING:
@@ -32,9 +33,12 @@ def alone(model: Model, task: Task) -> Point:
     return null_fit(model, task.runs)
 
 
-def between(model: Model, runs: Sequence[int], found: Sequence[Point]) -> str:
-    """What differs most between two of the runs, each fitted alone; empty: nothing is known to."""
-    if any(not point.converged or point.chi_squared > AGREES for point in found):
+def between(model: Model, runs: Sequence[int], found: Sequence[Point], together: Point) -> str:
+    """What differs most between two of the runs, each fitted alone; empty: nothing is known to.
+
+    together : the best fit of all of them
+    """
+    if any(not point.converged for point in found) or not _agree(model, found, together):
         return ""
     most, named = DIFFERENT, ("", "", "")
     for (k, a), (j, b) in combinations(zip(runs, found, strict=True), 2):
@@ -51,10 +55,22 @@ def between(model: Model, runs: Sequence[int], found: Sequence[Point]) -> str:
     )
 
 
+def _agree(model: Model, found: Sequence[Point], together: Point) -> bool:
+    """Whether each run alone agrees with the equations, in so far as the model can tell."""
+    if model.reaches_noise:
+        return all(point.chi_squared <= AGREES for point in found)
+    return sum(point.squares for point in found) <= LEFT * together.squares
+
+
 def _apart(name: str, a: Point, b: Point) -> float:
-    """Difference of a parameter of two fits in its standard errors."""
-    error = float((a.errors[name] ** 2 + b.errors[name] ** 2) ** 0.5)
+    """Difference of a parameter of two fits in its standard errors, wider by what they leave."""
+    error = float((_variance(name, a) + _variance(name, b)) ** 0.5)
     return abs(a.values[name] - b.values[name]) / error if error > 0.0 else 0.0
+
+
+def _variance(name: str, point: Point) -> float:
+    """Square of a standard error, by the residual and its autocorrelation."""
+    return point.errors[name] ** 2 * max(1.0, point.chi_squared) / point.share
 
 
 def _told(model: Model, name: str, run: int, found: Point) -> str:

@@ -33,6 +33,8 @@ EDGE, EDGE_SAMPLES = 0.2, 8
 """Left out at either end of a run, in which the filters still start: [s], samples that remain."""
 SHORTEST = 2.0
 """[s] of a run below which nothing is said of an axis."""
+FEWEST, FEWEST_LEFT = 100, 20
+"""Samples of a run, and those that remain of it in the band, below which nothing is fitted."""
 REST, REST_SPEED = 0.1, 0.002
 """[s] from which an axis rests, and the share of its highest speed below which it does."""
 
@@ -91,6 +93,8 @@ def thinned(values: Array, factor: int) -> Array:
 
 def period(log: AxisLog) -> float:
     """Time between two samples [s]; LogError where they are not even, or the run is too short."""
+    if len(log.time) < FEWEST:
+        raise LogError(f"{log.source}: {len(log.time)} samples; {FEWEST} or more are needed")
     steps = np.diff(log.time)
     usual = float(np.median(steps))
     worst = int(np.argmax(np.abs(steps - usual)))
@@ -180,9 +184,14 @@ class AxisRun:
 
 
 def prepared(log: AxisLog, rate: float) -> AxisRun:
-    """A log with its motion; LogError where force or position stands still."""
+    """A log with its motion; LogError where force or position stands still, or little is left."""
     moved, thin = motion(log, rate), band(log, rate)
     force = thin(log.force)
+    if len(force) < FEWEST_LEFT:
+        raise LogError(
+            f"{log.source}: {len(force)} samples are left of {len(log.time)} at {rate:g} a second "
+            f"without the ends; {FEWEST_LEFT} or more are needed: a longer run"
+        )
     level = noise(log.force) * thin.gain
     for name, moving in (("position", np.ptp(log.position) > 0.0), ("force", level > 0.0)):
         if not moving:

@@ -23,7 +23,7 @@ from plant_emulator.parameters import UNITS
 from plant_emulator.scans import scanned
 from plant_emulator.search import GAP_POSITION, Search
 from plant_emulator.simulate import TOLERANCE, values_of
-from plant_emulator.start_states import GAP, with_own
+from plant_emulator.start_states import states_of, with_own
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -83,6 +83,7 @@ def candidate(effect: Effect) -> Candidate:
         title=effect.description.partition("\n")[0].rstrip("."),
         needs=effect.needs,
         untold=tuple(untold),
+        exact=effect.exact,
     )
 
 
@@ -111,9 +112,13 @@ CHANNEL_UNITS = {
 
 
 class BenchModel:
-    """The bench and its logs; see `Model`."""
+    """The bench and its logs; see `Model`.
 
-    states = (GAP,)
+    Effects that the parameter set has belong to the bench: what they have of each run's own is a
+    state of every fit, their sizes stay. Its blocks are then not told apart, since their relations
+    know the nominal equations only.
+    """
+
     reaches_noise = True
 
     def __init__(
@@ -127,8 +132,12 @@ class BenchModel:
         self._effects = effects
         self._values = values_of(parameters)
         self._set = parameters
-        everything = {name: effect.plausible() for name, effect in effects.items()}
-        self._recordings = [with_own(r, everything, effects) for r in recordings]
+        known = {**kernel().effects, **effects}
+        plausible = {name: effect.plausible() for name, effect in effects.items()}
+        everything = {**plausible, **parameters.effects}
+        self._recordings = [with_own(r, everything, known) for r in recordings]
+        self._given = {f"{e}_{key}" for e, own in parameters.effects.items() for key in own}
+        self.states = states_of(parameters.effects, known)
         self.candidates = {name: candidate(effect) for name, effect in effects.items()}
         self.parameters = tuple(unknowns(parameters, self._free, self._values, ()))
         self.units = {name: UNITS[name] for name in self._free}
@@ -149,7 +158,8 @@ class BenchModel:
     def _fixed(self, run: int, effects: Sequence[str]) -> dict[str, float]:
         """Values that no fit changes: of the set, of the effects, and what the log tells."""
         there = {k: v for name in effects for k, v in self.candidates[name].fixed.items()}
-        own = {k: v for k, v in self._recordings[run].own.items() if k in there}
+        told = self._recordings[run].own
+        own = {k: v for k, v in told.items() if k in there or k in self._given}
         return {**self._values, **there, **own}
 
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
@@ -178,28 +188,32 @@ class BenchModel:
         search = Search(recordings, self._values, self._free)
         search.values |= start_values([r.log for r in recordings], self._values, self._free)
         search.scan()
-        return (
-            {name: search.values[name] for name in self._free},
-            [{GAP_POSITION: gap} for gap in search.gaps],
-        )
+        found = {name: search.values[name] for name in self._free}
+        if self._given:
+            return found, [self.start_states(k, (), found) for k in runs]
+        return found, [{GAP_POSITION: gap} for gap in search.gaps]
 
     def start_states(
         self, run: int, effects: Sequence[str], values: Mapping[str, float]
     ) -> dict[str, float]:
         """See `Model`."""
+        given = [u for u in self.states if u.name != GAP_POSITION]
         own = {u.name: u.start for name in effects for u in self.candidates[name].states}
+        own |= {u.name: u.start for u in given}
         everything = {**self._fixed(run, effects), **own, **values}
         search = Search([self._recordings[run]], everything, ())
         search.scan_gaps(GAPS)
         found = {GAP_POSITION: search.gaps[0], **own}
         residual = self.residual(run, effects)
-        for name in effects:  # each effect's alone: all of several together are too many
-            states = self.candidates[name].states
+        # Each effect's alone: all of several together are too many.
+        for states in (given, *(self.candidates[name].states for name in effects)):
             found = scanned(lambda trial: residual({**values, **trial}), found, states)
         return found
 
     def located(self, where: Point, runs: Sequence[int]) -> Mapping[str, Any] | None:
         """See `Model`."""
+        if self._given:
+            return None
         return locate([self._recordings[k] for k in runs], self._set, where).as_answer()
 
     def with_planned(self, where: Point, runs: Sequence[int]) -> BenchModel:
@@ -237,8 +251,11 @@ class BenchRecipe:
     own: tuple[Path, ...] = ()
 
     def contestants(self) -> dict[str, Effect]:
-        """The effects in the contest by name, of those that this process knows."""
-        return {n: effect for n, effect in kernel().effects.items() if n not in self.without}
+        """The effects in the contest by name, of those that this process knows: without those
+        that the bench has.
+        """
+        left_out = {*self.without, *self.parameters.effects}
+        return {n: effect for n, effect in kernel().effects.items() if n not in left_out}
 
     def build(self) -> BenchModel:
         """The model; this process then knows the user's own effects."""

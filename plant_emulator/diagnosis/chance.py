@@ -158,15 +158,19 @@ def _even(squares: Array, added: Array) -> bool:
 class _Weighted:
     """A model whose residuals are weighted; all else as it is."""
 
-    def __init__(self, model: Model, weights: Sequence[Array] | Mapping[int, Array]) -> None:
+    def __init__(self, model: Model, weights: Mapping[int, Array]) -> None:
         self._model, self._weights = model, weights
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._model, name)
 
+    def with_planned(self, where: Point, runs: Sequence[int]) -> Model:
+        """See `Model`; the planned runs come behind its own, without unrest."""
+        return cast("Model", _Weighted(self._model.with_planned(where, runs), self._weights))
+
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
         """See `Model`."""
-        plain, weight = self._model.residual(run, effects), self._weights[run]
+        plain, weight = self._model.residual(run, effects), self._weights.get(run, 1.0)
 
         def residual(values: Mapping[str, float]) -> Array:
             return np.asarray(plain(values) * weight)
@@ -183,7 +187,7 @@ class Weighted:
 
     def build(self) -> Model:
         """The model."""
-        return cast("Model", _Weighted(self.recipe.build(), self.weights))
+        return cast("Model", _Weighted(self.recipe.build(), dict(enumerate(self.weights))))
 
     def digest(self) -> str:
         """The same for the same model only."""

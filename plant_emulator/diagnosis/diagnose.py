@@ -68,7 +68,7 @@ class Diagnose:
         self.settings, self.notes, self.progress = settings, tuple(notes), progress
         self.cases = None if cases is None else tuple(cases)
         self.law_errors = law_errors or {}
-        self.folds = plan.folds
+        self.folds, self.predictable = plan.folds, True
 
     def diagnose(self) -> Diagnosis:
         """Contest, verdict, held-out runs, place."""
@@ -80,7 +80,7 @@ class Diagnose:
             progress=self.progress,
         )
         inquiry = inquiry.with_quiet_inputs()
-        explained, found = inquiry.found()
+        explained, found, quiet = inquiry.found()
         held_out = HeldOut(
             pool=self.pool,
             recipe=self.recipe,
@@ -89,11 +89,13 @@ class Diagnose:
             progress=self.progress,
         )
         followed = _followed(explained, found)
-        self.folds, notes = held_out.usable(explained, followed)
+        usable, notes = held_out.usable(explained, followed)
         self.notes += notes
+        # Where nothing can be predicted with the effects, all runs show what is left without them.
+        self.folds, self.predictable = usable or self.plan.folds, bool(usable)
         predicted = held_out.predictions(explained, followed, self.folds)
         self.notes += held_out.unsettled(self.folds, predicted)
-        return self._answered(explained, found, predicted, inquiry.recipe)
+        return self._answered(explained, found, predicted, quiet)
 
     def _answered(
         self,
@@ -184,8 +186,11 @@ class Diagnose:
     ) -> tuple[float | None, list[float] | None]:
         """The closed fraction with its interval, where the verdict names a cause.
 
-        None where the cause is chance alone: nothing predicts its course.
+        None where the cause is chance alone: nothing predicts its course; and where no held-out run
+        can be predicted with it.
         """
+        if not self.predictable:
+            return None, None
         if found.kind not in {"effect", "parameter"} or (found.effects and not followed):
             return None, None
         reference = gaps[NOMINAL] if found.kind == "parameter" else gaps[()]

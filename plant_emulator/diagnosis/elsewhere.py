@@ -38,14 +38,16 @@ def shaken(
 ) -> Point:
     """A few steps of a joint fit from some way off where it has come to, each number another way.
 
-    As far as SHAKE standard errors, no further than a prior deviation.
+    As far as SHAKE standard errors, no further than a prior deviation, and within the bounds: with
+    a friction below zero a bench shakes, in steps of microseconds.
     """
     random = np.random.default_rng(number)
     moved = dict(start.values)
     for u in template(model, effects, runs):
         if u.run is None:
             far = min(SHAKE * start.errors[u.name], u.std or abs(moved[u.name]))
-            moved[u.name] += far * float(random.standard_normal())
+            beyond = moved[u.name] + far * float(random.standard_normal())
+            moved[u.name] = float(np.clip(beyond, u.lower, u.upper))
     states = start.states
     if any(model.candidates[name].states for name in effects):
         states = best_states(model, effects, runs, moved, states, anew=effects)

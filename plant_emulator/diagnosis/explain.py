@@ -8,7 +8,7 @@ share is then taken no larger than that of the fit without effects.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -58,6 +58,7 @@ class Explanation:
     rivals : for every accepted effect the costs of all that took its place
     unconverged : why the answer cannot be trusted; empty where it can
     chance : effects whose course is chance, beside those of `final`
+    without : of several accepted effects the least cost that a fit without it came to, by name
     """
 
     null: Point
@@ -66,6 +67,7 @@ class Explanation:
     rivals: dict[str, dict[str, float]]
     unconverged: str
     chance: tuple[Unrest, ...] = ()
+    without: dict[str, float] = field(default_factory=dict)
 
     @property
     def named(self) -> tuple[str, ...]:
@@ -73,10 +75,13 @@ class Explanation:
         return (*(one.effect for one in self.chance), *self.final.effects)
 
     def evidence(self, contender: Contender) -> float:
-        """Evidence of an effect alone."""
+        """Evidence of an effect alone; of one of several accepted, of it beside the others."""
         for one in self.chance:
             if one.effect == contender.effect:
                 return one.evidence
+        if contender.effect in self.without:
+            fall = self.without[contender.effect] - self.final.cost
+            return weighed(fall, self.final, self.null)
         if contender.point is None:
             return 0.0
         best = min(self.final, contender.point, key=lambda p: p.chi_squared)

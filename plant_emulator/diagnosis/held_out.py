@@ -10,7 +10,7 @@ from plant_emulator.diagnosis.explain import DETECTABLE, THRESHOLD
 from plant_emulator.diagnosis.shrink import Fold
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.diagnosis.explain import Contender, Explanation
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.rounds import Progress
     from plant_emulator.diagnosis.shrink import Prediction
 
-# Effects whose held-out gain is computed: the best ones only, each takes a fit a fold.
+# Effects whose held-out gain is computed beside those accepted: the best ones only, each takes a
+# fit a fold.
 TRIED = 3
 # Share of the best one's evidence that another has at least: with less it is no rival, and its fits
 # stop in valleys, so that the share that it closes tells of these.
 NEAR = 0.5
 # The model "as given" among those that are compared by their effects.
 NOMINAL = ("nominal",)
-NONE_SHOWS = "no choice of fitted runs shows all effects; every run is predicted nevertheless"
 # Of every fold the runs that are fitted, and those that are predicted.
 Folds = tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
 
@@ -59,8 +59,8 @@ class HeldOut:
     ) -> tuple[Folds, tuple[str, ...]]:
         """The folds whose fitted runs show all named effects, and a note on every other.
 
-        Runs that do not show an effect cannot predict it; should no fold be left, all are
-        predicted, and one note tells it.
+        Runs that do not show an effect cannot predict it. No fold is left where no choice of runs
+        shows all.
         """
         tasks = [self._fold(explained.final, *fold, refitted=False) for fold in self.plan.folds]
         if not followed or len(tasks) < 2:
@@ -75,8 +75,6 @@ class HeldOut:
                 continue
             lost = ", ".join(self.model.runs[run].source for run in fold[1])
             notes.append(f"{lost}: not predicted; the other runs do not show {hidden[0]}")
-        if not usable:
-            return self.plan.folds, (NONE_SHOWS,)
         return tuple(usable), tuple(notes)
 
     def predictions(
@@ -90,7 +88,7 @@ class HeldOut:
         for count in range(1, len(followed) + 1):
             some = followed[:count]
             points[some] = replace(explained.final, effects=some)
-        for contender in _best(explained):
+        for contender in _best(explained, followed):
             assert contender.point is not None
             points.setdefault((contender.effect,), contender.point)
         tasks, keys = [], []
@@ -137,9 +135,10 @@ class HeldOut:
         )
 
 
-def _best(explained: Explanation) -> list[Contender]:
-    """Those that count, and come somewhere near the best."""
+def _best(explained: Explanation, followed: Sequence[str]) -> list[Contender]:
+    """Those accepted, and those that count and come somewhere near the best."""
     fitted = [c for c in explained.contenders if c.point is not None]
-    ranked = sorted(fitted, key=explained.evidence, reverse=True)[:TRIED]
+    ranked = sorted(fitted, key=explained.evidence, reverse=True)
     least = max([THRESHOLD, *(NEAR * explained.evidence(c) for c in ranked[:1])])
-    return [c for c in ranked if explained.evidence(c) > least]
+    near = [c for c in ranked[:TRIED] if explained.evidence(c) > least]
+    return [c for c in ranked if c in near or c.effect in followed]

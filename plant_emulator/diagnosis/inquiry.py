@@ -45,14 +45,18 @@ class Inquiry:
         recipe, null = quieted(self.pool, self.recipe, self.model, self.runs)
         return replace(self, recipe=recipe, null=null)
 
-    def found(self) -> tuple[Explanation, Verdict]:
-        """What the contest came to, and the verdict."""
-        explained = self._contest(self.recipe)
+    def found(self) -> tuple[Explanation, Verdict, Recipe]:
+        """What the contest came to, the verdict, and the recipe whose noise its costs count in."""
+        explained, recipe = self._contest(self.recipe), self.recipe
         found = verdict.decide(self.model, explained)
-        if found.kind == "unknown" and self.model.reaches_noise:
-            explained = self._by_chance(explained)
-            found = self._between(explained, verdict.decide(self.model, explained))
-        return explained, found
+        if not self.model.reaches_noise:
+            return explained, self._between(explained, found), recipe
+        if found.kind == "unknown":
+            explained, recipe = self._by_chance(explained)
+            found = verdict.decide(self.model, explained)
+            if found.kind == "unknown":
+                found = self._between(explained, found)
+        return explained, found, recipe
 
     def _contest(self, recipe: Recipe, by_chance: float = 0.0) -> Explanation:
         contest = Contest(
@@ -64,22 +68,26 @@ class Inquiry:
             reaches_noise=self.model.reaches_noise,
             by_chance=by_chance,
             null=self.null,
+            exact=[name for name, one in self.model.candidates.items() if one.exact],
         )
         return contest.explain()
 
-    def _by_chance(self, explained: Explanation) -> Explanation:
-        """The contest again with the unrest of the effect of chance course that explains most; as
-        it was where there is none.
+    def _by_chance(self, explained: Explanation) -> tuple[Explanation, Recipe]:
+        """The contest again with the unrest of the effect of chance course that explains most, and
+        the recipe with it; as it was where there is none.
         """
         found = self._unrest(explained.final, self.model.candidates)
         first = max(found, key=lambda one: one.evidence, default=None)
         if first is None:
-            return explained
+            return explained, self.recipe
         weights = dict(zip(self.runs, first.weights, strict=True))
         every = tuple(weights.get(k, np.ones(1)) for k in range(len(self.model.runs)))
-        again = self._contest(Weighted(self.recipe, every), first.evidence)
+        recipe = Weighted(self.recipe, every)
+        again = self._contest(recipe, first.evidence)
         last = self._unrest(again.final, [first.effect])
-        return replace(again, chance=tuple(last)) if last else explained
+        if not last:
+            return explained, self.recipe
+        return replace(again, chance=tuple(last)), recipe
 
     def _unrest(self, base: Point, names: Iterable[str]) -> list[Unrest]:
         """What holds of effects of chance course on top of a fit."""
@@ -92,11 +100,11 @@ class Inquiry:
         return [one for one in found if one.holds and one.evidence > THRESHOLD]
 
     def _between(self, explained: Explanation, found: Verdict) -> Verdict:
-        """The verdict; where nothing explains runs that each alone agree, with that reason."""
+        """The verdict; unknown with that reason where runs agree each alone, but not together."""
         runs = self.runs
-        if found.kind != "unknown" or explained.unconverged or len(runs) < 2:
+        if explained.unconverged or len(runs) < 2:
             return found
         tasks = [Task(base=explained.null, runs=(run,)) for run in runs]
         points = list(self.pool.map(apart.alone, self.recipe, tasks))
-        reason = apart.between(self.model, runs, points)
-        return replace(found, reason=reason) if reason else found
+        reason = apart.between(self.model, runs, points, explained.final)
+        return replace(found, kind="unknown", effects=(), reason=reason) if reason else found

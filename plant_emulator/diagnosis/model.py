@@ -41,6 +41,7 @@ class Candidate:
     title : what it is, in one line; needs : what a log must have to show it, empty: nothing special
     untold : its unknowns of one run that no fit and no measurement tells: its course is chance
     terms : what else it is known by, made of its own values and the machine's
+    exact : its law can have no other form, so that it leaves nothing where it is the cause
     """
 
     name: str
@@ -55,6 +56,7 @@ class Candidate:
     needs: str = ""
     untold: tuple[Unknown, ...] = ()
     terms: tuple[Term, ...] = ()
+    exact: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -49,7 +49,13 @@ def enough(final: Point, null: Point, reaches_noise: bool) -> bool:
 
 
 def counts(
-    best: Point, base: Point, null: Point, reaches_noise: bool, by_chance: float = 0.0
+    best: Point,
+    base: Point,
+    null: Point,
+    reaches_noise: bool,
+    *,
+    by_chance: float = 0.0,
+    exact: bool = False,
 ) -> bool:
     """Whether one more effect earns its place.
 
@@ -57,6 +63,7 @@ def counts(
     its evidence says nothing.
 
     by_chance : evidence of an effect of chance course, whose unrest all these fits have
+    exact : whether the law of what is there already can have no other form
     """
     fall = base.cost - best.cost
     evidence = weighed(fall, best, null)
@@ -69,7 +76,8 @@ def counts(
         gap = excess(null)
         closes = gap > THRESHOLD and fall > max(THRESHOLD, PART_OF_GAP * gap)
         return closes or evidence > THRESHOLD
-    small = any(best.sizes[name] < SMALL for name in best.effects if name not in base.effects)
+    sizes = [best.sizes[name] for name in best.effects if name not in base.effects]
+    small = not exact and any(size < SMALL for size in sizes)
     if noise_only(base):
         return evidence > SECOND and fall > (COARSE_LAW if small else LAW) * excess(null)
     orderly = _ordered(best) <= (1.0 - REST) * _ordered(base)

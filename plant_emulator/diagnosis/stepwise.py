@@ -19,7 +19,7 @@ from plant_emulator.diagnosis.rounds import MOST, Rounds
 from plant_emulator.diagnosis.rules import counts, enough
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.diagnosis.explain import Contender
@@ -38,6 +38,7 @@ class Contest:
 
     by_chance : evidence of an effect of chance course, if the recipe's noise holds one
     null : a fit without effects by another noise, to start from, if there is one
+    exact : names of effects whose law can have no other form
     """
 
     def __init__(
@@ -51,8 +52,10 @@ class Contest:
         reaches_noise: bool = True,
         by_chance: float = 0.0,
         null: Point | None = None,
+        exact: Collection[str] = (),
     ) -> None:
         self._reaches_noise, self._by_chance, self._null = reaches_noise, by_chance, null
+        self._exact = frozenset(exact)
         self._rounds = Rounds(pool, recipe, names, runs, progress)
 
     def explain(self) -> Explanation:
@@ -80,12 +83,14 @@ class Contest:
                 break  # each makes the other needless, in turn
             tried.add(frozenset(final.effects))
         final = self._rounds.restarts.settled(final)
+        alone = _costs(contenders)
         return Explanation(
             null=null,
             final=final,
             contenders=tuple(contenders),
             rivals=rivals,
             unconverged=_unconverged(null, final),
+            without=self._without(final, alone) if len(final.effects) > 1 else {},
         )
 
     def _first(self, null: Point) -> tuple[Point, list[Contender]]:
@@ -140,9 +145,26 @@ class Contest:
                 rivals[waiting[0]] = _costs(found)
         return final, rivals
 
+    def _without(self, final: Point, alone: Mapping[str, float]) -> dict[str, float]:
+        """Least cost without each of several effects: refitted, or of the other alone."""
+        found = {}
+        for name in final.effects:
+            rest = tuple(e for e in final.effects if e != name)
+            refitted = self._rounds.restarts.refitted(replace(final, effects=rest))
+            others = [alone[e] for e in rest if len(rest) == 1 and e in alone]
+            found[name] = min([refitted.cost, *others])
+        return found
+
     def _counts(self, best: Point, base: Point, null: Point) -> bool:
         """Whether one more effect earns its place."""
-        return counts(best, base, null, self._reaches_noise, self._by_chance)
+        return counts(
+            best,
+            base,
+            null,
+            self._reaches_noise,
+            by_chance=self._by_chance,
+            exact=self._exact.issuperset(base.effects),
+        )
 
     def _missed(self, final: Point, null: Point) -> Point:
         """Without an effect that another has made needless."""

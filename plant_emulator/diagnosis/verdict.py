@@ -56,7 +56,9 @@ class Verdict:
 
 
 def shifts(model: Model, found: Point) -> tuple[Shift, ...]:
-    """Parameters more than SHIFTED standard errors from nominal, the most surprising first."""
+    """Parameters more than SHIFTED standard errors from nominal: those that chance does not explain
+    first, of these the most surprising.
+    """
     moved = []
     for unknown in model.parameters:
         value, error = found.values[unknown.name], found.errors[unknown.name]
@@ -74,7 +76,7 @@ def shifts(model: Model, found: Point) -> tuple[Shift, ...]:
                 surprise=abs(value - unknown.prior) / std,
             )
         )
-    return tuple(sorted(moved, key=lambda shift: -shift.surprise))
+    return tuple(sorted(moved, key=lambda shift: (not shift.sure, -shift.surprise)))
 
 
 def decide(model: Model, explained: Explanation) -> Verdict:

@@ -24,7 +24,13 @@ from itertools import combinations
 from keyword import iskeyword
 from typing import TYPE_CHECKING
 
-from plant_emulator.effects.declaration import Effect, EffectParameter, Memory, effect_of
+from plant_emulator.effects.declaration import (
+    Effect,
+    EffectParameter,
+    Memory,
+    check_chance,
+    effect_of,
+)
 from plant_emulator.errors import ParameterError, place_in
 
 if TYPE_CHECKING:
@@ -88,7 +94,9 @@ def from_file(path: Path) -> Effect:
         spec.loader.exec_module(module)
     except Exception as error:
         raise ParameterError(place_in([str(path)], error) or f"{path}: {error}") from error
-    return effect_of(path.stem, module)
+    effect = effect_of(path.stem, module)
+    check_chance(effect)
+    return effect
 
 
 def parse(texts: tuple[str, ...] | list[str]) -> dict[str, dict[str, float]]:

@@ -43,7 +43,8 @@ class EffectParameter:
     per_run : its value is one run's own, such as a temperature at the start
     measured : the signal of a log whose mean is its value in that run, where the log has it
     std : standard deviation of what is known beforehand of a shape or a value per run; None: a fit
-        leaves it free if it is a size, and else where it is
+        leaves it free if it is a size, and else where it is. A value per run without, that no
+        signal tells, makes the effect's course chance; such an effect has one size
     step : how far apart the starts of a fit may lie so that one of them finds the right valley;
         None: of a value per run a few over what is known beforehand do, of others one
     """
@@ -89,6 +90,8 @@ class Effect:
     """An effect as the kernel and the commands see it.
 
     needs : the sensor or the manoeuvre without which a log hardly shows it; empty: nothing special
+    exact : its law can have no other form, as that of a factor or an offset; others are a law among
+        several that a machine may follow
     """
 
     name: str
@@ -99,6 +102,7 @@ class Effect:
     laws: Mapping[str, Callable[[float, Record, Record], float]]
     file: str
     needs: str = ""
+    exact: bool = False
 
     def plausible(self) -> dict[str, float]:
         """A plausible size of the effect, by parameter."""
@@ -148,6 +152,7 @@ def effect_of(name: str, module: ModuleType) -> Effect:
         laws=changed,
         file=str(module.__file__),
         needs=str(getattr(module, "NEEDS", "")),
+        exact=bool(getattr(module, "EXACT", False)),
     )
 
 
@@ -184,6 +189,25 @@ def _check_numbers(name: str, module: ModuleType) -> None:
         least = (one.upper - one.lower) / MOST_STARTS
         if one.step is not None and one.step <= least:
             raise ParameterError(f"{place}: step is {one.step:g}; more than {least:g} is expected")
+
+
+def check_chance(effect: Effect) -> None:
+    """Refuse values of a run that nothing tells in an effect that has not one size: it cannot be
+    diagnosed.
+    """
+    table = effect.parameters
+    untold = [k for k, p in table.items() if p.per_run and p.std is None and p.measured is None]
+    sizes = [
+        key
+        for key, p in table.items()
+        if not p.per_run and p.std is None and p.plausible != p.neutral
+    ]
+    if untold and len(sizes) != 1:
+        raise ParameterError(
+            f"effect {effect.name}: {effect.file}: parameter {untold[0]} is each run's own; give "
+            "it a std (a fit finds it) or the signal that is measured; without either the effect's "
+            f"course is chance, and it needs one size, not {len(sizes)}"
+        )
 
 
 def _check_memories(name: str, module: ModuleType) -> None:

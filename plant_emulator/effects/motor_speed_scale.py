@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from plant_emulator.kernel_types import Record
 
 SUBSYSTEM = "speed_sensor"
+EXACT = True
 PARAMETERS = {
     "error": EffectParameter(
         neutral=0.0, lower=-0.3, upper=0.3, plausible=0.01, unit="1", meaning="e"

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from plant_emulator.kernel_types import Record
 
 SUBSYSTEM = "torque_sensor"
+EXACT = True
 PARAMETERS = {
     "error": EffectParameter(
         neutral=0.0, lower=-0.5, upper=0.5, plausible=0.03, unit="1", meaning="e"

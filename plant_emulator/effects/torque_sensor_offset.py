@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from plant_emulator.kernel_types import Record
 
 SUBSYSTEM = "torque_sensor"
+EXACT = True
 PARAMETERS = {
     "offset": EffectParameter(
         neutral=0.0, lower=-20.0, upper=20.0, plausible=0.5, unit="N m", meaning="T_0"

@@ -50,6 +50,24 @@ def test_file_is_read_as_an_effect(own: effects.Effect) -> None:
     assert "T = k omega_g" in own.description
 
 
+def test_value_of_a_run_that_nothing_tells_needs_an_effect_of_one_size(tmp_path: Path) -> None:
+    path = tmp_path / "oil_drag.py"
+    phase = (
+        '    "phase": EffectParameter(neutral=0.0, lower=-3.0, upper=3.0, plausible=0.0,\n'
+        '        unit="rad", meaning="at the start", per_run=True),\n'
+    )
+    more = OIL_DRAG.replace('meaning="k"\n    )\n', f'meaning="k"\n    ),\n{phase}')
+    path.write_text(more, encoding="utf-8")
+    assert effects.from_file(path).name == "oil_drag"
+    second = more.replace(phase, phase + phase.replace('"phase"', '"second"', 1)).replace(
+        'plausible=0.0,\n        unit="rad", meaning="at the start", per_run=True),\n}',
+        'plausible=1.0,\n        unit="rad", meaning="at the start"),\n}',
+    )
+    path.write_text(second, encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"oil_drag.*phase is each run's own.*not 2"):
+        effects.from_file(path)
+
+
 SIMULATED = """
 import sys
 from pathlib import Path

@@ -1,6 +1,7 @@
 """A saved set is the model that was fitted: what is a run's own is found again for every run."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import pi
 from typing import Any, cast
 
@@ -8,7 +9,8 @@ import numpy as np
 import pytest
 
 from plant_emulator import effects
-from plant_emulator.diagnosis.contest import Point
+from plant_emulator.diagnosis.bench import BenchRecipe
+from plant_emulator.diagnosis.contest import Point, null_fit
 from plant_emulator.diagnosis.diagnose import Diagnosis
 from plant_emulator.diagnosis_session import parameter_set
 from plant_emulator.log import Log
@@ -74,6 +76,25 @@ def test_run_is_followed_from_its_own_start_of_the_sets_effects(nominal: Paramet
     # as it was asked for, a value stays
     asked = followed(log, nominal, known.effects, None, "fit")
     assert rms(log, asked) > 2.0 * SENSORS["shaft_torque"][0]
+
+
+def test_diagnosis_finds_each_runs_own_start_of_the_sets_effects(nominal: ParameterSet) -> None:
+    """Two runs of a bench whose gear is eccentric, from other angles than the set's."""
+    wobble = {**effects.load("gear_eccentricity").plausible(), "phase": 0.0}
+    bench = replace(nominal, effects={"gear_eccentricity": wobble})
+    runs = []
+    for seed, phase in enumerate((1.0, 4.0)):
+        own = replace(nominal, effects={"gear_eccentricity": {**wobble, "phase": phase}})
+        runs.append(
+            recording(noisy(simulated("program1", own, {}, hold=None, start="middle"), seed))
+        )
+    model = BenchRecipe(tuple(runs), bench).build()
+    assert "gear_eccentricity" not in model.candidates
+    found = null_fit(model, (0, 1))
+    assert found.chi_squared < 1.1
+    for state, phase in zip(found.states, (1.0, 4.0), strict=True):
+        assert np.cos(state["gear_eccentricity_phase"] - phase) > 0.95
+    assert model.located(found, (0, 1)) is None
 
 
 def rms(log: Log, simulation: Log) -> float:

@@ -126,6 +126,20 @@ def test_what_is_done_is_not_done_again(folder: Path) -> None:
     )
 
 
+def test_cases_of_many_logs_come_first(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    trial, order = Trial(folder, 5, 30), []
+    trial.seal()
+
+    def do(self: Trial, number: int) -> None:
+        order.append(len(self.folder.unseal(number).programs))
+        self.folder.keep(number, result(number, True))
+
+    monkeypatch.setattr(Trial, "_do", do)
+    trial.run(1)
+    assert order == sorted(order, reverse=True)
+    assert len(set(order)) > 1
+
+
 def test_command_shows_the_table_and_writes_the_answer(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

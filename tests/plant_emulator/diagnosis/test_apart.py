@@ -7,11 +7,12 @@ import pytest
 
 from plant_emulator.diagnosis import apart
 from plant_emulator.diagnosis.bench import BenchModel
-from plant_emulator.diagnosis.contest import null_fit
+from plant_emulator.diagnosis.contest import Point, null_fit
 from plant_emulator.kernel import kernel
 from plant_emulator.log import Log
 from plant_emulator.parameters import ParameterSet
 from plant_emulator.recording import recording
+from tests.plant_emulator.diagnosis.test_contest import TIME, Line
 
 BenchLog = Callable[[str], Log]
 NUMBER = r"(\d\S+) \+- (\d\S+) s in "
@@ -20,7 +21,46 @@ NUMBER = r"(\d\S+) \+- (\d\S+) s in "
 def told(nominal: ParameterSet, *logs: Log) -> str:
     model = BenchModel([recording(log) for log in logs], nominal, kernel().effects)
     runs = range(len(logs))
-    return apart.between(model, runs, [null_fit(model, (run,)) for run in runs])
+    found = [null_fit(model, (run,)) for run in runs]
+    return apart.between(model, runs, found, found[0])
+
+
+class Outlined(Line):
+    """A machine of which more than the noise is left."""
+
+    reaches_noise = False
+
+
+def fitted(a: float, squares: float) -> Point:
+    """A line at this level, known to 0.1 in white noise."""
+    return Point(
+        effects=(),
+        values={"a": a, "b": 0.0},
+        states=({},),
+        cost=squares,
+        squares=squares,
+        samples=100,
+        share=1.0,
+        errors={"a": 0.1, "b": 0.1},
+        converged=True,
+    )
+
+
+@pytest.mark.parametrize(
+    ("level", "squares", "differs"),
+    [(9.0, 400.0, True), (9.0, 2400.0, False), (2.9, 400.0, False)],
+)
+def test_runs_of_an_outlined_machine_differ_where_each_alone_leaves_little(
+    level: float, squares: float, differs: bool
+) -> None:
+    """By hand: errors of 0.1 sqrt(400 / 100) each are 0.28, of which 5 are 1.4; together the two
+    leave 800, or 4800, a fifth of 10 000 or more.
+    """
+    model = Outlined([TIME, TIME])
+    found = [fitted(2.0, squares), fitted(level, squares)]
+    told = apart.between(model, (0, 1), found, fitted(5.0, 10_000.0))
+    assert bool(told) == differs
+    assert ("a is 2.0" in told) == differs
 
 
 def test_two_drifted_benches_differ_in_what_was_shifted_most(

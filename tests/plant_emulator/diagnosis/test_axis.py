@@ -10,7 +10,7 @@ import pytest
 
 from plant_emulator.diagnosis.axis import AxisModel, AxisRecipe
 from plant_emulator.diagnosis.axis_effects import EFFECTS
-from plant_emulator.diagnosis.axis_signals import AxisLog
+from plant_emulator.diagnosis.axis_signals import AxisLog, prepared
 from plant_emulator.diagnosis.bands import power
 from plant_emulator.diagnosis.contest import Point, linearised, null_fit
 from plant_emulator.diagnosis.explain import Explanation
@@ -235,6 +235,14 @@ def test_bad_logs_are_refused() -> None:
             source="x",
         ),
     }
+    slow = slice(None, None, len(log.time) // 90)
+    cases["100 or more"] = AxisLog(
+        time=log.time[slow],
+        position=log.position[slow],
+        force=log.force[slow],
+        rotary=False,
+        source="x",
+    )
     for told, bad in cases.items():
         with pytest.raises(LogError, match=f"x: .*{told}"):
             AxisModel([bad])
@@ -243,6 +251,21 @@ def test_bad_logs_are_refused() -> None:
     )
     with pytest.raises(LogError, match=r"turned: rotary .*logs of one axis"):
         AxisModel([log, turned])
+
+
+def test_run_of_which_the_ends_leave_little_is_refused() -> None:
+    """By hand: 3 s are 15 samples at 5 a second, less than the 8 at either end."""
+    log = truth.log()
+    start = log.time <= log.time[0] + 3.0
+    short = AxisLog(
+        time=log.time[start],
+        position=log.position[start],
+        force=log.force[start],
+        rotary=False,
+        source="x",
+    )
+    with pytest.raises(LogError, match=r"x: 0 samples are left of .* at 5 a second"):
+        prepared(short, 5.0)
 
 
 def test_power_of_white_noise_is_its_variance_over_half_its_rate() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.chance import Weighted, unrest
-from plant_emulator.diagnosis.contest import null_fit
+from plant_emulator.diagnosis.contest import fit, null_fit
 from plant_emulator.diagnosis.inquiry import Inquiry
 from plant_emulator.diagnosis.pool import Here
 from plant_emulator.diagnosis.steps import Task
@@ -99,10 +99,13 @@ def test_effect_beside_an_unrest_is_named_with_it() -> None:
     y = noisy(2.0 + 3.0 * TIME + 0.5 * np.sin(20.0 * TIME)) + shaken(0.8)
     model = Shaken([y])
     inquiry = Inquiry(pool=Here(), recipe=Given(model), model=model, runs=(0,))
-    explained, verdict = inquiry.found()
+    explained, verdict, recipe = inquiry.found()
     assert (verdict.kind, verdict.effects) == ("effect", ("shake", "wave"))
     assert explained.classes() == [["shake"], ["wave"]]
     assert explained.final.values["wave_size"] == pytest.approx(0.5, abs=0.15)
+    # What is compared with these costs has to count in their noise.
+    again = fit(recipe.build(), ("wave",), [0], explained.final.values, explained.final.states)
+    assert again.cost == pytest.approx(explained.final.cost, abs=0.1)
 
 
 def test_what_is_little_beside_a_great_unrest_may_be_its_law() -> None:

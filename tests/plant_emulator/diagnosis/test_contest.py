@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from plant_emulator.diagnosis import rounds as engine
 from plant_emulator.diagnosis.answer import undetectable
 from plant_emulator.diagnosis.contest import Point, fit, linearised, null_fit
-from plant_emulator.diagnosis.elsewhere import from_nominal, in_place, sifted, vacated
+from plant_emulator.diagnosis.elsewhere import from_nominal, in_place, shaken, sifted, vacated
 from plant_emulator.diagnosis.explain import Explanation, adequate, excess
 from plant_emulator.diagnosis.looks import glance, glance_far, look
 from plant_emulator.diagnosis.model import Candidate, Run
@@ -133,7 +134,9 @@ def noisy(y: Array, seed: int = 0) -> Array:
 
 def explained(model: Line) -> Explanation:
     """The contest over all runs."""
-    return Contest(Here(), Given(model), tuple(model.candidates), range(len(model.runs))).explain()
+    exact = [name for name, one in model.candidates.items() if one.exact]
+    runs = range(len(model.runs))
+    return Contest(Here(), Given(model), tuple(model.candidates), runs, exact=exact).explain()
 
 
 def test_signature_is_what_a_line_cannot_follow() -> None:
@@ -527,13 +530,19 @@ def test_what_takes_but_a_part_of_the_rest_is_no_second_effect(
     assert set(explained(rippled(2.0, ripple)).final.effects) == named
 
 
-@pytest.mark.parametrize(("plausible", "named"), [(1.0, {"kink", "wave"}), (2.5, {"kink"})])
+@pytest.mark.parametrize(
+    ("plausible", "exact", "named"),
+    [(1.0, False, {"kink", "wave"}), (2.5, False, {"kink"}), (2.5, True, {"kink", "wave"})],
+)
 def test_small_second_of_what_is_no_noise_closes_much_of_the_gap(
-    plausible: float, named: set[str]
+    plausible: float, exact: bool, named: set[str]
 ) -> None:
-    """By hand: a ripple of 0.5 closes 250, less than a fifth of 1500 + 250."""
-    ripple = 0.5 * np.sin(20.0 * TIME)
-    assert set(explained(rippled(3.0, ripple, plausible)).final.effects) == named
+    """By hand: a ripple of 0.5 closes 250, less than a fifth of 1500 + 250; but a kink that is
+    exact leaves nothing.
+    """
+    model = rippled(3.0, 0.5 * np.sin(20.0 * TIME), plausible)
+    model.candidates["kink"] = replace(model.candidates["kink"], exact=exact)
+    assert set(explained(model).final.effects) == named
 
 
 class Pulse(Line):
@@ -587,3 +596,42 @@ def test_fit_that_stops_on_the_way_down_a_valley_is_followed_further() -> None:
     assert stopped.values["a"] < 1.5
     restarts = Restarts(pool=Here(), recipe=Given(model), runs=(0,))
     assert restarts.followed(stopped).values["a"] == pytest.approx(2.51, abs=0.02)
+
+
+def test_start_from_some_way_off_stays_within_the_bounds() -> None:
+    """Both may be told to go 20 off 0 and 2; what is asked of the machine there is recorded."""
+
+    class Bounded(Hollow):
+        parameters = (
+            replace(linear("a", 0.0, std=10.0), lower=-1.0, upper=1.0),
+            replace(linear("b", 2.0, prior=2.0, std=20.0), lower=1.0, upper=4.0),
+        )
+        asked: ClassVar[list[float]] = []
+
+        def residual(
+            self, run: int, effects: Sequence[str]
+        ) -> Callable[[Mapping[str, float]], Array]:
+            others = super().residual(run, effects)
+
+            def residual(v: Mapping[str, float]) -> Array:
+                self.asked.append(v["b"])
+                return others(v)
+
+            return residual
+
+    model = Bounded([noisy(30.0 * TIME)], ["kink"])
+    model.candidates["kink"] = replace(
+        model.candidates["kink"], states=(linear("turn", 0.0, prior=0.0, std=1.0),)
+    )
+    start = null_fit(model, [0])
+    far = replace(
+        start,
+        effects=("kink",),
+        errors={"a": 10.0, "b": 20.0, "kink_size": 1.0},
+        values={**start.values, "kink_size": 0.0},
+        states=({"turn": 0.0},),
+    )
+    for number in range(5):
+        shaken(model, ("kink",), [0], far, number)
+    assert min(model.asked) >= 1.0
+    assert max(model.asked) <= 4.0

@@ -91,7 +91,7 @@ class EachOwnEffect(Line):
         return super().residual(run, [name for name in effects if name == own])
 
 
-def test_runs_that_all_lack_an_effect_are_predicted_nevertheless_and_told_so_once() -> None:
+def test_nothing_is_said_to_close_where_every_run_lacks_an_effect_of_another() -> None:
     line = 2.0 + 3.0 * TIME
     runs = [noisy(line + 4.0 * np.abs(TIME), 1), noisy(line + 4.0 * np.sin(20.0 * TIME), 2)]
     plan = Plan(fitted=(0, 1), folds=(((1,), (0,)), ((0,), (1,))))
@@ -99,9 +99,34 @@ def test_runs_that_all_lack_an_effect_are_predicted_nevertheless_and_told_so_onc
     found = Diagnose(Here(), Given(model), plan, settings={}).diagnose()
     assert set(found.answer["verdict"]["effects"]) == {"kink", "wave"}
     assert found.answer["logs"]["held_out"] == ["run 0", "run 1"]
+    assert found.answer["gap"]["closed_fraction"] is None
+    assert "closes" not in found.answer["verdict"]["statement"]
     assert found.details.notes == (
-        "no choice of fitted runs shows all effects; every run is predicted nevertheless",
+        "run 0: not predicted; the other runs do not show kink",
+        "run 1: not predicted; the other runs do not show wave",
     )
+
+
+def test_both_of_two_effects_have_their_evidence_beside_the_other_and_their_gain() -> None:
+    """By hand: of 3 runs of 2000 samples the wave takes 3 n 0.5^2 / 2 = 750, the kink
+    3 n 20^2 / 12 = 200e3 (|x| on -1 to 1 less its mean); alone the kink leaves the wave.
+    """
+    y = 2.0 + 3.0 * TIME + 20.0 * np.abs(TIME) + 0.5 * np.sin(20.0 * TIME)
+    found = diagnosed(Line([noisy(y, seed) for seed in (1, 2, 3)], ["kink", "wave"]))
+    assert set(found.answer["verdict"]["effects"]) == {"kink", "wave"}
+    entries = {entry["effect"]: entry for entry in found.answer["ranking"]}
+    assert entries["kink"]["evidence"] == pytest.approx(200e3, rel=0.05)
+    assert entries["wave"]["evidence"] == pytest.approx(750.0, rel=0.2)
+    assert entries["wave"]["held_out_gain"] == pytest.approx(0.0, abs=0.05)
+    assert entries["kink"]["held_out_gain"] == pytest.approx(1.0, abs=0.05)
+
+
+def test_effect_with_little_evidence_beside_the_best_has_no_gain() -> None:
+    line, effect = 2.0 + 3.0 * TIME, 4.0 * np.abs(TIME)
+    found = diagnosed(Line([noisy(line + effect, seed) for seed in (1, 2, 3)], ["kink", "wave"]))
+    gains = {entry["effect"]: entry["held_out_gain"] for entry in found.answer["ranking"]}
+    assert gains["wave"] is None
+    assert gains["kink"] == pytest.approx(1.0, abs=0.05)
 
 
 def fold_of_a_line() -> tuple[Line, Fold]:

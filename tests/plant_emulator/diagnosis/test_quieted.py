@@ -63,7 +63,7 @@ def test_contest_starts_from_the_fit_that_told_the_noise() -> None:
 
     model = Once([noisy(2.0 + 3.0 * TIME) + FED])
     inquiry = Inquiry(pool=Here(), recipe=Given(model), model=model, runs=(0,))
-    explained, _ = inquiry.with_quiet_inputs().found()
+    explained, _, _ = inquiry.with_quiet_inputs().found()
     for name, value in (("a", 2.0), ("b", 3.0)):
         assert abs(explained.null.values[name] - value) < 3.0 * explained.null.errors[name]
 

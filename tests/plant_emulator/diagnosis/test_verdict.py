@@ -1,9 +1,12 @@
 """The verdict on a machine so small that it can be checked by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from plant_emulator.diagnosis.verdict import Verdict, decide
-from tests.plant_emulator.diagnosis.test_contest import TIME, Line, explained, noisy
+from plant_emulator.diagnosis.contest import null_fit
+from plant_emulator.diagnosis.verdict import Verdict, decide, shifts
+from tests.plant_emulator.diagnosis.test_contest import TIME, Line, explained, linear, noisy
 
 LINE = 2.0 + 3.0 * TIME
 SAMPLE = np.arange(len(TIME))
@@ -39,3 +42,14 @@ def test_effect_that_explains_much_more_than_is_left_is_named() -> None:
     ripple = np.sqrt(0.05) * np.sin(2.0 * np.pi * SAMPLE / 5.0)
     model = Line([noisy(LINE + 5.0 * np.abs(TIME) + ripple)], ["kink"])
     assert verdict(model).kind == "effect"
+
+
+def test_shift_that_chance_may_explain_does_not_come_first() -> None:
+    """Prior deviations of 10 and 0.1, errors of 1 and 0.1: b moves 3.5 errors and 3.5 deviations,
+    which surprises more, but a moves 5 errors.
+    """
+    model = Line([noisy(LINE)])
+    model.parameters = (linear("a", 0.0, prior=0.0, std=10.0), linear("b", 0.0, prior=0.0, std=0.1))
+    values, errors = {"a": 5.0, "b": 0.35}, {"a": 1.0, "b": 0.1}
+    point = replace(null_fit(model, [0]), values=values, errors=errors)
+    assert [(s.name, s.sure) for s in shifts(model, point)] == [("a", True), ("b", False)]
