@@ -10,8 +10,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from plant_emulator.laws import converter_voltage_drop
+
 if TYPE_CHECKING:
     from plant_emulator.kernel_types import Record, State
+
+# Step of the current over which a law's slope with it is taken [A].
+SHORT_OF_CURRENT = 1e-4
 
 SPEED_INTEGRAL, CURRENT_INTEGRAL, ARMATURE_CURRENT = 0, 1, 2
 
@@ -31,6 +36,20 @@ def flux_slope(k_phi: float, s: Record, p: Record) -> float:
         return 0.0
     slope = k_phi / divisor
     return -slope if s.motor_speed > 0.0 else slope
+
+
+def linearise_drop(s: Record, p: Record) -> None:
+    """The converter's voltage drop as drop + slope i, about the present estimate of the current.
+
+    A drop that is steep at small currents would otherwise take a pass of the stage for every digit.
+    """
+    current, drop = s.armature_current, converter_voltage_drop(s, p)
+    s.converter_voltage_drop, s.converter_voltage_drop_slope = drop, 0.0
+    if drop != 0.0:
+        s.armature_current = current + SHORT_OF_CURRENT
+        slope = (converter_voltage_drop(s, p) - drop) / SHORT_OF_CURRENT
+        s.armature_current = current
+        s.converter_voltage_drop, s.converter_voltage_drop_slope = drop - slope * current, slope
 
 
 def speed_controller(base: State, a: float, s: Record, p: Record) -> None:
@@ -68,7 +87,8 @@ def current_controller(base: State, a: float, s: Record, p: Record) -> None:
     back_emf = s.flux * s.motor_speed + s.converter_voltage_drop
     back_emf_slope = s.flux + s.flux_slope * s.motor_speed
     start = base[ARMATURE_CURRENT]
-    divisor = 1.0 / (1.0 + b * (s.resistance + gain))
+    resistance = s.resistance + s.converter_voltage_drop_slope
+    divisor = 1.0 / (1.0 + b * (resistance + gain))
     current = (start + b * (offset + gain * s.current_reference - back_emf)) * divisor
     slope = b * (gain * s.current_reference_slope - back_emf_slope) * divisor
     wanted = offset + gain * (s.current_reference - current)
@@ -77,7 +97,7 @@ def current_controller(base: State, a: float, s: Record, p: Record) -> None:
     s.wanted_voltage_slope = gain * (s.current_reference_slope - slope)
     share = 1.0
     if voltage != wanted:
-        divisor = 1.0 / (1.0 + b * s.resistance)
+        divisor = 1.0 / (1.0 + b * resistance)
         current = (start + b * (voltage - back_emf)) * divisor
         slope = -b * back_emf_slope * divisor
         if (s.current_reference - current) * voltage > 0.0:

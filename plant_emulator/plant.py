@@ -25,7 +25,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from plant_emulator.contact import prepare_drum
-from plant_emulator.drive import armature, flux_slope, move_drive, same_limits
+from plant_emulator.drive import (
+    armature,
+    flux_slope,
+    linearise_drop,
+    move_drive,
+    same_limits,
+)
 from plant_emulator.friction import gear_speed_of
 from plant_emulator.laws import (
     backlash_half_gap,
@@ -81,7 +87,7 @@ def evaluate_laws(s: Record, p: Record) -> None:
     s.current_limit = current_limit(s, p)
     s.voltage_limit = voltage_limit(s, p)
     s.integration_at_limit = integration_at_limit(s, p)
-    s.converter_voltage_drop = converter_voltage_drop(s, p)
+    linearise_drop(s, p)
     s.tachometer_gain = tachometer_gain(s, p)
     s.resistance = resistance(s, p)
     s.flux = flux(s, p)
@@ -128,7 +134,10 @@ def laws_moved(change: float, s: Record, p: Record) -> bool:
         or moved(motor_viscous_friction(s, p), s.motor_viscous_friction)
         or moved(reference(s, p), s.reference)
         or moved(resistance(s, p), s.resistance)
-        or moved(converter_voltage_drop(s, p), s.converter_voltage_drop)
+        or moved(
+            converter_voltage_drop(s, p),
+            s.converter_voltage_drop + s.converter_voltage_drop_slope * s.armature_current,
+        )
         or moved(voltage_limit(s, p), s.voltage_limit)
         or moved(current_limit(s, p), s.current_limit)
     )

@@ -32,6 +32,7 @@ STAGE = (
     "voltage_limit",
     "integration_at_limit",
     "converter_voltage_drop",
+    "converter_voltage_drop_slope",
     "tachometer_gain",
     "resistance",
     "flux",

@@ -34,6 +34,24 @@ def test_current_reference_is_gain_times_error_plus_integral(p: SimpleNamespace)
     assert s.current_reference == pytest.approx(15.0 * 1.0 + 15.0 / 1.0 * 2.0)
 
 
+def test_drop_of_the_converter_is_linear_about_the_current(
+    p: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By hand: 6 i / (|i| + 2) is 3 at 2 A, of slope 6 * 2 / (2 + 2)^2 = 0.75."""
+    monkeypatch.setattr(
+        drive,
+        "converter_voltage_drop",
+        lambda s, _p: 6.0 * s.armature_current / (abs(s.armature_current) + 2.0),
+    )
+    s = stage(p, reference=0.0, motor_speed=0.0)
+    assert (s.converter_voltage_drop, s.converter_voltage_drop_slope) == (0.0, 0.0)
+    s.armature_current = 2.0
+    drive.linearise_drop(s, p)
+    assert s.armature_current == 2.0
+    assert s.converter_voltage_drop_slope == pytest.approx(0.75, rel=1e-4)
+    assert s.converter_voltage_drop == pytest.approx(3.0 - 0.75 * 2.0, rel=1e-4)
+
+
 def test_integral_grows_by_the_error(p: SimpleNamespace) -> None:
     s = stage(p, reference=101.0, motor_speed=100.0)
     drive.speed_controller(state(integral=2.0), A, s, p)

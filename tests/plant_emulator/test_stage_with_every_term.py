@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from plant_emulator import plant, stage
+from plant_emulator import drive, plant, stage
 from tests import reference_plant as thesis
 from tests.plant_emulator.test_plant import TABLE, size
 
@@ -27,7 +27,9 @@ def every_term_present() -> Iterator[None]:
     """Each neglected law gives the value in p of its own name, as the law of an effect would."""
     with pytest.MonkeyPatch.context() as patch:
         for name in TERMS:
-            patch.setattr(plant, name, lambda s, p, name=name: getattr(p, name))
+            for module in (plant, drive):
+                if hasattr(module, name):
+                    patch.setattr(module, name, lambda s, p, name=name: getattr(p, name))
         yield
 
 
