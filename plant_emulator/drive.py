@@ -39,17 +39,17 @@ def flux_slope(k_phi: float, s: Record, p: Record) -> float:
 
 
 def linearise_drop(s: Record, p: Record) -> None:
-    """The converter's voltage drop as drop + slope i, about the present estimate of the current.
+    """The converter's voltage drop [V] as offset + slope i, about the present estimate of i [A].
 
     A drop that is steep at small currents would otherwise take a pass of the stage for every digit.
     """
     current, drop = s.armature_current, converter_voltage_drop(s, p)
-    s.converter_voltage_drop, s.converter_voltage_drop_slope = drop, 0.0
+    s.converter_drop_offset, s.converter_drop_slope = drop, 0.0
     if drop != 0.0:
         s.armature_current = current + SHORT_OF_CURRENT
         slope = (converter_voltage_drop(s, p) - drop) / SHORT_OF_CURRENT
         s.armature_current = current
-        s.converter_voltage_drop, s.converter_voltage_drop_slope = drop - slope * current, slope
+        s.converter_drop_offset, s.converter_drop_slope = drop - slope * current, slope
 
 
 def speed_controller(base: State, a: float, s: Record, p: Record) -> None:
@@ -78,16 +78,17 @@ def speed_controller(base: State, a: float, s: Record, p: Record) -> None:
 def current_controller(base: State, a: float, s: Record, p: Record) -> None:
     """Armature current, voltage and the current's slope with the motor speed (eq. 3.3, 3.4, 3.8).
 
-    L_a di/dt = u - R_a i - k Phi omega_m, taken implicitly together with the PI controller.
+    L_a di/dt = u - R_a i - k Phi omega_m - drop, taken implicitly together with the PI controller;
+    the drop of an effect's converter as `linearise_drop` left it.
     """
     b = a / p.armature_inductance
     integral = base[CURRENT_INTEGRAL]
     gain = p.current_gain * (1.0 + a / p.current_integral_time)
     offset = p.current_gain / p.current_integral_time * integral
-    back_emf = s.flux * s.motor_speed + s.converter_voltage_drop
+    back_emf = s.flux * s.motor_speed + s.converter_drop_offset
     back_emf_slope = s.flux + s.flux_slope * s.motor_speed
     start = base[ARMATURE_CURRENT]
-    resistance = s.resistance + s.converter_voltage_drop_slope
+    resistance = s.resistance + s.converter_drop_slope
     divisor = 1.0 / (1.0 + b * (resistance + gain))
     current = (start + b * (offset + gain * s.current_reference - back_emf)) * divisor
     slope = b * (gain * s.current_reference_slope - back_emf_slope) * divisor

@@ -136,7 +136,7 @@ def laws_moved(change: float, s: Record, p: Record) -> bool:
         or moved(resistance(s, p), s.resistance)
         or moved(
             converter_voltage_drop(s, p),
-            s.converter_voltage_drop + s.converter_voltage_drop_slope * s.armature_current,
+            s.converter_drop_offset + s.converter_drop_slope * s.armature_current,
         )
         or moved(voltage_limit(s, p), s.voltage_limit)
         or moved(current_limit(s, p), s.current_limit)

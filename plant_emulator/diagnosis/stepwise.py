@@ -65,6 +65,7 @@ class Contest:
         final = null
         rivals: dict[str, dict[str, float]] = {}
         tried: set[frozenset[str]] = set()
+        without: dict[str, float] = {}
         while len(final.effects) < MOST_EFFECTS and not enough(final, null, self._reaches_noise):
             found = contenders
             if final.effects:
@@ -76,21 +77,20 @@ class Contest:
                 found = self._rounds.in_place(found, best)
                 best = best_of(found) or best
             final, rivals = self._stand(best, found)
-            final = self._missed(final, null)
+            final, without = self._missed(final, null)
             if len(final.effects) == 1:
                 rivals = {final.effects[0]: _costs(contenders)}
             if frozenset(final.effects) in tried:
                 break  # each makes the other needless, in turn
             tried.add(frozenset(final.effects))
         final = self._rounds.restarts.settled(final)
-        alone = _costs(contenders)
         return Explanation(
             null=null,
             final=final,
             contenders=tuple(contenders),
             rivals=rivals,
             unconverged=_unconverged(null, final),
-            without=self._without(final, alone) if len(final.effects) > 1 else {},
+            without=_least(without, _costs(contenders)),
         )
 
     def _first(self, null: Point) -> tuple[Point, list[Contender]]:
@@ -145,16 +145,6 @@ class Contest:
                 rivals[waiting[0]] = _costs(found)
         return final, rivals
 
-    def _without(self, final: Point, alone: Mapping[str, float]) -> dict[str, float]:
-        """Least cost without each of several effects: refitted, or of the other alone."""
-        found = {}
-        for name in final.effects:
-            rest = tuple(e for e in final.effects if e != name)
-            refitted = self._rounds.restarts.refitted(replace(final, effects=rest))
-            others = [alone[e] for e in rest if len(rest) == 1 and e in alone]
-            found[name] = min([refitted.cost, *others])
-        return found
-
     def _counts(self, best: Point, base: Point, null: Point) -> bool:
         """Whether one more effect earns its place."""
         return counts(
@@ -166,20 +156,33 @@ class Contest:
             exact=self._exact.issuperset(base.effects),
         )
 
-    def _missed(self, final: Point, null: Point) -> Point:
-        """Without an effect that another has made needless."""
+    def _missed(self, final: Point, null: Point) -> tuple[Point, dict[str, float]]:
+        """Without an effect that another has made needless; and the cost without each of several
+        that are all needed, by name.
+        """
+        costs: dict[str, float] = {}
         if len(final.effects) < 2:
-            return final
+            return final, costs
         for name in final.effects:
             rest = tuple(e for e in final.effects if e != name)
             without = self._rounds.restarts.refitted(replace(final, effects=rest))
             if not self._counts(final, without, null):
-                return without
-        return final
+                return without, {}
+            costs[name] = without.cost
+        return final, costs
 
 
 def _costs(contenders: Sequence[Contender]) -> dict[str, float]:
     return {c.effect: c.point.cost for c in contenders if c.point is not None}
+
+
+def _least(without: Mapping[str, float], alone: Mapping[str, float]) -> dict[str, float]:
+    """Least cost without each of two effects: refitted from both, or of the other one alone."""
+    names = set(without)
+    return {
+        name: min([cost, *(alone[e] for e in names - {name} if e in alone)])
+        for name, cost in without.items()
+    }
 
 
 def _unconverged(null: Point, final: Point) -> str:

@@ -44,12 +44,12 @@ def test_drop_of_the_converter_is_linear_about_the_current(
         lambda s, _p: 6.0 * s.armature_current / (abs(s.armature_current) + 2.0),
     )
     s = stage(p, reference=0.0, motor_speed=0.0)
-    assert (s.converter_voltage_drop, s.converter_voltage_drop_slope) == (0.0, 0.0)
+    assert (s.converter_drop_offset, s.converter_drop_slope) == (0.0, 0.0)
     s.armature_current = 2.0
     drive.linearise_drop(s, p)
     assert s.armature_current == 2.0
-    assert s.converter_voltage_drop_slope == pytest.approx(0.75, rel=1e-4)
-    assert s.converter_voltage_drop == pytest.approx(3.0 - 0.75 * 2.0, rel=1e-4)
+    assert s.converter_drop_slope == pytest.approx(0.75, rel=1e-4)
+    assert s.converter_drop_offset == pytest.approx(3.0 - 0.75 * 2.0, rel=1e-4)
 
 
 def test_integral_grows_by_the_error(p: SimpleNamespace) -> None:

@@ -2,6 +2,7 @@
 
 import importlib.util
 import pickle
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,12 +14,14 @@ from plant_emulator.diagnosis.axis_effects import EFFECTS
 from plant_emulator.diagnosis.axis_signals import AxisLog, prepared
 from plant_emulator.diagnosis.bands import power
 from plant_emulator.diagnosis.contest import Point, linearised, null_fit
+from plant_emulator.diagnosis.diagnose import Diagnose
 from plant_emulator.diagnosis.explain import Explanation
 from plant_emulator.diagnosis.held_out import NOMINAL, HeldOut, Plan
 from plant_emulator.diagnosis.looks import glance, look
 from plant_emulator.diagnosis.pool import Here
 from plant_emulator.diagnosis.signature import signature
 from plant_emulator.diagnosis.tangents import Tangents
+from plant_emulator.diagnosis_session import plan_of
 from plant_emulator.errors import LogError
 
 spec = importlib.util.spec_from_file_location(
@@ -293,3 +296,15 @@ def test_nominal_axis_of_a_held_out_run_is_that_of_the_other_runs() -> None:
     found = held_out.predictions(nothing, (), plan.folds)[NOMINAL]
     left = [one.residuals[0][0] * model.runs[k].noise[0] for k, one in enumerate(found)]
     assert [float(e[e != 0.0].mean()) for e in left] == pytest.approx([-20.0, 20.0], abs=1.0)
+
+
+def test_two_machines_are_told_and_no_effect_is_named() -> None:
+    """80 kg, and 20 kg of which each log alone agrees with the equations."""
+    lighter = truth.log(lambda _q, _v, a: -60.0 * a, phase=0.7, seed=2)
+    recipe = AxisRecipe((truth.log(), lighter), fitted=(0, 1))
+    found = Diagnose(Here(), recipe, plan_of(2, 2), settings={}).diagnose().answer["verdict"]
+    assert (found["kind"], found["effects"]) == ("unknown", [])
+    masses = r"inertia is (\S+) .* kg in axis 1 and (\S+) .* kg in axis 2"
+    told = re.search(masses, found["statement"])
+    assert told is not None
+    assert [float(mass) for mass in told.groups()] == pytest.approx([80.0, 20.0], abs=0.1)
