@@ -46,6 +46,7 @@ class _Problem:
     residuals: Sequence[Residual]
     progress: Callable[[float], None] | None
     follow: _Followed | None = None
+    difference: float = DIFFERENCE_NORM
     simulations: int = 0
     known: tuple[bytes, list[Array]] = (b"", [])
     slopes_known: tuple[bytes, list[Array]] = (b"", [])
@@ -87,7 +88,7 @@ class _Problem:
                 jacobians[k][..., j] = (self._run(k, changed) - base[k]) / (changed[j] - z[j])
         if self.follow is not None:
             self.follow.fill(z, base, jacobians)
-        self.steps = _steps(jacobians)
+        self.steps = _steps(jacobians, self.difference)
         return jacobians
 
     def rows(self, z: Array) -> Array:
@@ -143,11 +144,12 @@ def _values(unknowns: Sequence[Unknown], z: Array, run: int) -> dict[str, float]
     return {u.name: u.value(float(z[j])) for j, u in enumerate(unknowns) if u.run in {None, run}}
 
 
-def _steps(jacobians: Sequence[Array]) -> Array:
-    """Steps of z that change the residual vector by DIFFERENCE_NORM, within their bounds."""
+def _steps(jacobians: Sequence[Array], difference: float) -> Array:
+    """Steps of z that change the residual vector by a norm, within their bounds."""
     squares = np.sum([np.einsum("cnj,cnj->j", j, j) for j in jacobians], axis=0)
-    wanted = DIFFERENCE_NORM / np.sqrt(np.maximum(squares, 1e-300))
-    return np.asarray(np.clip(wanted, SMALLEST_DIFFERENCE, LARGEST_DIFFERENCE))
+    wanted = difference / np.sqrt(np.maximum(squares, 1e-300))
+    largest = LARGEST_DIFFERENCE * max(1.0, difference)
+    return np.asarray(np.clip(wanted, SMALLEST_DIFFERENCE, largest))
 
 
 def estimate(
@@ -158,6 +160,7 @@ def estimate(
     iterations: int | None = None,
     progress: Callable[[float], None] | None = None,
     follow: Estimate | None = None,
+    difference: float = DIFFERENCE_NORM,
 ) -> Estimate:
     """Fit the unknowns from their starts.
 
@@ -167,6 +170,8 @@ def estimate(
     progress : called with the sum of squares after every simulation of all runs
     follow : an estimate nearby, of the same runs; the columns of its unknowns are then not
         simulated but follow by secants: far cheaper, and good for a first look only
+    difference : norm of the change of the residual vector that slopes are taken over; a wide one
+        looks over the hollows of a rough cost, and is good for a search only
     """
     from scipy.optimize import least_squares
     from threadpoolctl import threadpool_limits
@@ -177,7 +182,7 @@ def estimate(
     margin = 1e-6 * (upper - lower)
     start = np.array([u.scaled(u.start) for u in unknowns])
     followed = None if follow is None else _Followed(unknowns, follow)
-    problem = _Problem(unknowns, residuals, progress, followed)
+    problem = _Problem(unknowns, residuals, progress, followed, difference)
     problem.steps = np.full(len(unknowns), 1e-5)
     # Threads that wait for each other in a decomposition of ten columns take most of the time.
     with threadpool_limits(1):

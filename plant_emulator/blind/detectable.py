@@ -1,17 +1,19 @@
 """How large a hidden effect is in the logs, after drift has done what it can to imitate it.
 
 The norm of the whitened change that the true law makes at its hidden size, less what parameters and
-start states can follow (their tangents at the truth, with their priors).
+start states can follow: their tangents at the truth, with their priors; and, for drift can follow
+further than its tangents tell, their fit to the noiseless logs where little is left.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from plant_emulator.diagnosis.tangents import Tangents
-from plant_emulator.estimation import at
+from plant_emulator.estimation import at, estimate
 from plant_emulator.free_parameters import free_parameters, unknowns
 from plant_emulator.log import COMPARED
 from plant_emulator.search import GAP_POSITION
@@ -22,12 +24,17 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.blind.case import Case, Hidden
-    from plant_emulator.estimates import Array, Residual
+    from plant_emulator.estimates import Array, Residual, Unknown
     from plant_emulator.log import Log
     from plant_emulator.parameters import ParameterSet
 
 # Norm above which an effect counts as detectable.
 DETECTABLE = 7.0
+# Norm from which on drift has never been seen to follow an effect to below that.
+FOLLOWED = 100.0
+# The fit of the drift: relative fall of the cost that ends it, steps, and the norm of a change that
+# slopes are first taken over.
+SETTLED, FEW, COARSE = 1e-4, 10, 10.0
 
 
 def noise_levels(channels: Sequence[str]) -> Array:
@@ -54,7 +61,21 @@ def _norm(case: Case, hidden: Hidden, logs: Sequence[Log], parameters: Parameter
     whole = [run(start) for run, start in zip(complete, starts, strict=True)]
     change = [after - before for after, before in zip(whole, base, strict=True)]
     tangents = Tangents(at(wanted, [_less(p, b) for p, b in zip(without, base, strict=True)]))
-    return float(np.linalg.norm(tangents.rest(np.concatenate([c.ravel() for c in change]))))
+    norm = float(np.linalg.norm(tangents.rest(np.concatenate([c.ravel() for c in change]))))
+    if not DETECTABLE < norm < FOLLOWED:
+        return norm
+    return min(norm, _followed(wanted, [_less(p, w) for p, w in zip(without, whole, strict=True)]))
+
+
+def _followed(wanted: Sequence[Unknown], residuals: Sequence[Residual]) -> float:
+    """Norm of what a fit of drift from the truth leaves, at first with slopes over the hollows."""
+    coarse = estimate(wanted, residuals, settled=SETTLED, iterations=FEW, difference=COARSE)
+    starts = [
+        replace(u, start=float(np.clip(u.value(float(z)), u.lower, u.upper)))
+        for u, z in zip(coarse.unknowns, coarse.z, strict=True)
+    ]
+    found = estimate(starts, residuals, settled=SETTLED, iterations=FEW)
+    return float(np.sqrt(min(one.cost + one.penalty for one in (coarse, found))))
 
 
 def _less(simulated: Residual, base: Array) -> Residual:

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.covariance import correlation_time, structure
-from plant_emulator.estimation import at, estimate
+from plant_emulator.estimation import DIFFERENCE_NORM, at, estimate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -127,16 +127,25 @@ def fit(
     near: Estimate | None = None,
     *,
     shy: bool = False,
+    difference: float = DIFFERENCE_NORM,
 ) -> Point:
     """Joint fit of drift, states and these effects, from these values.
 
     near : see `estimate`'s `follow`; a first look only
     shy : see `template`
+    difference : see `estimate`
     """
     unknowns = started(template(model, effects, runs, shy=shy), values, states)
     residuals = [model.residual(k, effects) for k in runs]
     settled = SETTLED if near is None else GLANCE_SETTLED
-    found = estimate(unknowns, residuals, settled=settled, iterations=iterations, follow=near)
+    found = estimate(
+        unknowns,
+        residuals,
+        settled=settled,
+        iterations=iterations,
+        follow=near,
+        difference=difference,
+    )
     reached = point(effects, found, len(runs))
     sizes = {name: _largest(model.candidates[name], reached.values) for name in effects}
     return replace(reached, sizes=sizes)

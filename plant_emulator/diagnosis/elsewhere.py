@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.contest import Point, fit, template
+from plant_emulator.diagnosis.contest import Point, fit, linearised, template
 from plant_emulator.diagnosis.signature import signs, sized
+from plant_emulator.diagnosis.tangents import Tangents
 from plant_emulator.diagnosis.valleys import best_states, loss_of, whole
 from plant_emulator.scans import cauchy_loss
 
@@ -18,13 +19,15 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.model import Model
-    from plant_emulator.diagnosis.tangents import Tangents
 
-# Steps from some way off, and how far off that is [standard errors].
-FEW_SHAKEN, SHAKE = 12, 30.0
+# Steps from some way off, how far off that is [standard errors], and at most [scales].
+FEW_SHAKEN, SHAKE, FARTHEST = 12, 30.0, 1.0
 # Values that each unknown is tried at before such steps, and how far off they go [prior deviations;
 # parts of the value where there is no prior].
 SIFTED, SIFT, SIFT_SIZE = 11, 1.0, 0.1
+# What slopes are taken over in a search down a rough cost [norm of the change of the residual], and
+# steps with each.
+COARSE, FEW_COARSE = (100.0, 30.0, 10.0, 3.0), 8
 # Steps from the nominal parameters, where each goes far; with states of the effect's own.
 FEW_FAR, FEW_FAR_WITH_STATES = 4, 8
 # Sizes in another's place, which follow that one's size.
@@ -38,20 +41,35 @@ def shaken(
 ) -> Point:
     """A few steps of a joint fit from some way off where it has come to, each number another way.
 
-    As far as SHAKE standard errors, no further than a prior deviation, and within the bounds: with
-    a friction below zero a bench shakes, in steps of microseconds.
+    As far as SHAKE times the noise may have moved it, no further than what is known beforehand, and
+    along the floor of its valley: drawn with the covariance that the fit would have then. Within
+    the bounds: with a friction below zero a bench shakes, in steps of microseconds.
     """
-    random = np.random.default_rng(number)
-    moved = dict(start.values)
-    for u in template(model, effects, runs):
-        if u.run is None:
-            far = min(SHAKE * start.errors[u.name], u.std or abs(moved[u.name]))
-            beyond = moved[u.name] + far * float(random.standard_normal())
-            moved[u.name] = float(np.clip(beyond, u.lower, u.upper))
-    states = start.states
+    found = linearised(model, start, runs)
+    reach = np.array([min(u.scaled_std, FARTHEST) for u in found.unknowns])
+    squares, axes = np.linalg.eigh(found.information / SHAKE**2 + np.diag(reach**-2.0))
+    draw = np.random.default_rng(number).standard_normal(len(reach))
+    shift = axes @ (draw / np.sqrt(squares))
+    moved, states = Tangents(found).moved(shift, len(runs))
     if any(model.candidates[name].states for name in effects):
-        states = best_states(model, effects, runs, moved, states, anew=effects)
+        states = [*best_states(model, effects, runs, moved, states, anew=effects)]
     return fit(model, effects, runs, moved, states, FEW_SHAKEN)
+
+
+def smoothed(model: Model, effects: Sequence[str], runs: Sequence[int], start: Point) -> Point:
+    """A few steps of a joint fit from where another has come to, with slopes over wide differences
+    first, then over smaller ones.
+
+    Contact that comes and goes gives the cost a rough bottom, in whose hollows small differences
+    end; wide ones see the valley (as implicit filtering does: C. T. Kelley, SIAM 2011).
+    """
+    best = start
+    for difference in COARSE:
+        found = fit(
+            model, effects, runs, best.values, best.states, FEW_COARSE, difference=difference
+        )
+        best = min(best, found, key=lambda p: p.cost)
+    return best
 
 
 def sifted(model: Model, effects: Sequence[str], runs: Sequence[int], start: Point) -> Point:

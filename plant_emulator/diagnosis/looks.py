@@ -9,6 +9,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.contest import WORTH, Point, fit
+from plant_emulator.diagnosis.elsewhere import smoothed
+from plant_emulator.diagnosis.explain import excess
 from plant_emulator.diagnosis.signature import FAR, signs, sized
 from plant_emulator.diagnosis.valleys import best_sizes, best_states
 
@@ -24,6 +26,9 @@ GLANCE = 10
 # Steps of a fit that only has to show whether it is worth more: without and with states of its
 # own, which make a long curved valley of the cost.
 FEW, FEW_WITH_STATES = 8, 24
+# Costs above that of the fit without an effect, from which on a fit with it has stopped on its way
+# [gap], and finds no way [that cost].
+ON_THE_WAY, HOPELESS = 0.02, 20.0
 # Steps of a fit through where drift follows an effect along a curve.
 PATIENT = 25
 
@@ -50,10 +55,17 @@ def glance(
 def glance_far(
     model: Model, found: Signature, base: Point, runs: Sequence[int], near: Estimate
 ) -> Point | None:
-    """The same from a larger size; None where the signature has none."""
+    """The same from a larger size; None where the signature has none.
+
+    On with wide slopes where it stops on the way, for the way back from where the drift has gone to
+    imitate an effect is rough; not where nothing is in the way, nor from where none leads back.
+    """
     if found.far is None:
         return None
-    return fit(model, (*base.effects, found.effect), runs, *found.far, GLANCE, near)
+    effects = (*base.effects, found.effect)
+    start = fit(model, effects, runs, *found.far, GLANCE, near)
+    near_cost, far_cost = base.cost + WORTH + ON_THE_WAY * excess(base), HOPELESS * base.cost
+    return smoothed(model, effects, runs, start) if near_cost < start.cost < far_cost else start
 
 
 def patient(model: Model, found: Signature, base: Point, runs: Sequence[int]) -> Point:

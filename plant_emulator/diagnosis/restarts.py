@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.contest import ASTRAY, WORTH
+from plant_emulator.diagnosis.explain import excess
 from plant_emulator.diagnosis.rules import noise_only
 from plant_emulator.diagnosis.steps import Task, follow, refit, shake, sift, swap
 
@@ -17,10 +18,13 @@ if TYPE_CHECKING:
 
 # Times that a fit that ran out of steps is taken up again.
 PATIENCE = 3
-# How often a fit starts again from some way off.
+# How often a fit starts again, once with wide slopes and else from some way off.
 SHAKES = 3
-# How far a valley is followed beyond a step along it [such steps], and how often.
-STRIDES, FOLLOWED = (1.0, 3.0, 7.0), 6
+# How far a valley is followed beyond a step along it [such steps], how often, and how many times in
+# a row in vain.
+STRIDES, FOLLOWED, FAILED = (1.0, 3.0, 7.0), 6, 2
+# Costs that differ by no more are of the same place [gap].
+SAME = 0.03
 # Effects that are fitted in the place of another, and steps that the best of them goes further.
 SWAPPED, SIFTS = 2, 3
 
@@ -56,16 +60,17 @@ class Restarts:
         return self._ended(points, found)
 
     def shaken(self, points: Sequence[Point]) -> list[Point]:
-        """Fits, each the best of itself and those from some way off."""
-        tasks = [
-            Task(base=point, runs=self.runs, number=k) for point in points for k in range(SHAKES)
-        ]
-        found = list(self.pool.map(shake, self.recipe, tasks))
-        best = [
-            min(found[SHAKES * k : SHAKES * (k + 1)], key=lambda p: p.cost)
-            for k in range(len(points))
-        ]
+        """Fits, each the best of itself, that with wide slopes and those from some way off."""
+        off = self._off(points, range(SHAKES))
+        best = [min(found, key=lambda p: p.cost) for found in off]
         return self._ended(points, dict(enumerate(best)))
+
+    def _off(self, points: Sequence[Point], numbers: Sequence[int]) -> list[list[Point]]:
+        """Of every fit those from some way off, each number another way; 0: with wide slopes."""
+        tasks = [Task(base=point, runs=self.runs, number=k) for point in points for k in numbers]
+        found = list(self.pool.map(shake, self.recipe, tasks))
+        each = len(numbers)
+        return [found[each * k : each * (k + 1)] for k in range(len(points))]
 
     def swapped(self, point: Point, names: Sequence[str]) -> Point:
         """The fit with the likeliest of these effects in the place of the last, from that fit.
@@ -90,16 +95,24 @@ class Restarts:
         From where it has come to and where a start from some way off has, further the same way, as
         a pattern move (R. Hooke, T. A. Jeeves, J. ACM 8 (1961) 212).
         """
-        for _ in range(FOLLOWED):
-            if noise_only(point):
+        failed = 0
+        for k in range(FOLLOWED):
+            if noise_only(point) or failed == FAILED:
                 break
-            (moved,) = self.shaken([point])
-            if moved is point:
-                break
-            starts = [further(point, moved, stride) for stride in STRIDES]
-            tasks = [Task(base=start, runs=self.runs) for start in starts]
-            ahead = list(self.pool.map(refit, self.recipe, tasks))
-            point = min([moved, *ahead], key=lambda p: p.cost)
+            numbers = range(SHAKES * k, SHAKES * (k + 1))
+            off = self._off([point], numbers)[0]
+            (moved,) = self._ended([point], {0: min(off, key=lambda p: p.cost)})
+            step = WORTH + SAME * excess(point)
+            if moved.cost < point.cost - step:
+                starts = [further(point, moved, stride) for stride in STRIDES]
+                tasks = [Task(base=start, runs=self.runs) for start in starts]
+                ahead = list(self.pool.map(refit, self.recipe, tasks))
+                point, failed = min([moved, *ahead], key=lambda p: p.cost), 0
+                continue
+            same = any(n and p.cost < point.cost + step for n, p in zip(numbers, off, strict=True))
+            point, failed = moved, failed + 1
+            if same:
+                break  # another start has come to the same place: the bottom
         return point
 
     def _ended(self, points: Sequence[Point], found: Mapping[int, Point]) -> list[Point]:

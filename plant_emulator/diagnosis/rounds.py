@@ -23,7 +23,7 @@ from plant_emulator.diagnosis.contenders import (
     with_point,
 )
 from plant_emulator.diagnosis.contest import ASTRAY, WORTH
-from plant_emulator.diagnosis.explain import NOISE_LEFT, THRESHOLD
+from plant_emulator.diagnosis.explain import NOISE_LEFT, THRESHOLD, excess
 from plant_emulator.diagnosis.restarts import Restarts
 from plant_emulator.diagnosis.rules import SECOND, noise_only
 from plant_emulator.diagnosis.steps import (
@@ -37,6 +37,7 @@ from plant_emulator.diagnosis.steps import (
     show,
     start,
 )
+from plant_emulator.diagnosis.valleys import WIDEST
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -97,7 +98,8 @@ class Rounds:
     def contend(self, base: Point, stage: str, *, thorough: bool) -> list[Contender]:
         """All effects on top of a fit: a first look at each, the best of them fitted.
 
-        thorough : where none leaves little, all get a second look from a larger size
+        thorough : where none leaves little, those that could close it get a second look from a
+            larger size
         """
         names = [name for name in self._names if name not in base.effects]
         tasks = [Task(base=base, runs=self._runs, effect=name) for name in names]
@@ -122,17 +124,14 @@ class Rounds:
                 signatures = [one for one in shown.values() if one is not None]
                 contenders = self._patiently(contenders, signatures, base, stage)
                 contenders = self._fitted(contenders, base, 1, refit, stage)
+                nothing = base.cost - least_cost(contenders) < THRESHOLD
+                if nothing and not noise_only(base):
+                    contenders = self._from_afar(contenders, tasks, base, stage)
             return contenders
         if explained(contenders):
             return contenders
         if thorough and not closed(contenders, base, MOST):
-            far = self._told(stage, tasks, self._pool.map(contend_far, self._recipe, tasks))
-            again = [
-                replace(c, point=p)
-                for c, p in zip(with_point(contenders), far, strict=True)
-                if p is not None and p.cost < cost_of(c) - WORTH
-            ]
-            contenders = better_of(contenders, self._taken_further(again, base, stage))
+            contenders = self._from_afar(contenders, tasks, base, stage)
         if explained(contenders):
             return contenders
         alone = not thorough or closed(contenders, base, MOST)
@@ -151,6 +150,20 @@ class Rounds:
         found = self._told(stage, tasks, self._pool.map(plod, self._recipe, tasks))
         points = dict(zip(wrong, found, strict=True))
         return better_of(contenders, [replace(c, point=points.get(c.effect)) for c in contenders])
+
+    def _from_afar(
+        self, contenders: Sequence[Contender], tasks: Sequence[Task], base: Point, stage: str
+    ) -> list[Contender]:
+        """Effects that could close the gap fitted from a larger size, where that is better."""
+        large = [task for task in tasks if _could_close(task.signature, base)]
+        found = self._told(stage, large, self._pool.map(contend_far, self._recipe, large))
+        points = dict(zip((task.effect for task in large), found, strict=True))
+        again = [
+            replace(c, point=p)
+            for c in contenders
+            if (p := points.get(c.effect)) is not None and p.cost < cost_of(c) - WORTH
+        ]
+        return better_of(contenders, self._taken_further(again, base, stage))
 
     def _sighted(self, contenders: Sequence[Contender], base: Point, stage: str) -> list[Contender]:
         """The best effect on top of noise fitted to convergence, where it is worth that."""
@@ -216,7 +229,8 @@ class Rounds:
                 return list(contenders)
             best = best_few(contenders, base, most)
         points = self.restarts.sifted([c.point for c in best if c.point is not None])
-        points = self.restarts.shaken(points)
+        first = [self.restarts.followed(point) for point in points[:1]]
+        points = [*first, *self.restarts.shaken(points[1:])]
         again = [replace(c, point=p) for c, p in zip(best, points, strict=True)]
         return better_of(contenders, again)
 
@@ -243,3 +257,8 @@ class Rounds:
                 self._progress(stage, (done + 1) / len(tasks))
             every.append(one)
         return every
+
+
+def _could_close(shown: Signature | None, base: Point) -> bool:
+    """Whether an effect, drift or not, changes as much as a fit leaves beyond the noise."""
+    return shown is not None and (WIDEST * shown.raw) ** 2 > excess(base)

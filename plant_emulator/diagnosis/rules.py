@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 # Share of the gap that a first effect closes that is named without its evidence.
 PART_OF_GAP = 0.04
-# Evidence of a second effect where the first leaves nothing but noise: one with angles of its own
-# in every run came to 40 by chance.
+# Evidence of a second effect where either leaves nothing but noise: one with angles of its own in
+# every run came to 40 by chance.
 SECOND = 60.0
 # And the share of the whole gap that the first's own law may have left: the square of an error of
 # 3 % in it.
@@ -28,9 +28,10 @@ LAW = 0.001
 # (such had 0.1 to 0.35), and the share of the gap that it has to close then: the square of an error
 # of 10 %, where the first leaves noise.
 SMALL, COARSE_LAW = 0.4, 0.01
-# Elsewhere the share of what the first leaves that a second has to close, of the squares and of the
-# structure. What the first's own law leaves stays: beside real seconds up to half of either. What
-# seemed a second there closed up to 0.4 of the squares, but no more than 0.15 of the structure.
+# Where both leave more than noise, the share of what the first leaves that a second has to close,
+# of the squares and of the structure. What the first's own law leaves stays: beside real seconds up
+# to half of either. What seemed a second there closed up to 0.4 of the squares, but no more than
+# 0.15 of the structure.
 REST = 0.5
 # Share of the gap that is too little to look for more, of a model that never reaches the noise.
 LITTLE = 0.04
@@ -79,7 +80,10 @@ def counts(
     sizes = [best.sizes[name] for name in best.effects if name not in base.effects]
     small = not exact and any(size < SMALL for size in sizes)
     if noise_only(base):
-        return evidence > SECOND and fall > (COARSE_LAW if small else LAW) * excess(null)
+        left = 0.0 if exact else COARSE_LAW if small else LAW
+        return evidence > SECOND and fall > left * excess(null)
+    if noise_only(best):
+        return evidence > SECOND and fall > (LEFT if small else LAW) * excess(null)
     orderly = _ordered(best) <= (1.0 - REST) * _ordered(base)
     most = fall > max(REST * (base.squares - base.samples), LEFT * excess(null) if small else 0.0)
     return evidence > THRESHOLD and orderly and most

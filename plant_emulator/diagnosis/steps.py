@@ -6,7 +6,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.contest import Point, again, linearised, null_fit
-from plant_emulator.diagnosis.elsewhere import from_nominal, in_place, shaken, sifted, vacated
+from plant_emulator.diagnosis.elsewhere import (
+    from_nominal,
+    in_place,
+    shaken,
+    sifted,
+    smoothed,
+    vacated,
+)
 from plant_emulator.diagnosis.looks import glance, glance_far, look, patient
 from plant_emulator.diagnosis.signature import signature
 from plant_emulator.diagnosis.tangents import Tangents
@@ -69,7 +76,9 @@ def follow(model: Model, task: Task) -> Point:
 
 
 def shake(model: Model, task: Task) -> Point:
-    """The fit of `task.base` from some way off its values."""
+    """The fit of `task.base` from some way off, or, number 0, with wide slopes."""
+    if task.number == 0:
+        return smoothed(model, task.base.effects, task.runs, task.base)
     return shaken(model, task.base.effects, task.runs, task.base, task.number)
 
 

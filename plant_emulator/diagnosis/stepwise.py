@@ -12,11 +12,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.contenders import best_of, better_of, closed, explained
-from plant_emulator.diagnosis.contest import ASTRAY
-from plant_emulator.diagnosis.explain import MARGIN, THRESHOLD, Explanation, excess
+from plant_emulator.diagnosis.contenders import best_of, better_of, closed, explained, least_cost
+from plant_emulator.diagnosis.explain import MARGIN, NOISE_LEFT, THRESHOLD, Explanation, excess
 from plant_emulator.diagnosis.rounds import MOST, Rounds
-from plant_emulator.diagnosis.rules import counts, enough
+from plant_emulator.diagnosis.rules import counts, enough, noise_only
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -26,9 +25,8 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.pool import Pool, Recipe
     from plant_emulator.diagnosis.rounds import Progress
 
-# Share of the gap that a better fit without effects closes when it has moved to another valley;
-# share that an effect closes which no start from elsewhere is likely to outdo.
-MOVED, HALF = 0.5, 0.5
+# Share of the gap that a better fit without effects closes when it has moved to another valley.
+MOVED = 0.5
 # More effects than that at once explain anything.
 MOST_EFFECTS = 2
 
@@ -96,24 +94,21 @@ class Contest:
     def _first(self, null: Point) -> tuple[Point, list[Contender]]:
         """All effects on the fit without any, and that fit, started again from the best of them.
 
-        Where none leaves little, all are tried again when the fit without effects has moved to
-        another valley, and start once more from the nominal parameters when none closes half the
-        gap: in a cost of many valleys a signature is but a hint.
+        All are tried again when the fit without effects has moved to another valley and they leave
+        much, or are no better than it: in a cost of many valleys a signature is but a hint.
         """
         stage = "contest"
         contenders = self._rounds.contend(null, stage, thorough=True)
         better = self._rounds.restarted(null, contenders)
         moved = null.cost - better.cost > max(THRESHOLD, MOVED * excess(null))
-        if moved:
+        if moved or (better.chi_squared <= NOISE_LEFT and not noise_only(better)):
             better = self._rounds.restarts.followed(better)
-        if explained(contenders) or closed(contenders, better, MOST):
+            moved = null.cost - better.cost > max(THRESHOLD, MOVED * excess(null))
+        stale = moved and better.cost - least_cost(contenders) < THRESHOLD
+        if not stale and (explained(contenders) or closed(contenders, better, MOST)):
             return better, contenders
         if moved:
             again = self._rounds.contend(better, stage, thorough=True)
-            contenders = better_of(contenders, again)
-            better = self._rounds.restarted(better, contenders)
-        if better.chi_squared > ASTRAY and not closed(contenders, better, HALF):
-            again = self._rounds.from_nominal(better, contenders, stage)
             contenders = better_of(contenders, again)
             better = self._rounds.restarted(better, contenders)
         return better, contenders
