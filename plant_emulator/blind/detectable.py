@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 # Norm above which an effect counts as detectable.
 DETECTABLE = 7.0
-# Norm from which on drift has never been seen to follow an effect to below that.
-FOLLOWED = 100.0
 # The fit of the drift: relative fall of the cost that ends it, steps, and the norm of a change that
 # slopes are first taken over.
 SETTLED, FEW, COARSE = 1e-4, 10, 10.0
@@ -62,7 +60,7 @@ def _norm(case: Case, hidden: Hidden, logs: Sequence[Log], parameters: Parameter
     change = [after - before for after, before in zip(whole, base, strict=True)]
     tangents = Tangents(at(wanted, [_less(p, b) for p, b in zip(without, base, strict=True)]))
     norm = float(np.linalg.norm(tangents.rest(np.concatenate([c.ravel() for c in change]))))
-    if not DETECTABLE < norm < FOLLOWED:
+    if norm <= DETECTABLE:
         return norm
     return min(norm, _followed(wanted, [_less(p, w) for p, w in zip(without, whole, strict=True)]))
 
@@ -75,7 +73,7 @@ def _followed(wanted: Sequence[Unknown], residuals: Sequence[Residual]) -> float
         for u, z in zip(coarse.unknowns, coarse.z, strict=True)
     ]
     found = estimate(starts, residuals, settled=SETTLED, iterations=FEW)
-    return float(np.sqrt(min(one.cost + one.penalty for one in (coarse, found))))
+    return float(np.sqrt(min(one.cost for one in (coarse, found))))
 
 
 def _less(simulated: Residual, base: Array) -> Residual:

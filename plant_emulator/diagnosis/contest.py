@@ -7,13 +7,12 @@
  3. A joint fit of drift and effect, started from the size whose signature explains most, the drift
     moved by what the linear picture says: of every effect a cheap first look, whose drift follows
     by secants; of the best a few full steps; of the best of these to convergence.
- 4. Where the fit without effects leaves much, it may lie in a wrong valley, and mislead both the
-    signature and the start: where the best joint fit leaves much as well, it starts once more from
-    the nominal parameters and the size that fits these best, the runs taken in one by one.
- 5. What leaves more than noise starts again from a larger size, for the linear picture is wrong
-    where drift has gone far to imitate the effect; and the best from the best values of each of
-    its unknowns by a loss that forgives, and from some way off (3 times): where contact comes and
-    goes, the cost is rough, and a fit may have stopped in a small hollow or in another valley.
+ 4. Where none leaves little, the signature and the start mislead: drift has gone far to imitate the
+    effect, and the way back is rough, since contact comes and goes. All that could close the gap
+    then start from a larger size, with slopes over wide differences first; and the best once more
+    from the nominal parameters and the size that fits these best, the runs taken in one by one.
+ 5. The best starts again from the best values of each of its unknowns by a loss that forgives, and
+    from some way off along the floor of its valley, as long as that leads further down.
  6. The fit without effects starts again from every joint fit's drift: should it get as low, there
     was no effect, only a better valley. One that has come to such is followed down it.
 
