@@ -41,15 +41,20 @@ def shaken(
 ) -> Point:
     """A few steps of a joint fit from some way off where it has come to, each number another way.
 
-    As far as SHAKE times the noise may have moved it, no further than what is known beforehand, and
-    along the floor of its valley: drawn with the covariance that the fit would have then. Within
-    the bounds: with a friction below zero a bench shakes, in steps of microseconds.
+    As far as SHAKE times the noise may have moved it, no further than what is known beforehand. One
+    in three goes along the floor of its valley, drawn with the covariance that the fit would have
+    then; the others move each unknown by itself, which leads out of it. Within the bounds: with a
+    friction below zero a bench shakes, in steps of microseconds.
     """
     found = linearised(model, start, runs)
     reach = np.array([min(u.scaled_std, FARTHEST) for u in found.unknowns])
-    squares, axes = np.linalg.eigh(found.information / SHAKE**2 + np.diag(reach**-2.0))
     draw = np.random.default_rng(number).standard_normal(len(reach))
-    shift = axes @ (draw / np.sqrt(squares))
+    if number % 3 == 1:
+        squares, axes = np.linalg.eigh(found.information / SHAKE**2 + np.diag(reach**-2.0))
+        shift = axes @ (draw / np.sqrt(squares))
+    else:
+        own = np.array([u.run is not None for u in found.unknowns])
+        shift = np.where(own, 0.0, draw * np.minimum(SHAKE * found.standard_errors, reach))
     moved, states = Tangents(found).moved(shift, len(runs))
     if any(model.candidates[name].states for name in effects):
         states = [*best_states(model, effects, runs, moved, states, anew=effects)]

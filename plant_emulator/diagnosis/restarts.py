@@ -109,10 +109,7 @@ class Restarts:
                 ahead = list(self.pool.map(refit, self.recipe, tasks))
                 point, failed = min([moved, *ahead], key=lambda p: p.cost), 0
                 continue
-            same = any(n and p.cost < point.cost + step for n, p in zip(numbers, off, strict=True))
             point, failed = moved, failed + 1
-            if same:
-                break  # another start has come to the same place: the bottom
         return point
 
     def _ended(self, points: Sequence[Point], found: Mapping[int, Point]) -> list[Point]:
