@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 SETTLED = 1e-6
 # The same of a fit whose slopes are not exact.
 GLANCE_SETTLED = 1e-4
+# A size is certain from so many of its standard errors on.
+CERTAIN = 3.0
 # Mean square from which on a fit may lie in a wrong valley.
 ASTRAY = 1.5
 # What is known beforehand of a size that a prediction needs [plausible sizes].
@@ -60,6 +62,8 @@ class Point:
     structure : of the residuals, beyond white noise, see `covariance.structure`
     looks : of the cost, what the choice of the states has gained by chance, see `looks_of`
     sizes : the largest size of every effect, in plausible sizes
+    unsure : effects with values of each run and no certain size; those can be anything that differs
+        from run to run
     """
 
     effects: tuple[str, ...]
@@ -74,6 +78,7 @@ class Point:
     structure: float = 0.0
     looks: float = 0.0
     sizes: Mapping[str, float] = field(default_factory=dict)
+    unsure: tuple[str, ...] = ()
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -147,7 +152,8 @@ def fit(
     )
     reached = point(effects, found, len(runs))
     sizes = {name: _largest(model.candidates[name], reached.values) for name in effects}
-    return replace(reached, sizes=sizes)
+    unsure = tuple(name for name in effects if not _sure(model.candidates[name], reached))
+    return replace(reached, sizes=sizes, unsure=unsure)
 
 
 def _largest(candidate: Candidate, values: Mapping[str, float]) -> float:
@@ -157,6 +163,14 @@ def _largest(candidate: Candidate, values: Mapping[str, float]) -> float:
         (values[u.name] - neutral[u.name]) / (u.start - neutral[u.name]) for u in candidate.sizes
     )
     return max(map(abs, sizes), default=0.0)
+
+
+def _sure(candidate: Candidate, found: Point) -> bool:
+    """Whether an effect without values of each run, or one of its sizes not zero by chance."""
+    return not candidate.states or any(
+        abs(found.values[u.name] - candidate.neutral[u.name]) > CERTAIN * found.errors[u.name]
+        for u in candidate.sizes
+    )
 
 
 def again(model: Model, effects: Sequence[str], runs: Sequence[int], start: Point) -> Point:

@@ -9,9 +9,9 @@ import numpy as np
 
 from plant_emulator.diagnosis import apart, verdict
 from plant_emulator.diagnosis.chance import Weighted, unrest
-from plant_emulator.diagnosis.explain import THRESHOLD
+from plant_emulator.diagnosis.explain import NOISE_LEFT, THRESHOLD, excess
 from plant_emulator.diagnosis.quieted import quieted
-from plant_emulator.diagnosis.steps import Task
+from plant_emulator.diagnosis.steps import Task, refit, start
 from plant_emulator.diagnosis.stepwise import Contest
 
 if TYPE_CHECKING:
@@ -25,12 +25,16 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.rounds import Progress
     from plant_emulator.diagnosis.verdict import Verdict
 
+# Structure of a residual, as a share of its squares beyond the noise, up to which it may be chance:
+# that of a dead time that varies from scan to scan was 0.014.
+RANDOM = 0.05
+
 
 @dataclass(frozen=True, kw_only=True)
 class Inquiry:
     """One diagnosis up to its verdict.
 
-    runs : that are fitted, by number; null : a fit without effects to start from, if there is one
+    runs : that are fitted, by number; null : the fit without effects, if it has been made
     """
 
     pool: Pool
@@ -47,18 +51,22 @@ class Inquiry:
 
     def found(self) -> tuple[Explanation, Verdict, Recipe]:
         """What the contest came to, the verdict, and the recipe whose noise its costs count in."""
-        explained, recipe = self._contest(self.recipe), self.recipe
-        found = verdict.decide(self.model, explained)
         if not self.model.reaches_noise:
-            return explained, self._between(explained, found), recipe
-        if found.kind == "unknown":
-            explained, recipe = self._by_chance(explained)
+            explained = self._contest(self.recipe, self.null)
             found = verdict.decide(self.model, explained)
-            if found.kind == "unknown":
-                found = self._between(explained, found)
+            return explained, self._between(explained, found), self.recipe
+        (null,) = [self.null] if self.null else self.pool.map(start, self.recipe, [self.runs])
+        explained, recipe = self._restless(null) or (self._contest(self.recipe, null), self.recipe)
+        found = verdict.decide(self.model, explained)
+        if found.kind == "unknown" and not explained.chance:
+            again = self._by_chance(explained.final, explained.null)
+            explained, recipe = again or (explained, recipe)
+            found = verdict.decide(self.model, explained)
+        if found.kind == "unknown":
+            found = self._between(explained, found)
         return explained, found, recipe
 
-    def _contest(self, recipe: Recipe, by_chance: float = 0.0) -> Explanation:
+    def _contest(self, recipe: Recipe, null: Point | None, by_chance: float = 0.0) -> Explanation:
         contest = Contest(
             self.pool,
             recipe,
@@ -67,27 +75,36 @@ class Inquiry:
             self.progress,
             reaches_noise=self.model.reaches_noise,
             by_chance=by_chance,
-            null=self.null,
+            null=null,
             exact=[name for name, one in self.model.candidates.items() if one.exact],
         )
         return contest.explain()
 
-    def _by_chance(self, explained: Explanation) -> tuple[Explanation, Recipe]:
-        """The contest again with the unrest of the effect of chance course that explains most, and
-        the recipe with it; as it was where there is none.
+    def _restless(self, null: Point) -> tuple[Explanation, Recipe] | None:
+        """The contest with an effect of chance course, where the fit without effects leaves much,
+        but next to nothing that is not random: a contest of others would be in vain.
         """
-        found = self._unrest(explained.final, self.model.candidates)
+        if null.chi_squared <= NOISE_LEFT or null.structure > RANDOM * excess(null):
+            return None
+        return self._by_chance(null, null)
+
+    def _by_chance(self, base: Point, null: Point) -> tuple[Explanation, Recipe] | None:
+        """The contest with the unrest of the effect of chance course that explains most on top of
+        a fit, and the recipe with it; None where there is none.
+
+        null : the fit without effects
+        """
+        found = self._unrest(base, self.model.candidates)
         first = max(found, key=lambda one: one.evidence, default=None)
         if first is None:
-            return explained, self.recipe
+            return None
         weights = dict(zip(self.runs, first.weights, strict=True))
         every = tuple(weights.get(k, np.ones(1)) for k in range(len(self.model.runs)))
         recipe = Weighted(self.recipe, every)
-        again = self._contest(recipe, first.evidence)
+        (null,) = self.pool.map(refit, recipe, [Task(base=null, runs=self.runs)])
+        again = self._contest(recipe, null, first.evidence)
         last = self._unrest(again.final, [first.effect])
-        if not last:
-            return explained, self.recipe
-        return replace(again, chance=tuple(last)), recipe
+        return (replace(again, chance=tuple(last)), recipe) if last else None
 
     def _unrest(self, base: Point, names: Iterable[str]) -> list[Unrest]:
         """What holds of effects of chance course on top of a fit."""

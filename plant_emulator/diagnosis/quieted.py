@@ -10,7 +10,7 @@ import hashlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
-from plant_emulator.diagnosis.steps import Task, start
+from plant_emulator.diagnosis.steps import Task, refit, start
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -28,13 +28,17 @@ def quieted(
     """The recipe of a model whose residuals have white noise also where inputs are fed.
 
     The recipe itself where these runs feed none, or none that counts; and the fit without effects
-    that told, None where none was needed.
+    by it, None where none was needed.
     """
     if not any(model.runs[run].fed for run in runs):
         return recipe, None
     (null,) = pool.map(start, recipe, [runs])
     (found,) = pool.map(louds, recipe, [Task(base=null, runs=runs)])
-    return Quieted(recipe, found) if found else recipe, null
+    if not found:
+        return recipe, null
+    quiet = Quieted(recipe, found)
+    (null,) = pool.map(refit, quiet, [Task(base=null, runs=runs)])
+    return quiet, null
 
 
 def louds(model: Model, task: Task) -> dict[int, Loud]:

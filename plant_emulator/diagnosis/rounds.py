@@ -85,12 +85,12 @@ class Rounds:
         self._runs, self._progress = tuple(runs), progress
         self.restarts = Restarts(pool=pool, recipe=recipe, runs=self._runs)
 
-    def without_effects(self, near: Point | None) -> Point:
-        """The fit without effects, from one by another noise where there is such."""
-        if near is None:
-            (null,) = self._pool.map(start, self._recipe, [self._runs])
-        else:
-            null = self.restarts.refitted(near)
+    def without_effects(self, found: Point | None) -> Point:
+        """The fit without effects, started again from elsewhere where it leaves much.
+
+        found : where it has been made already
+        """
+        (null,) = [found] if found else self._pool.map(start, self._recipe, [self._runs])
         if null.chi_squared > NOISE_LEFT:
             (null,) = self.restarts.shaken([null])
         return null

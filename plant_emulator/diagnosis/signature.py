@@ -74,6 +74,8 @@ def signature(
     moving = [trial for trial in trials if trial.norm > 1e-6]
     if not moving:
         return None
+    # A limit that is not reached does next to nothing at small sizes: no fit begins there.
+    moving = [trial for trial in moving if _told(trial)] or moving
     best = max(moving, key=lambda trial: trial.gain)
     beyond = [t for t in moving if t.size / best.size > 1.0 and abs(t.size) >= FAR]
     larger = min(beyond, key=lambda trial: abs(trial.size), default=None)
@@ -94,6 +96,11 @@ def signature(
         imitated_by=names[int(np.argmax(follows))],
         direction=plausible.rest / max(plausible.norm, 1e-12),
     )
+
+
+def _told(trial: _Trial) -> bool:
+    """Whether a size changes the residual by more than the noise hides."""
+    return float(np.linalg.norm(trial.change)) > RESOLVED
 
 
 def _concentrated(rest: Array) -> bool:

@@ -35,7 +35,7 @@ class Contest:
     """One diagnosis on its pool; see the module's text.
 
     by_chance : evidence of an effect of chance course, if the recipe's noise holds one
-    null : a fit without effects by another noise, to start from, if there is one
+    null : the fit without effects, where it has been made already
     exact : names of effects whose law can have no other form
     """
 

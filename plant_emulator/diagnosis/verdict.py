@@ -95,9 +95,9 @@ def _of_contest(model: Model, explained: Explanation) -> Verdict:
     if model.reaches_noise and _structured(explained):
         reason = "what is left is as small as the noise, but not as random"
         return Verdict(kind="unknown", effects=(), shifts=moved, reason=reason)
-    of_runs = [name for name in final.effects if not _sized(model.candidates[name], final)]
-    if of_runs:
-        reason = f"it differs between the runs; {of_runs[0]} would do, but no size of it is certain"
+    if final.unsure:
+        name = final.unsure[0]
+        reason = f"it differs between the runs; {name} would do, but no size of it is certain"
         return Verdict(kind="unknown", effects=(), shifts=moved, reason=reason)
     if final.effects and (adequate(final, null) or not model.reaches_noise):
         return Verdict(kind="effect", effects=final.effects, shifts=moved, reason="")
@@ -110,16 +110,6 @@ def _of_contest(model: Model, explained: Explanation) -> Verdict:
         effects=(),
         shifts=moved,
         reason="no effect of the library, alone or with others, brings the residual to the noise",
-    )
-
-
-def _sized(candidate: Candidate, final: Point) -> bool:
-    """Whether an effect with values of each run has a size; those alone can be anything that
-    differs from run to run.
-    """
-    return not candidate.states or any(
-        abs(final.values[u.name] - candidate.neutral[u.name]) > SHIFTED * final.errors[u.name]
-        for u in candidate.sizes
     )
 
 

@@ -10,7 +10,7 @@ from plant_emulator.diagnosis.chance import Weighted, unrest
 from plant_emulator.diagnosis.contest import fit, null_fit
 from plant_emulator.diagnosis.inquiry import Inquiry
 from plant_emulator.diagnosis.pool import Here
-from plant_emulator.diagnosis.steps import Task
+from plant_emulator.diagnosis.steps import Task, show
 from plant_emulator.estimates import Array
 from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, effect, linear, noisy
 
@@ -106,6 +106,23 @@ def test_effect_beside_an_unrest_is_named_with_it() -> None:
     # What is compared with these costs has to count in their noise.
     again = fit(recipe.build(), ("wave",), [0], explained.final.values, explained.final.states)
     assert again.cost == pytest.approx(explained.final.cost, abs=0.1)
+
+
+def test_no_other_effect_is_sought_where_all_is_chance() -> None:
+    """Every first look at one counts the unrest as noise already."""
+    looked = []
+
+    class Watched(Here):
+        def map(self, function, recipe, tasks):  # type: ignore[no-untyped-def]
+            if function is show and tasks:
+                looked.append(recipe)
+            return super().map(function, recipe, tasks)
+
+    model = Shaken([noisy(2.0 + 3.0 * TIME) + shaken(0.8)])
+    inquiry = Inquiry(pool=Watched(), recipe=Given(model), model=model, runs=(0,))
+    assert inquiry.found()[1].effects == ("shake",)
+    assert looked
+    assert all(isinstance(recipe, Weighted) for recipe in looked)
 
 
 def test_what_is_little_beside_a_great_unrest_may_be_its_law() -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from plant_emulator.diagnosis import rounds as engine
 from plant_emulator.diagnosis.answer import undetectable
+from plant_emulator.diagnosis.contenders import best_of
 from plant_emulator.diagnosis.contest import Point, fit, linearised, null_fit
 from plant_emulator.diagnosis.elsewhere import (
     from_nominal,
@@ -18,7 +19,7 @@ from plant_emulator.diagnosis.elsewhere import (
     smoothed,
     vacated,
 )
-from plant_emulator.diagnosis.explain import Explanation, adequate, excess
+from plant_emulator.diagnosis.explain import Contender, Explanation, adequate, excess
 from plant_emulator.diagnosis.looks import glance, glance_far, look
 from plant_emulator.diagnosis.model import Candidate, Run
 from plant_emulator.diagnosis.place import subsystem
@@ -200,15 +201,63 @@ def test_two_effects_lie_where_the_larger_share_is() -> None:
         assert subsystem(found, model.candidates, shares) == f"part of {larger}"
 
 
+def of_runs(model: Line) -> Line:
+    """The same with a wave that has a value of each run, too."""
+    own = (linear("phase", 0.0, std=1.0),)
+    model.candidates["wave"] = replace(model.candidates["wave"], states=own)
+    return model
+
+
 def test_effect_whose_values_of_the_runs_explain_all_is_not_named_without_a_size() -> None:
-    model = Line([noisy(2.0 + 3.0 * TIME + 0.8 * np.sin(20.0 * TIME))], ["wave"])
+    """By hand: standard error of the wave's size sqrt(2 / n) = 0.03; 0.01 of it is chance."""
+    for size, unsure in ((0.01, ("wave",)), (0.3, ())):
+        y = noisy(2.0 + 3.0 * TIME + size * np.sin(20.0 * TIME))
+        plain, model = Line([y], ["wave"]), of_runs(Line([y], ["wave"]))
+        start = {"wave_size": 1.0}
+        assert fit(model, ("wave",), [0], start, [{}]).unsure == unsure
+        assert fit(plain, ("wave",), [0], start, [{}]).unsure == ()
+    model = of_runs(Line([noisy(2.0 + 3.0 * TIME + 0.8 * np.sin(20.0 * TIME))], ["wave"]))
     found = explained(model)
-    for states, error, kind in (((), 0.3, "effect"), ((linear("phase"),), 0.3, "unknown")):
-        model.candidates["wave"] = replace(model.candidates["wave"], states=states)
-        final = replace(found.final, errors={**found.final.errors, "wave_size": error})
-        assert decide(model, replace(found, final=final)).kind == kind
-    sure = replace(found.final, errors={**found.final.errors, "wave_size": 0.2})
-    assert decide(model, replace(found, final=sure)).kind == "effect"
+    assert decide(model, found).kind == "effect"
+    chance = replace(found.final, unsure=("wave",))
+    assert decide(model, replace(found, final=chance)).kind == "unknown"
+
+
+def test_second_effect_has_to_have_a_size() -> None:
+    """Alone one without a certain size stays: the verdict tells that it would do."""
+    model = Line([noisy(2.0 + 3.0 * TIME + 0.8 * np.sin(20.0 * TIME))])
+    alone = explained(model).final
+    unsure = replace(alone, cost=alone.cost - 100.0, unsure=("wave",))
+    beside = replace(unsure, effects=("cube", "wave"))
+    of = {"norm": 1.0, "raw": 1.0, "imitated_by": ""}
+    for first in (unsure, beside):
+        best = best_of([Contender(effect="wave", point=p, **of) for p in (alone, first)])
+        assert best is (alone if first is beside else unsure)
+
+
+class Capped(Line):
+    """The line with a wave that shows next to nothing, and that the wrong way, up to some size."""
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+        plain = super().residual(run, effects)
+
+        def residual(v: Mapping[str, float]) -> Array:
+            size = v.get("wave_size", 0.0)
+            return plain({**v, "wave_size": 20.0 * max(0.0, size - 0.45) - 1e-4 * size})
+
+        return residual
+
+
+def test_limit_that_small_sizes_do_not_reach_is_found() -> None:
+    """By hand: 20 (0.51 - 0.45) = 1.2 of the wave; the next size that is tried makes 3 of it."""
+    model = Capped([noisy(2.0 + 3.0 * TIME + 1.2 * np.sin(20.0 * TIME))], ["wave", "cube"])
+    (size,) = model.candidates["wave"].sizes
+    sizes = (replace(size, lower=0.0),)
+    model.candidates["wave"] = replace(model.candidates["wave"], sizes=sizes)
+    found = explained(model)
+    assert found.final.effects == ("wave",)
+    assert found.final.values["wave_size"] == pytest.approx(0.51, abs=0.01)
 
 
 def test_effect_of_chance_course_is_not_tried() -> None:
