@@ -173,9 +173,15 @@ def _sure(candidate: Candidate, found: Point) -> bool:
     )
 
 
-def again(model: Model, effects: Sequence[str], runs: Sequence[int], start: Point) -> Point:
+def again(
+    model: Model,
+    effects: Sequence[str],
+    runs: Sequence[int],
+    start: Point,
+    iterations: int | None = None,
+) -> Point:
     """Joint fit with these effects from where another fit has come to."""
-    return fit(model, effects, runs, start.values, start.states)
+    return fit(model, effects, runs, start.values, start.states, iterations)
 
 
 def linearised(model: Model, where: Point, runs: Sequence[int]) -> Estimate:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from plant_emulator.diagnosis.contest import ASTRAY, WORTH
 from plant_emulator.diagnosis.explain import excess
 from plant_emulator.diagnosis.rules import noise_only
-from plant_emulator.diagnosis.steps import Task, follow, refit, shake, sift, swap
+from plant_emulator.diagnosis.steps import Task, advance, follow, refit, shake, sift, swap
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -104,13 +104,18 @@ class Restarts:
             (moved,) = self._ended([point], {0: min(off, key=lambda p: p.cost)})
             step = WORTH + SAME * excess(point)
             if moved.cost < point.cost - step:
-                starts = [further(point, moved, stride) for stride in STRIDES]
-                tasks = [Task(base=start, runs=self.runs) for start in starts]
-                ahead = list(self.pool.map(refit, self.recipe, tasks))
-                point, failed = min([moved, *ahead], key=lambda p: p.cost), 0
+                ahead = [further(point, moved, stride) for stride in STRIDES]
+                point, failed = self.lowest(moved, ahead), 0
                 continue
             point, failed = moved, failed + 1
         return point
+
+    def lowest(self, point: Point, starts: Sequence[Point]) -> Point:
+        """A fit, or the best of some steps from these starts, where that is better, to the end."""
+        tasks = [Task(base=start, runs=self.runs) for start in starts]
+        found = list(self.pool.map(advance, self.recipe, tasks))
+        best = min([point, *found], key=lambda p: p.cost)
+        return self._ended([point], {0: best})[0]
 
     def _ended(self, points: Sequence[Point], found: Mapping[int, Point]) -> list[Point]:
         """Fits, or what was found in their place where that is better, to convergence."""

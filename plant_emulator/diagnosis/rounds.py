@@ -55,8 +55,9 @@ Found = TypeVar("Found")
 RESTARTS = 3
 # Best of a round's first looks that are fitted, and best of these that are fitted to convergence.
 CHOSEN, POLISHED = 8, 4
-# Share of the gap that an effect closes where no other is likely to close more.
-MOST = 0.9
+# Share of the gap that an effect closes where no other is likely to close more, and where none is
+# that a first look from a small size has missed.
+MOST, MUCH = 0.9, 0.7
 # Fall of the sum of squares that the signature promises where one more effect on top of noise is
 # worth a look: there the linear picture holds.
 GLIMPSE = 5.0
@@ -130,7 +131,7 @@ class Rounds:
             return contenders
         if explained(contenders):
             return contenders
-        if thorough and not closed(contenders, base, MOST):
+        if thorough and not closed(contenders, base, MUCH):
             contenders = self._from_afar(contenders, tasks, base, stage)
         if explained(contenders):
             return contenders
@@ -198,13 +199,13 @@ class Rounds:
         return self._fitted(again, base, POLISHED, refit, stage)
 
     def restarted(self, base: Point, contenders: Sequence[Contender]) -> Point:
-        """The best fit with the base's effects from the drift of the best contenders."""
+        """The best fit with the base's effects from the drift of the best contenders: a few steps
+        from each, and on from where these lead lower.
+        """
         most = 1 if base.effects and noise_only(base) else RESTARTS
         ranked = sorted(points_of(contenders), key=lambda p: p.cost)[:most]
         starts = [replace(p, effects=base.effects) for p in ranked if base.cost - p.cost > WORTH]
-        tasks = [Task(base=p, runs=self._runs) for p in starts]
-        again = self._pool.map(refit, self._recipe, tasks)
-        return min([base, *again], key=lambda p: p.cost)
+        return self.restarts.lowest(base, starts)
 
     def in_place(self, contenders: Sequence[Contender], best: Point) -> list[Contender]:
         """A round's effects, the likeliest in the best one's place fitted from there.

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.model import Model
     from plant_emulator.diagnosis.signature import Signature
 
+# Steps after which a fit shows whether it leads lower.
+ADVANCED = 10
+
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
@@ -96,6 +99,11 @@ def swap(model: Model, task: Task) -> tuple[float, Point]:
 def once_more(model: Model, task: Task) -> Point:
     """The joint fit of an effect from the nominal parameters."""
     return from_nominal(model, task.effect, task.base, task.runs)
+
+
+def advance(model: Model, task: Task) -> Point:
+    """Some steps of the fit of `task.base` from its values."""
+    return again(model, task.base.effects, task.runs, task.base, ADVANCED)
 
 
 def refit(model: Model, task: Task) -> Point:
