@@ -1,6 +1,8 @@
 """The contest between effects: which one, fitted with everything that may drift, is needed.
 
- 1. One converged fit without effects.
+ 1. One converged fit without effects. Where it leaves much and some of the runs need no effect,
+    steps 2 and 3 first from the drift of those alone, which no effect has led astray; 4 and 5 are
+    needless where one explains most of what the others show there.
  2. For each effect its signature: the residual's change when the effect comes in at some size, all
     else as fitted; and what of that the drifting parameters cannot imitate (the part orthogonal to
     their tangents: Basseville and Nikiforov, INRIA RR-4438, 2002).

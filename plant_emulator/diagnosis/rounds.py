@@ -35,12 +35,13 @@ from plant_emulator.diagnosis.steps import (
     plod,
     refit,
     show,
+    spread,
     start,
 )
 from plant_emulator.diagnosis.valleys import WIDEST
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.diagnosis.explain import Contender
@@ -86,15 +87,30 @@ class Rounds:
         self._runs, self._progress = tuple(runs), progress
         self.restarts = Restarts(pool=pool, recipe=recipe, runs=self._runs)
 
-    def without_effects(self, found: Point | None) -> Point:
-        """The fit without effects, started again from elsewhere where it leaves much.
-
-        found : where it has been made already
-        """
-        (null,) = [found] if found else self._pool.map(start, self._recipe, [self._runs])
-        if null.chi_squared > NOISE_LEFT:
-            (null,) = self.restarts.shaken([null])
+    def without_effects(self) -> Point:
+        """The fit without effects."""
+        (null,) = self._pool.map(start, self._recipe, [self._runs])
         return null
+
+    def clear(self) -> Point | None:
+        """The fit without effects of the runs that need none, as it is on all; None where there are
+        fewer than two of these, or no others.
+
+        A drift that no effect has led astray: the others show the effect that they need as it is.
+        """
+        alone = self._pool.map(start, self._recipe, [(run,) for run in self._runs])
+        runs = tuple(run for run, point in zip(self._runs, alone, strict=True) if noise_only(point))
+        if not 1 < len(runs) < len(self._runs):
+            return None
+        (joint,) = self._pool.map(start, self._recipe, [runs])
+        if not noise_only(joint):
+            return None
+        task = Task(base=joint, runs=self._runs, known=runs)
+        return next(iter(self._pool.map(spread, self._recipe, [task])))
+
+    def from_clear(self, base: Point, null: Point, stage: str) -> list[Contender]:
+        """All effects on top of such a fit, the best of them fitted; null : the fit to all runs."""
+        return self._taken_further(self._looked(base, stage)[1], null, stage)
 
     def contend(self, base: Point, stage: str, *, thorough: bool) -> list[Contender]:
         """All effects on top of a fit: a first look at each, the best of them fitted.
@@ -102,19 +118,7 @@ class Rounds:
         thorough : where none leaves little, those that could close it get a second look from a
             larger size
         """
-        names = [name for name in self._names if name not in base.effects]
-        tasks = [Task(base=base, runs=self._runs, effect=name) for name in names]
-        found = self._told(stage, tasks, self._pool.map(show, self._recipe, tasks))
-        shown = dict(zip(names, found, strict=True))
-        promising = GLIMPSE if base.chi_squared <= NOISE_LEFT else -inf
-        tasks = [
-            Task(base=base, runs=self._runs, effect=name, signature=one)
-            for name, one in shown.items()
-            if one is not None and one.gain > promising
-        ]
-        points = self._told(stage, tasks, self._pool.map(contend, self._recipe, tasks))
-        seen = dict(zip((task.effect for task in tasks), points, strict=True))
-        contenders = [contender_of(name, one, seen.get(name)) for name, one in shown.items()]
+        shown, contenders = self._looked(base, stage)
         if base.effects and noise_only(base):
             contenders = self._sighted(contenders, base, stage)
             if base.cost - least_cost(contenders) < SECOND:
@@ -127,12 +131,12 @@ class Rounds:
                 contenders = self._fitted(contenders, base, 1, refit, stage)
                 nothing = base.cost - least_cost(contenders) < THRESHOLD
                 if nothing and not noise_only(base):
-                    contenders = self._from_afar(contenders, tasks, base, stage)
+                    contenders = self._from_afar(contenders, shown, base, stage)
             return contenders
         if explained(contenders):
             return contenders
         if thorough and not closed(contenders, base, MUCH):
-            contenders = self._from_afar(contenders, tasks, base, stage)
+            contenders = self._from_afar(contenders, shown, base, stage)
         if explained(contenders):
             return contenders
         alone = not thorough or closed(contenders, base, MOST)
@@ -152,11 +156,37 @@ class Rounds:
         points = dict(zip(wrong, found, strict=True))
         return better_of(contenders, [replace(c, point=points.get(c.effect)) for c in contenders])
 
+    def _looked(
+        self, base: Point, stage: str
+    ) -> tuple[dict[str, Signature | None], list[Contender]]:
+        """The signatures of all effects on top of a fit, and these effects after a first look."""
+        names = [name for name in self._names if name not in base.effects]
+        tasks = [Task(base=base, runs=self._runs, effect=name) for name in names]
+        found = self._told(stage, tasks, self._pool.map(show, self._recipe, tasks))
+        shown = dict(zip(names, found, strict=True))
+        promising = GLIMPSE if base.chi_squared <= NOISE_LEFT else -inf
+        tasks = [
+            Task(base=base, runs=self._runs, effect=name, signature=one)
+            for name, one in shown.items()
+            if one is not None and one.gain > promising
+        ]
+        points = self._told(stage, tasks, self._pool.map(contend, self._recipe, tasks))
+        seen = dict(zip((task.effect for task in tasks), points, strict=True))
+        return shown, [contender_of(name, one, seen.get(name)) for name, one in shown.items()]
+
     def _from_afar(
-        self, contenders: Sequence[Contender], tasks: Sequence[Task], base: Point, stage: str
+        self,
+        contenders: Sequence[Contender],
+        shown: Mapping[str, Signature | None],
+        base: Point,
+        stage: str,
     ) -> list[Contender]:
         """Effects that could close the gap fitted from a larger size, where that is better."""
-        large = [task for task in tasks if _could_close(task.signature, base)]
+        large = [
+            Task(base=base, runs=self._runs, effect=name, signature=one)
+            for name, one in shown.items()
+            if _could_close(one, base)
+        ]
         found = self._told(stage, large, self._pool.map(contend_far, self._recipe, large))
         points = dict(zip((task.effect for task in large), found, strict=True))
         again = [

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.contest import Point, again, linearised, null_fit
+from plant_emulator.diagnosis.contest import Point, again, linearised, null_fit, point
 from plant_emulator.diagnosis.elsewhere import (
     from_nominal,
     in_place,
@@ -32,6 +32,7 @@ class Task:
 
     signature : where a joint fit starts from, if it has been computed
     number : of several starts
+    known : runs that `base` is a fit of, where it is not one of all
     """
 
     base: Point
@@ -39,11 +40,22 @@ class Task:
     effect: str = ""
     signature: Signature | None = None
     number: int = 0
+    known: tuple[int, ...] = ()
 
 
 def start(model: Model, runs: tuple[int, ...]) -> Point:
     """The fit without effects."""
     return null_fit(model, runs)
+
+
+def spread(model: Model, task: Task) -> Point:
+    """A fit of some runs as it is on all, their states looked for."""
+    base, known = task.base, dict(zip(task.known, task.base.states, strict=True))
+    states = tuple(
+        known.get(k) or model.start_states(k, base.effects, base.values) for k in task.runs
+    )
+    found = linearised(model, replace(base, states=states), task.runs)
+    return point(base.effects, found, len(task.runs))
 
 
 def show(model: Model, task: Task) -> Signature | None:

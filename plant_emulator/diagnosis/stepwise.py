@@ -58,7 +58,7 @@ class Contest:
 
     def explain(self) -> Explanation:
         """Go through the contest."""
-        null, contenders = self._first(self._rounds.without_effects(self._null))
+        null, contenders = self._first(self._null or self._rounds.without_effects())
         null = self._rounds.restarts.settled(null)
         final = null
         rivals: dict[str, dict[str, float]] = {}
@@ -98,7 +98,10 @@ class Contest:
         much, or are no better than it: in a cost of many valleys a signature is but a hint.
         """
         stage = "contest"
-        contenders = self._rounds.contend(null, stage, thorough=True)
+        null, contenders, told = self._from_clear(null, stage)
+        if not told:
+            null, found = self._from_all(null, stage)
+            contenders = better_of(found, contenders)
         better = self._rounds.restarted(null, contenders)
         moved = null.cost - better.cost > max(THRESHOLD, MOVED * excess(null))
         if moved or (better.chi_squared <= NOISE_LEFT and not noise_only(better)):
@@ -112,6 +115,26 @@ class Contest:
             contenders = better_of(contenders, again)
             better = self._rounds.restarted(better, contenders)
         return better, contenders
+
+    def _from_clear(self, null: Point, stage: str) -> tuple[Point, list[Contender], bool]:
+        """The fit without effects, and all effects, from the drift of the runs that need none; and
+        whether one explains most of what the others show. No effects where there are no such runs.
+        """
+        base = self._rounds.clear() if null.chi_squared > NOISE_LEFT else None
+        if base is None:
+            return null, [], False
+        null = self._rounds.restarts.lowest(null, [base])
+        if null.chi_squared <= NOISE_LEFT:
+            return null, [], False
+        contenders = self._rounds.from_clear(base, null, stage)
+        most = explained(contenders) or closed(contenders, base, MOST)
+        return null, contenders, most and null.cost - least_cost(contenders) > THRESHOLD
+
+    def _from_all(self, null: Point, stage: str) -> tuple[Point, list[Contender]]:
+        """The same from the fit without effects to all runs, started again where it leaves much."""
+        if null.chi_squared > NOISE_LEFT:
+            (null,) = self._rounds.restarts.shaken([null])
+        return null, self._rounds.contend(null, stage, thorough=True)
 
     def _further(self, base: Point, stage: str) -> tuple[Point, list[Contender]]:
         """All other effects on top of some, and that fit started again from the best of them."""

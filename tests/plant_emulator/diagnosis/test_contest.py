@@ -260,6 +260,52 @@ def test_limit_that_small_sizes_do_not_reach_is_found() -> None:
     assert found.final.values["wave_size"] == pytest.approx(0.51, abs=0.01)
 
 
+class Partly(Line):
+    """The line, whose runs after the second alone show its effects."""
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+        return super().residual(run, effects if run > 1 else ())
+
+
+def partly(*sizes: float) -> Partly:
+    """Runs with waves of these sizes."""
+    waves = [2.0 + 3.0 * TIME + size * np.sin(20.0 * TIME) for size in sizes]
+    return Partly([noisy(y, seed) for seed, y in enumerate(waves)])
+
+
+def rounds_of(model: Line) -> engine.Rounds:
+    """The rounds of a contest over all runs."""
+    runs = range(len(model.runs))
+    return engine.Rounds(Here(), Given(model), tuple(model.candidates), runs)
+
+
+def test_drift_is_that_of_the_runs_that_need_no_effect() -> None:
+    """By hand: what the third run's wave of 5 leaves there is n 5^2 / 2."""
+    model = partly(0.0, 0.0, 5.0)
+    base = rounds_of(model).clear()
+    assert base is not None
+    two = fit(model, (), [0, 1], {"a": 0.0, "b": 0.0}, [{}, {}])
+    assert base.values == pytest.approx(two.values)
+    assert len(base.states) == 3
+    assert base.squares - base.samples == pytest.approx(len(TIME) * 12.5, rel=0.05)
+    found = explained(model).final
+    assert found.effects == ("wave",)
+    assert found.values["wave_size"] == pytest.approx(5.0, abs=0.1)
+
+
+@pytest.mark.parametrize("sizes", [(0.0, 0.0, 0.0), (0.0, 5.0, 5.0), (0.0, 0.0)])
+def test_drift_of_all_runs_or_of_one_is_no_clear_start(sizes: tuple[float, ...]) -> None:
+    assert rounds_of(partly(*sizes)).clear() is None
+
+
+def test_runs_that_need_no_effect_each_but_one_together_are_no_clear_start() -> None:
+    lines = [level + 3.0 * TIME for level in (2.0, 4.0)]
+    wave = 2.0 + 3.0 * TIME + 5.0 * np.sin(20.0 * TIME)
+    model = Partly([noisy(y, seed) for seed, y in enumerate([*lines, wave])])
+    assert rounds_of(model).clear() is None
+
+
 def test_effect_of_chance_course_is_not_tried() -> None:
     model = Line([noisy(2.0 + 3.0 * TIME + 0.8 * np.sin(20.0 * TIME))], ["wave"])
     model.candidates["wave"] = replace(
