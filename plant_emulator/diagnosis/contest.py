@@ -9,12 +9,12 @@
  3. A joint fit of drift and effect, started from the size whose signature explains most, the drift
     moved by what the linear picture says: of every effect a cheap first look, whose drift follows
     by secants; of the best a few full steps; of the best of these to convergence.
- 4. Where none leaves little, the signature and the start mislead: drift has gone far to imitate the
+ 4. Where none closes much, the signature and the start mislead: drift has gone far to imitate the
     effect, and the way back is rough, since contact comes and goes. All that could close the gap
     then start from a larger size, with slopes over wide differences first; and the best once more
     from the nominal parameters and the size that fits these best, the runs taken in one by one.
  5. The best starts again from the best values of each of its unknowns by a loss that forgives, and
-    from some way off along the floor of its valley, as long as that leads further down.
+    from some way off, along the floor of its valley and out of it, as long as that leads down.
  6. The fit without effects starts again from every joint fit's drift: should it get as low, there
     was no effect, only a better valley. One that has come to such is followed down it.
 
@@ -168,7 +168,9 @@ def _largest(candidate: Candidate, values: Mapping[str, float]) -> float:
 
 
 def _sure(candidate: Candidate, found: Point) -> bool:
-    """Whether an effect without values of each run, or one of its sizes not zero by chance."""
+    """Whether a size of an effect is not neutral by chance; without values of each run none has to
+    be told.
+    """
     return not candidate.states or any(
         abs(found.values[u.name] - candidate.neutral[u.name]) > CERTAIN * found.errors[u.name]
         for u in candidate.sizes

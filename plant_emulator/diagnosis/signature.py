@@ -75,7 +75,7 @@ def signature(
     if not moving:
         return None
     # A limit that is not reached does next to nothing at small sizes: no fit begins there.
-    moving = [trial for trial in moving if _told(trial)] or moving
+    moving = [trial for trial in moving if _shows(trial)] or moving
     best = max(moving, key=lambda trial: trial.gain)
     beyond = [t for t in moving if t.size / best.size > 1.0 and abs(t.size) >= FAR]
     larger = min(beyond, key=lambda trial: abs(trial.size), default=None)
@@ -98,7 +98,7 @@ def signature(
     )
 
 
-def _told(trial: _Trial) -> bool:
+def _shows(trial: _Trial) -> bool:
     """Whether a size changes the residual by more than the noise hides."""
     return float(np.linalg.norm(trial.change)) > RESOLVED
 

@@ -52,7 +52,8 @@ def spread(model: Model, task: Task) -> Point:
     """A fit of some runs as it is on all, their states looked for."""
     base, known = task.base, dict(zip(task.known, task.base.states, strict=True))
     states = tuple(
-        known.get(k) or model.start_states(k, base.effects, base.values) for k in task.runs
+        known[k] if k in known else model.start_states(k, base.effects, base.values)
+        for k in task.runs
     )
     found = linearised(model, replace(base, states=states), task.runs)
     return point(base.effects, found, len(task.runs))
