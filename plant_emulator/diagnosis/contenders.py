@@ -12,9 +12,10 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.diagnosis.signature import Signature
 
-# What keeps an effect in a round: the fall of its cost [fall of the best one], or that it is no
-# further behind the best than a first look may be wrong [chi squared].
-KEPT, NEAR = 0.25, 50.0
+# What keeps an effect in a round: the fall of its cost [fall of the best one], more of it beside
+# one that leaves nothing but noise, or that it is no further behind the best than a first look may
+# be wrong [chi squared].
+KEPT, KEPT_BESIDE_NOISE, NEAR = 0.25, 0.5, 50.0
 
 
 def explained(contenders: Sequence[Contender]) -> bool:
@@ -36,6 +37,12 @@ def contender_of(name: str, shown: Signature | None, point: Point | None) -> Con
     )
 
 
+def beside(point: Point, base: Point) -> Contender:
+    """The effect that a fit has beside those of another."""
+    (name,) = set(point.effects) - set(base.effects)
+    return Contender(effect=name, norm=0.0, raw=0.0, imitated_by="", point=point)
+
+
 def better_of(first: Sequence[Contender], second: Sequence[Contender]) -> list[Contender]:
     """Of two fits of the same effect the better one."""
     others = {c.effect: c for c in second if c.point is not None}
@@ -48,7 +55,8 @@ def best_few(contenders: Sequence[Contender], base: Point, most: int) -> list[Co
     if not order:
         return []
     least = cost_of(order[0])
-    reach = max(least + NEAR, base.cost - KEPT * (base.cost - least))
+    kept = KEPT_BESIDE_NOISE if explained(order[:1]) else KEPT
+    reach = max(least + NEAR, base.cost - kept * (base.cost - least))
     return [c for c in order[:most] if cost_of(c) <= reach]
 
 

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.signature import Signature
     from plant_emulator.estimates import Estimate
 
-# Steps of a first look, whose drift follows by secants.
-GLANCE = 10
+# Steps of a first look, whose drift follows by secants: most of what ten find, the first four find.
+GLANCE = 5
 # Steps of a fit that only has to show whether it is worth more: without and with states of its
 # own, which make a long curved valley of the cost.
 FEW, FEW_WITH_STATES = 8, 24
@@ -37,14 +37,14 @@ def glance(
     model: Model, found: Signature, base: Point, runs: Sequence[int], near: Estimate
 ) -> Point:
     """A first look at the joint fit of one more effect, from its signature's start, or, where that
-    leads nowhere, from the drift as it is.
+    stops on its way back, from the drift as it is.
 
     near : the base's estimate; the drift's slopes follow from its own, only the effect's are
         simulated
     """
     effects = (*base.effects, found.effect)
     best = fit(model, effects, runs, found.start, found.states, GLANCE, near)
-    if best.cost < base.cost - WORTH:
+    if best.cost < _on_the_way(base):
         return best
     states = [{**own, **state} for own, state in zip(found.states, base.states, strict=True)]
     small = {**found.start, **base.values}
@@ -64,8 +64,13 @@ def glance_far(
         return None
     effects = (*base.effects, found.effect)
     start = fit(model, effects, runs, *found.far, GLANCE, near)
-    near_cost, far_cost = base.cost + WORTH + ON_THE_WAY * excess(base), HOPELESS * base.cost
-    return smoothed(model, effects, runs, start) if near_cost < start.cost < far_cost else start
+    stopped = _on_the_way(base) < start.cost < HOPELESS * base.cost
+    return smoothed(model, effects, runs, start) if stopped else start
+
+
+def _on_the_way(base: Point) -> float:
+    """Cost from which on a fit with one more effect has stopped on its way to where it is none."""
+    return base.cost + WORTH + ON_THE_WAY * excess(base)
 
 
 def patient(model: Model, found: Signature, base: Point, runs: Sequence[int]) -> Point:

@@ -12,6 +12,7 @@ from math import inf
 from typing import TYPE_CHECKING, TypeVar
 
 from plant_emulator.diagnosis.contenders import (
+    beside,
     best_few,
     better_of,
     closed,
@@ -112,18 +113,33 @@ class Rounds:
         """All effects on top of such a fit, the best of them fitted; null : the fit to all runs."""
         return self._taken_further(self._looked(base, stage)[1], null, stage)
 
-    def contend(self, base: Point, stage: str, *, thorough: bool) -> list[Contender]:
+    def contend(
+        self,
+        base: Point,
+        stage: str,
+        *,
+        thorough: bool,
+        hasty: bool = False,
+        known: Point | None = None,
+    ) -> list[Contender]:
         """All effects on top of a fit: a first look at each, the best of them fitted.
 
         thorough : where none leaves little, those that could close it get a second look from a
             larger size
+        hasty : none is fitted to convergence where none closes much
+        known : the fit with one more effect, where it has been made already
         """
-        shown, contenders = self._looked(base, stage)
+        there = [] if known is None else [beside(known, base)]
+        shown, contenders = self._looked(base, stage, but=[c.effect for c in there])
+        contenders += there
         if base.effects and noise_only(base):
             contenders = self._sighted(contenders, base, stage)
             if base.cost - least_cost(contenders) < SECOND:
                 return contenders
-        contenders = self._taken_further(contenders, base, stage)
+        contenders = self._fitted(contenders, base, CHOSEN, follow, stage, there)
+        if hasty and not (explained(contenders) or closed(contenders, base, MUCH)):
+            return contenders
+        contenders = self._fitted(contenders, base, POLISHED, refit, stage, there)
         if base.chi_squared <= NOISE_LEFT:
             if not base.effects and base.cost - least_cost(contenders) < THRESHOLD:
                 signatures = [one for one in shown.values() if one is not None]
@@ -133,14 +149,18 @@ class Rounds:
                 if nothing and not noise_only(base):
                     contenders = self._from_afar(contenders, shown, base, stage)
             return contenders
-        if explained(contenders):
-            return contenders
-        if thorough and not closed(contenders, base, MUCH):
+        if thorough and not explained(contenders) and not closed(contenders, base, MUCH):
             contenders = self._from_afar(contenders, shown, base, stage)
-        if explained(contenders):
-            return contenders
-        alone = not thorough or closed(contenders, base, MOST)
-        return self._moved(contenders, base, 1 if alone else SHAKEN, stage)
+        return contenders
+
+    def deepened(self, contenders: Sequence[Contender], base: Point, stage: str) -> list[Contender]:
+        """The best of a round started again from elsewhere, where none leaves little."""
+        if base.chi_squared <= NOISE_LEFT or explained(contenders):
+            return list(contenders)
+        ended = [c for c in with_point(contenders) if c.point and c.point.converged]
+        contenders = self._fitted(contenders, base, POLISHED, refit, stage, ended)
+        one = base.effects or closed(contenders, base, MOST)
+        return self._moved(contenders, base, 1 if one else SHAKEN, stage)
 
     def _patiently(
         self,
@@ -157,10 +177,10 @@ class Rounds:
         return better_of(contenders, [replace(c, point=points.get(c.effect)) for c in contenders])
 
     def _looked(
-        self, base: Point, stage: str
+        self, base: Point, stage: str, but: Sequence[str] = ()
     ) -> tuple[dict[str, Signature | None], list[Contender]]:
-        """The signatures of all effects on top of a fit, and these effects after a first look."""
-        names = [name for name in self._names if name not in base.effects]
+        """The signatures of all other effects on top of a fit, and these after a first look."""
+        names = [name for name in self._names if name not in {*base.effects, *but}]
         tasks = [Task(base=base, runs=self._runs, effect=name) for name in names]
         found = self._told(stage, tasks, self._pool.map(show, self._recipe, tasks))
         shown = dict(zip(names, found, strict=True))
@@ -272,13 +292,14 @@ class Rounds:
         most: int,
         step: Callable[[Model, Task], Point],
         stage: str,
+        done: Sequence[Contender] = (),
     ) -> list[Contender]:
-        """The best of a round taken a step further."""
-        best = best_few(contenders, base, most)
+        """The best of a round taken a step further, but for those that are done."""
+        best = [c for c in best_few(contenders, base, most) if c not in done]
         tasks = [Task(base=c.point, runs=self._runs) for c in best if c.point is not None]
         fitted = self._told(stage, tasks, self._pool.map(step, self._recipe, tasks))
-        done = {c.effect: replace(c, point=p) for c, p in zip(best, fitted, strict=True)}
-        return [done.get(c.effect, c) for c in contenders]
+        further = {c.effect: replace(c, point=p) for c, p in zip(best, fitted, strict=True)}
+        return [further.get(c.effect, c) for c in contenders]
 
     def _told(self, stage: str, tasks: Sequence[Task], found: Iterator[Found]) -> list[Found]:
         """All that is found, told as it comes."""

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 # Sizes at which a signature is tried, in plausible sizes.
 SIZES = (0.03, 0.1, 0.3, 0.6, 1.0, 2.0)
+# The first so many of them show in which direction.
+SMALL_SIZES = 2
 # From which of these on a fit may begin besides the best one.
 FAR = 0.3
 # Norm of a change of the residual that the noise does not hide, and the samples, of equal squares,
@@ -44,7 +46,8 @@ class Signature:
     concentrated : whether that part sits in a few samples already at the smallest size, as where a
         contact begins a little earlier: drift may follow there all the same, not in proportion
     imitated_by : the parameter that follows it most
-    norms : of the part that drift cannot imitate, by size in plausible sizes, ascending
+    norms : of the part that drift cannot imitate, by size in plausible sizes, ascending, in one
+        direction
     direction : the part that drift cannot imitate over its norm, all runs and channels
     """
 
@@ -66,11 +69,7 @@ def signature(
 ) -> Signature | None:
     """The signature of an effect at a fit that lacks it; None: it changes nothing there."""
     own = _own_states(model, name, where, runs, tangents)
-    trials = [
-        _trial(model, name, where, runs, tangents, own, sign * size)
-        for size in SIZES
-        for sign in signs(model.candidates[name].sizes)
-    ]
+    trials = _trials(model, name, where, runs, tangents, own)
     moving = [trial for trial in trials if trial.norm > 1e-6]
     if not moving:
         return None
@@ -79,7 +78,7 @@ def signature(
     best = max(moving, key=lambda trial: trial.gain)
     beyond = [t for t in moving if t.size / best.size > 1.0 and abs(t.size) >= FAR]
     larger = min(beyond, key=lambda trial: abs(trial.size), default=None)
-    plausible = max((t for t in trials if abs(t.size) == 1.0), key=lambda t: t.norm)
+    plausible = next(t for t in trials if abs(t.size) == 1.0)
     values, states = _start(best, tangents, own)
     names = [u.name for u in tangents.found.unknowns]
     follows = np.abs(tangents.imitation(plausible.change)) * _lengths(tangents.found)
@@ -92,7 +91,7 @@ def signature(
         raw=float(np.linalg.norm(plausible.change)),
         gain=best.gain,
         concentrated=any(_concentrated(t.rest) for t in trials if abs(t.size) == SIZES[0]),
-        norms=tuple((t.size, t.norm) for t in trials if t.size > 0.0),
+        norms=tuple((abs(t.size), t.norm) for t in trials if t.size * plausible.size > 0.0),
         imitated_by=names[int(np.argmax(follows))],
         direction=plausible.rest / max(plausible.norm, 1e-12),
     )
@@ -163,6 +162,26 @@ class _Trial:
     rest: Array
     norm: float
     gain: float
+
+
+def _trials(
+    model: Model,
+    name: str,
+    where: Point,
+    runs: Sequence[int],
+    tangents: Tangents,
+    own: Sequence[Mapping[str, float]],
+) -> list[_Trial]:
+    """The effect at all sizes, in the direction whose small sizes explain more; those in both."""
+
+    def tried(size: float) -> _Trial:
+        return _trial(model, name, where, runs, tangents, own, size)
+
+    small, large = SIZES[:SMALL_SIZES], SIZES[SMALL_SIZES:]
+    found = {s: [tried(s * size) for size in small] for s in signs(model.candidates[name].sizes)}
+    better = max(found, key=lambda sign: max(trial.gain for trial in found[sign]))
+    large_ones = [tried(better * size) for size in large]
+    return [*(trial for trials in found.values() for trial in trials), *large_ones]
 
 
 def _trial(

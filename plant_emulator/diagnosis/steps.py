@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.contest import Point, again, linearised, null_fit, point
+from plant_emulator.diagnosis.contest import ADVANCED, Point, again, linearised, null_fit, point
 from plant_emulator.diagnosis.elsewhere import (
     from_nominal,
     in_place,
@@ -21,9 +21,6 @@ from plant_emulator.diagnosis.tangents import Tangents
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.model import Model
     from plant_emulator.diagnosis.signature import Signature
-
-# Steps after which a fit shows whether it leads lower.
-ADVANCED = 10
 
 
 @dataclass(frozen=True, kw_only=True)

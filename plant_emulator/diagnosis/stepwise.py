@@ -5,6 +5,10 @@ and the gap is not closed. Of a second, which stands on a fit that may have gone
 the likeliest others are fitted once more in its place. After every addition each earlier effect has
 to stand the contest again, with all others in its place; and at the end each has to be missed when
 it is taken out.
+
+That a first effect leaves much may mean that there is a second, or that its fit is astray. The
+second is looked for first, which is cheaper; where the two leave more than noise as well, the best
+of every round start again from elsewhere, and all is gone through once more.
 """
 
 from __future__ import annotations
@@ -14,7 +18,7 @@ from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.contenders import best_of, better_of, closed, explained, least_cost
 from plant_emulator.diagnosis.explain import MARGIN, NOISE_LEFT, THRESHOLD, Explanation, excess
-from plant_emulator.diagnosis.rounds import MOST, Rounds
+from plant_emulator.diagnosis.rounds import MOST, MUCH, Rounds
 from plant_emulator.diagnosis.rules import counts, enough, noise_only
 
 if TYPE_CHECKING:
@@ -25,6 +29,9 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.pool import Pool, Recipe
     from plant_emulator.diagnosis.rounds import Progress
 
+# Share of the gap that an effect closes, from a drift that no effect has led astray, where a second
+# is looked for before anything else.
+HALF = 0.5
 # Share of the gap that a better fit without effects closes when it has moved to another valley.
 MOVED = 0.5
 # More effects than that at once explain anything.
@@ -55,19 +62,41 @@ class Contest:
         self._reaches_noise, self._by_chance, self._null = reaches_noise, by_chance, null
         self._exact = frozenset(exact)
         self._rounds = Rounds(pool, recipe, names, runs, progress)
+        self._deep, self._from_clear_only = not reaches_noise, False
+        self._known: dict[object, list[Contender]] = {}
+        self._refits: dict[object, Point] = {}
 
     def explain(self) -> Explanation:
         """Go through the contest."""
         null, contenders = self._first(self._null or self._rounds.without_effects())
+        found = self._stepped(null, contenders)
+        if not self._deep and found.final.chi_squared > NOISE_LEFT:
+            self._deep = True
+            found = self._stepped(*self._deepened(null, contenders))
+        return found
+
+    def _deepened(
+        self, null: Point, contenders: Sequence[Contender]
+    ) -> tuple[Point, list[Contender]]:
+        """A first round in earnest: also from the fit to all runs, where that has not been done."""
+        if self._from_clear_only and not closed(contenders, null, MOST):
+            null, found = self._from_all(null, "contest")
+            return self._confirmed(null, better_of(found, contenders))
+        return self._confirmed(null, self._rounds.deepened(contenders, null, "contest"))
+
+    def _stepped(self, null: Point, contenders: Sequence[Contender]) -> Explanation:
+        """Forward and backward steps from the fit without effects and the first round on it."""
         null = self._rounds.restarts.settled(null)
         final = null
         rivals: dict[str, dict[str, float]] = {}
         tried: set[frozenset[str]] = set()
         without: dict[str, float] = {}
         while len(final.effects) < MOST_EFFECTS and not enough(final, null, self._reaches_noise):
-            found = contenders
+            found = list(contenders)
             if final.effects:
-                final, found = self._further(final, "further effects")
+                final, found = self._further(final)
+                if not (self._deep or explained(found)):
+                    break
             best = best_of(found)
             if best is None or not self._counts(best, final, null):
                 break
@@ -92,16 +121,22 @@ class Contest:
         )
 
     def _first(self, null: Point) -> tuple[Point, list[Contender]]:
-        """All effects on the fit without any, and that fit, started again from the best of them.
+        """All effects on the fit without any, and that fit, started again from the best of them."""
+        stage = "contest"
+        null, contenders, self._from_clear_only = self._from_clear(null, stage)
+        if not self._from_clear_only:
+            null, found = self._from_all(null, stage)
+            contenders = better_of(found, contenders)
+        return self._confirmed(null, contenders)
+
+    def _confirmed(
+        self, null: Point, contenders: Sequence[Contender]
+    ) -> tuple[Point, list[Contender]]:
+        """A first round, and the fit without effects, started again from the best of it.
 
         All are tried again when the fit without effects has moved to another valley and they leave
         much, or are no better than it: in a cost of many valleys a signature is but a hint.
         """
-        stage = "contest"
-        null, contenders, told = self._from_clear(null, stage)
-        if not told:
-            null, found = self._from_all(null, stage)
-            contenders = better_of(found, contenders)
         better = self._rounds.restarted(null, contenders)
         moved = null.cost - better.cost > max(THRESHOLD, MOVED * excess(null))
         if moved or (better.chi_squared <= NOISE_LEFT and not noise_only(better)):
@@ -109,16 +144,16 @@ class Contest:
             moved = null.cost - better.cost > max(THRESHOLD, MOVED * excess(null))
         stale = moved and better.cost - least_cost(contenders) < THRESHOLD
         if not stale and (explained(contenders) or closed(contenders, better, MOST)):
-            return better, contenders
+            return better, list(contenders)
         if moved:
-            again = self._rounds.contend(better, stage, thorough=True)
+            again = self._searched(better, "contest")
             contenders = better_of(contenders, again)
             better = self._rounds.restarted(better, contenders)
-        return better, contenders
+        return better, list(contenders)
 
     def _from_clear(self, null: Point, stage: str) -> tuple[Point, list[Contender], bool]:
         """The fit without effects, and all effects, from the drift of the runs that need none; and
-        whether one explains most of what the others show. No effects where there are no such runs.
+        whether one explains half of what the others show. No effects where there are no such runs.
         """
         base = self._rounds.clear() if null.chi_squared > NOISE_LEFT else None
         if base is None:
@@ -127,19 +162,34 @@ class Contest:
         if null.chi_squared <= NOISE_LEFT:
             return null, [], False
         contenders = self._rounds.from_clear(base, null, stage)
-        most = explained(contenders) or closed(contenders, base, MOST)
-        return null, contenders, most and null.cost - least_cost(contenders) > THRESHOLD
+        half = explained(contenders) or closed(contenders, base, HALF)
+        return null, contenders, half and null.cost - least_cost(contenders) > THRESHOLD
 
     def _from_all(self, null: Point, stage: str) -> tuple[Point, list[Contender]]:
         """The same from the fit without effects to all runs, started again where it leaves much."""
         if null.chi_squared > NOISE_LEFT:
             (null,) = self._rounds.restarts.shaken([null])
-        return null, self._rounds.contend(null, stage, thorough=True)
+        return null, self._searched(null, stage)
 
-    def _further(self, base: Point, stage: str) -> tuple[Point, list[Contender]]:
-        """All other effects on top of some, and that fit started again from the best of them."""
-        contenders = self._rounds.contend(base, stage, thorough=False)
-        return self._rounds.restarted(base, contenders), contenders
+    def _searched(self, null: Point, stage: str) -> list[Contender]:
+        """A first round; the best of it started again where none closes much, or in earnest."""
+        found = self._rounds.contend(null, stage, thorough=True)
+        shallow = closed(found, null, MUCH) and not self._deep
+        return found if shallow else self._rounds.deepened(found, null, stage)
+
+    def _further(self, base: Point) -> tuple[Point, list[Contender]]:
+        """A fit with effects started again from the best others on top of it, and all of these."""
+        stage = "further effects"
+        if base.key not in self._known:
+            hasty = not self._deep
+            found = self._rounds.contend(base, stage, thorough=False, hasty=hasty)
+            self._known[base.key] = found
+        found = self._known[base.key]
+        if self._deep:
+            found = self._rounds.deepened(found, base, stage)
+        elif not explained(found):
+            return base, found
+        return self._rounds.restarted(base, found), found
 
     def _stand(
         self, final: Point, last: Sequence[Contender]
@@ -153,15 +203,24 @@ class Contest:
             waiting = [name for name in final.effects if name not in rivals]
             if not waiting:
                 break
-            rest = tuple(e for e in final.effects if e != waiting[0])
-            without = self._rounds.restarts.refitted(replace(final, effects=rest))
-            without, found = self._further(without, "standing again")
+            without = self._without(final, waiting[0])
+            known = final if noise_only(final) else None
+            stage = "standing again"
+            found = self._rounds.contend(without, stage, thorough=False, known=known)
             best = best_of(found)
             if best is not None and best.cost < final.cost - MARGIN:
                 final, rivals = best, {best.effects[-1]: _costs(found)}
             else:
                 rivals[waiting[0]] = _costs(found)
         return final, rivals
+
+    def _without(self, final: Point, name: str) -> Point:
+        """A fit without one of its effects, fitted again."""
+        rest = tuple(e for e in final.effects if e != name)
+        if (final.key, name) not in self._refits:
+            found = self._rounds.restarts.refitted(replace(final, effects=rest))
+            self._refits[final.key, name] = found
+        return self._refits[final.key, name]
 
     def _counts(self, best: Point, base: Point, null: Point) -> bool:
         """Whether one more effect earns its place."""
@@ -182,8 +241,7 @@ class Contest:
         if len(final.effects) < 2:
             return final, costs
         for name in final.effects:
-            rest = tuple(e for e in final.effects if e != name)
-            without = self._rounds.restarts.refitted(replace(final, effects=rest))
+            without = self._without(final, name)
             if not self._counts(final, without, null):
                 return without, {}
             costs[name] = without.cost

@@ -41,6 +41,8 @@ def drum_coulomb_friction(value: float, s: Record, p: Record) -> float:
 
 def drum_viscous_friction(value: float, s: Record, p: Record) -> float:
     """Torque of the lubricant over the drum speed [N m s/rad]."""
+    if p.drum_bearing_friction_viscous == 0.0:
+        return value
     speed = abs(s.drum_speed) + SLOW
     film: float = speed ** (p.drum_bearing_friction_exponent - 1.0)
     return value + p.drum_bearing_friction_viscous * film
