@@ -1,8 +1,8 @@
 """The contest between effects: which one, fitted with everything that may drift, is needed.
 
  1. One converged fit without effects. Where it leaves much and some of the runs need no effect,
-    steps 2 and 3 first from the drift of those alone, which no effect has led astray; 4 and 5 are
-    needless where one explains most of what the others show there.
+    steps 2 and 3 first from the drift of those alone, which no effect has led astray; the same from
+    the fit to all only where none explains half of what the others show there.
  2. For each effect its signature: the residual's change when the effect comes in at some size, all
     else as fitted; and what of that the drifting parameters cannot imitate (the part orthogonal to
     their tangents: Basseville and Nikiforov, INRIA RR-4438, 2002).
@@ -14,7 +14,8 @@
     then start from a larger size, with slopes over wide differences first; and the best once more
     from the nominal parameters and the size that fits these best, the runs taken in one by one.
  5. The best starts again from the best values of each of its unknowns by a loss that forgives, and
-    from some way off, along the floor of its valley and out of it, as long as that leads down.
+    from some way off, along the floor of its valley and out of it, as long as that leads down; at
+    once where none closes much, and else where a second effect beside it leaves more than noise.
  6. The fit without effects starts again from every joint fit's drift: should it get as low, there
     was no effect, only a better valley. One that has come to such is followed down it.
 

@@ -1,8 +1,8 @@
 """The contest on a machine so small that it can be checked by hand."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -304,6 +304,72 @@ def test_runs_that_need_no_effect_each_but_one_together_are_no_clear_start() -> 
     wave = 2.0 + 3.0 * TIME + 5.0 * np.sin(20.0 * TIME)
     model = Partly([noisy(y, seed) for seed, y in enumerate([*lines, wave])])
     assert rounds_of(model).clear() is None
+
+
+class Watched(Here):
+    """A pool that notes its steps: the function, the effects there, and the effect looked at."""
+
+    def __init__(self) -> None:
+        self.steps: list[tuple[str, tuple[str, ...], str]] = []
+
+    def map(self, function: Any, recipe: Any, items: Sequence[Any]) -> Iterator[Any]:
+        """See `Pool`."""
+        for item in items:
+            base = getattr(item, "base", None)
+            effects = base.effects if base is not None else ()
+            self.steps.append((function.__name__, effects, getattr(item, "effect", "")))
+        return super().map(function, recipe, items)
+
+    def names(self) -> set[str]:
+        """Of all steps of fits with effects."""
+        return {name for name, effects, _ in self.steps if effects}
+
+
+# A cube that closes 0.8 of the gap, and what else there is.
+CUBE = 40.0 * SHAPES["cube"](TIME)
+ELSEWHERE = {"shake", "once_more", "sift", "swap", "contend_far"}
+
+
+def test_second_effect_is_looked_for_before_the_first_starts_again_from_elsewhere() -> None:
+    """The cube's fit leaves 9 times the noise: not since it is astray, but for the kink."""
+    model = Line([noisy(CUBE + 10.0 * SHAPES["kink"](TIME))], ("cube", "wave", "kink"))
+    pool = Watched()
+    found = Contest(pool, Given(model), tuple(model.candidates), (0,)).explain()
+    assert set(found.final.effects) == {"cube", "kink"}
+    assert not pool.names() & ELSEWHERE
+
+
+def test_effect_that_stands_again_in_noise_is_not_looked_at_once_more() -> None:
+    """Its fit is known: the last one of all."""
+    model = Line([noisy(CUBE + 10.0 * SHAPES["kink"](TIME))], ("cube", "wave", "kink"))
+    pool = Watched()
+    found = Contest(pool, Given(model), tuple(model.candidates), (0,)).explain()
+    looked = {(base, effect) for name, base, effect in pool.steps if name == "show"}
+    assert (("kink",), "wave") in looked
+    assert (("kink",), "cube") not in looked
+    assert found.rivals["cube"]["cube"] == found.final.cost
+
+
+def test_where_two_leave_more_than_noise_the_best_start_again_from_elsewhere() -> None:
+    """A ripple that no effect explains: nothing says that the fits are not astray."""
+    ripple = 5.0 * np.sin(7.0 * TIME)
+    model = Line([noisy(CUBE + 10.0 * SHAPES["kink"](TIME) + ripple)], ("cube", "wave", "kink"))
+    pool = Watched()
+    Contest(pool, Given(model), tuple(model.candidates), (0,)).explain()
+    assert pool.names() >= {"once_more", "sift", "shake"}
+
+
+def test_signature_of_an_effect_below_zero_begins_below_zero() -> None:
+    """What is told by size is told for that direction."""
+    model = Line([noisy(-0.5 * SHAPES["kink"](TIME))], ("kink",))
+    null = null_fit(model, (0,))
+    found = signature(model, "kink", null, (0,), Tangents(linearised(model, null, (0,))))
+    assert found is not None
+    assert found.start["kink_size"] == -0.6
+    sizes = [size for size, _ in found.norms]
+    assert sizes == [0.03, 0.1, 0.3, 0.6, 1.0, 2.0]
+    # |x| less its mean has a mean square of 1/12 over 2000 samples.
+    assert found.norm == pytest.approx((2000 / 12) ** 0.5, rel=2e-3)
 
 
 def test_effect_of_chance_course_is_not_tried() -> None:
