@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.tangents import Tangents
+from plant_emulator.errors import UnsettledError
 from plant_emulator.estimation import at, estimate
 from plant_emulator.free_parameters import free_parameters, unknowns
 from plant_emulator.log import COMPARED
+from plant_emulator.recording import IMPOSSIBLE
 from plant_emulator.search import GAP_POSITION
 from plant_emulator.sensors import SENSORS
 from plant_emulator.simulate import run_of, simulate, values_of
@@ -62,7 +64,9 @@ def _norm(case: Case, hidden: Hidden, logs: Sequence[Log], parameters: Parameter
     norm = float(np.linalg.norm(tangents.rest(np.concatenate([c.ravel() for c in change]))))
     if norm <= DETECTABLE:
         return norm
-    return min(norm, _followed(wanted, [_less(p, w) for p, w in zip(without, whole, strict=True)]))
+    away = [_less(p, w) for p, w in zip(without, whole, strict=True)]
+    bounded = [or_impossible(one, w) for one, w in zip(away, whole, strict=True)]
+    return min(norm, _followed(wanted, bounded))
 
 
 def _followed(wanted: Sequence[Unknown], residuals: Sequence[Residual]) -> float:
@@ -74,6 +78,20 @@ def _followed(wanted: Sequence[Unknown], residuals: Sequence[Residual]) -> float
     ]
     found = estimate(starts, residuals, settled=SETTLED, iterations=FEW)
     return float(np.sqrt(min(one.cost for one in (coarse, found))))
+
+
+def or_impossible(residual: Residual, like: Array) -> Residual:
+    """A residual of that one's shape, far off where the bench cannot be simulated: a bad place for
+    drift to go, but no end of the search.
+    """
+
+    def found(values: Mapping[str, float]) -> Array:
+        try:
+            return residual(values)
+        except UnsettledError:
+            return np.full_like(like, IMPOSSIBLE)
+
+    return found
 
 
 def _less(simulated: Residual, base: Array) -> Residual:

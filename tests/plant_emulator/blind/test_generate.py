@@ -1,10 +1,14 @@
 """The logs of a case."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import pytest
 
-from plant_emulator.blind.detectable import norms
+from plant_emulator.blind.detectable import norms, or_impossible
 from plant_emulator.blind.generate import measured, true_logs
+from plant_emulator.errors import UnsettledError
+from plant_emulator.estimates import Array
 from plant_emulator.log import COMPARED
 from plant_emulator.parameters import ParameterSet
 from plant_emulator.sensors import SENSORS
@@ -58,3 +62,18 @@ def test_effect_that_drift_imitates_is_not_detectable(
     """
     case = case_with(hidden("friction_asymmetry", "gear", asymmetry=asymmetry))
     assert norms(case, true_logs(case, nominal), nominal)["friction_asymmetry"] < left
+
+
+def test_drift_that_no_bench_can_be_simulated_with_is_a_bad_place_and_no_error() -> None:
+    """A fit that looks how far drift follows an effect may try any."""
+
+    def residual(values: Mapping[str, float]) -> Array:
+        if values["drum_inertia"] < 100.0:
+            raise UnsettledError("program1: 1 implicit stages did not settle")
+        return np.full((4, 3), values["drum_inertia"])
+
+    found = or_impossible(residual, np.zeros((4, 3)))
+    assert (found({"drum_inertia": 300.0}) == 300.0).all()
+    bad = found({"drum_inertia": 50.0})
+    assert bad.shape == (4, 3)
+    assert np.mean(bad**2) >= 100.0**2
