@@ -136,10 +136,7 @@ class Rounds:
             contenders = self._sighted(contenders, base, stage)
             if base.cost - least_cost(contenders) < SECOND:
                 return contenders
-        contenders = self._fitted(contenders, base, CHOSEN, follow, stage, there)
-        if hasty and not (explained(contenders) or closed(contenders, base, MUCH)):
-            return contenders
-        contenders = self._fitted(contenders, base, POLISHED, refit, stage, there)
+        contenders = self._taken_further(contenders, base, stage, done=there, hasty=hasty)
         if base.chi_squared <= NOISE_LEFT:
             if not base.effects and base.cost - least_cost(contenders) < THRESHOLD:
                 signatures = [one for one in shown.values() if one is not None]
@@ -226,11 +223,22 @@ class Rounds:
         return found
 
     def _taken_further(
-        self, contenders: Sequence[Contender], base: Point, stage: str
+        self,
+        contenders: Sequence[Contender],
+        base: Point,
+        stage: str,
+        *,
+        done: Sequence[Contender] = (),
+        hasty: bool = False,
     ) -> list[Contender]:
-        """The best after a first look fitted, and the best of these to convergence."""
-        contenders = self._fitted(contenders, base, CHOSEN, follow, stage)
-        return self._fitted(contenders, base, POLISHED, refit, stage)
+        """The best after a first look fitted, and the best of these to convergence.
+
+        done : those that have been; hasty : see `contend`
+        """
+        found = self._fitted(contenders, base, CHOSEN, follow, stage, done)
+        if hasty and not (explained(found) or closed(found, base, MUCH)):
+            return found
+        return self._fitted(found, base, POLISHED, refit, stage, done)
 
     def from_nominal(
         self, base: Point, contenders: Sequence[Contender], stage: str

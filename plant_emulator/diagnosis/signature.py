@@ -7,6 +7,7 @@ the tangents of the drifting parameters (Basseville and Nikiforov, INRIA RR-4438
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from math import pi
 from typing import TYPE_CHECKING
 
@@ -16,7 +17,7 @@ from plant_emulator.diagnosis.tangents import gain_along, gain_turned
 from plant_emulator.scans import combinations
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.diagnosis.model import Candidate, Model
@@ -69,7 +70,8 @@ def signature(
 ) -> Signature | None:
     """The signature of an effect at a fit that lacks it; None: it changes nothing there."""
     own = _own_states(model, name, where, runs, tangents)
-    trials = _trials(model, name, where, runs, tangents, own)
+    tried = partial(_trial, model, name, where, runs, tangents, own)
+    trials = _trials(tried, signs(model.candidates[name].sizes))
     moving = [trial for trial in trials if trial.norm > 1e-6]
     if not moving:
         return None
@@ -164,24 +166,13 @@ class _Trial:
     gain: float
 
 
-def _trials(
-    model: Model,
-    name: str,
-    where: Point,
-    runs: Sequence[int],
-    tangents: Tangents,
-    own: Sequence[Mapping[str, float]],
-) -> list[_Trial]:
+def _trials(tried: Callable[[float], _Trial], directions: Sequence[float]) -> list[_Trial]:
     """The effect at all sizes, in the direction whose small sizes explain more; those in both."""
-
-    def tried(size: float) -> _Trial:
-        return _trial(model, name, where, runs, tangents, own, size)
-
     small, large = SIZES[:SMALL_SIZES], SIZES[SMALL_SIZES:]
-    found = {s: [tried(s * size) for size in small] for s in signs(model.candidates[name].sizes)}
+    found = {sign: [tried(sign * size) for size in small] for sign in directions}
     better = max(found, key=lambda sign: max(trial.gain for trial in found[sign]))
-    large_ones = [tried(better * size) for size in large]
-    return [*(trial for trials in found.values() for trial in trials), *large_ones]
+    both = [trial for trials in found.values() for trial in trials]
+    return [*both, *(tried(better * size) for size in large)]
 
 
 def _trial(

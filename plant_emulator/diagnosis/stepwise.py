@@ -63,7 +63,8 @@ class Contest:
         self._exact = frozenset(exact)
         self._rounds = Rounds(pool, recipe, names, runs, progress)
         self._deep, self._from_clear_only = not reaches_noise, False
-        self._known: dict[object, list[Contender]] = {}
+        # Rounds on top of effects, and fits without one of these, by the fit: none is made twice.
+        self._on_top: dict[object, list[Contender]] = {}
         self._refits: dict[object, Point] = {}
 
     def explain(self) -> Explanation:
@@ -180,11 +181,11 @@ class Contest:
     def _further(self, base: Point) -> tuple[Point, list[Contender]]:
         """A fit with effects started again from the best others on top of it, and all of these."""
         stage = "further effects"
-        if base.key not in self._known:
+        if base.key not in self._on_top:
             hasty = not self._deep
             found = self._rounds.contend(base, stage, thorough=False, hasty=hasty)
-            self._known[base.key] = found
-        found = self._known[base.key]
+            self._on_top[base.key] = found
+        found = self._on_top[base.key]
         if self._deep:
             found = self._rounds.deepened(found, base, stage)
         elif not explained(found):
