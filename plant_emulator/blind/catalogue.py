@@ -38,7 +38,12 @@ ANY_ANGLE = (-3.14, 3.14)
 OIL = {"start_temperature": (287.0, 306.0), "shell_temperature": (288.0, 303.0)}
 
 INSIDE = (
-    Entry(effect="reference_ramp_limit", law="soft_landing_ramp"),
+    # A slope that the steepest ramps of the programs exceed: one that they keep is not there.
+    Entry(
+        effect="reference_ramp_limit",
+        law="soft_landing_ramp",
+        ranges={"ramp_time": (4.5, 16.0)},
+    ),
     Entry(effect="reference_filter", law="three_lag_reference"),
     Entry(effect="delay_jitter", law="two_valued_delay"),
     # A limit that the programs reach, and with which the bench still goes.

@@ -59,8 +59,10 @@ def ranked(explained: Explanation) -> list[Contender]:
 
 
 def with_chance(explained: Explanation) -> Point:
-    """The final fit with the sizes of effects whose course is chance."""
-    values = {one.name: one.size for one in explained.chance}
+    """The final fit with the sizes and shapes of effects whose course is chance."""
+    values: dict[str, float] = {}
+    for one in explained.chance:
+        values |= {one.name: one.size, **one.shape}
     errors = {one.name: one.error for one in explained.chance}
     final = explained.final
     return replace(final, values={**final.values, **values}, errors={**final.errors, **errors})
@@ -81,7 +83,9 @@ def rank(
     name = contender.effect
     usual = {u.name: abs(u.start - candidate.neutral[u.name]) for u in candidate.sizes}
     point = with_chance(explained) if name in accepted else contender.point
-    names = [u.name for u in (*candidate.sizes, *candidate.shapes)]
+    # Of an effect of chance course the size is all that is estimated.
+    shapes = () if candidate.untold else candidate.shapes
+    names = [u.name for u in (*candidate.sizes, *shapes)]
     return {
         "effect": name,
         "subsystem": candidate.subsystem,

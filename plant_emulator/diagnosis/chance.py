@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.contest import Point
-    from plant_emulator.diagnosis.model import Model
+    from plant_emulator.diagnosis.model import Candidate, Model
     from plant_emulator.diagnosis.pool import Recipe
     from plant_emulator.diagnosis.steps import Task
     from plant_emulator.estimates import Array, Residual, Unknown
@@ -50,18 +50,27 @@ class Unrest:
     """An effect of chance course on top of a fit.
 
     size, error : a with its standard error, in the unit of `name`
+    shape : constants that only shape the effect, by name
     evidence : twice the rise of the log-likelihood
     weights : 1 / sqrt(1 + a^2 v) of every run, shape (channels, samples)
-    holds : whether what is left is as small at every level as it says, and as random
+    even : whether what is left is as small as it says at every level
+    random : whether what is left is random
     """
 
     effect: str
     name: str
     size: float
     error: float
+    shape: Mapping[str, float]
     evidence: float
     weights: tuple[Array, ...]
-    holds: bool
+    even: bool
+    random: bool
+
+    @property
+    def holds(self) -> bool:
+        """Whether the residual is what the effect leaves."""
+        return self.even and self.random
 
 
 def unrest(model: Model, task: Task) -> Unrest:
@@ -69,22 +78,40 @@ def unrest(model: Model, task: Task) -> Unrest:
 
     Where it does not hold, once more on the fit with its weights: restless samples, taken at the
     sensors' noise, draw a fit to their chance course, and what that leaves elsewhere is not random.
+    Where it is random then, but not at every level as large as the effect says, the likeliest of
+    other shapes: a scan of exactly the log's period is seen at one phase only, any other at all.
     """
-    first = _unrest(model, task)
+    candidate = model.candidates[task.effect]
+    usual = {u.name: u.start for u in candidate.shapes}
+    first = _unrest(model, task, usual)
     if first.holds or first.evidence <= THRESHOLD:
         return first
     weighted = cast("Model", _Weighted(model, dict(zip(task.runs, first.weights, strict=True))))
-    moved = again(weighted, task.base.effects, task.runs, task.base)
-    return _unrest(model, replace(task, base=moved))
+    task = replace(task, base=again(weighted, task.base.effects, task.runs, task.base))
+    second = _unrest(model, task, usual)
+    if second.holds or not second.random:
+        return second
+    others = [_unrest(model, task, usual | shape) for shape in _shapes(candidate)]
+    return max([second, *others], key=lambda one: one.evidence)
 
 
-def _unrest(model: Model, task: Task) -> Unrest:
+def _shapes(candidate: Candidate) -> list[dict[str, float]]:
+    """Shapes of an effect other than the usual one: each constant a deviation to either side."""
+    return [
+        {u.name: float(np.clip(u.start + side * u.std, u.lower, u.upper))}
+        for u in candidate.shapes
+        if u.std is not None
+        for side in (-1.0, 1.0)
+    ]
+
+
+def _unrest(model: Model, task: Task, shape: Mapping[str, float]) -> Unrest:
     where, (size,) = task.base, model.candidates[task.effect].sizes
     residuals = [
         model.residual(run, where.effects)({**where.values, **states})
         for run, states in zip(task.runs, where.states, strict=True)
     ]
-    variances = _variances(model, task.effect, where, task.runs, size.start)
+    variances = _variances(model, task, shape, size.start)
     counted = [residual != 0.0 for residual in residuals]
     squares = np.concatenate([r[c] for r, c in zip(residuals, counted, strict=True)]) ** 2
     added = np.concatenate([v[c] for v, c in zip(variances, counted, strict=True)])
@@ -100,23 +127,31 @@ def _unrest(model: Model, task: Task) -> Unrest:
         name=size.name,
         size=found,
         error=error,
+        shape=shape,
         evidence=evidence,
         weights=weights,
-        holds=_even(squares, found**2 * added) and left < LEFT_STRUCTURED * evidence,
+        even=_even(squares, found**2 * added),
+        random=left < LEFT_STRUCTURED * evidence,
     )
 
 
-def _variances(
-    model: Model, effect: str, where: Point, runs: Sequence[int], size: float
-) -> list[Array]:
+def _variances(model: Model, task: Task, shape: Mapping[str, float], size: float) -> list[Array]:
     """Variance of every run's whitened channels over the courses, of the size 1."""
-    candidate, random = model.candidates[effect], np.random.default_rng(0)
+    where, candidate = task.base, model.candidates[task.effect]
+    random = np.random.default_rng(0)
+    own = {**shape, candidate.sizes[0].name: size}
     found = []
-    for run, states in zip(runs, where.states, strict=True):
-        residual = model.residual(run, (*where.effects, effect))
-        plain = {**where.values, **states, candidate.sizes[0].name: size}
+    for run, states in zip(task.runs, where.states, strict=True):
+        residual = model.residual(run, (*where.effects, task.effect))
         courses = [
-            residual({**plain, **{u.name: _drawn(u, random) for u in candidate.untold}})
+            residual(
+                {
+                    **where.values,
+                    **states,
+                    **own,
+                    **{u.name: _drawn(u, random) for u in candidate.untold},
+                }
+            )
             for _ in range(COURSES)
         ]
         found.append(np.var(np.stack(courses), axis=0, ddof=1) / size**2)

@@ -24,7 +24,7 @@ PARAMETERS = {
         neutral=0.0, lower=0.0, upper=0.05, plausible=0.005, unit="s", meaning="A"
     ),
     "scan_period": EffectParameter(
-        neutral=0.01, lower=0.001, upper=0.1, plausible=0.01, unit="s", meaning="T_s"
+        neutral=0.01, lower=0.001, upper=0.1, plausible=0.01, unit="s", meaning="T_s", std=0.0025
     ),
     "sequence": EffectParameter(
         neutral=0.0,

@@ -14,7 +14,15 @@ import pytest
 
 from plant_emulator import compiler, effects, laws, stage
 from plant_emulator.errors import ParameterError
-from plant_emulator.kernel import Kernel, build, glue, kernel, kernel_for, plain_kernel
+from plant_emulator.kernel import (
+    Kernel,
+    build,
+    glue,
+    kernel,
+    kernel_for,
+    partial_kernel,
+    plain_kernel,
+)
 from plant_emulator.log import COMPARED
 from plant_emulator.parameters import ParameterSet
 from plant_emulator.simulate import values_of
@@ -75,26 +83,46 @@ def test_all_effects_at_their_neutral_values_leave_the_run_bit_for_bit(
 
 @needs_compiler
 def test_switching_an_effect_on_compiles_nothing(nominal: ParameterSet) -> None:
-    simulate(INPUTS, nominal.values(), kernel=kernel())
-    before = len(kernel().run.__wrapped__.signatures)  # type: ignore[attr-defined]
+    kernels = [kernel(), partial_kernel(remembering=True), partial_kernel(remembering=False)]
+    for model in kernels:
+        simulate(INPUTS, nominal.values(), kernel=model)
+
+    def compiled() -> list[int]:
+        return [len(model.run.__wrapped__.signatures) for model in kernels]  # type: ignore[attr-defined]
+
+    assert compiled() == [1, 1, 1]
     for name in effects.names():
         plausible = {name: effects.load(name).plausible()}
         simulate(INPUTS, values_of(nominal, plausible))
-    assert len(kernel().run.__wrapped__.signatures) == before == 1  # type: ignore[attr-defined]
+    assert compiled() == [1, 1, 1]
 
 
 def test_kernel_is_built_once_a_process() -> None:
     assert kernel() is kernel()
 
 
-def test_effects_that_are_not_there_cost_nothing(nominal: ParameterSet) -> None:
-    """The kernel without effects, for which the nominal run is the same bit for bit."""
+@pytest.mark.parametrize("name", effects.names())
+def test_other_effects_that_are_not_there_change_no_bit(nominal: ParameterSet, name: str) -> None:
+    """The least kernel with an effect against the one with all of them."""
+    values = values_of(nominal, {name: effects.load(name).plausible()})
+    assert kernel_for(values)[0] is not kernel()
+    least, whole = simulate(INPUTS, values), simulate(INPUTS, values, kernel=kernel())
+    for channel in whole.signals:
+        np.testing.assert_array_equal(least[channel], whole[channel])
+
+
+def test_least_kernel_with_the_effects_that_are_there(nominal: ParameterSet) -> None:
+    """A lag has a memory, a gain has none; without either there is nothing but the bench."""
     assert kernel_for(nominal.values())[0] is plain_kernel()
-    lag = {"torque_sensor_lag_time_constant": 0.0}
-    model, values = kernel_for({**nominal.values(), **lag})
+    lag, gain = {"torque_sensor_lag_time_constant": 0.1}, {"torque_sensor_gain_error": 0.01}
+    model, values = kernel_for({**nominal.values(), **dict.fromkeys([*lag, *gain], 0.0)})
     assert model is plain_kernel()
     assert values == nominal.values()
-    assert kernel_for({**nominal.values(), **dict.fromkeys(lag, 0.1)})[0] is kernel()
+    assert kernel_for({**nominal.values(), **lag})[0] is partial_kernel(remembering=True)
+    model, values = kernel_for({**nominal.values(), **gain, "torque_sensor_lag_time_constant": 0.0})
+    assert model is partial_kernel(remembering=False)
+    assert values == {**nominal.values(), **gain}
+    assert kernel_for({**nominal.values(), **lag, **gain})[0] is kernel()
 
 
 def test_value_of_no_effect_is_refused(nominal: ParameterSet) -> None:

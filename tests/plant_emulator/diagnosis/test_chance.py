@@ -95,6 +95,40 @@ def test_unrest_that_draws_the_fit_to_its_course_is_told_all_the_same() -> None:
     assert one.size == pytest.approx(8.0, rel=0.05)
 
 
+def test_unrest_of_a_shape_that_is_not_the_usual_one() -> None:
+    """The machine's shake shows at small slopes, too; the usual one hardly does there."""
+
+    class Shaped(Shaken):
+        def __init__(self, measured: Sequence[Array]) -> None:
+            super().__init__(measured)
+            power = linear("shake_power", 2.0, std=1.0)
+            self.candidates["shake"] = replace(self.candidates["shake"], shapes=(power,))
+
+        def residual(
+            self, run: int, effects: Sequence[str]
+        ) -> Callable[[Mapping[str, float]], Array]:
+            plain = super().residual(run, effects)
+            bare = Line.residual(self, run, [name for name in effects if name != "shake"])
+
+            def residual(v: Mapping[str, float]) -> Array:
+                still, moved = bare(v), plain(v)
+                return still + (moved - still) * SLOPE ** (v.get("shake_power", 1.0) - 1.0)
+
+            return residual
+
+    y = noisy(2.0 + 3.0 * TIME) + shaken(8.0)
+    model = Shaped([y])
+    one = unrest(model, Task(base=null_fit(model, [0]), runs=(0,), effect="shake"))
+    assert one.holds
+    assert one.shape == {"shake_power": 1.0}
+    assert one.size == pytest.approx(8.0, rel=0.1)
+    # Neither does the usual one hold nor one of a higher power.
+    model.candidates["shake"] = replace(
+        model.candidates["shake"], shapes=(linear("shake_power", 2.0),)
+    )
+    assert not unrest(model, Task(base=null_fit(model, [0]), runs=(0,), effect="shake")).even
+
+
 def test_effect_beside_an_unrest_is_named_with_it() -> None:
     y = noisy(2.0 + 3.0 * TIME + 0.5 * np.sin(20.0 * TIME)) + shaken(0.8)
     model = Shaken([y])
