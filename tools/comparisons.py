@@ -155,13 +155,19 @@ def tick(_: Study) -> Rows:
 
 
 def effects(study: Study) -> Rows:
-    """What all effects cost while none is there."""
+    """What all effects cost while none is there, and how much of it a kernel with some saves."""
     tolerance, _ = study.ours
     every, none = kernel.kernel(), kernel.build({})
     times = side_by_side(
         study.raw(every, tolerance, LARGEST_STEP), study.raw(none, tolerance, LARGEST_STEP)
     )
     yield row("effects", times[0], "the kernel without effects", times[1], 0.5)
+    for name, remembering in {"with_memories": True, "without_memories": False}.items():
+        some = kernel.partial_kernel(remembering=remembering)
+        times = side_by_side(
+            study.raw(some, tolerance, LARGEST_STEP), study.raw(every, tolerance, LARGEST_STEP)
+        )
+        yield row(f"effects_{name}", times[0], "the kernel with all effects", times[1], 1.1)
 
 
 def thousand(study: Study) -> Rows:

@@ -65,6 +65,8 @@ MOST, MUCH = 0.9, 0.7
 GLIMPSE = 5.0
 # Fall of the cost at first look that makes one more effect on top of noise worth a fit.
 SIGHT = 20.0
+# Mean square that a fit to a few runs leaves where its drift is one to start from on all.
+LITTLE = 2.0
 # Best of a round that start again from elsewhere.
 SHAKEN = 3
 
@@ -93,21 +95,24 @@ class Rounds:
         (null,) = self._pool.map(start, self._recipe, [self._runs])
         return null
 
-    def clear(self) -> Point | None:
-        """The fit without effects of the runs that need none, as it is on all; None where there are
-        fewer than two of these, or no others.
+    def clear(self) -> tuple[Point, bool] | None:
+        """The fit without effects of the runs that need none, as it is on all, and whether they
+        leave nothing but noise, or little; None where these are fewer than two, or all.
 
         A drift that no effect has led astray: the others show the effect that they need as it is.
         """
         alone = self._pool.map(start, self._recipe, [(run,) for run in self._runs])
-        runs = tuple(run for run, point in zip(self._runs, alone, strict=True) if noise_only(point))
-        if not 1 < len(runs) < len(self._runs):
-            return None
-        (joint,) = self._pool.map(start, self._recipe, [runs])
-        if not noise_only(joint):
-            return None
-        task = Task(base=joint, runs=self._runs, known=runs)
-        return next(iter(self._pool.map(spread, self._recipe, [task])))
+        points = dict(zip(self._runs, alone, strict=True))
+        for needs_none in (noise_only, _little):
+            runs = tuple(run for run, point in points.items() if needs_none(point))
+            if not 1 < len(runs) < len(self._runs):
+                continue
+            (joint,) = self._pool.map(start, self._recipe, [runs])
+            if needs_none(joint):
+                task = Task(base=joint, runs=self._runs, known=runs)
+                (found,) = self._pool.map(spread, self._recipe, [task])
+                return found, needs_none is noise_only
+        return None
 
     def from_clear(self, base: Point, null: Point, stage: str) -> list[Contender]:
         """All effects on top of such a fit, the best of them fitted; null : the fit to all runs."""
@@ -151,8 +156,10 @@ class Rounds:
         return contenders
 
     def deepened(self, contenders: Sequence[Contender], base: Point, stage: str) -> list[Contender]:
-        """The best of a round started again from elsewhere, where none leaves little."""
-        if base.chi_squared <= NOISE_LEFT or explained(contenders):
+        """The best of a round started again from elsewhere, where none leaves little and the fit
+        that they are on top of may be astray.
+        """
+        if base.chi_squared <= ASTRAY or explained(contenders):
             return list(contenders)
         ended = [c for c in with_point(contenders) if c.point and c.point.converged]
         contenders = self._fitted(contenders, base, POLISHED, refit, stage, ended)
@@ -317,6 +324,11 @@ class Rounds:
                 self._progress(stage, (done + 1) / len(tasks))
             every.append(one)
         return every
+
+
+def _little(point: Point) -> bool:
+    """Whether a fit leaves little enough to have its drift from."""
+    return point.chi_squared <= LITTLE
 
 
 def _could_close(shown: Signature | None, base: Point) -> bool:

@@ -156,11 +156,12 @@ class Contest:
         """The fit without effects, and all effects, from the drift of the runs that need none; and
         whether one explains half of what the others show. No effects where there are no such runs.
         """
-        base = self._rounds.clear() if null.chi_squared > NOISE_LEFT else None
-        if base is None:
+        clear = self._rounds.clear() if null.chi_squared > NOISE_LEFT else None
+        if clear is None:
             return null, [], False
+        base, noise = clear
         null = self._rounds.restarts.lowest(null, [base])
-        if null.chi_squared <= NOISE_LEFT:
+        if null.chi_squared <= NOISE_LEFT or not noise:
             return null, [], False
         contenders = self._rounds.from_clear(base, null, stage)
         half = explained(contenders) or closed(contenders, base, HALF)

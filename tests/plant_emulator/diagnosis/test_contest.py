@@ -25,6 +25,7 @@ from plant_emulator.diagnosis.model import Candidate, Run
 from plant_emulator.diagnosis.place import subsystem
 from plant_emulator.diagnosis.pool import Here
 from plant_emulator.diagnosis.restarts import Restarts
+from plant_emulator.diagnosis.rules import noise_only
 from plant_emulator.diagnosis.signature import signature
 from plant_emulator.diagnosis.stepwise import Contest
 from plant_emulator.diagnosis.tangents import Tangents
@@ -283,8 +284,10 @@ def rounds_of(model: Line) -> engine.Rounds:
 def test_drift_is_that_of_the_runs_that_need_no_effect() -> None:
     """By hand: what the third run's wave of 5 leaves there is n 5^2 / 2."""
     model = partly(0.0, 0.0, 5.0)
-    base = rounds_of(model).clear()
-    assert base is not None
+    clear = rounds_of(model).clear()
+    assert clear is not None
+    base, needs_none = clear
+    assert needs_none
     two = fit(model, (), [0, 1], {"a": 0.0, "b": 0.0}, [{}, {}])
     assert base.values == pytest.approx(two.values)
     assert len(base.states) == 3
@@ -292,6 +295,20 @@ def test_drift_is_that_of_the_runs_that_need_no_effect() -> None:
     found = explained(model).final
     assert found.effects == ("wave",)
     assert found.values["wave_size"] == pytest.approx(5.0, abs=0.1)
+
+
+def test_drift_of_the_runs_that_leave_little_is_where_the_fit_to_all_starts_too() -> None:
+    """A kink of 1.5 that no effect makes: two runs leave 1 + 1.5^2 var|x|, more than noise."""
+    kinked = [2.0 + 3.0 * TIME + 1.5 * np.abs(TIME)] * 3
+    kinked[2] = kinked[2] + 5.0 * np.sin(20.0 * TIME)
+    model = Partly([noisy(y, seed) for seed, y in enumerate(kinked)])
+    two = fit(model, (), [0, 1], {"a": 0.0, "b": 0.0}, [{}, {}])
+    assert two.chi_squared == pytest.approx(1.0 + 1.5**2 / 12.0, abs=0.1)
+    assert not noise_only(two)
+    base, needs_none = rounds_of(model).clear() or (two, True)
+    assert not needs_none
+    assert base.values == pytest.approx(two.values)
+    assert len(base.states) == 3
 
 
 @pytest.mark.parametrize("sizes", [(0.0, 0.0, 0.0), (0.0, 5.0, 5.0), (0.0, 0.0)])
