@@ -24,8 +24,8 @@ from plant_emulator.blind import draw, laws, score
 from plant_emulator.blind.generate import measured, true_logs
 from plant_emulator.diagnosis import answer
 from plant_emulator.diagnosis.bench import BenchRecipe
+from plant_emulator.diagnosis.inquiry import Inquiry
 from plant_emulator.diagnosis.pool import Here, model_of
-from plant_emulator.diagnosis.stepwise import Contest
 from plant_emulator.kernel import kernel, know
 from plant_emulator.recording import recording
 
@@ -52,11 +52,13 @@ def sizes(seed: int, only: tuple[str, ...], number: int) -> list[dict[str, Any]]
     others = tuple(name for name in known if name != hidden.effect)
     recipe = BenchRecipe(tuple(_recordings(case, nominal)), nominal, others)
     with threadpool_limits(1):
-        found = Contest(Here(), recipe, (hidden.effect,), range(len(case.programs))).explain()
+        model, runs = model_of(recipe), tuple(range(len(case.programs)))
+        inquiry = Inquiry(pool=Here(), recipe=recipe, model=model, runs=runs)
+        found, _, _ = inquiry.with_quiet_inputs().found()
     if not found.named:
         return []
     (contender,) = found.contenders
-    candidate = model_of(recipe).candidates[hidden.effect]
+    candidate = model.candidates[hidden.effect]
     told = {
         "verdict": {"kind": "effect", "effects": [hidden.effect]},
         "ranking": [answer.rank(contender, found, found.named, candidate, None, {})],

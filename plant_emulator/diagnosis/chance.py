@@ -78,21 +78,22 @@ def unrest(model: Model, task: Task) -> Unrest:
 
     Where it does not hold, once more on the fit with its weights: restless samples, taken at the
     sensors' noise, draw a fit to their chance course, and what that leaves elsewhere is not random.
-    Where it is random then, but not at every level as large as the effect says, the likeliest of
-    other shapes: a scan of exactly the log's period is seen at one phase only, any other at all.
+    Of what is random the likeliest of some shapes: a scan of exactly the log's period is seen at
+    one phase only, any other at all.
     """
     candidate = model.candidates[task.effect]
     usual = {u.name: u.start for u in candidate.shapes}
-    first = _unrest(model, task, usual)
-    if first.holds or first.evidence <= THRESHOLD:
-        return first
-    weighted = cast("Model", _Weighted(model, dict(zip(task.runs, first.weights, strict=True))))
-    task = replace(task, base=again(weighted, task.base.effects, task.runs, task.base))
-    second = _unrest(model, task, usual)
-    if second.holds or not second.random:
-        return second
+    found = _unrest(model, task, usual)
+    if found.evidence <= THRESHOLD:
+        return found
+    if not found.holds:
+        weighted = cast("Model", _Weighted(model, dict(zip(task.runs, found.weights, strict=True))))
+        task = replace(task, base=again(weighted, task.base.effects, task.runs, task.base))
+        found = _unrest(model, task, usual)
+    if not found.random:
+        return found
     others = [_unrest(model, task, usual | shape) for shape in _shapes(candidate)]
-    return max([second, *others], key=lambda one: one.evidence)
+    return max([found, *others], key=lambda one: one.evidence)
 
 
 def _shapes(candidate: Candidate) -> list[dict[str, float]]:

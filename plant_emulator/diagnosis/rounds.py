@@ -67,6 +67,9 @@ GLIMPSE = 5.0
 SIGHT = 20.0
 # Mean square that a fit to a few runs leaves where its drift is one to start from on all.
 LITTLE = 2.0
+# What all runs leave alone, as a part of what they leave together, where the fit to all may be
+# astray.
+APART = 0.2
 # Best of a round that start again from elsewhere.
 SHAKEN = 3
 
@@ -95,24 +98,37 @@ class Rounds:
         (null,) = self._pool.map(start, self._recipe, [self._runs])
         return null
 
-    def clear(self) -> tuple[Point, bool] | None:
-        """The fit without effects of the runs that need none, as it is on all, and whether they
-        leave nothing but noise, or little; None where these are fewer than two, or all.
+    def drifts(self, null: Point) -> tuple[list[Point], bool]:
+        """Drift of some runs as it is on all, to start from; and whether these need no effect.
 
-        A drift that no effect has led astray: the others show the effect that they need as it is.
+        Runs that need none show drift that no effect has led astray, and the others show the effect
+        that they need as it is. Otherwise that of runs that leave little; or that of every run,
+        where they leave much less alone than together. Empty where it is none of these.
+
+        null : the fit without effects to all runs
         """
-        alone = self._pool.map(start, self._recipe, [(run,) for run in self._runs])
-        points = dict(zip(self._runs, alone, strict=True))
+        alone = dict(
+            zip(
+                self._runs,
+                self._pool.map(start, self._recipe, [(run,) for run in self._runs]),
+                strict=True,
+            )
+        )
         for needs_none in (noise_only, _little):
-            runs = tuple(run for run, point in points.items() if needs_none(point))
+            runs = tuple(run for run, point in alone.items() if needs_none(point))
             if not 1 < len(runs) < len(self._runs):
                 continue
             (joint,) = self._pool.map(start, self._recipe, [runs])
             if needs_none(joint):
-                task = Task(base=joint, runs=self._runs, known=runs)
-                (found,) = self._pool.map(spread, self._recipe, [task])
-                return found, needs_none is noise_only
-        return None
+                return self._spread({runs: joint}), needs_none is noise_only
+        if sum(map(excess, alone.values())) >= APART * excess(null):
+            return [], False
+        return self._spread({(run,): point for run, point in alone.items()}), False
+
+    def _spread(self, points: Mapping[tuple[int, ...], Point]) -> list[Point]:
+        """Fits to some runs as they are on all, by these runs."""
+        tasks = [Task(base=point, runs=self._runs, known=runs) for runs, point in points.items()]
+        return list(self._pool.map(spread, self._recipe, tasks))
 
     def from_clear(self, base: Point, null: Point, stage: str) -> list[Contender]:
         """All effects on top of such a fit, the best of them fitted; null : the fit to all runs."""

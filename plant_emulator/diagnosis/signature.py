@@ -30,6 +30,8 @@ SIZES = (0.03, 0.1, 0.3, 0.6, 1.0, 2.0)
 SMALL_SIZES = 2
 # From which of these on a fit may begin besides the best one.
 FAR = 0.3
+# And those at which each size of several is tried alone.
+ALONE = (0.3, 1.0, 2.0)
 # Norm of a change of the residual that the noise does not hide, and the samples, of equal squares,
 # that are few.
 RESOLVED, FEW_SAMPLES = 2.0, 30.0
@@ -80,6 +82,7 @@ def signature(
     best = max(moving, key=lambda trial: trial.gain)
     beyond = [t for t in moving if t.size / best.size > 1.0 and abs(t.size) >= FAR]
     larger = min(beyond, key=lambda trial: abs(trial.size), default=None)
+    best = max([best, *_alone(tried, model.candidates[name])], key=lambda trial: trial.gain)
     plausible = next(t for t in trials if abs(t.size) == 1.0)
     values, states = _start(best, tangents, own)
     names = [u.name for u in tangents.found.unknowns]
@@ -121,7 +124,7 @@ def _own_states(
     candidate = model.candidates[name]
     if not candidate.states:
         return [{} for _ in runs]
-    sizes = sized(candidate, SIZES[1])
+    sizes = _with_states(model, candidate, where, runs)
 
     def parts(state: Mapping[str, float]) -> list[Array]:
         """What each run's small signature with this state leaves that drift cannot imitate."""
@@ -139,6 +142,27 @@ def _own_states(
             gain, best = gain_turned(ahead, aside, behind, tangents.residual)
             found[k].append((gain, {**state, angle: best}))
     return [max(trials, key=lambda one: one[0])[1] for trials in found]
+
+
+def _with_states(
+    model: Model, candidate: Candidate, where: Point, runs: Sequence[int]
+) -> dict[str, float]:
+    """An effect at a small size to find its states by; of several sizes only that one which goes
+    with them, for what the others do hides which states are right.
+    """
+    every = [sized(candidate, SIZES[1], only=size.name) for size in candidate.sizes]
+    if len(every) == 1:
+        return every[0]
+    states = [{u.name: u.start + shift * u.scale for u in candidate.states} for shift in (0.0, 1.0)]
+
+    def moved(sizes: Mapping[str, float]) -> float:
+        """How much other states change."""
+        here, there = (
+            _residual(model, candidate, where, runs, [state] * len(runs), sizes) for state in states
+        )
+        return float(np.linalg.norm(there - here))
+
+    return max(every, key=moved)
 
 
 def _start(
@@ -175,6 +199,20 @@ def _trials(tried: Callable[[float], _Trial], directions: Sequence[float]) -> li
     return [*both, *(tried(better * size) for size in large)]
 
 
+def _alone(tried: Callable[..., _Trial], candidate: Candidate) -> list[_Trial]:
+    """Each size of an effect that has several, while the others are neutral: what one does at a
+    wrong value hides what another explains.
+    """
+    if len(candidate.sizes) == 1:
+        return []
+    return [
+        tried(sign * size, only=u.name)
+        for u in candidate.sizes
+        for sign in signs([u])
+        for size in ALONE
+    ]
+
+
 def _trial(
     model: Model,
     name: str,
@@ -183,10 +221,13 @@ def _trial(
     tangents: Tangents,
     own: Sequence[Mapping[str, float]],
     size: float,
+    only: str | None = None,
 ) -> _Trial:
-    """The effect at one size, in plausible sizes; own : its states of every run."""
+    """The effect at one size, in plausible sizes; own : its states of every run; only : see
+    `sized`.
+    """
     candidate = model.candidates[name]
-    sizes = sized(candidate, size)
+    sizes = sized(candidate, size, only)
     change = _residual(model, candidate, where, runs, own, sizes) - tangents.residual
     rest = tangents.rest(change)
     after = tangents.residual + rest
@@ -218,9 +259,14 @@ def _residual(
     )
 
 
-def sized(candidate: Candidate, size: float) -> dict[str, float]:
-    """Sizes, in plausible sizes from neutral, and shapes of an effect."""
-    sizes = {u.name: bounded(u, candidate.neutral[u.name], size) for u in candidate.sizes}
+def sized(candidate: Candidate, size: float, only: str | None = None) -> dict[str, float]:
+    """Sizes, in plausible sizes from neutral, and shapes of an effect; only : of its sizes, while
+    the others are neutral.
+    """
+    sizes = {
+        u.name: bounded(u, candidate.neutral[u.name], size if only in (None, u.name) else 0.0)
+        for u in candidate.sizes
+    }
     return sizes | {u.name: u.start for u in candidate.shapes}
 
 

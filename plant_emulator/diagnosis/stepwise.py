@@ -156,13 +156,13 @@ class Contest:
         """The fit without effects, and all effects, from the drift of the runs that need none; and
         whether one explains half of what the others show. No effects where there are no such runs.
         """
-        clear = self._rounds.clear() if null.chi_squared > NOISE_LEFT else None
-        if clear is None:
+        if null.chi_squared <= NOISE_LEFT:
             return null, [], False
-        base, noise = clear
-        null = self._rounds.restarts.lowest(null, [base])
-        if null.chi_squared <= NOISE_LEFT or not noise:
+        starts, clear = self._rounds.drifts(null)
+        null = self._rounds.restarts.lowest(null, starts)
+        if null.chi_squared <= NOISE_LEFT or not clear:
             return null, [], False
+        (base,) = starts
         contenders = self._rounds.from_clear(base, null, stage)
         half = explained(contenders) or closed(contenders, base, HALF)
         return null, contenders, half and null.cost - least_cost(contenders) > THRESHOLD

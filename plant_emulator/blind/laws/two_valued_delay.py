@@ -1,15 +1,17 @@
 """The dead time of the reference is long in some scans and short in the others.
 
-    b_k = b + A or b - A, as a fieldbus telegram just misses a scan of length T_s or not
+    b_k = b + A / sqrt(3) or b - A / sqrt(3), as a fieldbus telegram just misses a scan of length
+    T_s or not
 
 Source: J. Nilsson, Real-Time Control Systems with Delays, thesis, Lund 1998 (delays that jump
 between a few values). Which it is follows from the scan's number: the fractional part of its
-square times the golden ratio. A = 0: the constant dead time.
+square times the golden ratio. A is that of delays evenly spread over b - A .. b + A with the same
+standard deviation. A = 0: the constant dead time.
 """
 
 from __future__ import annotations
 
-from math import floor
+from math import floor, sqrt
 from typing import TYPE_CHECKING
 
 from plant_emulator.effects.declaration import EffectParameter
@@ -38,4 +40,5 @@ def dead_time(value: float, s: Record, p: Record) -> float:
     scan = floor(s.time / p.two_valued_delay_scan_period + 1e-6)
     turns = GOLDEN * scan * scan
     drawn = turns - floor(turns)
-    return max(0.0, value + (amplitude if drawn < 0.5 else -amplitude))
+    jump = amplitude / sqrt(3.0)
+    return max(0.0, value + (jump if drawn < 0.5 else -jump))

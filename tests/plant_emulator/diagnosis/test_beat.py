@@ -7,11 +7,12 @@ from math import pi
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.contest import fit, null_fit
+from plant_emulator.diagnosis.contest import fit, linearised, null_fit
 from plant_emulator.diagnosis.looks import look
 from plant_emulator.diagnosis.model import Candidate
 from plant_emulator.diagnosis.shrink import Fold, refitted
-from plant_emulator.diagnosis.tangents import gain_turned
+from plant_emulator.diagnosis.signature import signature
+from plant_emulator.diagnosis.tangents import Tangents, gain_turned
 from plant_emulator.estimates import Array, Unknown
 from plant_emulator.scans import scanned
 from tests.plant_emulator.diagnosis.test_contest import TIME, Line, explained, linear, noisy
@@ -56,7 +57,41 @@ class Beating(Line):
         return residual
 
 
+class Loaded(Beating):
+    """The beat has a load besides, 100 times larger at its usual size, that these runs lack."""
+
+    def __init__(self, measured: Sequence[Array]) -> None:
+        super().__init__(measured)
+        load = linear("beat_load", 100.0)
+        self.candidates = {
+            "beat": replace(
+                BEAT,
+                sizes=(*BEAT.sizes, replace(load, lower=0.0)),
+                neutral={**BEAT.neutral, "beat_load": 0.0},
+                units={**BEAT.units, "beat_load": "1"},
+            )
+        }
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+        plain = super().residual(run, effects)
+        return lambda v: plain(v) - v.get("beat_load", 0.0) * TIME**3
+
+
 RUNS = ((3.37, 2.0), (-1.62, -0.7), (4.81, 0.4))
+
+
+def test_size_that_the_runs_lack_does_not_hide_the_one_that_they_show() -> None:
+    model = Loaded([noisy(2.0 + wave(0.5, *own), seed) for seed, own in enumerate(RUNS)])
+    base = null_fit(model, range(3))
+    found = signature(model, "beat", base, range(3), Tangents(linearised(model, base, range(3))))
+    assert found is not None
+    assert found.start["beat_load"] == 0.0
+    assert abs(found.start["beat_size"]) == pytest.approx(0.3)  # of those tried the nearest to 0.5
+    # By hand: half of 6000 squares of 0.5 less those of the 0.2 that is left.
+    assert found.gain == pytest.approx(3000.0 * (0.5**2 - 0.2**2), rel=0.2)
+    for states, (rate, _) in zip(found.states, RUNS, strict=True):
+        assert abs(states["beat_rate"]) == pytest.approx(abs(rate), abs=0.1)
 
 
 def test_beat_of_another_frequency_and_phase_in_every_run_is_found() -> None:

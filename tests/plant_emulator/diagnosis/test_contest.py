@@ -281,12 +281,16 @@ def rounds_of(model: Line) -> engine.Rounds:
     return engine.Rounds(Here(), Given(model), tuple(model.candidates), runs)
 
 
+def drifts(model: Line) -> tuple[list[Point], bool]:
+    """What the fit without effects starts from."""
+    rounds = rounds_of(model)
+    return rounds.drifts(rounds.without_effects())
+
+
 def test_drift_is_that_of_the_runs_that_need_no_effect() -> None:
     """By hand: what the third run's wave of 5 leaves there is n 5^2 / 2."""
     model = partly(0.0, 0.0, 5.0)
-    clear = rounds_of(model).clear()
-    assert clear is not None
-    base, needs_none = clear
+    (base,), needs_none = drifts(model)
     assert needs_none
     two = fit(model, (), [0, 1], {"a": 0.0, "b": 0.0}, [{}, {}])
     assert base.values == pytest.approx(two.values)
@@ -305,7 +309,7 @@ def test_drift_of_the_runs_that_leave_little_is_where_the_fit_to_all_starts_too(
     two = fit(model, (), [0, 1], {"a": 0.0, "b": 0.0}, [{}, {}])
     assert two.chi_squared == pytest.approx(1.0 + 1.5**2 / 12.0, abs=0.1)
     assert not noise_only(two)
-    base, needs_none = rounds_of(model).clear() or (two, True)
+    (base,), needs_none = drifts(model)
     assert not needs_none
     assert base.values == pytest.approx(two.values)
     assert len(base.states) == 3
@@ -313,14 +317,23 @@ def test_drift_of_the_runs_that_leave_little_is_where_the_fit_to_all_starts_too(
 
 @pytest.mark.parametrize("sizes", [(0.0, 0.0, 0.0), (0.0, 5.0, 5.0), (0.0, 0.0)])
 def test_drift_of_all_runs_or_of_one_is_no_clear_start(sizes: tuple[float, ...]) -> None:
-    assert rounds_of(partly(*sizes)).clear() is None
+    assert drifts(partly(*sizes)) == ([], False)
 
 
 def test_runs_that_need_no_effect_each_but_one_together_are_no_clear_start() -> None:
     lines = [level + 3.0 * TIME for level in (2.0, 4.0)]
     wave = 2.0 + 3.0 * TIME + 5.0 * np.sin(20.0 * TIME)
     model = Partly([noisy(y, seed) for seed, y in enumerate([*lines, wave])])
-    assert rounds_of(model).clear() is None
+    assert drifts(model) == ([], False)
+
+
+def test_drift_of_every_run_where_they_leave_much_less_alone() -> None:
+    model = Line([noisy(level + 3.0 * TIME, 1) for level in (2.0, 4.0, 6.0)])
+    starts, needs_none = drifts(model)
+    assert not needs_none
+    assert [point.values["a"] for point in starts] == pytest.approx([2.0, 4.0, 6.0], abs=0.1)
+    # By hand: what the first one's drift leaves on the others is n (2^2 + 4^2).
+    assert starts[0].squares - starts[0].samples == pytest.approx(len(TIME) * 20.0, rel=0.05)
 
 
 class Watched(Here):
