@@ -6,8 +6,10 @@ list of effects:
     change it, the copying of states and memories (`glue`);
  2. rebind every function to the glue and to its compiled callees;
  3. compile run and advance with numba, kept on disk.
-Values of parameters are data: a changed value, or an effect switched on, compiles nothing. With
-NUMBA_DISABLE_JIT=1 step 3 is left out and the same functions run as they are.
+Values of parameters are data: a changed value, or an effect switched on, compiles nothing once the
+few kernels are there (`kernel_for`: without effects, with those that have memories, with those that
+have none, with all). With NUMBA_DISABLE_JIT=1 step 3 is left out and the same functions run as they
+are.
 """
 
 from __future__ import annotations
@@ -125,19 +127,23 @@ def kernel() -> Kernel:
 
 @cache
 def _kernel(own: tuple[Effect, ...]) -> Kernel:
-    return build({**shipped(), **{effect.name: effect for effect in own}})
+    return build(_known(own))
+
+
+def _known(own: tuple[Effect, ...]) -> dict[str, Effect]:
+    return {**shipped(), **{effect.name: effect for effect in own}}
 
 
 @cache
 def plain_kernel() -> Kernel:
-    """The kernel without effects: half the time where none of them is there."""
+    """The kernel without effects: for what effects cost that are not there see `tools/bench.py`."""
     return build({})
 
 
 @cache
 def partial_kernel(*, remembering: bool) -> Kernel:
-    """The kernel with the shipped effects that have memories, or with those that have none: each
-    takes about half of the time that effects cost which are not there.
+    """The kernel with the shipped effects that have memories, or with those that have none: most
+    simulations have one effect, and the other kind's cost time even where they are not there.
     """
     return build({n: e for n, e in shipped().items() if bool(e.memories) is remembering})
 
@@ -147,10 +153,10 @@ def _neutral(own: tuple[Effect, ...]) -> dict[str, tuple[float, bool | None]]:
     """Neutral value of every parameter of an effect, and whether that effect has memories, by the
     parameter's name; None of a user's own effects, which no partial kernel has.
     """
-    known, remembering = _kernel(own).effects, {n: bool(e.memories) for n, e in shipped().items()}
+    remembering = {name: bool(effect.memories) for name, effect in shipped().items()}
     return {
         parameter: (value, remembering.get(name))
-        for name, effect in known.items()
+        for name, effect in _known(own).items()
         for parameter, value in effects.neutral({name: effect}).items()
     }
 

@@ -140,19 +140,12 @@ def _variances(model: Model, task: Task, shape: Mapping[str, float], size: float
     """Variance of every run's whitened channels over the courses, of the size 1."""
     where, candidate = task.base, model.candidates[task.effect]
     random = np.random.default_rng(0)
-    own = {**shape, candidate.sizes[0].name: size}
     found = []
     for run, states in zip(task.runs, where.states, strict=True):
         residual = model.residual(run, (*where.effects, task.effect))
+        plain = {**where.values, **states, **shape, candidate.sizes[0].name: size}
         courses = [
-            residual(
-                {
-                    **where.values,
-                    **states,
-                    **own,
-                    **{u.name: _drawn(u, random) for u in candidate.untold},
-                }
-            )
+            residual({**plain, **{u.name: _drawn(u, random) for u in candidate.untold}})
             for _ in range(COURSES)
         ]
         found.append(np.var(np.stack(courses), axis=0, ddof=1) / size**2)

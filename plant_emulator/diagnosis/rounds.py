@@ -36,8 +36,6 @@ from plant_emulator.diagnosis.steps import (
     plod,
     refit,
     show,
-    spread,
-    start,
 )
 from plant_emulator.diagnosis.valleys import WIDEST
 
@@ -65,11 +63,6 @@ MOST, MUCH = 0.9, 0.7
 GLIMPSE = 5.0
 # Fall of the cost at first look that makes one more effect on top of noise worth a fit.
 SIGHT = 20.0
-# Mean square that a fit to a few runs leaves where its drift is one to start from on all.
-LITTLE = 2.0
-# What all runs leave alone, as a part of what they leave together, where the fit to all may be
-# astray.
-APART = 0.2
 # Best of a round that start again from elsewhere.
 SHAKEN = 3
 
@@ -93,45 +86,11 @@ class Rounds:
         self._runs, self._progress = tuple(runs), progress
         self.restarts = Restarts(pool=pool, recipe=recipe, runs=self._runs)
 
-    def without_effects(self) -> Point:
-        """The fit without effects."""
-        (null,) = self._pool.map(start, self._recipe, [self._runs])
-        return null
-
-    def drifts(self, null: Point) -> tuple[list[Point], bool]:
-        """Drift of some runs as it is on all, to start from; and whether these need no effect.
-
-        Runs that need none show drift that no effect has led astray, and the others show the effect
-        that they need as it is. Otherwise that of runs that leave little; or that of every run,
-        where they leave much less alone than together. Empty where it is none of these.
+    def from_clear(self, base: Point, null: Point, stage: str) -> list[Contender]:
+        """All effects on top of the drift of some runs, the best of them fitted.
 
         null : the fit without effects to all runs
         """
-        alone = dict(
-            zip(
-                self._runs,
-                self._pool.map(start, self._recipe, [(run,) for run in self._runs]),
-                strict=True,
-            )
-        )
-        for needs_none in (noise_only, _little):
-            runs = tuple(run for run, point in alone.items() if needs_none(point))
-            if not 1 < len(runs) < len(self._runs):
-                continue
-            (joint,) = self._pool.map(start, self._recipe, [runs])
-            if needs_none(joint):
-                return self._spread({runs: joint}), needs_none is noise_only
-        if sum(map(excess, alone.values())) >= APART * excess(null):
-            return [], False
-        return self._spread({(run,): point for run, point in alone.items()}), False
-
-    def _spread(self, points: Mapping[tuple[int, ...], Point]) -> list[Point]:
-        """Fits to some runs as they are on all, by these runs."""
-        tasks = [Task(base=point, runs=self._runs, known=runs) for runs, point in points.items()]
-        return list(self._pool.map(spread, self._recipe, tasks))
-
-    def from_clear(self, base: Point, null: Point, stage: str) -> list[Contender]:
-        """All effects on top of such a fit, the best of them fitted; null : the fit to all runs."""
         return self._taken_further(self._looked(base, stage)[1], null, stage)
 
     def contend(
@@ -340,11 +299,6 @@ class Rounds:
                 self._progress(stage, (done + 1) / len(tasks))
             every.append(one)
         return every
-
-
-def _little(point: Point) -> bool:
-    """Whether a fit leaves little enough to have its drift from."""
-    return point.chi_squared <= LITTLE
 
 
 def _could_close(shown: Signature | None, base: Point) -> bool:

@@ -124,7 +124,7 @@ def _own_states(
     candidate = model.candidates[name]
     if not candidate.states:
         return [{} for _ in runs]
-    sizes = _with_states(model, candidate, where, runs)
+    sizes = _size_to_find_states(model, candidate, where, runs)
 
     def parts(state: Mapping[str, float]) -> list[Array]:
         """What each run's small signature with this state leaves that drift cannot imitate."""
@@ -144,7 +144,7 @@ def _own_states(
     return [max(trials, key=lambda one: one[0])[1] for trials in found]
 
 
-def _with_states(
+def _size_to_find_states(
     model: Model, candidate: Candidate, where: Point, runs: Sequence[int]
 ) -> dict[str, float]:
     """An effect at a small size to find its states by; of several sizes only that one which goes

@@ -17,6 +17,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.contenders import best_of, better_of, closed, explained, least_cost
+from plant_emulator.diagnosis.drifts import Drifts
 from plant_emulator.diagnosis.explain import MARGIN, NOISE_LEFT, THRESHOLD, Explanation, excess
 from plant_emulator.diagnosis.rounds import MOST, MUCH, Rounds
 from plant_emulator.diagnosis.rules import counts, enough, noise_only
@@ -62,6 +63,7 @@ class Contest:
         self._reaches_noise, self._by_chance, self._null = reaches_noise, by_chance, null
         self._exact = frozenset(exact)
         self._rounds = Rounds(pool, recipe, names, runs, progress)
+        self._drifts = Drifts(pool=pool, recipe=recipe, runs=tuple(runs))
         self._deep, self._from_clear_only = not reaches_noise, False
         # Rounds on top of effects, and fits without one of these, by the fit: none is made twice.
         self._on_top: dict[object, list[Contender]] = {}
@@ -69,7 +71,7 @@ class Contest:
 
     def explain(self) -> Explanation:
         """Go through the contest."""
-        null, contenders = self._first(self._null or self._rounds.without_effects())
+        null, contenders = self._first(self._null or self._drifts.of_all())
         found = self._stepped(null, contenders)
         if not self._deep and found.final.chi_squared > NOISE_LEFT:
             self._deep = True
@@ -158,7 +160,7 @@ class Contest:
         """
         if null.chi_squared <= NOISE_LEFT:
             return null, [], False
-        starts, clear = self._rounds.drifts(null)
+        starts, clear = self._drifts.of_some(null)
         null = self._rounds.restarts.lowest(null, starts)
         if null.chi_squared <= NOISE_LEFT or not clear:
             return null, [], False

@@ -44,7 +44,8 @@ class EffectParameter:
     measured : the signal of a log whose mean is its value in that run, where the log has it
     std : standard deviation of what is known beforehand of a shape or a value per run; None: a fit
         leaves it free if it is a size, and else where it is. A value per run without, that no
-        signal tells, makes the effect's course chance; such an effect has one size
+        signal tells, makes the effect's course chance; such an effect has one size, and of a shape
+        the likeliest of three values counts: the plausible one and a deviation to either side
     step : how far apart the starts of a fit may lie so that one of them finds the right valley;
         None: of a value per run a few over what is known beforehand do, of others one
     """

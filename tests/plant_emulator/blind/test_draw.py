@@ -7,9 +7,11 @@ import pytest
 
 from plant_emulator.blind.case import Case, case_of
 from plant_emulator.blind.catalogue import INSIDE
+from plant_emulator.blind.draw import PROGRAMS as ALWAYS
 from plant_emulator.blind.draw import draw, kinds
 from plant_emulator.effects import Effect
 from plant_emulator.parameters import ParameterSet
+from plant_emulator.programs import PROGRAMS, SpeedProgram
 
 
 @pytest.fixture(scope="module")
@@ -89,3 +91,16 @@ def test_effects_of_a_truck_have_one(cases: list[Case]) -> None:
     for case in cases:
         if any(h.effect in {"wheel_slip", "tyre_rolling_loss"} for h in case.hidden):
             assert "program6" in case.programs
+
+
+def test_every_limit_of_a_ramp_is_below_the_steepest_of_the_programs(nominal: ParameterSet) -> None:
+    """One that no ramp reaches is not there, and its law's landing a mere lag."""
+    (entry,) = [one for one in INSIDE if one.effect == "reference_ramp_limit"]
+    shortest, _ = entry.ranges["ramp_time"]
+    steepest = max(
+        float(np.max(np.abs(np.diff(reference) / np.diff(time))))
+        for program in map(PROGRAMS.get, ALWAYS)
+        if isinstance(program, SpeedProgram)
+        for time, reference in [program.reference()]
+    )
+    assert nominal.values()["speed_limit"] / shortest < steepest

@@ -11,6 +11,7 @@ from plant_emulator.diagnosis import rounds as engine
 from plant_emulator.diagnosis.answer import undetectable
 from plant_emulator.diagnosis.contenders import best_of
 from plant_emulator.diagnosis.contest import Point, fit, linearised, null_fit
+from plant_emulator.diagnosis.drifts import Drifts
 from plant_emulator.diagnosis.elsewhere import (
     from_nominal,
     in_place,
@@ -275,16 +276,10 @@ def partly(*sizes: float) -> Partly:
     return Partly([noisy(y, seed) for seed, y in enumerate(waves)])
 
 
-def rounds_of(model: Line) -> engine.Rounds:
-    """The rounds of a contest over all runs."""
-    runs = range(len(model.runs))
-    return engine.Rounds(Here(), Given(model), tuple(model.candidates), runs)
-
-
 def drifts(model: Line) -> tuple[list[Point], bool]:
     """What the fit without effects starts from."""
-    rounds = rounds_of(model)
-    return rounds.drifts(rounds.without_effects())
+    found = Drifts(pool=Here(), recipe=Given(model), runs=tuple(range(len(model.runs))))
+    return found.of_some(found.of_all())
 
 
 def test_drift_is_that_of_the_runs_that_need_no_effect() -> None:
