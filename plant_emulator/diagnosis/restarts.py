@@ -89,15 +89,17 @@ class Restarts:
             best = min(best, again, key=lambda p: p.cost)
         return best
 
-    def followed(self, point: Point) -> Point:
+    def followed(self, point: Point, *, to_noise: bool = True) -> Point:
         """The fit followed down a long valley, in whose rough bottom fits stop on the way.
 
         From where it has come to and where a start from some way off has, further the same way, as
         a pattern move (R. Hooke, T. A. Jeeves, J. ACM 8 (1961) 212).
+
+        to_noise : no further than where it leaves nothing but noise
         """
         failed = 0
         for k in range(FOLLOWED):
-            if noise_only(point) or failed == FAILED:
+            if (to_noise and noise_only(point)) or failed == FAILED:
                 break
             numbers = range(SHAKES * k, SHAKES * (k + 1))
             off = self._off([point], numbers)[0]

@@ -65,6 +65,9 @@ GLIMPSE = 5.0
 SIGHT = 20.0
 # Best of a round that start again from elsewhere.
 SHAKEN = 3
+# Mean square of a fit without effects from which on it may lie so far from where the cause is that
+# no signature there tells of it.
+LOST = 3.0
 
 
 class Rounds:
@@ -84,6 +87,8 @@ class Rounds:
     ) -> None:
         self._pool, self._recipe, self._names = pool, recipe, tuple(names)
         self._runs, self._progress = tuple(runs), progress
+        # Whether all effects have been fitted from the nominal parameters: that is done once.
+        self._surveyed = False
         self.restarts = Restarts(pool=pool, recipe=recipe, runs=self._runs)
 
     def from_clear(self, base: Point, null: Point, stage: str) -> list[Contender]:
@@ -184,7 +189,7 @@ class Rounds:
         large = [
             Task(base=base, runs=self._runs, effect=name, signature=one)
             for name, one in shown.items()
-            if _could_close(one, base)
+            if one is not None and _could_close(one.raw, base)
         ]
         found = self._told(stage, large, self._pool.map(contend_far, self._recipe, large))
         points = dict(zip((task.effect for task in large), found, strict=True))
@@ -225,18 +230,17 @@ class Rounds:
     def from_nominal(
         self, base: Point, contenders: Sequence[Contender], stage: str
     ) -> list[Contender]:
-        """Effects fitted from the nominal parameters."""
+        """Effects fitted from the nominal parameters, and the best from the best values of each of
+        its unknowns: a few steps from afar end anywhere, but seldom far from where it lies.
+        """
         chosen = with_point(contenders)
         tasks = [Task(base=base, runs=self._runs, effect=c.effect) for c in chosen]
         points = self._told(stage, tasks, self._pool.map(once_more, self._recipe, tasks))
-        again = sorted(
-            (replace(c, point=p) for c, p in zip(chosen, points, strict=True)), key=cost_of
-        )
-        # A few steps from afar end anywhere: the best go on, however they stand against the others.
-        tasks = [Task(base=c.point, runs=self._runs) for c in again[:POLISHED] if c.point]
-        points = self._told(stage, tasks, self._pool.map(follow, self._recipe, tasks))
-        again = [replace(c, point=p) for c, p in zip(again, points, strict=False)]
-        return self._fitted(again, base, POLISHED, refit, stage)
+        again = (replace(c, point=p) for c, p in zip(chosen, points, strict=True))
+        best = sorted(again, key=cost_of)[:POLISHED]
+        points = self.restarts.sifted([c.point for c in best if c.point is not None])
+        best = [replace(c, point=p) for c, p in zip(best, points, strict=True)]
+        return self._fitted(best, base, POLISHED, refit, stage)
 
     def restarted(self, base: Point, contenders: Sequence[Contender]) -> Point:
         """The best fit with the base's effects from the drift of the best contenders: a few steps
@@ -264,11 +268,16 @@ class Rounds:
     ) -> list[Contender]:
         """The best of a round started again from the nominal parameters and from some way off."""
         best = best_few(contenders, base, most)
-        if any(c.point.chi_squared > ASTRAY for c in best[:1] if c.point):
-            contenders = better_of(contenders, self.from_nominal(base, best, stage))
-            if explained(contenders):
-                return list(contenders)
-            best = best_few(contenders, base, most)
+        contenders = better_of(contenders, self.from_nominal(base, best, stage))
+        far = base.chi_squared > LOST and not (base.effects or self._surveyed)
+        if far and not (explained(contenders) or closed(contenders, base, MUCH)):
+            self._surveyed = True
+            tried = {c.effect for c in best}
+            rest = [c for c in contenders if c.effect not in tried and _could_close(c.raw, base)]
+            contenders = better_of(contenders, self.from_nominal(base, rest, stage))
+        if explained(contenders):
+            return list(contenders)
+        best = best_few(contenders, base, most)
         points = self.restarts.sifted([c.point for c in best if c.point is not None])
         first = [self.restarts.followed(point) for point in points[:1]]
         points = [*first, *self.restarts.shaken(points[1:])]
@@ -301,6 +310,9 @@ class Rounds:
         return every
 
 
-def _could_close(shown: Signature | None, base: Point) -> bool:
-    """Whether an effect, drift or not, changes as much as a fit leaves beyond the noise."""
-    return shown is not None and (WIDEST * shown.raw) ** 2 > excess(base)
+def _could_close(raw: float, base: Point) -> bool:
+    """Whether an effect, drift or not, changes as much as a fit leaves beyond the noise.
+
+    raw : norm of what it changes at its plausible size
+    """
+    return (WIDEST * raw) ** 2 > excess(base)

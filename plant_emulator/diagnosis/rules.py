@@ -24,10 +24,11 @@ SECOND = 60.0
 # And the share of the whole gap that the first's own law may have left: the square of an error of
 # 3 % in it.
 LAW = 0.001
+# The same where the first leaves no more than the noise: the square of an error of 10 %.
+COARSE_LAW = 0.01
 # Size of a second, in plausible sizes, below which it may be what another law of the first has left
-# (such had 0.1 to 0.35), and the share of the gap that it has to close then: the square of an error
-# of 10 %, where the first leaves noise.
-SMALL, COARSE_LAW = 0.4, 0.01
+# (such had 0.1 to 0.35).
+SMALL = 0.4
 # Where both leave more than noise, the share of what the first leaves that a second has to close,
 # of the squares and of the structure. What the first's own law leaves stays: beside real seconds up
 # to half of either. What seemed a second there closed up to 0.4 of the squares, but no more than
@@ -79,8 +80,8 @@ def counts(
         return closes or evidence > THRESHOLD
     sizes = [best.sizes[name] for name in best.effects if name not in base.effects]
     small = not exact and any(size < SMALL for size in sizes)
-    if noise_only(base):
-        left = 0.0 if exact else COARSE_LAW if small else LAW
+    if base.chi_squared <= NOISE_LEFT:
+        left = 0.0 if exact else COARSE_LAW
         return evidence > SECOND and fall > left * excess(null)
     if noise_only(best):
         return evidence > SECOND and fall > (LEFT if small else LAW) * excess(null)

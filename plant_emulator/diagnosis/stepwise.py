@@ -16,9 +16,24 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.contenders import best_of, better_of, closed, explained, least_cost
+from plant_emulator.diagnosis.contenders import (
+    beside,
+    best_of,
+    better_of,
+    closed,
+    explained,
+    least_cost,
+    points_of,
+)
 from plant_emulator.diagnosis.drifts import Drifts
-from plant_emulator.diagnosis.explain import MARGIN, NOISE_LEFT, THRESHOLD, Explanation, excess
+from plant_emulator.diagnosis.explain import (
+    MARGIN,
+    NOISE_LEFT,
+    THRESHOLD,
+    Explanation,
+    excess,
+    weighed,
+)
 from plant_emulator.diagnosis.rounds import MOST, MUCH, Rounds
 from plant_emulator.diagnosis.rules import counts, enough, noise_only
 
@@ -35,6 +50,9 @@ if TYPE_CHECKING:
 HALF = 0.5
 # Share of the gap that a better fit without effects closes when it has moved to another valley.
 MOVED = 0.5
+# Evidence of one of two effects that may be depth of a hollow: fits stopped 300 and 450 above the
+# bottom, while all that they left was noise.
+FAINT = 500.0
 # More effects than that at once explain anything.
 MOST_EFFECTS = 2
 
@@ -65,9 +83,11 @@ class Contest:
         self._rounds = Rounds(pool, recipe, names, runs, progress)
         self._drifts = Drifts(pool=pool, recipe=recipe, runs=tuple(runs))
         self._deep, self._from_clear_only = not reaches_noise, False
-        # Rounds on top of effects, and fits without one of these, by the fit: none is made twice.
+        # Rounds on top of effects, fits without one of these, and single effects from the nominal
+        # parameters: none is made twice.
         self._on_top: dict[object, list[Contender]] = {}
         self._refits: dict[object, Point] = {}
+        self._from_nominal: dict[tuple[str, ...], Point] = {}
 
     def explain(self) -> Explanation:
         """Go through the contest."""
@@ -108,6 +128,9 @@ class Contest:
                 best = best_of(found) or best
             final, rivals = self._stand(best, found)
             final, without = self._missed(final, null)
+            if self._faint(final, null, without):
+                final = self._rounds.restarts.followed(final, to_noise=False)
+                final, without = self._missed(final, null)
             if len(final.effects) == 1:
                 rivals = {final.effects[0]: _costs(contenders)}
             if frozenset(final.effects) in tried:
@@ -226,6 +249,13 @@ class Contest:
             self._refits[final.key, name] = found
         return self._refits[final.key, name]
 
+    def _alone(self, point: Point, null: Point) -> Point:
+        """The fit with one effect, or that from the nominal parameters, where that is better."""
+        if point.effects not in self._from_nominal:
+            found = self._rounds.from_nominal(null, [beside(point, null)], "standing again")
+            self._from_nominal[point.effects] = next(points_of(found))
+        return min(point, self._from_nominal[point.effects], key=lambda p: p.cost)
+
     def _counts(self, best: Point, base: Point, null: Point) -> bool:
         """Whether one more effect earns its place."""
         return counts(
@@ -237,6 +267,14 @@ class Contest:
             exact=self._exact.issuperset(base.effects),
         )
 
+    def _faint(self, final: Point, null: Point, without: Mapping[str, float]) -> bool:
+        """Whether one of two effects explains no more than what a fit may gain by leaving a hollow
+        of its valley.
+        """
+        return noise_only(final) and any(
+            weighed(cost - final.cost, final, null) < FAINT for cost in without.values()
+        )
+
     def _missed(self, final: Point, null: Point) -> tuple[Point, dict[str, float]]:
         """Without an effect that another has made needless; and the cost without each of several
         that are all needed, by name.
@@ -246,6 +284,8 @@ class Contest:
             return final, costs
         for name in final.effects:
             without = self._without(final, name)
+            if self._counts(final, without, null) and without.chi_squared > NOISE_LEFT:
+                without = self._alone(without, null)
             if not self._counts(final, without, null):
                 return without, {}
             costs[name] = without.cost
