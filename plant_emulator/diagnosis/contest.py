@@ -11,11 +11,12 @@
     by secants; of the best a few full steps; of the best of these to convergence.
  4. Where none closes much, the signature and the start mislead: drift has gone far to imitate the
     effect, and the way back is rough, since contact comes and goes. All that could close the gap
-    then start from a larger size, with slopes over wide differences first; and the best once more
-    from the nominal parameters and the size that fits these best, the runs taken in one by one.
- 5. The best starts again from the best values of each of its unknowns by a loss that forgives, and
-    from some way off, along the floor of its valley and out of it, as long as that leads down; at
-    once where none closes much, and else where a second effect beside it leaves more than noise.
+    then start from a larger size, with slopes over wide differences first; or, where so much is
+    left that the drift says nothing, from the nominal parameters.
+ 5. The best starts again from the nominal parameters and the size that fits these best, the runs
+    taken in one by one, then from the best values of each of its unknowns by a loss that forgives,
+    and from some way off, along the floor of its valley and out of it, as long as that leads down;
+    at once where none closes much, and else where a second effect beside it leaves more than noise.
  6. The fit without effects starts again from every joint fit's drift: should it get as low, there
     was no effect, only a better valley. One that has come to such is followed down it.
 

@@ -57,7 +57,7 @@ RESTARTS = 3
 CHOSEN, POLISHED = 8, 4
 # Share of the gap that an effect closes where no other is likely to close more, and where none is
 # that a first look from a small size has missed.
-MOST, MUCH = 0.9, 0.7
+MOST, MUCH = 0.9, 0.5
 # Fall of the sum of squares that the signature promises where one more effect on top of noise is
 # worth a look: there the linear picture holds.
 GLIMPSE = 5.0
@@ -67,7 +67,7 @@ SIGHT = 20.0
 SHAKEN = 3
 # Mean square of a fit without effects from which on it may lie so far from where the cause is that
 # no signature there tells of it.
-LOST = 3.0
+LOST = 4.0
 
 
 class Rounds:
@@ -87,8 +87,9 @@ class Rounds:
     ) -> None:
         self._pool, self._recipe, self._names = pool, recipe, tuple(names)
         self._runs, self._progress = tuple(runs), progress
-        # Whether all effects have been fitted from the nominal parameters: that is done once.
-        self._surveyed = False
+        # Fits from the nominal parameters, after a few steps and at their end.
+        self._far: dict[tuple[object, str], Point] = {}
+        self._near: dict[tuple[object, str], Point] = {}
         self.restarts = Restarts(pool=pool, recipe=recipe, runs=self._runs)
 
     def from_clear(self, base: Point, null: Point, stage: str) -> list[Contender]:
@@ -132,7 +133,10 @@ class Rounds:
                     contenders = self._from_afar(contenders, shown, base, stage)
             return contenders
         if thorough and not explained(contenders) and not closed(contenders, base, MUCH):
-            contenders = self._from_afar(contenders, shown, base, stage)
+            if base.effects or base.chi_squared <= LOST:
+                return self._from_afar(contenders, shown, base, stage)
+            able = [c for c in contenders if _could_close(c.raw, base)]
+            contenders = better_of(contenders, self.from_nominal(base, able, stage))
         return contenders
 
     def deepened(self, contenders: Sequence[Contender], base: Point, stage: str) -> list[Contender]:
@@ -230,17 +234,24 @@ class Rounds:
     def from_nominal(
         self, base: Point, contenders: Sequence[Contender], stage: str
     ) -> list[Contender]:
-        """Effects fitted from the nominal parameters, and the best from the best values of each of
-        its unknowns: a few steps from afar end anywhere, but seldom far from where it lies.
+        """The best of some effects fitted from the nominal parameters, from where a few steps come
+        to and then from the best values of each unknown.
+
+        A few steps from afar end anywhere, but seldom far from where the valley lies. None is made
+        twice: without other effects the fit that they are on top of is of no account.
         """
-        chosen = with_point(contenders)
-        tasks = [Task(base=base, runs=self._runs, effect=c.effect) for c in chosen]
-        points = self._told(stage, tasks, self._pool.map(once_more, self._recipe, tasks))
-        again = (replace(c, point=p) for c, p in zip(chosen, points, strict=True))
-        best = sorted(again, key=cost_of)[:POLISHED]
-        points = self.restarts.sifted([c.point for c in best if c.point is not None])
-        best = [replace(c, point=p) for c, p in zip(best, points, strict=True)]
-        return self._fitted(best, base, POLISHED, refit, stage)
+        chosen = {(base.key if base.effects else (), c.effect): c for c in with_point(contenders)}
+        new = [key for key in chosen if key not in self._far]
+        tasks = [Task(base=base, runs=self._runs, effect=chosen[key].effect) for key in new]
+        found = self._told(stage, tasks, self._pool.map(once_more, self._recipe, tasks))
+        self._far.update(zip(new, found, strict=True))
+        best = sorted(chosen, key=lambda key: self._far[key].cost)[:POLISHED]
+        new = [key for key in best if key not in self._near]
+        points = self.restarts.sifted([self._far[key] for key in new])
+        tasks = [Task(base=point, runs=self._runs) for point in points]
+        ended = self._told(stage, tasks, self._pool.map(refit, self._recipe, tasks))
+        self._near.update(zip(new, ended, strict=True))
+        return [replace(chosen[key], point=self._near[key]) for key in best]
 
     def restarted(self, base: Point, contenders: Sequence[Contender]) -> Point:
         """The best fit with the base's effects from the drift of the best contenders: a few steps
@@ -268,17 +279,15 @@ class Rounds:
     ) -> list[Contender]:
         """The best of a round started again from the nominal parameters and from some way off."""
         best = best_few(contenders, base, most)
+        before = closed(contenders, base, MOST)
         contenders = better_of(contenders, self.from_nominal(base, best, stage))
-        far = base.chi_squared > LOST and not (base.effects or self._surveyed)
-        if far and not (explained(contenders) or closed(contenders, base, MUCH)):
-            self._surveyed = True
-            tried = {c.effect for c in best}
-            rest = [c for c in contenders if c.effect not in tried and _could_close(c.raw, base)]
-            contenders = better_of(contenders, self.from_nominal(base, rest, stage))
-        if explained(contenders):
+        if explained(contenders) or (closed(contenders, base, MOST) and not before):
             return list(contenders)
         best = best_few(contenders, base, most)
-        points = self.restarts.sifted([c.point for c in best if c.point is not None])
+        known = {p.key for p in self._near.values()}
+        new = {p.key: p for p in points_of(best) if p.key not in known}
+        sifted = dict(zip(new, self.restarts.sifted([*new.values()]), strict=True))
+        points = [sifted.get(p.key, p) for p in points_of(best)]
         first = [self.restarts.followed(point) for point in points[:1]]
         points = [*first, *self.restarts.shaken(points[1:])]
         again = [replace(c, point=p) for c, p in zip(best, points, strict=True)]

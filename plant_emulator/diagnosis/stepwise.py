@@ -4,7 +4,7 @@ Forward: the effect whose joint fit lowers the cost most comes in, as long as it
 and the gap is not closed. Of a second, which stands on a fit that may have gone astray without it,
 the likeliest others are fitted once more in its place. After every addition each earlier effect has
 to stand the contest again, with all others in its place; and at the end each has to be missed when
-it is taken out.
+it is taken out, and the other fitted alone from there and from the nominal parameters.
 
 That a first effect leaves much may mean that there is a second, or that its fit is astray. The
 second is looked for first, which is cheaper; where the two leave more than noise as well, the best
@@ -53,6 +53,8 @@ MOVED = 0.5
 # Evidence of one of two effects that may be depth of a hollow: fits stopped 300 and 450 above the
 # bottom, while all that they left was noise.
 FAINT = 500.0
+# Share of the gap that two may leave and be those: what other laws of them leave.
+OTHER_LAW = 0.05
 # More effects than that at once explain anything.
 MOST_EFFECTS = 2
 
@@ -83,17 +85,15 @@ class Contest:
         self._rounds = Rounds(pool, recipe, names, runs, progress)
         self._drifts = Drifts(pool=pool, recipe=recipe, runs=tuple(runs))
         self._deep, self._from_clear_only = not reaches_noise, False
-        # Rounds on top of effects, fits without one of these, and single effects from the nominal
-        # parameters: none is made twice.
+        # Rounds on top of effects, and fits without one of these, by the fit: none is made twice.
         self._on_top: dict[object, list[Contender]] = {}
         self._refits: dict[object, Point] = {}
-        self._from_nominal: dict[tuple[str, ...], Point] = {}
 
     def explain(self) -> Explanation:
         """Go through the contest."""
         null, contenders = self._first(self._null or self._drifts.of_all())
         found = self._stepped(null, contenders)
-        if not self._deep and found.final.chi_squared > NOISE_LEFT:
+        if not self._deep and not _settled(found):
             self._deep = True
             found = self._stepped(*self._deepened(null, contenders))
         return found
@@ -118,7 +118,7 @@ class Contest:
             found = list(contenders)
             if final.effects:
                 final, found = self._further(final)
-                if not (self._deep or explained(found)):
+                if not (self._deep or self._settles(found, final)):
                     break
             best = best_of(found)
             if best is None or not self._counts(best, final, null):
@@ -214,9 +214,13 @@ class Contest:
         found = self._on_top[base.key]
         if self._deep:
             found = self._rounds.deepened(found, base, stage)
-        elif not explained(found):
+        elif not self._settles(found, base):
             return base, found
         return self._rounds.restarted(base, found), found
+
+    def _settles(self, found: Sequence[Contender], base: Point) -> bool:
+        """Whether a second effect explains so much that nothing is likely to be astray."""
+        return explained(found) or closed(found, base, MOST)
 
     def _stand(
         self, final: Point, last: Sequence[Contender]
@@ -251,10 +255,8 @@ class Contest:
 
     def _alone(self, point: Point, null: Point) -> Point:
         """The fit with one effect, or that from the nominal parameters, where that is better."""
-        if point.effects not in self._from_nominal:
-            found = self._rounds.from_nominal(null, [beside(point, null)], "standing again")
-            self._from_nominal[point.effects] = next(points_of(found))
-        return min(point, self._from_nominal[point.effects], key=lambda p: p.cost)
+        found = self._rounds.from_nominal(null, [beside(point, null)], "standing again")
+        return min([point, *points_of(found)], key=lambda p: p.cost)
 
     def _counts(self, best: Point, base: Point, null: Point) -> bool:
         """Whether one more effect earns its place."""
@@ -290,6 +292,14 @@ class Contest:
                 return without, {}
             costs[name] = without.cost
         return final, costs
+
+
+def _settled(found: Explanation) -> bool:
+    """Whether a contest leaves so little that its fits are not astray."""
+    if found.final.chi_squared <= NOISE_LEFT:
+        return True
+    both = len(found.final.effects) == MOST_EFFECTS
+    return both and excess(found.final) <= OTHER_LAW * excess(found.null)
 
 
 def _costs(contenders: Sequence[Contender]) -> dict[str, float]:

@@ -374,6 +374,28 @@ def test_each_of_two_effects_is_fitted_alone_from_the_nominal_parameters() -> No
     assert sorted(alone) == ["cube", "kink"]
 
 
+def test_faint_second_effect_is_followed_beyond_the_noise() -> None:
+    """Its evidence, about 100, may be depth of a hollow that the fit of the first has stopped in."""
+    model = Line([noisy(CUBE + 0.8 * SHAPES["kink"](TIME))], ("cube", "wave", "kink"))
+    pool = Watched()
+    found = Contest(pool, Given(model), tuple(model.candidates), (0,), exact=("cube",)).explain()
+    assert set(found.final.effects) == {"cube", "kink"}
+    assert noise_only(found.final)
+    assert any(name == "shake" and len(effects) == 2 for name, effects, _ in pool.steps)
+
+
+def test_far_from_the_cause_all_start_from_the_nominal_parameters() -> None:
+    """A ripple whose mean square is 18: no effect closes half of it, and none is tried twice."""
+    model = Line([noisy(6.0 * np.sin(7.0 * TIME))], ("cube", "wave", "kink"))
+    pool = Watched()
+    found = Contest(pool, Given(model), tuple(model.candidates), (0,)).explain()
+    assert 15.0 < found.null.chi_squared < 20.0
+    assert ("contend_far", ()) not in {(name, base) for name, base, _ in pool.steps}
+    tried = [effect for name, base, effect in pool.steps if name == "once_more" and not base]
+    assert sorted(tried) == sorted(set(tried))
+    assert set(tried) >= {"cube", "kink"}
+
+
 def test_effect_that_stands_again_in_noise_is_not_looked_at_once_more() -> None:
     """Its fit is known: the last one of all."""
     model = Line([noisy(CUBE + 10.0 * SHAPES["kink"](TIME))], ("cube", "wave", "kink"))
