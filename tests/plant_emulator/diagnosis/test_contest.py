@@ -375,7 +375,7 @@ def test_each_of_two_effects_is_fitted_alone_from_the_nominal_parameters() -> No
 
 
 def test_faint_second_effect_is_followed_beyond_the_noise() -> None:
-    """Its evidence, about 100, may be depth of a hollow that the fit of the first has stopped in."""
+    """Its evidence, about 100, may be depth of a hollow that the first has stopped in."""
     model = Line([noisy(CUBE + 0.8 * SHAPES["kink"](TIME))], ("cube", "wave", "kink"))
     pool = Watched()
     found = Contest(pool, Given(model), tuple(model.candidates), (0,), exact=("cube",)).explain()
