@@ -65,8 +65,8 @@ GLIMPSE = 5.0
 SIGHT = 20.0
 # Best of a round that start again from elsewhere.
 SHAKEN = 3
-# Mean square of a fit without effects from which on it may lie so far from where the cause is that
-# no signature there tells of it.
+# Mean square of a fit without effects, or with one, from which on it may lie so far from where the
+# cause is that no signature there tells of it.
 LOST = 4.0
 
 
@@ -135,8 +135,7 @@ class Rounds:
         if thorough and not explained(contenders) and not closed(contenders, base, MUCH):
             if base.effects or base.chi_squared <= LOST:
                 return self._from_afar(contenders, shown, base, stage)
-            able = [c for c in contenders if _could_close(c.raw, base)]
-            contenders = better_of(contenders, self.from_nominal(base, able, stage))
+            contenders = self._surveyed(contenders, base, stage)
         return contenders
 
     def deepened(self, contenders: Sequence[Contender], base: Point, stage: str) -> list[Contender]:
@@ -253,6 +252,13 @@ class Rounds:
         self._near.update(zip(new, ended, strict=True))
         return [replace(chosen[key], point=self._near[key]) for key in best]
 
+    def _surveyed(
+        self, contenders: Sequence[Contender], base: Point, stage: str
+    ) -> list[Contender]:
+        """All that could close the gap, from the nominal parameters where that is better."""
+        able = [c for c in contenders if _could_close(c.raw, base)]
+        return better_of(contenders, self.from_nominal(base, able, stage))
+
     def restarted(self, base: Point, contenders: Sequence[Contender]) -> Point:
         """The best fit with the base's effects from the drift of the best contenders: a few steps
         from each, and on from where these lead lower.
@@ -281,6 +287,8 @@ class Rounds:
         best = best_few(contenders, base, most)
         before = closed(contenders, base, MOST)
         contenders = better_of(contenders, self.from_nominal(base, best, stage))
+        if not base.effects and all(p.chi_squared > LOST for p in points_of(contenders)):
+            contenders = self._surveyed(contenders, base, stage)
         if explained(contenders) or (closed(contenders, base, MOST) and not before):
             return list(contenders)
         best = best_few(contenders, base, most)

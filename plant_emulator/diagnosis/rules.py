@@ -24,7 +24,11 @@ SECOND = 60.0
 # And the share of the whole gap that the first's own law may have left: the square of an error of
 # 3 % in it.
 LAW = 0.001
-# The same where the first leaves no more than the noise: the square of an error of 10 %.
+# Evidence of a second effect that may be depth of a hollow: fits stopped 300 and 450 above the
+# bottom, while all that they left was noise.
+FAINT = 500.0
+# The share of such a one, or a small one, where the first leaves no more than the noise: the square
+# of an error of 10 %.
 COARSE_LAW = 0.01
 # Size of a second, in plausible sizes, below which it may be what another law of the first has left
 # (such had 0.1 to 0.35).
@@ -81,7 +85,8 @@ def counts(
     sizes = [best.sizes[name] for name in best.effects if name not in base.effects]
     small = not exact and any(size < SMALL for size in sizes)
     if base.chi_squared <= NOISE_LEFT:
-        left = 0.0 if exact else COARSE_LAW
+        coarse = small or evidence < FAINT
+        left = 0.0 if exact else COARSE_LAW if coarse else LAW
         return evidence > SECOND and fall > left * excess(null)
     if noise_only(best):
         return evidence > SECOND and fall > (LEFT if small else LAW) * excess(null)

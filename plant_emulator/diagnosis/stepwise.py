@@ -35,7 +35,7 @@ from plant_emulator.diagnosis.explain import (
     weighed,
 )
 from plant_emulator.diagnosis.rounds import MOST, MUCH, Rounds
-from plant_emulator.diagnosis.rules import counts, enough, noise_only
+from plant_emulator.diagnosis.rules import FAINT, counts, enough, noise_only
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -50,9 +50,6 @@ if TYPE_CHECKING:
 HALF = 0.5
 # Share of the gap that a better fit without effects closes when it has moved to another valley.
 MOVED = 0.5
-# Evidence of one of two effects that may be depth of a hollow: fits stopped 300 and 450 above the
-# bottom, while all that they left was noise.
-FAINT = 500.0
 # Share of the gap that two may leave and be those: what other laws of them leave.
 OTHER_LAW = 0.05
 # More effects than that at once explain anything.
