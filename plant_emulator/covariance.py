@@ -59,6 +59,12 @@ def sandwich(
     inverse /= np.outer(scale, scale)
     covariance = inverse @ middle @ inverse
     covariance = 0.5 * (covariance + covariance.T)
+    # The taper leaves no spectrum that is certainly positive: far from an optimum a variance may
+    # come out below 0, and is then that of white residuals; below 0 as well, by rounding, where the
+    # data hardly know it.
+    below = np.flatnonzero(np.diag(covariance) < 0.0)
+    white = np.diag(inverse)[below]
+    covariance[below, below] = np.where(white > 0.0, white, np.inf)
     unknown = np.flatnonzero(np.diag(hessian) <= 0.0)
     covariance[unknown, unknown] = np.inf
     return np.asarray(covariance)
