@@ -26,13 +26,17 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+# Eigenvalue of an information matrix of unit diagonal that is 0 but for rounding [the largest], and
+# the part that an unknown has in such a direction.
+ROUNDING, PART = 1e-14, 1e-6
+
 
 def data_errors(information: Array) -> Array:
     """Standard errors of z from an information matrix, infinite in directions without any."""
     scale = np.sqrt(np.diag(information))
     safe = np.where(scale > 0.0, scale, 1.0)
     values, vectors = np.linalg.eigh(information / np.outer(safe, safe))
-    weight = np.where(values > 1e-14 * values[-1], values, 1e-300)
+    weight = np.where(values > ROUNDING * values[-1], values, 1e-300)
     variance = (vectors**2 / weight).sum(axis=1) / safe**2
     return np.where(scale > 0.0, np.sqrt(variance), np.inf)
 
@@ -55,17 +59,12 @@ def sandwich(
             middle += freedom * slopes.T @ coloured(slopes, autocovariance(residual[channel]))
     hessian = information + precision
     scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
-    inverse = np.linalg.pinv(hessian / np.outer(scale, scale), rcond=1e-15, hermitian=True)
-    inverse /= np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(hessian / np.outer(scale, scale))
+    told = values > ROUNDING * values[-1]
+    inverse = (vectors[:, told] / values[told]) @ vectors[:, told].T / np.outer(scale, scale)
     covariance = inverse @ middle @ inverse
     covariance = 0.5 * (covariance + covariance.T)
-    # The taper leaves no spectrum that is certainly positive: far from an optimum a variance may
-    # come out below 0, and is then that of white residuals; below 0 as well, by rounding, where the
-    # data hardly know it.
-    below = np.flatnonzero(np.diag(covariance) < 0.0)
-    white = np.diag(inverse)[below]
-    covariance[below, below] = np.where(white > 0.0, white, np.inf)
-    unknown = np.flatnonzero(np.diag(hessian) <= 0.0)
+    unknown = np.flatnonzero(np.any(np.abs(vectors[:, ~told]) > PART, axis=1))
     covariance[unknown, unknown] = np.inf
     return np.asarray(covariance)
 

@@ -10,6 +10,7 @@ from plant_emulator.covariance import (
     autocovariance,
     correlation_time,
     data_errors,
+    sandwich,
     structure,
 )
 from plant_emulator.estimates import Unknown
@@ -227,3 +228,20 @@ def test_structure_is_none_in_white_noise_and_that_of_a_hidden_ripple() -> None:
     n = np.arange(3000)
     rippled = random.standard_normal(3000) + np.sin(2.0 * np.pi * n / 5.0)
     assert structure(rippled) == pytest.approx(3000 * 10.0 * (0.5 / 1.5) ** 2, rel=0.1)
+
+
+def test_what_two_unknowns_share_alone_is_known_of_neither() -> None:
+    """By hand: slopes 1 and -1 over 100 samples in turn, white residuals of variance 1: the third
+    unknown's variance is 1/100; of two with the same slope only the sum is known, which rounding
+    must not hide (an eigenvalue of -2e-15 had made their variance negative).
+    """
+    slope = np.random.default_rng(3).standard_normal(100)
+    third = np.tile([1.0, -1.0], 50)
+    slope -= third * (slope @ third) / 100.0
+    jacobian = np.stack([slope, (1.0 + 1e-12) * slope, third], axis=1)[None]
+    residual = np.random.default_rng(0).standard_normal((1, 100))
+    residual /= np.sqrt(np.mean(residual**2))
+    information = jacobian[0].T @ jacobian[0]
+    found = sandwich([residual], [jacobian], information, np.zeros((3, 3)))
+    assert np.isinf(found[[0, 1], [0, 1]]).all()
+    assert found[2, 2] == pytest.approx(1.0 / 97.0, rel=1e-9)  # less three that were fitted
