@@ -88,3 +88,8 @@ def best_of(contenders: Sequence[Contender]) -> Point | None:
     """
     sure = [p for p in points_of(contenders) if len(p.effects) == 1 or not p.unsure]
     return min(sure, key=lambda p: p.cost, default=None)
+
+
+def costs_of(contenders: Sequence[Contender]) -> dict[str, float]:
+    """The cost of those that show, by effect."""
+    return {c.effect: c.point.cost for c in contenders if c.point is not None}

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.held_out import Plan
     from plant_emulator.diagnosis.model import Model
     from plant_emulator.diagnosis.pool import Pool, Recipe
-    from plant_emulator.diagnosis.rounds import Progress
     from plant_emulator.diagnosis.shrink import Gap, Prediction
+    from plant_emulator.diagnosis.told_pool import Progress
     from plant_emulator.diagnosis.verdict import Verdict
 
 

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.explain import Contender, Explanation
     from plant_emulator.diagnosis.model import Model
     from plant_emulator.diagnosis.pool import Pool, Recipe
-    from plant_emulator.diagnosis.rounds import Progress
     from plant_emulator.diagnosis.shrink import Prediction
+    from plant_emulator.diagnosis.told_pool import Progress
 
 # Effects whose held-out gain is computed beside those accepted: the best ones only, each takes a
 # fit a fold.

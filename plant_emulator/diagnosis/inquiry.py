@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.explain import Explanation
     from plant_emulator.diagnosis.model import Model
     from plant_emulator.diagnosis.pool import Pool, Recipe
-    from plant_emulator.diagnosis.rounds import Progress
+    from plant_emulator.diagnosis.told_pool import Progress
     from plant_emulator.diagnosis.verdict import Verdict
 
 # Structure of a residual, as a share of its squares beyond the noise, up to which it may be chance:

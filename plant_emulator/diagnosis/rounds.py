@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import inf
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.contenders import (
     beside,
@@ -24,7 +24,8 @@ from plant_emulator.diagnosis.contenders import (
     with_point,
 )
 from plant_emulator.diagnosis.contest import ASTRAY, WORTH
-from plant_emulator.diagnosis.explain import NOISE_LEFT, THRESHOLD, excess
+from plant_emulator.diagnosis.explain import NOISE_LEFT, THRESHOLD
+from plant_emulator.diagnosis.nominal import POLISHED, FromNominal, could_close
 from plant_emulator.diagnosis.restarts import Restarts
 from plant_emulator.diagnosis.rules import SECOND, noise_only
 from plant_emulator.diagnosis.steps import (
@@ -32,29 +33,25 @@ from plant_emulator.diagnosis.steps import (
     contend,
     contend_far,
     follow,
-    once_more,
     plod,
     refit,
     show,
 )
-from plant_emulator.diagnosis.valleys import WIDEST
+from plant_emulator.diagnosis.told_pool import ToldPool
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.diagnosis.explain import Contender
     from plant_emulator.diagnosis.model import Model
     from plant_emulator.diagnosis.pool import Pool, Recipe
     from plant_emulator.diagnosis.signature import Signature
-
-    Progress = Callable[[str, float], None]
-
-Found = TypeVar("Found")
+    from plant_emulator.diagnosis.told_pool import Progress
 
 RESTARTS = 3
-# Best of a round's first looks that are fitted, and best of these that are fitted to convergence.
-CHOSEN, POLISHED = 8, 4
+# Best of a round's first looks that are fitted; the best of these are fitted to convergence.
+CHOSEN = 8
 # Share of the gap that an effect closes where no other is likely to close more, and where none is
 # that a first look from a small size has missed.
 MOST, MUCH = 0.9, 0.5
@@ -85,12 +82,10 @@ class Rounds:
         runs: Sequence[int],
         progress: Progress | None = None,
     ) -> None:
-        self._pool, self._recipe, self._names = pool, recipe, tuple(names)
-        self._runs, self._progress = tuple(runs), progress
-        # Fits from the nominal parameters, after a few steps and at their end.
-        self._far: dict[tuple[object, str], Point] = {}
-        self._near: dict[tuple[object, str], Point] = {}
+        self._told = ToldPool(pool=pool, recipe=recipe, progress=progress)
+        self._names, self._runs = tuple(names), tuple(runs)
         self.restarts = Restarts(pool=pool, recipe=recipe, runs=self._runs)
+        self.nominal = FromNominal(told=self._told, restarts=self.restarts, runs=self._runs)
 
     def from_clear(self, base: Point, null: Point, stage: str) -> list[Contender]:
         """All effects on top of the drift of some runs, the best of them fitted.
@@ -111,7 +106,7 @@ class Rounds:
         """All effects on top of a fit: a first look at each, the best of them fitted.
 
         thorough : where none leaves little, those that could close it get a second look from a
-            larger size
+            larger size, or from the nominal parameters
         hasty : none is fitted to convergence where none closes much
         known : the fit with one more effect, where it has been made already
         """
@@ -135,7 +130,7 @@ class Rounds:
         if thorough and not explained(contenders) and not closed(contenders, base, MUCH):
             if base.effects or base.chi_squared <= LOST:
                 return self._from_afar(contenders, shown, base, stage)
-            contenders = self._surveyed(contenders, base, stage)
+            contenders = self.nominal.surveyed(contenders, base, stage)
         return contenders
 
     def deepened(self, contenders: Sequence[Contender], base: Point, stage: str) -> list[Contender]:
@@ -159,7 +154,7 @@ class Rounds:
         """Effects whose signature promises nothing, but may be wrong, fitted all the same."""
         wrong = {one.effect: one for one in signatures if one.concentrated}
         tasks = [Task(base=base, runs=self._runs, signature=one) for one in wrong.values()]
-        found = self._told(stage, tasks, self._pool.map(plod, self._recipe, tasks))
+        found = self._told.all_of(plod, tasks, stage)
         points = dict(zip(wrong, found, strict=True))
         return better_of(contenders, [replace(c, point=points.get(c.effect)) for c in contenders])
 
@@ -169,7 +164,7 @@ class Rounds:
         """The signatures of all other effects on top of a fit, and these after a first look."""
         names = [name for name in self._names if name not in {*base.effects, *but}]
         tasks = [Task(base=base, runs=self._runs, effect=name) for name in names]
-        found = self._told(stage, tasks, self._pool.map(show, self._recipe, tasks))
+        found = self._told.all_of(show, tasks, stage)
         shown = dict(zip(names, found, strict=True))
         promising = GLIMPSE if base.chi_squared <= NOISE_LEFT else -inf
         tasks = [
@@ -177,7 +172,7 @@ class Rounds:
             for name, one in shown.items()
             if one is not None and one.gain > promising
         ]
-        points = self._told(stage, tasks, self._pool.map(contend, self._recipe, tasks))
+        points = self._told.all_of(contend, tasks, stage)
         seen = dict(zip((task.effect for task in tasks), points, strict=True))
         return shown, [contender_of(name, one, seen.get(name)) for name, one in shown.items()]
 
@@ -192,9 +187,9 @@ class Rounds:
         large = [
             Task(base=base, runs=self._runs, effect=name, signature=one)
             for name, one in shown.items()
-            if one is not None and _could_close(one.raw, base)
+            if one is not None and could_close(one.raw, base)
         ]
-        found = self._told(stage, large, self._pool.map(contend_far, self._recipe, large))
+        found = self._told.all_of(contend_far, large, stage)
         points = dict(zip((task.effect for task in large), found, strict=True))
         again = [
             replace(c, point=p)
@@ -230,35 +225,6 @@ class Rounds:
             return found
         return self._fitted(found, base, POLISHED, refit, stage, done)
 
-    def from_nominal(
-        self, base: Point, contenders: Sequence[Contender], stage: str
-    ) -> list[Contender]:
-        """The best of some effects fitted from the nominal parameters, from where a few steps come
-        to and then from the best values of each unknown.
-
-        A few steps from afar end anywhere, but seldom far from where the valley lies. None is made
-        twice: without other effects the fit that they are on top of is of no account.
-        """
-        chosen = {(base.key if base.effects else (), c.effect): c for c in with_point(contenders)}
-        new = [key for key in chosen if key not in self._far]
-        tasks = [Task(base=base, runs=self._runs, effect=chosen[key].effect) for key in new]
-        found = self._told(stage, tasks, self._pool.map(once_more, self._recipe, tasks))
-        self._far.update(zip(new, found, strict=True))
-        best = sorted(chosen, key=lambda key: self._far[key].cost)[:POLISHED]
-        new = [key for key in best if key not in self._near]
-        points = self.restarts.sifted([self._far[key] for key in new])
-        tasks = [Task(base=point, runs=self._runs) for point in points]
-        ended = self._told(stage, tasks, self._pool.map(refit, self._recipe, tasks))
-        self._near.update(zip(new, ended, strict=True))
-        return [replace(chosen[key], point=self._near[key]) for key in best]
-
-    def _surveyed(
-        self, contenders: Sequence[Contender], base: Point, stage: str
-    ) -> list[Contender]:
-        """All that could close the gap, from the nominal parameters where that is better."""
-        able = [c for c in contenders if _could_close(c.raw, base)]
-        return better_of(contenders, self.from_nominal(base, able, stage))
-
     def restarted(self, base: Point, contenders: Sequence[Contender]) -> Point:
         """The best fit with the base's effects from the drift of the best contenders: a few steps
         from each, and on from where these lead lower.
@@ -286,14 +252,13 @@ class Rounds:
         """The best of a round started again from the nominal parameters and from some way off."""
         best = best_few(contenders, base, most)
         before = closed(contenders, base, MOST)
-        contenders = better_of(contenders, self.from_nominal(base, best, stage))
+        contenders = better_of(contenders, self.nominal.fitted(base, best, stage))
         if not base.effects and all(p.chi_squared > LOST for p in points_of(contenders)):
-            contenders = self._surveyed(contenders, base, stage)
+            contenders = self.nominal.surveyed(contenders, base, stage)
         if explained(contenders) or (closed(contenders, base, MOST) and not before):
             return list(contenders)
         best = best_few(contenders, base, most)
-        known = {p.key for p in self._near.values()}
-        new = {p.key: p for p in points_of(best) if p.key not in known}
+        new = {p.key: p for p in points_of(best) if not self.nominal.ended_at(p)}
         sifted = dict(zip(new, self.restarts.sifted([*new.values()]), strict=True))
         points = [sifted.get(p.key, p) for p in points_of(best)]
         first = [self.restarts.followed(point) for point in points[:1]]
@@ -313,23 +278,6 @@ class Rounds:
         """The best of a round taken a step further, but for those that are done."""
         best = [c for c in best_few(contenders, base, most) if c not in done]
         tasks = [Task(base=c.point, runs=self._runs) for c in best if c.point is not None]
-        fitted = self._told(stage, tasks, self._pool.map(step, self._recipe, tasks))
+        fitted = self._told.all_of(step, tasks, stage)
         further = {c.effect: replace(c, point=p) for c, p in zip(best, fitted, strict=True)}
         return [further.get(c.effect, c) for c in contenders]
-
-    def _told(self, stage: str, tasks: Sequence[Task], found: Iterator[Found]) -> list[Found]:
-        """All that is found, told as it comes."""
-        every = []
-        for done, one in enumerate(found):
-            if self._progress is not None:
-                self._progress(stage, (done + 1) / len(tasks))
-            every.append(one)
-        return every
-
-
-def _could_close(raw: float, base: Point) -> bool:
-    """Whether an effect, drift or not, changes as much as a fit leaves beyond the noise.
-
-    raw : norm of what it changes at its plausible size
-    """
-    return (WIDEST * raw) ** 2 > excess(base)

@@ -16,6 +16,8 @@ from plant_emulator.diagnosis.explain import (
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.contest import Point
 
+# More effects than that at once explain anything.
+MOST_EFFECTS = 2
 # Share of the gap that a first effect closes that is named without its evidence.
 PART_OF_GAP = 0.04
 # Evidence of a second effect where either leaves nothing but noise: one with angles of its own in

@@ -13,29 +13,26 @@ of every round start again from elsewhere, and all is gone through once more.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from plant_emulator.diagnosis.backward import Backward
 from plant_emulator.diagnosis.contenders import (
-    beside,
     best_of,
     better_of,
     closed,
+    costs_of,
     explained,
     least_cost,
-    points_of,
 )
 from plant_emulator.diagnosis.drifts import Drifts
 from plant_emulator.diagnosis.explain import (
-    MARGIN,
     NOISE_LEFT,
     THRESHOLD,
     Explanation,
     excess,
-    weighed,
 )
 from plant_emulator.diagnosis.rounds import MOST, MUCH, Rounds
-from plant_emulator.diagnosis.rules import FAINT, counts, enough, noise_only
+from plant_emulator.diagnosis.rules import MOST_EFFECTS, counts, enough, noise_only
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -43,17 +40,12 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.diagnosis.explain import Contender
     from plant_emulator.diagnosis.pool import Pool, Recipe
-    from plant_emulator.diagnosis.rounds import Progress
+    from plant_emulator.diagnosis.told_pool import Progress
 
-# Share of the gap that an effect closes, from a drift that no effect has led astray, where a second
-# is looked for before anything else.
-HALF = 0.5
 # Share of the gap that a better fit without effects closes when it has moved to another valley.
 MOVED = 0.5
 # Share of the gap that two may leave and be those: what other laws of them leave.
 OTHER_LAW = 0.05
-# More effects than that at once explain anything.
-MOST_EFFECTS = 2
 
 
 class Contest:
@@ -80,11 +72,11 @@ class Contest:
         self._reaches_noise, self._by_chance, self._null = reaches_noise, by_chance, null
         self._exact = frozenset(exact)
         self._rounds = Rounds(pool, recipe, names, runs, progress)
+        self._backward = Backward(rounds=self._rounds, counts=self._counts)
         self._drifts = Drifts(pool=pool, recipe=recipe, runs=tuple(runs))
         self._deep, self._from_clear_only = not reaches_noise, False
-        # Rounds on top of effects, and fits without one of these, by the fit: none is made twice.
+        # Rounds on top of effects, by the fit: none is made twice.
         self._on_top: dict[object, list[Contender]] = {}
-        self._refits: dict[object, Point] = {}
 
     def explain(self) -> Explanation:
         """Go through the contest."""
@@ -123,13 +115,10 @@ class Contest:
             if final.effects:
                 found = self._rounds.in_place(found, best)
                 best = best_of(found) or best
-            final, rivals = self._stand(best, found)
-            final, without = self._missed(final, null)
-            if self._faint(final, null, without):
-                final = self._rounds.restarts.followed(final, to_noise=False)
-                final, without = self._missed(final, null)
+            final, rivals = self._backward.stand(best, found)
+            final, without = self._backward.missed(final, null)
             if len(final.effects) == 1:
-                rivals = {final.effects[0]: _costs(contenders)}
+                rivals = {final.effects[0]: costs_of(contenders)}
             if frozenset(final.effects) in tried:
                 break  # each makes the other needless, in turn
             tried.add(frozenset(final.effects))
@@ -140,7 +129,7 @@ class Contest:
             contenders=tuple(contenders),
             rivals=rivals,
             unconverged=_unconverged(null, final),
-            without=_least(without, _costs(contenders)),
+            without=_least(without, costs_of(contenders)),
         )
 
     def _first(self, null: Point) -> tuple[Point, list[Contender]]:
@@ -186,7 +175,7 @@ class Contest:
             return null, [], False
         (base,) = starts
         contenders = self._rounds.from_clear(base, null, stage)
-        half = explained(contenders) or closed(contenders, base, HALF)
+        half = explained(contenders) or closed(contenders, base, MUCH)
         return null, contenders, half and null.cost - least_cost(contenders) > THRESHOLD
 
     def _from_all(self, null: Point, stage: str) -> tuple[Point, list[Contender]]:
@@ -219,42 +208,6 @@ class Contest:
         """Whether a second effect explains so much that nothing is likely to be astray."""
         return explained(found) or closed(found, base, MOST)
 
-    def _stand(
-        self, final: Point, last: Sequence[Contender]
-    ) -> tuple[Point, dict[str, dict[str, float]]]:
-        """Let every effect but the last stand the contest again; take the best in its place.
-
-        Where another takes an effect's place, the rest have new company, and stand once more.
-        """
-        rivals = {final.effects[-1]: _costs(last)}
-        for _ in range(MOST_EFFECTS**2):
-            waiting = [name for name in final.effects if name not in rivals]
-            if not waiting:
-                break
-            without = self._without(final, waiting[0])
-            known = final if noise_only(final) else None
-            stage = "standing again"
-            found = self._rounds.contend(without, stage, thorough=False, known=known)
-            best = best_of(found)
-            if best is not None and best.cost < final.cost - MARGIN:
-                final, rivals = best, {best.effects[-1]: _costs(found)}
-            else:
-                rivals[waiting[0]] = _costs(found)
-        return final, rivals
-
-    def _without(self, final: Point, name: str) -> Point:
-        """A fit without one of its effects, fitted again."""
-        rest = tuple(e for e in final.effects if e != name)
-        if (final.key, name) not in self._refits:
-            found = self._rounds.restarts.refitted(replace(final, effects=rest))
-            self._refits[final.key, name] = found
-        return self._refits[final.key, name]
-
-    def _alone(self, point: Point, null: Point) -> Point:
-        """The fit with one effect, or that from the nominal parameters, where that is better."""
-        found = self._rounds.from_nominal(null, [beside(point, null)], "standing again")
-        return min([point, *points_of(found)], key=lambda p: p.cost)
-
     def _counts(self, best: Point, base: Point, null: Point) -> bool:
         """Whether one more effect earns its place."""
         return counts(
@@ -266,30 +219,6 @@ class Contest:
             exact=self._exact.issuperset(base.effects),
         )
 
-    def _faint(self, final: Point, null: Point, without: Mapping[str, float]) -> bool:
-        """Whether one of two effects explains no more than what a fit may gain by leaving a hollow
-        of its valley.
-        """
-        return noise_only(final) and any(
-            weighed(cost - final.cost, final, null) < FAINT for cost in without.values()
-        )
-
-    def _missed(self, final: Point, null: Point) -> tuple[Point, dict[str, float]]:
-        """Without an effect that another has made needless; and the cost without each of several
-        that are all needed, by name.
-        """
-        costs: dict[str, float] = {}
-        if len(final.effects) < 2:
-            return final, costs
-        for name in final.effects:
-            without = self._without(final, name)
-            if self._counts(final, without, null) and without.chi_squared > NOISE_LEFT:
-                without = self._alone(without, null)
-            if not self._counts(final, without, null):
-                return without, {}
-            costs[name] = without.cost
-        return final, costs
-
 
 def _settled(found: Explanation) -> bool:
     """Whether a contest leaves so little that its fits are not astray."""
@@ -297,10 +226,6 @@ def _settled(found: Explanation) -> bool:
         return True
     both = len(found.final.effects) == MOST_EFFECTS
     return both and excess(found.final) <= OTHER_LAW * excess(found.null)
-
-
-def _costs(contenders: Sequence[Contender]) -> dict[str, float]:
-    return {c.effect: c.point.cost for c in contenders if c.point is not None}
 
 
 def _least(without: Mapping[str, float], alone: Mapping[str, float]) -> dict[str, float]:
