@@ -57,10 +57,11 @@ def admitted(
 
 def unlabelled(log: Log | AxisLog) -> None:
     """Refuse a log that carries its own answer."""
-    for column in log.other:
-        if any(TELLING.match(word.lower()) for word in WORD.findall(column)):
+    where = "variable" if log.source.endswith(".mat") else "line 1: column"
+    for name in log.other:
+        if any(TELLING.match(word.lower()) for word in WORD.findall(name)):
             raise DiagnosisError(
-                f"{log.source}: line 1: column {column} looks like the answer; a diagnosis must "
+                f"{log.source}: {where} {name} looks like the answer; a diagnosis must "
                 "not see it: take it out"
             )
 

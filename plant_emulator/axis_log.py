@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import gzip
 import zlib
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -81,20 +82,20 @@ def _matlab(path: Path) -> AxisLog:
         found = loadmat(path)
     except Exception as error:
         raise LogError(f"{path}: no readable MATLAB file up to version 7 ({error})") from error
+    other = tuple(name for name in found if not name.startswith("__"))
     if all(name in found for name in SCREW):
         time, position, voltage = (_vector(found, name, path) for name in SCREW[:3])
         force = voltage * _number(found, "gtau", path)
-        return _log(path, time, position, force, rotary=False)
+        return replace(_log(path, time, position, force, rotary=False), other=other)
     if all(name in found for name in MOTOR):
         table = _numbers(found, "data", path)
         if table.ndim != 2 or table.shape[1] != MOTOR_COLUMNS:
             raise LogError(f"{path}: data has shape {table.shape}; {MOTOR_COLUMNS} columns needed")
         torque = table[:, 6] * _number(found, "Cu", path)
-        return _log(path, table[:, 0], table[:, 2], torque, rotary=True)
-    names = ", ".join(sorted(name for name in found if not name.startswith("__")))
+        return replace(_log(path, table[:, 0], table[:, 2], torque, rotary=True), other=other)
     raise LogError(
-        f"{path}: variables {names}; known: {', '.join(SCREW)}, or {', '.join(MOTOR)}; "
-        "write any other log as CSV"
+        f"{path}: variables {', '.join(sorted(other))}; known: {', '.join(SCREW)}, "
+        f"or {', '.join(MOTOR)}; write any other log as CSV"
     )
 
 

@@ -64,6 +64,10 @@ def sandwich(
     inverse = (vectors[:, told] / values[told]) @ vectors[:, told].T / np.outer(scale, scale)
     covariance = inverse @ middle @ inverse
     covariance = 0.5 * (covariance + covariance.T)
+    # Between the frequencies where it was made positive, the spectrum of a tapered autocovariance
+    # may be negative; a variance that comes out so is that of white residuals.
+    for k in np.flatnonzero(np.diag(covariance) <= 0.0):
+        covariance[k], covariance[:, k] = inverse[k], inverse[k]
     unknown = np.flatnonzero(np.any(np.abs(vectors[:, ~told]) > PART, axis=1))
     covariance[unknown, unknown] = np.inf
     return np.asarray(covariance)

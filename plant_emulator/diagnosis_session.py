@@ -65,7 +65,7 @@ def loaded(
     hold: str | None = None,
 ) -> Loaded:
     """The logs as a recipe and a plan; an InputError says what cannot be used."""
-    files = tuple(Path(file) for file in own)
+    files = tuple(Path(file).absolute() for file in own)
     named = [effect.name for effect in effects.from_files(files)]
     _known(without, [*effects.names(), *named])
     recordings, notes = admitted([*paths, *held_out], parameters, hold)
@@ -212,13 +212,10 @@ def parameter_set(
     final, named = diagnosis.final, diagnosis.answer["verdict"]["effects"]
     own = {name: dict(diagnosis.fixed[name]) for name in named}
     for name in named:
-        prefix = f"{name}_"
-        own[name] |= {
-            key.removeprefix(prefix): value
-            for key, value in final.values.items()
-            if key.startswith(prefix)
-        }
-        own[name] |= _of_runs(kernel().effects[name], final.states, recordings)
+        effect = kernel().effects[name]
+        fitted = {key: final.values.get(f"{name}_{key}") for key in effect.parameters}
+        own[name] |= {key: value for key, value in fitted.items() if value is not None}
+        own[name] |= _of_runs(effect, final.states, recordings)
     changed = {n: v for n, v in final.values.items() if n in parameters.parameters}
     new = parameters.with_values(changed)
     kept = {

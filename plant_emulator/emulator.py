@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_emulator import effects, faults, logs, parameter_sets, truck
+from plant_emulator import effects, faults, known_set, logs, truck
 from plant_emulator.bench import Bench
 from plant_emulator.log import Log
 from plant_emulator.plc import STEPS, Plc
@@ -170,7 +170,7 @@ def build(options: Options) -> Emulator:
     """An emulator at rest; raises on anything in the options that does not exist."""
     register_map = load(options.map)
     active_faults = tuple(faults.parse(text) for text in options.faults)
-    parameters = parameter_sets.load(options.parameters)
+    parameters = known_set.load(options.parameters)
     chosen = effects.parse(options.effects)
     # The first call compiles: better here than in the first scan.
     Bench(parameters, chosen).advance([0.0] * STEPS)

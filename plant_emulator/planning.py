@@ -10,6 +10,7 @@ import numpy as np
 from plant_emulator.admission import admitted
 from plant_emulator.diagnosis.bench import BenchModel, BenchRecipe
 from plant_emulator.diagnosis.contest import Point, null_fit
+from plant_emulator.errors import ParameterError
 from plant_emulator.log import COMPARED
 from plant_emulator.programs import PROGRAMS
 from plant_emulator.recording import Recording
@@ -44,6 +45,10 @@ def prepared(
     Logs are fitted; programs are simulated at what the logs say, or at the set as given.
     """
     recorded = [name for name in names if name not in PROGRAMS or Path(name).is_file()]
+    for name in recorded:
+        if not Path(name).exists():
+            known = ", ".join(PROGRAMS)
+            raise ParameterError(f"{name}: neither a log file nor a program; known: {known}")
     recordings, notes = admitted(recorded, parameters, hold)
     values = parameters.values()
     states: tuple[dict[str, float], ...] = ()

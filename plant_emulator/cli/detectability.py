@@ -27,11 +27,11 @@ def command(
 
     And which effects they cannot tell apart, and what they lack for the rest.
     """
-    from plant_emulator import parameter_sets
+    from plant_emulator import known_set
     from plant_emulator.diagnosis.detect import as_answer, detectability
     from plant_emulator.planning import prepared
 
-    model, point, notes = prepared(runs, parameter_sets.load(parameters), reference)
+    model, point, notes = prepared(runs, known_set.load(parameters), reference)
     for note in notes:
         click.echo(f"note: {note}", err=True)
     found = detectability(model, point, range(len(runs)))

@@ -85,7 +85,7 @@ def command(
     """
     from threadpoolctl import threadpool_limits
 
-    from plant_emulator import parameter_sets
+    from plant_emulator import known_set, parameter_sets
     from plant_emulator.cli._progress import progress
     from plant_emulator.diagnosis.diagnose import Diagnose
     from plant_emulator.diagnosis.terminal import lines
@@ -98,7 +98,7 @@ def command(
     )
     from plant_emulator.workers import pool_of
 
-    given = parameter_sets.load(parameters)
+    given = known_set.load(parameters, own)
     if model == "axis":
         _only_of_the_bench()
         run = axis_loaded(logs, held_out, without=without)
@@ -125,6 +125,12 @@ def command(
     if save:
         parameter_sets.save(parameter_set(found, given, run.fitted), save)
         _own_in(save, own, found.answer["verdict"]["effects"])
+        if found.answer["verdict"]["kind"] == "unknown":
+            click.echo(
+                f"note: {save}: the cause is unknown: no effect is in it, and its parameters may "
+                "have moved to imitate one",
+                err=True,
+            )
     if report:
         from plant_emulator.diagnosis.report import html
 

@@ -53,7 +53,7 @@ def command(
     position in the backlash gap is fitted for every log. Standard errors come from the residuals,
     with their autocorrelation.
     """
-    from plant_emulator import effects, parameter_sets
+    from plant_emulator import effects, known_set, parameter_sets
     from plant_emulator.cli._progress import progress
     from plant_emulator.identification import identified
     from plant_emulator.identification_report import spreadsheet
@@ -63,7 +63,7 @@ def command(
         result = identified(
             logs,
             held_out,
-            parameter_sets.load(parameters),
+            known_set.load(parameters),
             free,
             effects=own,
             hold=reference,

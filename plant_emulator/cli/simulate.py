@@ -44,14 +44,14 @@ def command(
     A log's start position in the backlash gap is fitted to it unless --start middle; a program
     starts in the middle of the gap.
     """
-    from plant_emulator import effects, logs, parameter_sets
+    from plant_emulator import effects, known_set, logs
     from plant_emulator.logs import csv
     from plant_emulator.sensors import noisy
     from plant_emulator.session import simulated
 
     log = simulated(
         program,
-        parameter_sets.load(parameters),
+        known_set.load(parameters),
         effects.parse(effect_texts),
         hold=reference,
         start=start,

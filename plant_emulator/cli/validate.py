@@ -48,13 +48,13 @@ def command(
 
     Val1 = 100 (1 - NRMSD), Val2 = 100 (1 - sum|e| / sum|y|), percent.
     """
-    from plant_emulator import effects, parameter_sets
+    from plant_emulator import effects, known_set
     from plant_emulator import logs as log_files
     from plant_emulator.identification_report import measures, table_of, table_rows
     from plant_emulator.session import followed
     from plant_emulator.validate import validate, zero_phase
 
-    values, effect_values = parameter_sets.load(parameters), effects.parse(effect_texts)
+    values, effect_values = known_set.load(parameters), effects.parse(effect_texts)
     measured = [log_files.read(path) for path in logs]
     pairs = [(log, followed(log, values, effect_values, reference, start)) for log in measured]
     if cutoff is not None:

@@ -44,8 +44,7 @@ class Backward:
                 break
             without = self._without(final, waiting[0])
             known = final if noise_only(final) else None
-            stage = "standing again"
-            found = self.rounds.contend(without, stage, thorough=False, known=known)
+            found = self.rounds.contend(without, thorough=False, known=known)
             best = best_of(found)
             if best is not None and best.cost < final.cost - MARGIN:
                 final, rivals = best, {best.effects[-1]: costs_of(found)}
@@ -88,7 +87,7 @@ class Backward:
 
     def _alone(self, point: Point, null: Point) -> Point:
         """The fit with one effect, or that from the nominal parameters, where that is better."""
-        found = self.rounds.nominal.fitted(null, [beside(point, null)], "standing again")
+        found = self.rounds.nominal.fitted(null, [beside(point, null)])
         return min([point, *points_of(found)], key=lambda p: p.cost)
 
     def _faint(self, final: Point, null: Point, without: Mapping[str, float]) -> bool:

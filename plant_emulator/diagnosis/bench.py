@@ -263,5 +263,8 @@ class BenchRecipe:
         return BenchModel(self.recordings, self.parameters, self.contestants())
 
     def digest(self) -> str:
-        """Hash of all that the model is made of."""
-        return hashlib.sha256(pickle.dumps(self)).hexdigest()
+        """Hash of all that the model is made of, the text of a user's own effects too: a cluster's
+        worker outlives an edit of it.
+        """
+        texts = [path.read_bytes() for path in self.own]
+        return hashlib.sha256(pickle.dumps((self, texts))).hexdigest()

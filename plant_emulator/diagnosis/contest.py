@@ -17,8 +17,8 @@
     taken in one by one, then from the best values of each of its unknowns by a loss that forgives,
     and from some way off, along the floor of its valley and out of it, as long as that leads down;
     at once where none closes much, and else where a second effect beside it leaves more than noise.
- 6. The fit without effects starts again from every joint fit's drift: should it get as low, there
-    was no effect, only a better valley. One that has come to such is followed down it.
+ 6. The fit without effects starts again from the drift of the best joint fits: should it get as
+    low, there was no effect, only a better valley. One that has come to such is followed down it.
 
 Every step is a function of a model and plain data, so that steps run side by side on other
 processes.

@@ -10,12 +10,15 @@ from plant_emulator.diagnosis import place, shrink, verdict
 from plant_emulator.diagnosis.advice import Advice
 from plant_emulator.diagnosis.calibration import confidence
 from plant_emulator.diagnosis.details import Details
+from plant_emulator.diagnosis.explain import NOISE_LEFT, THRESHOLD
 from plant_emulator.diagnosis.held_out import NOMINAL, HeldOut
 from plant_emulator.diagnosis.inquiry import Inquiry
 from plant_emulator.diagnosis.pool import model_of
 from plant_emulator.diagnosis.rest import rest_of
+from plant_emulator.diagnosis.rules import SECOND
 from plant_emulator.diagnosis.steps import Task
 from plant_emulator.diagnosis.terms import in_terms
+from plant_emulator.diagnosis.told import Told
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -27,7 +30,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.model import Model
     from plant_emulator.diagnosis.pool import Pool, Recipe
     from plant_emulator.diagnosis.shrink import Gap, Prediction
-    from plant_emulator.diagnosis.told_pool import Progress
+    from plant_emulator.diagnosis.told import Progress
     from plant_emulator.diagnosis.verdict import Verdict
 
 
@@ -44,11 +47,20 @@ class Diagnosis:
     fixed: Mapping[str, Mapping[str, float]]
 
 
+# Of the contest, as the report tells them.
+THRESHOLDS = {
+    "evidence that an effect needs": f"{THRESHOLD:g}",
+    "evidence that a second one needs": f"{SECOND:g}",
+    "mean square over the noise up to which a fit leaves noise": f"{NOISE_LEFT:g}",
+}
+
+
 class Diagnose:
     """The steps from a plan to a diagnosis.
 
     cases : a blind trial's, for the confidence; None: there are none of this machine
     law_errors : of sizes by name, relative, see `law_error`
+    progress : told every step and its done share
     """
 
     def __init__(
@@ -63,9 +75,10 @@ class Diagnose:
         notes: Sequence[str] = (),
         progress: Progress | None = None,
     ) -> None:
-        self.pool, self.recipe, self.plan = pool, recipe, plan
+        self.pool = pool if progress is None else Told(pool, progress)
+        self.recipe, self.plan = recipe, plan
         self.model: Model = model_of(recipe)
-        self.settings, self.notes, self.progress = settings, tuple(notes), progress
+        self.settings, self.notes = settings, tuple(notes)
         self.cases = None if cases is None else tuple(cases)
         self.law_errors = law_errors or {}
         self.folds, self.predictable = plan.folds, True
@@ -77,7 +90,6 @@ class Diagnose:
             recipe=self.recipe,
             model=self.model,
             runs=self.plan.fitted,
-            progress=self.progress,
         )
         inquiry = inquiry.with_quiet_inputs()
         explained, found, quiet = inquiry.found()
@@ -86,7 +98,6 @@ class Diagnose:
             recipe=self.recipe,
             model=self.model,
             plan=self.plan,
-            progress=self.progress,
         )
         followed = _followed(explained, found)
         usable, notes = held_out.usable(explained, followed)
@@ -107,7 +118,7 @@ class Diagnose:
         runs = [self.model.runs[run] for _, some in self.folds for run in some]
         lengths = shrink.block_lengths(predicted[()])
         gaps = {key: shrink.gap(runs, some, lengths) for key, some in predicted.items()}
-        location = self._location(explained, found)
+        location, maps = self._location(explained, found)
         final = parts.with_chance(explained) if found.effects else explained.null
         followed = _followed(explained, found)
         traces = parts.traces(runs, predicted[()], predicted[followed])
@@ -157,9 +168,10 @@ class Diagnose:
         details = Details(
             traces=traces,
             waterfall=parts.waterfall(gaps, followed),
-            settings=self.settings,
+            settings={**self.settings, **THRESHOLDS},
             notes=self.notes,
             rest=rest,
+            maps=maps,
         )
         return Diagnosis(
             answer=answer,
@@ -172,14 +184,18 @@ class Diagnose:
         fixed = self.model.candidates[name].fixed
         return {key.removeprefix(f"{name}_"): value for key, value in fixed.items()}
 
-    def _location(self, explained: Explanation, found: Verdict) -> dict[str, Any]:
+    def _location(
+        self, explained: Explanation, found: Verdict
+    ) -> tuple[dict[str, Any], Mapping[str, Any]]:
+        """The answer's location, and the residual map by axis."""
         task = Task(base=explained.null, runs=self.plan.fitted)
         (located,) = self.pool.map(place.site, self.recipe, [task])
         shares = place.evidence_shares(explained, self.model.candidates)
         if located is not None:
             shares = {entry["name"]: entry["share"] for entry in located["subsystems"]}
         where = place.subsystem(found, self.model.candidates, shares)
-        return place.location(where, shares, located)
+        maps = {} if located is None else located["maps"]
+        return place.location(where, shares, located), maps
 
     def _closed(
         self, found: Verdict, followed: tuple[str, ...], gaps: Mapping[tuple[str, ...], Gap]

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.model import Model
     from plant_emulator.diagnosis.pool import Pool, Recipe
     from plant_emulator.diagnosis.shrink import Prediction
-    from plant_emulator.diagnosis.told_pool import Progress
 
 # Effects whose held-out gain is computed beside those accepted: the best ones only, each takes a
 # fit a fold.
@@ -52,7 +51,6 @@ class HeldOut:
     recipe: Recipe
     model: Model
     plan: Plan
-    progress: Progress | None = None
 
     def usable(
         self, explained: Explanation, followed: tuple[str, ...]
@@ -74,7 +72,7 @@ class HeldOut:
                 usable.append(fold)
                 continue
             lost = ", ".join(self.model.runs[run].source for run in fold[1])
-            notes.append(f"{lost}: not predicted; the other runs do not show {hidden[0]}")
+            notes.append(f"{lost}: shows no shrinkage; the other runs do not show {hidden[0]}")
         return tuple(usable), tuple(notes)
 
     def predictions(
@@ -101,9 +99,7 @@ class HeldOut:
                 tasks.append(self._fold(start, fitted, predicted, refitted=key != NOMINAL))
         found_all: dict[tuple[str, ...], list[Prediction]] = {}
         answers = self.pool.map(shrink.predict, self.recipe, tasks)
-        for done, (key, prediction) in enumerate(zip(keys, answers, strict=True)):
-            if self.progress is not None:
-                self.progress("held-out runs", (done + 1) / len(keys))
+        for key, prediction in zip(keys, answers, strict=True):
             found_all.setdefault(key, []).append(prediction)
         return found_all
 

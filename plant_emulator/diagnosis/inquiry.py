@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.explain import Explanation
     from plant_emulator.diagnosis.model import Model
     from plant_emulator.diagnosis.pool import Pool, Recipe
-    from plant_emulator.diagnosis.told_pool import Progress
     from plant_emulator.diagnosis.verdict import Verdict
 
 # Structure of a residual, as a share of its squares beyond the noise, up to which it may be chance:
@@ -41,7 +40,6 @@ class Inquiry:
     recipe: Recipe
     model: Model
     runs: tuple[int, ...]
-    progress: Progress | None = None
     null: Point | None = None
 
     def with_quiet_inputs(self) -> Inquiry:
@@ -72,7 +70,6 @@ class Inquiry:
             recipe,
             tuple(self.model.candidates),
             self.runs,
-            self.progress,
             reaches_noise=self.model.reaches_noise,
             by_chance=by_chance,
             null=null,

@@ -60,19 +60,19 @@ class Location:
     gain: float
     cells: tuple[Cell, ...]
 
-    def entries(self, axis: str = "phase") -> list[dict[str, Any]]:
-        """The map's entries along one axis."""
-        return [cell.as_entry() for cell in self.cells if cell.axis == axis]
-
     def as_answer(self) -> dict[str, Any]:
-        """The part `location` of the answer."""
+        """The part `location` of the answer; and `maps`: the residual map by axis."""
+        maps: dict[str, list[dict[str, Any]]] = {}
+        for cell in self.cells:
+            maps.setdefault(cell.axis, []).append(cell.as_entry())
         ordered = sorted(self.shares.items(), key=lambda pair: -pair[1])
         return {
             "subsystem": self.subsystem,
             "channel": self.channel,
             "phase": self.phase,
             "subsystems": [{"name": name, "share": share} for name, share in ordered],
-            "map": self.entries(),
+            "map": maps["phase"],
+            "maps": maps,
         }
 
 

@@ -135,7 +135,8 @@ class Model(Protocol):
     def located(self, where: Point, runs: Sequence[int]) -> Mapping[str, Any] | None:
         """Where the gap of a fit without effects lies, without any hypothesis of its cause.
 
-        In the form of the answer's `location`; None: this machine has no blocks to tell apart.
+        In the form of the answer's `location`, and the residual map along all axes as `maps`; None:
+        this machine has no blocks to tell apart.
         """
 
     def with_planned(self, where: Point, runs: Sequence[int]) -> Model:

@@ -15,21 +15,22 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.diagnosis.explain import Contender
+    from plant_emulator.diagnosis.pool import Pool, Recipe
     from plant_emulator.diagnosis.restarts import Restarts
-    from plant_emulator.diagnosis.told_pool import ToldPool
 
 # Best after a few steps that are fitted to convergence.
 POLISHED = 4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class FromNominal:
     """Fits from the nominal parameters on a diagnosis's pool, none made twice.
 
     runs : by number
     """
 
-    told: ToldPool
+    pool: Pool
+    recipe: Recipe
     restarts: Restarts
     runs: tuple[int, ...]
     # By the effects before and the last one: the points after a few steps, and at their end.
@@ -40,7 +41,7 @@ class FromNominal:
         """Whether a fit from the nominal parameters has ended there."""
         return point.key in {p.key for p in self._near.values()}
 
-    def fitted(self, base: Point, contenders: Sequence[Contender], stage: str) -> list[Contender]:
+    def fitted(self, base: Point, contenders: Sequence[Contender]) -> list[Contender]:
         """The best of some effects fitted from the nominal parameters, from where a few steps come
         to and then from the best values of each unknown.
 
@@ -50,20 +51,20 @@ class FromNominal:
         chosen = {(base.key if base.effects else (), c.effect): c for c in with_point(contenders)}
         new = [key for key in chosen if key not in self._far]
         tasks = [Task(base=base, runs=self.runs, effect=chosen[key].effect) for key in new]
-        found = self.told.all_of(once_more, tasks, stage)
+        found = list(self.pool.map(once_more, self.recipe, tasks))
         self._far.update(zip(new, found, strict=True))
         best = sorted(chosen, key=lambda key: self._far[key].cost)[:POLISHED]
         new = [key for key in best if key not in self._near]
         points = self.restarts.sifted([self._far[key] for key in new])
         tasks = [Task(base=point, runs=self.runs) for point in points]
-        ended = self.told.all_of(refit, tasks, stage)
+        ended = list(self.pool.map(refit, self.recipe, tasks))
         self._near.update(zip(new, ended, strict=True))
         return [replace(chosen[key], point=self._near[key]) for key in best]
 
-    def surveyed(self, contenders: Sequence[Contender], base: Point, stage: str) -> list[Contender]:
+    def surveyed(self, contenders: Sequence[Contender], base: Point) -> list[Contender]:
         """All that could close the gap, from the nominal parameters where that is better."""
         able = [c for c in contenders if could_close(c.raw, base)]
-        return better_of(contenders, self.fitted(base, able, stage))
+        return better_of(contenders, self.fitted(base, able))
 
 
 def could_close(raw: float, base: Point) -> bool:

@@ -60,7 +60,7 @@ def html(answer: Mapping[str, Any], details: Details) -> str:
         "main",
         _verdict(answer, units),
         _shrinkage(answer, details),
-        _location(answer["location"], units),
+        _location(answer["location"], details.maps, units),
         _rest(details.rest),
         _effects(answer),
         _parameters(verdict),
@@ -125,10 +125,15 @@ def _shrinkage(answer: Mapping[str, Any], details: Details) -> Markup:
     return _section("How far the gap shrinks", *parts)
 
 
-def _location(location: Mapping[str, Any], units: Mapping[str, str]) -> Markup:
+def _location(
+    location: Mapping[str, Any],
+    maps: Mapping[str, Sequence[Mapping[str, Any]]],
+    units: Mapping[str, str],
+) -> Markup:
     parts = []
     if location["map"]:
         parts.append(tables.residual_map(location, units))
+        parts += tables.residual_maps(maps, units)
     if location["subsystems"]:
         parts.append(tables.subsystems(location))
     return _section("Where it lies", *(parts or [tag("p", "Nothing stands out of the noise.")]))

@@ -23,12 +23,20 @@ from plant_emulator.diagnosis.wording import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from plant_emulator.diagnosis.details import Trace
 
 # From which multiple of the noise a cell of the map takes which tint.
 HEAT = ((10.0, "heat4"), (5.0, "heat3"), (2.0, "heat2"), (1.2, "heat1"))
+# Axes of the residual map but the phase, in words.
+AXES = {
+    "speed": "the motor's speed",
+    "load": "load on the drum",
+    "direction": "direction",
+    "frequency": "frequency",
+    "time": "time since the start of the run",
+}
 # Half width of a 95 % interval in standard errors.
 NORMAL_95 = 1.96
 PLUS_MINUS = "\N{PLUS-MINUS SIGN}"
@@ -78,30 +86,52 @@ def _pooled(traces: Sequence[Trace], both: bool) -> list[str]:
 
 def residual_map(location: Mapping[str, Any], units: Mapping[str, str]) -> Markup:
     """Channel by phase: the gap over the noise, tinted, and the gap in the channel's unit."""
-    cells = {(c["channel"], c["phase"]): c for c in location["map"]}
-    channels = list(dict.fromkeys(c for c, _ in cells))
-    seen = dict.fromkeys(p for _, p in cells)
+    seen = dict.fromkeys(c["phase"] for c in location["map"])
     phases = [p for p in PHASES if p in seen] + [p for p in seen if p not in PHASES]
-    here = (location["channel"], location["phase"])
+    return _map(
+        location["map"],
+        "phase",
+        phases,
+        units,
+        "Residual by channel and phase of operation, in multiples of the noise, and in the "
+        "channel's unit. Darker tint: from 1.2, 2, 5 and 10 times the noise. Framed: the place "
+        "that the answer names.",
+        (location["channel"], location["phase"]),
+    )
+
+
+def residual_maps(
+    maps: Mapping[str, Sequence[Mapping[str, Any]]], units: Mapping[str, str]
+) -> Iterator[Markup]:
+    """The same along the other axes."""
+    for axis, words in AXES.items():
+        if axis in maps:
+            bins = list(dict.fromkeys(c[axis] for c in maps[axis]))
+            yield _map(maps[axis], axis, bins, units, f"The same by {words}.")
+
+
+def _map(
+    entries: Sequence[Mapping[str, Any]],
+    axis: str,
+    bins: Sequence[str],
+    units: Mapping[str, str],
+    caption: str,
+    here: tuple[str, str] | None = None,
+) -> Markup:
+    cells = {(c["channel"], c[axis]): c for c in entries}
+    channels = list(dict.fromkeys(c for c, _ in cells))
     rows = [
         tag(
             "tr",
             row_head(spoken(channel)),
             *(
-                _map_cell(cells.get((channel, p)), units.get(channel), (channel, p) == here)
-                for p in phases
+                _map_cell(cells.get((channel, name)), units.get(channel), (channel, name) == here)
+                for name in bins
             ),
         )
         for channel in channels
     ]
-    return table(
-        "Residual by channel and phase of operation, in multiples of the noise, and in the "
-        "channel's unit. Darker tint: from 1.2, 2, 5 and 10 times the noise. Framed: the place "
-        "that the answer names.",
-        ["channel", *(right(spoken(p)) for p in phases)],
-        rows,
-        "map",
-    )
+    return table(caption, ["channel", *(right(spoken(name)) for name in bins)], rows, "map")
 
 
 def _map_cell(found: Mapping[str, Any] | None, unit: str | None, here: bool) -> Markup:

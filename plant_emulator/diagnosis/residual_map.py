@@ -43,11 +43,6 @@ class Cell:
     noise: float
     samples: int
 
-    @property
-    def excess(self) -> float:
-        """What of the sum of squares is more than noise, in units of the noise's variance."""
-        return self.samples * ((self.gap / self.noise) ** 2 - 1.0)
-
     def as_entry(self) -> dict[str, Any]:
         """As the answer's map has it."""
         return {"channel": self.channel, self.axis: self.bin, "gap": self.gap, "noise": self.noise}

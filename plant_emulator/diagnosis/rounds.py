@@ -37,7 +37,6 @@ from plant_emulator.diagnosis.steps import (
     refit,
     show,
 )
-from plant_emulator.diagnosis.told_pool import ToldPool
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -47,7 +46,6 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.model import Model
     from plant_emulator.diagnosis.pool import Pool, Recipe
     from plant_emulator.diagnosis.signature import Signature
-    from plant_emulator.diagnosis.told_pool import Progress
 
 RESTARTS = 3
 # Best of a round's first looks that are fitted; the best of these are fitted to convergence.
@@ -70,7 +68,7 @@ LOST = 4.0
 class Rounds:
     """The rounds of one diagnosis on its pool.
 
-    names : of the effects; runs : by number; progress : told the stage and its done share
+    names : of the effects; runs : by number
     restarts : of single fits
     """
 
@@ -80,24 +78,24 @@ class Rounds:
         recipe: Recipe,
         names: Sequence[str],
         runs: Sequence[int],
-        progress: Progress | None = None,
     ) -> None:
-        self._told = ToldPool(pool=pool, recipe=recipe, progress=progress)
+        self._pool, self._recipe = pool, recipe
         self._names, self._runs = tuple(names), tuple(runs)
         self.restarts = Restarts(pool=pool, recipe=recipe, runs=self._runs)
-        self.nominal = FromNominal(told=self._told, restarts=self.restarts, runs=self._runs)
+        self.nominal = FromNominal(
+            pool=pool, recipe=recipe, restarts=self.restarts, runs=self._runs
+        )
 
-    def from_clear(self, base: Point, null: Point, stage: str) -> list[Contender]:
+    def from_clear(self, base: Point, null: Point) -> list[Contender]:
         """All effects on top of the drift of some runs, the best of them fitted.
 
         null : the fit without effects to all runs
         """
-        return self._taken_further(self._looked(base, stage)[1], null, stage)
+        return self._taken_further(self._looked(base)[1], null)
 
     def contend(
         self,
         base: Point,
-        stage: str,
         *,
         thorough: bool,
         hasty: bool = False,
@@ -111,60 +109,59 @@ class Rounds:
         known : the fit with one more effect, where it has been made already
         """
         there = [] if known is None else [beside(known, base)]
-        shown, contenders = self._looked(base, stage, but=[c.effect for c in there])
+        shown, contenders = self._looked(base, but=[c.effect for c in there])
         contenders += there
         if base.effects and noise_only(base):
-            contenders = self._sighted(contenders, base, stage)
+            contenders = self._sighted(contenders, base)
             if base.cost - least_cost(contenders) < SECOND:
                 return contenders
-        contenders = self._taken_further(contenders, base, stage, done=there, hasty=hasty)
+        contenders = self._taken_further(contenders, base, done=there, hasty=hasty)
         if base.chi_squared <= NOISE_LEFT:
             if not base.effects and base.cost - least_cost(contenders) < THRESHOLD:
                 signatures = [one for one in shown.values() if one is not None]
-                contenders = self._patiently(contenders, signatures, base, stage)
-                contenders = self._fitted(contenders, base, 1, refit, stage)
+                contenders = self._patiently(contenders, signatures, base)
+                contenders = self._fitted(contenders, base, 1, refit)
                 nothing = base.cost - least_cost(contenders) < THRESHOLD
                 if nothing and not noise_only(base):
-                    contenders = self._from_afar(contenders, shown, base, stage)
+                    contenders = self._from_afar(contenders, shown, base)
             return contenders
         if thorough and not explained(contenders) and not closed(contenders, base, MUCH):
             if base.effects or base.chi_squared <= LOST:
-                return self._from_afar(contenders, shown, base, stage)
-            contenders = self.nominal.surveyed(contenders, base, stage)
+                return self._from_afar(contenders, shown, base)
+            contenders = self.nominal.surveyed(contenders, base)
         return contenders
 
-    def deepened(self, contenders: Sequence[Contender], base: Point, stage: str) -> list[Contender]:
+    def deepened(self, contenders: Sequence[Contender], base: Point) -> list[Contender]:
         """The best of a round started again from elsewhere, where none leaves little and the fit
         that they are on top of may be astray.
         """
         if base.chi_squared <= ASTRAY or explained(contenders):
             return list(contenders)
         ended = [c for c in with_point(contenders) if c.point and c.point.converged]
-        contenders = self._fitted(contenders, base, POLISHED, refit, stage, ended)
+        contenders = self._fitted(contenders, base, POLISHED, refit, ended)
         one = base.effects or closed(contenders, base, MOST)
-        return self._moved(contenders, base, 1 if one else SHAKEN, stage)
+        return self._moved(contenders, base, 1 if one else SHAKEN)
 
     def _patiently(
         self,
         contenders: Sequence[Contender],
         signatures: Sequence[Signature],
         base: Point,
-        stage: str,
     ) -> list[Contender]:
         """Effects whose signature promises nothing, but may be wrong, fitted all the same."""
         wrong = {one.effect: one for one in signatures if one.concentrated}
         tasks = [Task(base=base, runs=self._runs, signature=one) for one in wrong.values()]
-        found = self._told.all_of(plod, tasks, stage)
+        found = list(self._pool.map(plod, self._recipe, tasks))
         points = dict(zip(wrong, found, strict=True))
         return better_of(contenders, [replace(c, point=points.get(c.effect)) for c in contenders])
 
     def _looked(
-        self, base: Point, stage: str, but: Sequence[str] = ()
+        self, base: Point, but: Sequence[str] = ()
     ) -> tuple[dict[str, Signature | None], list[Contender]]:
         """The signatures of all other effects on top of a fit, and these after a first look."""
         names = [name for name in self._names if name not in {*base.effects, *but}]
         tasks = [Task(base=base, runs=self._runs, effect=name) for name in names]
-        found = self._told.all_of(show, tasks, stage)
+        found = list(self._pool.map(show, self._recipe, tasks))
         shown = dict(zip(names, found, strict=True))
         promising = GLIMPSE if base.chi_squared <= NOISE_LEFT else -inf
         tasks = [
@@ -172,7 +169,7 @@ class Rounds:
             for name, one in shown.items()
             if one is not None and one.gain > promising
         ]
-        points = self._told.all_of(contend, tasks, stage)
+        points = list(self._pool.map(contend, self._recipe, tasks))
         seen = dict(zip((task.effect for task in tasks), points, strict=True))
         return shown, [contender_of(name, one, seen.get(name)) for name, one in shown.items()]
 
@@ -181,7 +178,6 @@ class Rounds:
         contenders: Sequence[Contender],
         shown: Mapping[str, Signature | None],
         base: Point,
-        stage: str,
     ) -> list[Contender]:
         """Effects that could close the gap fitted from a larger size, where that is better."""
         large = [
@@ -189,29 +185,28 @@ class Rounds:
             for name, one in shown.items()
             if one is not None and could_close(one.raw, base)
         ]
-        found = self._told.all_of(contend_far, large, stage)
+        found = list(self._pool.map(contend_far, self._recipe, large))
         points = dict(zip((task.effect for task in large), found, strict=True))
         again = [
             replace(c, point=p)
             for c in contenders
             if (p := points.get(c.effect)) is not None and p.cost < cost_of(c) - WORTH
         ]
-        return better_of(contenders, self._taken_further(again, base, stage))
+        return better_of(contenders, self._taken_further(again, base))
 
-    def _sighted(self, contenders: Sequence[Contender], base: Point, stage: str) -> list[Contender]:
+    def _sighted(self, contenders: Sequence[Contender], base: Point) -> list[Contender]:
         """The best effect on top of noise fitted to convergence, where it is worth that."""
         found = list(contenders)
         for step in (follow, refit):
             if base.cost - least_cost(found) < SIGHT:
                 break
-            found = self._fitted(found, base, 1, step, stage)
+            found = self._fitted(found, base, 1, step)
         return found
 
     def _taken_further(
         self,
         contenders: Sequence[Contender],
         base: Point,
-        stage: str,
         *,
         done: Sequence[Contender] = (),
         hasty: bool = False,
@@ -220,10 +215,10 @@ class Rounds:
 
         done : those that have been; hasty : see `contend`
         """
-        found = self._fitted(contenders, base, CHOSEN, follow, stage, done)
+        found = self._fitted(contenders, base, CHOSEN, follow, done)
         if hasty and not (explained(found) or closed(found, base, MUCH)):
             return found
-        return self._fitted(found, base, POLISHED, refit, stage, done)
+        return self._fitted(found, base, POLISHED, refit, done)
 
     def restarted(self, base: Point, contenders: Sequence[Contender]) -> Point:
         """The best fit with the base's effects from the drift of the best contenders: a few steps
@@ -246,15 +241,13 @@ class Rounds:
         again = [replace(c, point=found) for c in contenders if c.effect == found.effects[-1]]
         return better_of(contenders, again)
 
-    def _moved(
-        self, contenders: Sequence[Contender], base: Point, most: int, stage: str
-    ) -> list[Contender]:
+    def _moved(self, contenders: Sequence[Contender], base: Point, most: int) -> list[Contender]:
         """The best of a round started again from the nominal parameters and from some way off."""
         best = best_few(contenders, base, most)
         before = closed(contenders, base, MOST)
-        contenders = better_of(contenders, self.nominal.fitted(base, best, stage))
+        contenders = better_of(contenders, self.nominal.fitted(base, best))
         if not base.effects and all(p.chi_squared > LOST for p in points_of(contenders)):
-            contenders = self.nominal.surveyed(contenders, base, stage)
+            contenders = self.nominal.surveyed(contenders, base)
         if explained(contenders) or (closed(contenders, base, MOST) and not before):
             return list(contenders)
         best = best_few(contenders, base, most)
@@ -272,12 +265,11 @@ class Rounds:
         base: Point,
         most: int,
         step: Callable[[Model, Task], Point],
-        stage: str,
         done: Sequence[Contender] = (),
     ) -> list[Contender]:
         """The best of a round taken a step further, but for those that are done."""
         best = [c for c in best_few(contenders, base, most) if c not in done]
         tasks = [Task(base=c.point, runs=self._runs) for c in best if c.point is not None]
-        fitted = self._told.all_of(step, tasks, stage)
+        fitted = list(self._pool.map(step, self._recipe, tasks))
         further = {c.effect: replace(c, point=p) for c, p in zip(best, fitted, strict=True)}
         return [further.get(c.effect, c) for c in contenders]

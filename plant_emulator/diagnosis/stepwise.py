@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.contest import Point
     from plant_emulator.diagnosis.explain import Contender
     from plant_emulator.diagnosis.pool import Pool, Recipe
-    from plant_emulator.diagnosis.told_pool import Progress
 
 # Share of the gap that a better fit without effects closes when it has moved to another valley.
 MOVED = 0.5
@@ -62,7 +61,6 @@ class Contest:
         recipe: Recipe,
         names: Sequence[str],
         runs: Sequence[int],
-        progress: Progress | None = None,
         *,
         reaches_noise: bool = True,
         by_chance: float = 0.0,
@@ -71,7 +69,7 @@ class Contest:
     ) -> None:
         self._reaches_noise, self._by_chance, self._null = reaches_noise, by_chance, null
         self._exact = frozenset(exact)
-        self._rounds = Rounds(pool, recipe, names, runs, progress)
+        self._rounds = Rounds(pool, recipe, names, runs)
         self._backward = Backward(rounds=self._rounds, counts=self._counts)
         self._drifts = Drifts(pool=pool, recipe=recipe, runs=tuple(runs))
         self._deep, self._from_clear_only = not reaches_noise, False
@@ -92,9 +90,9 @@ class Contest:
     ) -> tuple[Point, list[Contender]]:
         """A first round in earnest: also from the fit to all runs, where that has not been done."""
         if self._from_clear_only and not closed(contenders, null, MOST):
-            null, found = self._from_all(null, "contest")
+            null, found = self._from_all(null)
             return self._confirmed(null, better_of(found, contenders))
-        return self._confirmed(null, self._rounds.deepened(contenders, null, "contest"))
+        return self._confirmed(null, self._rounds.deepened(contenders, null))
 
     def _stepped(self, null: Point, contenders: Sequence[Contender]) -> Explanation:
         """Forward and backward steps from the fit without effects and the first round on it."""
@@ -134,10 +132,9 @@ class Contest:
 
     def _first(self, null: Point) -> tuple[Point, list[Contender]]:
         """All effects on the fit without any, and that fit, started again from the best of them."""
-        stage = "contest"
-        null, contenders, self._from_clear_only = self._from_clear(null, stage)
+        null, contenders, self._from_clear_only = self._from_clear(null)
         if not self._from_clear_only:
-            null, found = self._from_all(null, stage)
+            null, found = self._from_all(null)
             contenders = better_of(found, contenders)
         return self._confirmed(null, contenders)
 
@@ -158,12 +155,12 @@ class Contest:
         if not stale and (explained(contenders) or closed(contenders, better, MOST)):
             return better, list(contenders)
         if moved:
-            again = self._searched(better, "contest")
+            again = self._searched(better)
             contenders = better_of(contenders, again)
             better = self._rounds.restarted(better, contenders)
         return better, list(contenders)
 
-    def _from_clear(self, null: Point, stage: str) -> tuple[Point, list[Contender], bool]:
+    def _from_clear(self, null: Point) -> tuple[Point, list[Contender], bool]:
         """The fit without effects, and all effects, from the drift of the runs that need none; and
         whether one explains half of what the others show. No effects where there are no such runs.
         """
@@ -174,32 +171,31 @@ class Contest:
         if null.chi_squared <= NOISE_LEFT or not clear:
             return null, [], False
         (base,) = starts
-        contenders = self._rounds.from_clear(base, null, stage)
+        contenders = self._rounds.from_clear(base, null)
         half = explained(contenders) or closed(contenders, base, MUCH)
         return null, contenders, half and null.cost - least_cost(contenders) > THRESHOLD
 
-    def _from_all(self, null: Point, stage: str) -> tuple[Point, list[Contender]]:
+    def _from_all(self, null: Point) -> tuple[Point, list[Contender]]:
         """The same from the fit without effects to all runs, started again where it leaves much."""
         if null.chi_squared > NOISE_LEFT:
             (null,) = self._rounds.restarts.shaken([null])
-        return null, self._searched(null, stage)
+        return null, self._searched(null)
 
-    def _searched(self, null: Point, stage: str) -> list[Contender]:
+    def _searched(self, null: Point) -> list[Contender]:
         """A first round; the best of it started again where none closes much, or in earnest."""
-        found = self._rounds.contend(null, stage, thorough=True)
+        found = self._rounds.contend(null, thorough=True)
         shallow = closed(found, null, MUCH) and not self._deep
-        return found if shallow else self._rounds.deepened(found, null, stage)
+        return found if shallow else self._rounds.deepened(found, null)
 
     def _further(self, base: Point) -> tuple[Point, list[Contender]]:
         """A fit with effects started again from the best others on top of it, and all of these."""
-        stage = "further effects"
         if base.key not in self._on_top:
             hasty = not self._deep
-            found = self._rounds.contend(base, stage, thorough=False, hasty=hasty)
+            found = self._rounds.contend(base, thorough=False, hasty=hasty)
             self._on_top[base.key] = found
         found = self._on_top[base.key]
         if self._deep:
-            found = self._rounds.deepened(found, base, stage)
+            found = self._rounds.deepened(found, base)
         elif not self._settles(found, base):
             return base, found
         return self._rounds.restarted(base, found), found

@@ -38,10 +38,11 @@ def _parameter(term: Term, where: Estimate) -> dict[str, Any]:
     for k in shared:
         step = STEP * np.eye(len(where.z))[k]
         slope[k] = (_at(term, where, step) - _at(term, where, -step)) / (2.0 * STEP)
+    on = np.flatnonzero(slope)  # an unknown that the term is not of may have an infinite variance
     return {
         "name": term.name,
         "value": _at(term, where, np.zeros(len(where.z))),
-        "standard_error": float(np.sqrt(slope @ where.covariance @ slope)),
+        "standard_error": float(np.sqrt(slope[on] @ where.covariance[np.ix_(on, on)] @ slope[on])),
         "unit": term.unit,
     }
 

@@ -111,6 +111,8 @@ def times_noise(
 
 def logs_used(logs: Mapping[str, Sequence[str]]) -> str:
     """How many logs were fitted, and how many held out; the same ones are held out in turn."""
+    if len(logs["estimation"]) == 1 and logs["estimation"] == logs["held_out"]:
+        return "1 log, its last part held out"
     if len(logs["estimation"]) > 1 and set(logs["estimation"]) == set(logs["held_out"]):
         return f"{len(logs['estimation'])} logs, each held out in turn"
     kinds = {"estimation": "fitted", "held_out": "held out"}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -52,7 +53,9 @@ def text(parameters: ParameterSet) -> str:
 
 
 def _entries(parameter: Parameter) -> dict[str, object]:
-    """What the file says of a parameter; a calculated value is left to be calculated."""
+    """What the file says of a parameter; a calculated value is left to be calculated, and an error
+    that is infinite is no information.
+    """
     calculated = parameter.kind == "calculated"
     entries = {
         "symbol": parameter.symbol,
@@ -63,7 +66,7 @@ def _entries(parameter: Parameter) -> dict[str, object]:
         "standard_error": parameter.standard_error,
         "source": parameter.source,
     }
-    return {key: value for key, value in entries.items() if value is not None}
+    return {key: value for key, value in entries.items() if value not in (None, inf)}
 
 
 def _table(name: str, entries: dict[str, object]) -> str:

@@ -9,7 +9,8 @@ import pytest
 from scipy.io import savemat
 
 from plant_emulator import axis_log
-from plant_emulator.errors import LogError
+from plant_emulator.admission import unlabelled
+from plant_emulator.errors import DiagnosisError, LogError
 
 TIME = np.arange(5) * 1e-3
 LINEAR = "time_s,position_m,force_N,label\n0,0.1,5,1\n0.001,0.2,-6.5,1\n0.002,0.3,7,1\n"
@@ -139,3 +140,11 @@ def test_a_damaged_matlab_file_is_told(tmp_path: Path) -> None:
 def test_a_file_that_is_not_there_is_told(tmp_path: Path) -> None:
     with pytest.raises(LogError, match=r"nothing\.csv: no such file"):
         axis_log.read(tmp_path / "nothing.csv")
+
+
+def test_a_variable_that_looks_like_the_answer_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "run.mat"
+    time = np.arange(100.0) * 1e-3
+    savemat(path, {"t": time, "qm": time, "vir": time, "gtau": 2.0, "true_effect": "friction"})
+    with pytest.raises(DiagnosisError, match=r"run\.mat: variable true_effect looks like"):
+        unlabelled(axis_log.read(path))

@@ -245,3 +245,21 @@ def test_what_two_unknowns_share_alone_is_known_of_neither() -> None:
     found = sandwich([residual], [jacobian], information, np.zeros((3, 3)))
     assert np.isinf(found[[0, 1], [0, 1]]).all()
     assert found[2, 2] == pytest.approx(1.0 / 97.0, rel=1e-9)  # less three that were fitted
+
+
+def test_a_variance_that_a_tapered_autocovariance_makes_negative_is_that_of_white_residuals() -> (
+    None
+):
+    """The spectrum of a step in the residual, tapered, falls below 0 between the frequencies of its
+    Fourier transform; an unknown that acts at such a frequency only has J'J = 600 / 2 by hand.
+    """
+    n = np.arange(600)
+    residual = np.where(n < 300, 5.0, -5.0) + np.random.default_rng(1).standard_normal(600)
+    variances = []
+    for frequency in np.linspace(0.01, 0.05, 401):
+        slope = np.sin(2.0 * np.pi * frequency * n)[None, :, None]
+        information = np.array([[float((slope**2).sum())]])
+        found = sandwich([residual[None]], [slope], information, np.zeros((1, 1)))
+        variances.append(found[0, 0])
+    assert min(variances) > 0.0
+    assert min(abs(v * 300.0 - 1.0) for v in variances) < 0.05  # some of them are of the white kind

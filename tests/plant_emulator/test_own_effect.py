@@ -10,8 +10,10 @@ from click.testing import CliRunner
 
 from plant_emulator import compiler, effects, parameter_sets
 from plant_emulator.cli import main
+from plant_emulator.diagnosis.bench import BenchRecipe
 from plant_emulator.errors import ParameterError
 from plant_emulator.kernel import build
+from plant_emulator.parameters import ParameterSet
 from tests.plant_emulator.runs import linear, needs_compiler, simulate
 
 ROOT = Path(__file__).parents[2]
@@ -330,3 +332,16 @@ def test_function_may_bear_the_name_of_a_field_that_it_reads(
     inputs = linear((0.0, 0.0), (0.5, 50.0), duration=0.5)
     log = simulate(inputs, {**parameter_sets.load().values(), "own_factor": 5.0}, kernel=model)
     assert log["motor_speed"][-1] > 10.0
+
+
+def test_a_recipe_with_an_edited_effect_is_another_one(
+    nominal: ParameterSet, tmp_path: Path
+) -> None:
+    """A worker keeps the model of a recipe by its hash; the path alone would keep the old law."""
+    path = tmp_path / "oil_drag.py"
+    path.write_text(OIL_DRAG, encoding="utf-8")
+    recipe = BenchRecipe((), nominal, own=(path,))
+    before = recipe.digest()
+    assert recipe.digest() == before
+    path.write_text(OIL_DRAG.replace("factor * speed", "2.0 * factor * speed"), encoding="utf-8")
+    assert recipe.digest() != before

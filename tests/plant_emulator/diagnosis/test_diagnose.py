@@ -50,7 +50,7 @@ def test_run_that_alone_shows_the_effect_is_not_predicted_and_named() -> None:
     found = diagnosed(OnlyInTheFirst(runs, ["kink", "wave"]))
     assert found.answer["verdict"]["effects"] == ["kink"]
     assert found.answer["logs"]["held_out"] == ["run 1", "run 2"]
-    assert found.details.notes == ("run 0: not predicted; the other runs do not show kink",)
+    assert found.details.notes == ("run 0: shows no shrinkage; the other runs do not show kink",)
 
 
 def test_effect_that_every_run_shows_is_predicted_in_all() -> None:
@@ -102,8 +102,8 @@ def test_nothing_is_said_to_close_where_every_run_lacks_an_effect_of_another() -
     assert found.answer["gap"]["closed_fraction"] is None
     assert "closes" not in found.answer["verdict"]["statement"]
     assert found.details.notes == (
-        "run 0: not predicted; the other runs do not show kink",
-        "run 1: not predicted; the other runs do not show wave",
+        "run 0: shows no shrinkage; the other runs do not show kink",
+        "run 1: shows no shrinkage; the other runs do not show wave",
     )
 
 

@@ -155,6 +155,29 @@ def test_map_frames_the_named_place_and_no_other():
     assert not [c for c in page("none").iter("td") if "here" in c.get("class", "").split()]
 
 
+def test_residual_is_mapped_along_every_axis():
+    maps = {
+        "speed": [
+            {"channel": "armature_current", "speed": "0 to 25 rad/s", "gap": 0.5, "noise": 0.25},
+            {"channel": "armature_current", "speed": "25 to 50 rad/s", "gap": 1.0, "noise": 0.25},
+        ],
+        "direction": [
+            {"channel": "shaft_torque", "direction": "backward", "gap": 0.3, "noise": 0.25}
+        ],
+    }
+    found = page("effect", replace(answers.DETAILS, maps=maps))
+    tables = {words(t.find("caption")): t for t in found.iter("table") if t.get("class") == "map"}
+    assert len(tables) == 3
+    rows = [words(r) for r in tables["The same by the motor's speed."].iter("tr")]
+    times = "\N{MULTIPLICATION SIGN}"
+    assert rows == [
+        "channel 0 to 25 rad/s 25 to 50 rad/s",
+        f"armature current 2.0 {times} 0.500 A 4.0 {times} 1.00 A",
+    ]
+    rows = [words(r) for r in tables["The same by direction."].iter("tr")]
+    assert rows == ["channel backward", f"shaft torque 1.2 {times} 0.300 N m"]
+
+
 def test_what_is_null_is_told_as_not_known_and_never_as_none_or_nan():
     for kind in answers.KINDS:
         told = words(page(kind).find("body"))

@@ -63,4 +63,5 @@ def test_white_noise_has_no_excess_in_any_bin(run: Recording) -> None:
     residual = np.random.default_rng(1).standard_normal(run.use.shape)
     cells = residual_map([run], [residual], BASE_SPEED)
     assert {c.axis for c in cells} == {"phase", "speed", "load", "direction", "time", "frequency"}
-    assert max(abs(c.excess) / np.sqrt(2.0 * c.samples) for c in cells) < 4.0
+    for c in cells:
+        assert abs((c.gap / c.noise) ** 2 - 1.0) < 4.0 * np.sqrt(2.0 / c.samples)

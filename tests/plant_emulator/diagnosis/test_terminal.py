@@ -145,6 +145,13 @@ def test_parameters_that_moved_are_counted_where_the_first_has_no_room():
     assert moved == "moved    gear_viscous_friction; drum_inertia; drum_inertia; and 2 more"
 
 
+def test_a_single_log_is_told_as_one():
+    answer = answers.KINDS["effect"]()
+    answer["logs"] = {"estimation": ["run.csv"], "held_out": ["run.csv"]}
+    told = lines(answer)[0]
+    assert "1 log, its last part held out" in told
+
+
 def test_logs_held_out_in_turn_are_told_as_such():
     answer = answers.effect()
     logs = ["a.csv", "b.csv", "c.csv"]
