@@ -48,6 +48,9 @@ GLANCE_SETTLED = 1e-4
 ADVANCED = 10
 # A size is certain from so many of its standard errors on.
 CERTAIN = 3.0
+# Share of the largest size allowed from which on an effect does what it can for something else:
+# what imitated another law of a first effect had come to 0.99 and more.
+AT_BOUND = 0.95
 # Mean square from which on a fit may lie in a wrong valley.
 ASTRAY = 1.5
 # What is known beforehand of a size that a prediction needs [plausible sizes].
@@ -172,12 +175,15 @@ def _largest(candidate: Candidate, values: Mapping[str, float]) -> float:
 
 
 def _sure(candidate: Candidate, found: Point) -> bool:
-    """Whether a size of an effect is not neutral by chance; without values of each run none has to
-    be told.
+    """Whether a size of an effect is not neutral by chance, and not as large as it may be; without
+    values of each run none has to be told.
     """
     return not candidate.states or any(
-        abs(found.values[u.name] - candidate.neutral[u.name]) > CERTAIN * found.errors[u.name]
+        abs(size) > CERTAIN * found.errors[u.name]
+        and abs(size) < AT_BOUND * abs((u.upper if size > 0.0 else u.lower) - neutral)
         for u in candidate.sizes
+        for neutral in (candidate.neutral[u.name],)
+        for size in (found.values[u.name] - neutral,)
     )
 
 

@@ -114,6 +114,11 @@ def excess(point: Point) -> float:
     return max(0.0, point.squares - (1.0 + NOISE_KNOWN) * point.samples)
 
 
+def evident(point: Point, null: Point) -> bool:
+    """Whether a fit with effects explains more than chance does."""
+    return weighed(null.cost - point.cost, point, null) >= THRESHOLD
+
+
 def adequate(point: Point, null: Point) -> bool:
     """Whether a model leaves so little of the gap that its cause is known."""
     return excess(point) <= max(LEFT * excess(null), THRESHOLD)

@@ -74,6 +74,7 @@ class Inquiry:
             by_chance=by_chance,
             null=null,
             exact=[name for name, one in self.model.candidates.items() if one.exact],
+            subsystems={name: one.subsystem for name, one in self.model.candidates.items()},
         )
         return contest.explain()
 

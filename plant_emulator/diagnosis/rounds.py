@@ -26,6 +26,7 @@ from plant_emulator.diagnosis.contenders import (
 from plant_emulator.diagnosis.contest import ASTRAY, WORTH
 from plant_emulator.diagnosis.explain import NOISE_LEFT, THRESHOLD
 from plant_emulator.diagnosis.nominal import POLISHED, FromNominal, could_close
+from plant_emulator.diagnosis.place import site
 from plant_emulator.diagnosis.restarts import Restarts
 from plant_emulator.diagnosis.rules import SECOND, noise_only
 from plant_emulator.diagnosis.steps import (
@@ -58,6 +59,8 @@ MOST, MUCH = 0.9, 0.5
 GLIMPSE = 5.0
 # Fall of the cost at first look that makes one more effect on top of noise worth a fit.
 SIGHT = 20.0
+# Share of the gap from which on a subsystem may be its place.
+PLACED = 0.3
 # Best of a round that start again from elsewhere.
 SHAKEN = 3
 # Mean square of a fit without effects, or with one, from which on it may lie so far from where the
@@ -219,6 +222,12 @@ class Rounds:
         if hasty and not (explained(found) or closed(found, base, MUCH)):
             return found
         return self._fitted(found, base, POLISHED, refit, done)
+
+    def located(self, null: Point) -> frozenset[str]:
+        """The subsystems that the gap of a fit without effects lies in, by themselves."""
+        (found,) = self._pool.map(site, self._recipe, [Task(base=null, runs=self._runs)])
+        shares = [] if found is None else found["subsystems"]
+        return frozenset(one["name"] for one in shares if one["share"] >= PLACED)
 
     def restarted(self, base: Point, contenders: Sequence[Contender]) -> Point:
         """The best fit with the base's effects from the drift of the best contenders: a few steps

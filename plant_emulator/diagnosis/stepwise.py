@@ -7,8 +7,9 @@ to stand the contest again, with all others in its place; and at the end each ha
 it is taken out, and the other fitted alone from there and from the nominal parameters.
 
 That a first effect leaves much may mean that there is a second, or that its fit is astray. The
-second is looked for first, which is cheaper; where the two leave more than noise as well, the best
-of every round start again from elsewhere, and all is gone through once more.
+second is looked for first, which is cheaper; where the two leave more than noise as well, the
+effects of the subsystem that the gap lies in, as found without any hypothesis, start from the
+nominal parameters, the best of every round from elsewhere, and all is gone through once more.
 """
 
 from __future__ import annotations
@@ -53,6 +54,7 @@ class Contest:
     by_chance : evidence of an effect of chance course, if the recipe's noise holds one
     null : the fit without effects, where it has been made already
     exact : names of effects whose law can have no other form
+    subsystems : that the effects belong to, by effect
     """
 
     def __init__(
@@ -66,9 +68,10 @@ class Contest:
         by_chance: float = 0.0,
         null: Point | None = None,
         exact: Collection[str] = (),
+        subsystems: Mapping[str, str] | None = None,
     ) -> None:
         self._reaches_noise, self._by_chance, self._null = reaches_noise, by_chance, null
-        self._exact = frozenset(exact)
+        self._exact, self._subsystems = frozenset(exact), subsystems or {}
         self._rounds = Rounds(pool, recipe, names, runs)
         self._backward = Backward(rounds=self._rounds, counts=self._counts)
         self._drifts = Drifts(pool=pool, recipe=recipe, runs=tuple(runs))
@@ -88,7 +91,12 @@ class Contest:
     def _deepened(
         self, null: Point, contenders: Sequence[Contender]
     ) -> tuple[Point, list[Contender]]:
-        """A first round in earnest: also from the fit to all runs, where that has not been done."""
+        """A first round in earnest: the effects of the place that the gap lies in from the nominal
+        parameters; and also from the fit to all runs, where that has not been done.
+        """
+        there = self._rounds.located(null)
+        found = [c for c in contenders if self._subsystems.get(c.effect) in there]
+        contenders = better_of(contenders, self._rounds.nominal.surveyed(found, null))
         if self._from_clear_only and not closed(contenders, null, MOST):
             null, found = self._from_all(null)
             return self._confirmed(null, better_of(found, contenders))

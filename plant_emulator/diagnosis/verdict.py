@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
-from plant_emulator.diagnosis.explain import STRUCTURED, adequate
+from plant_emulator.diagnosis.explain import STRUCTURED, adequate, evident
 from plant_emulator.diagnosis.rest import lies, shrinks
 from plant_emulator.diagnosis.wording import number, percent
 
@@ -95,7 +95,7 @@ def _of_contest(model: Model, explained: Explanation) -> Verdict:
     if model.reaches_noise and _structured(explained):
         reason = "what is left is as small as the noise, but not as random"
         return Verdict(kind="unknown", effects=(), shifts=moved, reason=reason)
-    if final.unsure:
+    if final.unsure and not (len(final.effects) == 1 and evident(final, null)):
         name = final.unsure[0]
         reason = f"it differs between the runs; {name} would do, but no size of it is certain"
         return Verdict(kind="unknown", effects=(), shifts=moved, reason=reason)

@@ -221,8 +221,28 @@ def test_effect_whose_values_of_the_runs_explain_all_is_not_named_without_a_size
     model = of_runs(Line([noisy(2.0 + 3.0 * TIME + 0.8 * np.sin(20.0 * TIME))], ["wave"]))
     found = explained(model)
     assert decide(model, found).kind == "effect"
-    chance = replace(found.final, unsure=("wave",))
+    unsure = replace(found.final, unsure=("wave",))
+    chance = replace(unsure, cost=found.null.cost - 15.0)
     assert decide(model, replace(found, final=chance)).kind == "unknown"
+
+
+def test_effect_that_explains_more_than_chance_needs_no_certain_size() -> None:
+    """A size and values of the runs that trade: neither is certain, but one cannot do without."""
+    model = of_runs(Line([noisy(2.0 + 3.0 * TIME + 0.8 * np.sin(20.0 * TIME))], ["wave"]))
+    found = explained(model)
+    unsure = replace(found.final, unsure=("wave",))
+    assert found.null.cost - unsure.cost > 100.0
+    assert decide(model, replace(found, final=unsure)).effects == ("wave",)
+
+
+def test_size_as_large_as_it_may_be_is_no_certain_one() -> None:
+    """0.8 by its making; a bound of 1.0 leaves it certain, one of 0.7 stops it."""
+    model = of_runs(Line([noisy(2.0 + 3.0 * TIME + 0.8 * np.sin(20.0 * TIME))], ["wave"]))
+    for upper, unsure in ((1.0, ()), (0.7, ("wave",))):
+        wave = model.candidates["wave"]
+        sizes = tuple(replace(u, upper=upper, start=0.5) for u in wave.sizes)
+        model.candidates["wave"] = replace(wave, sizes=sizes)
+        assert fit(model, ("wave",), [0], {"wave_size": 0.5}, [{}]).unsure == unsure
 
 
 def test_second_effect_has_to_have_a_size() -> None:
@@ -394,6 +414,25 @@ def test_far_from_the_cause_all_start_from_the_nominal_parameters() -> None:
     tried = [effect for name, base, effect in pool.steps if name == "once_more" and not base]
     assert sorted(tried) == sorted(set(tried))
     assert set(tried) >= {"cube", "kink"}
+
+
+class Placed(Line):
+    """The gap is known to lie where the kink belongs."""
+
+    def located(self, where: Point, runs: Sequence[int]) -> Mapping[str, Any]:  # type: ignore[override]
+        """See `Model`."""
+        return {"subsystems": [{"name": "here", "share": 0.8}, {"name": "there", "share": 0.2}]}
+
+
+def test_effects_of_the_gaps_place_start_from_the_nominal_parameters_before_others() -> None:
+    """The cube closes most, and would be the first without the place."""
+    measured = 0.2 * CUBE + 2.0 * SHAPES["kink"](TIME) + 1.5 * np.sin(7.0 * TIME)
+    model = Placed([noisy(measured)], ("cube", "wave", "kink"))
+    places = {"cube": "there", "wave": "there", "kink": "here"}
+    pool = Watched()
+    Contest(pool, Given(model), tuple(places), (0,), subsystems=places).explain()
+    tried = [effect for name, base, effect in pool.steps if name == "once_more" and not base]
+    assert tried[0] == "kink"
 
 
 def test_effect_that_stands_again_in_noise_is_not_looked_at_once_more() -> None:
