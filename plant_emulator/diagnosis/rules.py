@@ -35,6 +35,9 @@ COARSE_LAW = 0.01
 # Size of a second, in plausible sizes, below which it may be what another law of the first has left
 # (such had 0.1 to 0.35).
 SMALL = 0.4
+# And below which it is none: what chance and other laws had left came to 0.03 and 0.04, the least
+# of the true ones to 0.17.
+TINY = 0.1
 # Where both leave more than noise, the share of what the first leaves that a second has to close,
 # of the squares and of the structure. What the first's own law leaves stays: beside real seconds up
 # to half of either. What seemed a second there closed up to 0.4 of the squares, but no more than
@@ -75,7 +78,9 @@ def counts(
     """
     fall = base.cost - best.cost
     evidence = weighed(fall, best, null)
-    if evidence <= LAW * by_chance:
+    sizes = [best.sizes[name] for name in best.effects if name not in base.effects]
+    tiny = reaches_noise and base.effects and min(sizes) < TINY
+    if tiny or evidence <= LAW * by_chance:
         return False
     if not reaches_noise:
         return evidence > THRESHOLD
@@ -84,7 +89,6 @@ def counts(
         gap = excess(null)
         closes = gap > THRESHOLD and fall > max(THRESHOLD, PART_OF_GAP * gap)
         return closes or evidence > THRESHOLD
-    sizes = [best.sizes[name] for name in best.effects if name not in base.effects]
     small = not exact and any(size < SMALL for size in sizes)
     if base.chi_squared <= NOISE_LEFT:
         coarse = small or evidence < FAINT

@@ -5,10 +5,13 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
+from plant_emulator.blind import laws
 from plant_emulator.blind.detectable import norms, or_impossible
+from plant_emulator.blind.draw import draw
 from plant_emulator.blind.generate import measured, true_logs
 from plant_emulator.errors import UnsettledError
 from plant_emulator.estimates import Array
+from plant_emulator.kernel import kernel, know
 from plant_emulator.log import COMPARED
 from plant_emulator.parameters import ParameterSet
 from plant_emulator.sensors import SENSORS
@@ -24,6 +27,16 @@ def test_truth_has_the_start_in_the_gap_and_the_drift_of_its_case(nominal: Param
     errors = [np.abs(log[c] - found[c]).max() / SENSORS[c][0] for c in COMPARED]
     assert 0.0 < max(errors) < 0.5
     assert max(np.abs(log[c] - other[c]).max() / SENSORS[c][0] for c in COMPARED) > 5.0
+
+
+def test_truth_that_does_not_settle_by_its_step_takes_a_shorter_one(nominal: ParameterSet) -> None:
+    """Presliding that left one stage of program 3 unsettled by 0.2 ms, and ended a trial."""
+    know(*(laws.load(name) for name in laws.names()))
+    case = draw(86028, 32, nominal, kernel().effects)
+    assert [h.law for h in case.hidden] == ["elastoplastic_presliding"]
+    found = true_logs(case, nominal)
+    assert [log.source for log in found] == ["program1", "program2", "program3"]
+    assert all(np.isfinite(log["shaft_torque"]).all() for log in found)
 
 
 def test_measured_log_is_quantised_and_noisy(nominal: ParameterSet) -> None:
