@@ -758,7 +758,9 @@ def rippled(kink: float, ripple: Array, plausible: float = 0.3) -> Line:
         # Less or more than what an error of 10 % in the kink would leave, large or small.
         (15.0, 0.25, 0.3, {"kink"}),
         (15.0, 0.25, 3.0, {"kink"}),
-        (5.0, 0.25, 3.0, {"kink", "wave"}),
+        (5.0, 0.25, 2.0, {"kink", "wave"}),
+        # Less than a tenth of its plausible size.
+        (5.0, 0.25, 3.0, {"kink"}),
     ],
 )
 def test_second_effect_in_what_looks_like_noise_needs_its_own_evidence(
