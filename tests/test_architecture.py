@@ -52,6 +52,7 @@ SHELL = {
     "plant_emulator.logs.mdf4": "files",
     "plant_emulator.logs.parquet": "files",
     "plant_emulator.pace": "clock",
+    "plant_emulator.known_set": "files",
     "plant_emulator.parameter_sets": "files",
     "plant_emulator.planning": "files",
     "plant_emulator.plots": "files",
