@@ -66,7 +66,10 @@ def left(answer: Mapping[str, Any]) -> dict[str, float]:
 
 
 def right(case: Case, answer: Mapping[str, Any], *, withheld: bool) -> bool:
-    """Whether the answer names what is there at class level; withheld: that, or nothing."""
+    """Whether the answer names what is there at class level.
+
+    withheld : whether it is unknown, or names another effect that leaves nothing but noise
+    """
     verdict = answer["verdict"]
     if withheld:
         noise = (sum(x * x for x in left(answer).values()) / len(left(answer))) ** 0.5 <= NOISE
@@ -93,9 +96,10 @@ def diagnosed(folder: Path, case: Case, withheld: str | None) -> tuple[dict[str,
     with TemporaryDirectory() as scratch:
         file = Path(scratch) / "answer.json"
         command = [sys.executable, "-m", "plant_emulator", "diagnose", *logs, *options]
-        subprocess.run(
-            [*command, "--workers", "1", "--json", str(file)], check=True, capture_output=True
-        )
+        command += ["--workers", "1", "--json", str(file)]
+        done = subprocess.run(command, check=False, capture_output=True, text=True)
+        if done.returncode != 0:
+            raise click.ClickException(f"{case.name}: {done.stderr.strip()}")
         return json.loads(file.read_text()), perf_counter() - begun
 
 

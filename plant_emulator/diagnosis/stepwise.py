@@ -113,7 +113,7 @@ class Contest:
             found = list(contenders)
             if final.effects:
                 final, found = self._further(final)
-                if not (self._deep or self._settles(found, final)):
+                if not (self._deep or _settles(found, final)):
                     break
             best = best_of(found)
             if best is None or not self._counts(best, final, null):
@@ -204,13 +204,9 @@ class Contest:
         found = self._on_top[base.key]
         if self._deep:
             found = self._rounds.deepened(found, base)
-        elif not self._settles(found, base):
+        elif not _settles(found, base):
             return base, found
         return self._rounds.restarted(base, found), found
-
-    def _settles(self, found: Sequence[Contender], base: Point) -> bool:
-        """Whether a second effect explains so much that nothing is likely to be astray."""
-        return explained(found) or closed(found, base, MOST)
 
     def _counts(self, best: Point, base: Point, null: Point) -> bool:
         """Whether one more effect earns its place."""
@@ -222,6 +218,11 @@ class Contest:
             by_chance=self._by_chance,
             exact=self._exact.issuperset(base.effects),
         )
+
+
+def _settles(found: Sequence[Contender], base: Point) -> bool:
+    """Whether a second effect explains so much that nothing is likely to be astray."""
+    return explained(found) or closed(found, base, MOST)
 
 
 def _settled(found: Explanation) -> bool:
