@@ -131,6 +131,8 @@ def line(case: Case, answer: Mapping[str, Any], seconds: float, *, withheld: boo
 @click.option("--only", metavar="CASE", help="One case.")
 def main(folder: Path, *, withhold: bool, only: str | None) -> None:
     """Diagnose the labelled cases of FOLDER, as many side by side as there are cores."""
+    if not (folder / "labels.tsv").is_file():
+        raise click.UsageError(f"{folder}/labels.tsv: no such file; it says what each case hides")
     cases = [c for c in cases_of(folder) if only in (None, c.name)]
     if withhold:
         cases = [c for c in cases if len(c.effects) == 1]
