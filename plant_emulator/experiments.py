@@ -16,7 +16,7 @@ import numpy as np
 from plant_emulator import estimation
 from plant_emulator.covariance import data_errors
 from plant_emulator.errors import UnsettledError
-from plant_emulator.log import COMPARED, Log
+from plant_emulator.log import COMPARED, VOLTAGE, Log
 from plant_emulator.programs import PROGRAMS, SpeedProgram
 from plant_emulator.search import GAP_POSITION
 from plant_emulator.simulate import run_of, simulate
@@ -96,7 +96,7 @@ def noise_levels(recordings: Sequence[Recording]) -> dict[str, float]:
         name: float(
             np.mean([r.noise[r.channels.index(name)] for r in recordings if name in r.channels])
         )
-        for name in COMPARED
+        for name in (*COMPARED, VOLTAGE)
         if any(name in r.channels for r in recordings)
     }
 

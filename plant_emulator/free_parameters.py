@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 # Held fixed unless asked for: a log shows it only through J_g + xi^2 J_m.
 NOT_FREE = frozenset({"gear_inertia"})
+# Given, since without the voltage the current loop hides it; free where that is logged.
+IN_VOLTAGE = ("armature_resistance",)
 # A parameter may leave its value in the set by this factor either way.
 BOUND_FACTOR = 5.0
 
@@ -50,8 +52,13 @@ def unknowns(
     ]
 
 
-def free_parameters(parameters: ParameterSet, names: Sequence[str] = ()) -> tuple[str, ...]:
-    """The names given, or all that the set calls estimated but those of NOT_FREE and zeros."""
+def free_parameters(
+    parameters: ParameterSet, names: Sequence[str] = (), *, voltage: bool = False
+) -> tuple[str, ...]:
+    """The names given, or all that the set calls estimated but those of NOT_FREE and zeros.
+
+    voltage : whether a log has it: what only the voltage shows is then free as well
+    """
     for name in names:
         if name not in parameters.values():
             known = ", ".join(parameters.values())
@@ -70,4 +77,4 @@ def free_parameters(parameters: ParameterSet, names: Sequence[str] = ()) -> tupl
         for p in parameters
         if p.kind == "estimated" and p.name not in NOT_FREE and p.value > 0.0
     ]
-    return tuple(dict.fromkeys(names)) or tuple(estimated)
+    return tuple(dict.fromkeys(names)) or (*estimated, *(IN_VOLTAGE if voltage else ()))

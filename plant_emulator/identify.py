@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 from plant_emulator import estimation
 from plant_emulator.equation_error import start_values
 from plant_emulator.free_parameters import free_parameters, unknowns
+from plant_emulator.log import VOLTAGE
 from plant_emulator.run_residuals import quieted_functions, residual_functions
 from plant_emulator.search import FINE_SCANS, GAP_POSITION, Search
 from plant_emulator.simulate import TOLERANCE, values_of
@@ -102,7 +103,7 @@ def identify(
         own is fitted too, or taken from its log
     progress : called with a stage's name and how far it has come, 0 to 1
     """
-    free = free_parameters(parameters, free)
+    free = free_parameters(parameters, free, voltage=any(VOLTAGE in r.channels for r in recordings))
     states = states_of(effects or {})
     recordings = [with_own(r, effects or {}) for r in recordings]
     values = values_of(parameters, effects)

@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-# Channels that a simulation is compared on.
+# Channels that a simulation is compared on, and one more where a log has it.
 COMPARED = ("motor_speed", "drum_speed", "armature_current", "shaft_torque")
+VOLTAGE = "armature_voltage"
 
 
 @dataclass(frozen=True)
@@ -40,3 +41,12 @@ class Log:
 
     def __contains__(self, signal: str) -> bool:
         return signal in self.signals
+
+
+def compared(log: Log) -> tuple[str, ...]:
+    """Channels of a log that a simulation is compared on.
+
+    The voltage only where it moves: a column of it that nobody feeds stays where it is.
+    """
+    moves = VOLTAGE in log and np.ptp(log[VOLTAGE]) > 0.0
+    return (*(name for name in COMPARED if name in log), *((VOLTAGE,) if moves else ()))

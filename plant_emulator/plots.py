@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from plant_emulator.log import COMPARED, Log
+from plant_emulator.log import COMPARED, VOLTAGE, Log, compared
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,6 +17,7 @@ LABELS = {
     "drum_speed": "drum speed [rad/s]",
     "armature_current": "armature current [A]",
     "shaft_torque": "shaft torque [N m]",
+    "armature_voltage": "armature voltage [V]",
 }
 # Okabe and Ito's colours: told apart with every kind of colour vision.
 MEASURED, SIMULATED, RESIDUAL = "#000000", "#0072B2", "#D55E00"
@@ -26,7 +27,8 @@ def draw_validation(pairs: Sequence[tuple[Log, Log]], path: str) -> None:
     """Measured over simulated and the residual below, one column a log; writes the picture."""
     from matplotlib.figure import Figure
 
-    names = [name for name in COMPARED if any(name in log for log, _ in pairs)]
+    shown = {name for log, _ in pairs for name in compared(log)}
+    names = [name for name in (*COMPARED, VOLTAGE) if name in shown]
     figure = Figure(figsize=(7.0 * len(pairs), 3.2 * len(names)), layout="constrained")
     axes = figure.subplots(
         2 * len(names),
@@ -38,7 +40,7 @@ def draw_validation(pairs: Sequence[tuple[Log, Log]], path: str) -> None:
     for column, (log, simulation) in enumerate(pairs):
         axes[0][column].set_title(log.source)
         for row, name in enumerate(names):
-            if name in log:
+            if name in compared(log):
                 _draw(axes[2 * row][column], axes[2 * row + 1][column], log, simulation, name)
         axes[-1][column].set_xlabel("time [s]")
     axes[0][0].legend(loc="upper right")

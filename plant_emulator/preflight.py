@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant_emulator.errors import LogError
-from plant_emulator.log import COMPARED, Array, Log
+from plant_emulator.log import VOLTAGE, Array, Log, compared
 from plant_emulator.noise import FLOOR, noise
 from register_maps.signals import LOG_COLUMNS
 
@@ -82,11 +82,12 @@ def preflight(measured: Log, gear_ratio: float) -> Preflight:
             f"{measured.source}: without {NAMES['armature_current']} the flux (K_1, K_2) shows in "
             "the speeds only where the voltage is at its limit"
         )
+    if VOLTAGE in measured and VOLTAGE not in compared(measured):
+        notes.append(f"{measured.source}: {NAMES[VOLTAGE]} does not move; it is left out")
     use = {}
-    for name in COMPARED:
-        if name in measured:
-            use[name], told = _counting(measured, name)
-            notes += told
+    for name in compared(measured):
+        use[name], told = _counting(measured, name)
+        notes += told
     return Preflight(use, tuple(notes))
 
 
@@ -163,6 +164,13 @@ def _signs(measured: Log, interval: float) -> None:
             f"{measured.source}: {NAMES['shaft_torque']} is {torque:+.1f} while the motor drives "
             "at steady forward speed; it must be negative there: change its sign"
         )
+    if VOLTAGE in compared(measured):
+        voltage = float(np.median(measured[VOLTAGE][steady]))
+        if voltage < 0.0:
+            raise LogError(
+                f"{measured.source}: {NAMES[VOLTAGE]} is {voltage:+.1f} while the motor drives at "
+                "steady forward speed; it must be positive there: change its sign"
+            )
     if "armature_current" not in measured:
         return
     current = float(np.median(measured["armature_current"][steady]))
@@ -179,7 +187,7 @@ def _counting(measured: Log, name: str) -> tuple[Use, list[str]]:
     channel = measured[name]
     nothing = np.zeros(len(channel), bool)
     repeated = _repeated(channel)
-    others = np.sum([_repeated(measured[o]) for o in COMPARED if o in measured], axis=0) - repeated
+    others = np.sum([_repeated(measured[o]) for o in compared(measured)], axis=0) - repeated
     alive = ~_runs(repeated, others, CERTAINLY_FROZEN)
     noisy = noise(channel, alive) > NOISY * np.ptp(channel)
     held = repeated if _held(channel, repeated) else nothing

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.errors import IdentificationError, UnsettledError
-from plant_emulator.log import COMPARED, Array, Log
+from plant_emulator.log import Array, Log, compared
 from plant_emulator.noise import noise
 from plant_emulator.simulate import TOLERANCE, Hold, Run, run_of, simulate
 
@@ -67,7 +67,7 @@ def recording(
 
     use : samples that count, by channel; all where a channel is not named
     """
-    channels = tuple(name for name in COMPARED if name in log)
+    channels = compared(log)
     everything = np.ones(len(log.time), bool)
     counted = np.stack([(use or {}).get(name, everything) for name in channels])
     levels = [noise(log[name], counted[k]) for k, name in enumerate(channels)]

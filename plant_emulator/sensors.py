@@ -1,7 +1,8 @@
 """Noise and resolution of the bench's sensors, for logs that should look measured.
 
 White noise of the standard deviations and steps of quantisation that the independent bench's noisy
-logs have; the reference is not measured and stays exact.
+logs have; those have no voltage, whose figures are those of an isolating amplifier of 0.2 % of
+500 V. The reference is not measured and stays exact.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ SENSORS: dict[str, tuple[float, float]] = {
     "armature_current": (0.25, 200 / 4096),
     "shaft_torque": (0.25, 100 / 4096),
     "wheel_torque": (2.0, 3000 / 4096),
+    "armature_voltage": (1.0, 1000 / 4096),
 }
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from plant_emulator.errors import LogError
-from plant_emulator.log import COMPARED, Array, Log
+from plant_emulator.log import COMPARED, VOLTAGE, Array, Log, compared
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,7 @@ def validate(measured: Log, simulated: Log) -> dict[str, Fit]:
     """Measures of every compared channel that the measured log has."""
     return {
         name: fit(measured[name], simulated[name], f"{measured.source}: {name}")
-        for name in COMPARED
-        if name in measured
+        for name in compared(measured)
     }
 
 
@@ -72,7 +71,7 @@ def zero_phase(log: Log, cutoff: float) -> Log:
     sections = butter(2, cutoff, fs=1.0 / interval, output="sos")
     kept = slice(edge, -edge)
     signals = {
-        name: sosfiltfilt(sections, values)[kept] if name in COMPARED else values[kept]
+        name: sosfiltfilt(sections, values)[kept] if name in (*COMPARED, VOLTAGE) else values[kept]
         for name, values in log.signals.items()
     }
     return Log(log.time[kept], signals, log.source, log.other)

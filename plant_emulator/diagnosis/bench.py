@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from plant_emulator.diagnosis.bench_plans import COLD_SHELL, lacks, planned
+from plant_emulator.diagnosis.bench_plans import COLD_SHELL, VOLTAGE_COLUMN, lacks, planned
 from plant_emulator.diagnosis.locate import locate
 from plant_emulator.diagnosis.model import Candidate, Run
 from plant_emulator.diagnosis.relations import base_speed
@@ -19,6 +19,7 @@ from plant_emulator.estimates import Unknown
 from plant_emulator.fed_noise import loud
 from plant_emulator.free_parameters import free_parameters, unknowns
 from plant_emulator.kernel import kernel, know
+from plant_emulator.log import VOLTAGE
 from plant_emulator.parameters import UNITS
 from plant_emulator.scans import scanned
 from plant_emulator.search import GAP_POSITION, Search
@@ -43,8 +44,8 @@ WITH_TRUCK = 1e-4
 GAPS = 41
 
 
-def candidate(effect: Effect) -> Candidate:
-    """An effect's declaration as unknowns of a fit."""
+def candidate(effect: Effect, *, voltage: bool = False) -> Candidate:
+    """An effect's declaration as unknowns of a fit; voltage : whether all logs have it."""
     sizes: list[Unknown] = []
     shapes: list[Unknown] = []
     states: list[Unknown] = []
@@ -81,7 +82,7 @@ def candidate(effect: Effect) -> Candidate:
         fixed={name: value for name, value in plausible.items() if name not in free},
         units={f"{effect.name}_{key}": d.unit for key, d in effect.parameters.items()},
         title=effect.description.partition("\n")[0].rstrip("."),
-        needs=effect.needs,
+        needs="" if voltage and VOLTAGE_COLUMN in effect.needs else effect.needs,
         untold=tuple(untold),
         exact=effect.exact,
     )
@@ -90,7 +91,13 @@ def candidate(effect: Effect) -> Candidate:
 # Where the parameters of the model belong.
 SUBSYSTEMS = {
     "drive": ("dead_time", "speed_gain", "speed_integral_time", "current_gain"),
-    "motor": ("flux_constant", "flux_constant_1", "flux_constant_2", "motor_inertia"),
+    "motor": (
+        "armature_resistance",
+        "flux_constant",
+        "flux_constant_1",
+        "flux_constant_2",
+        "motor_inertia",
+    ),
     "motor_shaft": ("motor_shaft_stiffness",),
     "gear": (
         "gear_inertia",
@@ -108,6 +115,7 @@ CHANNEL_UNITS = {
     "drum_speed": "rad/s",
     "armature_current": "A",
     "shaft_torque": "N m",
+    "armature_voltage": "V",
 }
 
 
@@ -128,7 +136,8 @@ class BenchModel:
         effects: Mapping[str, Effect],
         free: Sequence[str] = (),
     ) -> None:
-        self._free = free_parameters(parameters, free)
+        voltage = [VOLTAGE in r.channels for r in recordings]
+        self._free = free_parameters(parameters, free, voltage=any(voltage))
         self._effects = effects
         self._values = values_of(parameters)
         self._set = parameters
@@ -138,7 +147,9 @@ class BenchModel:
         self._recordings = [with_own(r, everything, known) for r in recordings]
         self._given = {f"{e}_{key}" for e, own in parameters.effects.items() for key in own}
         self.states = states_of(parameters.effects, known)
-        self.candidates = {name: candidate(effect) for name, effect in effects.items()}
+        self.candidates = {
+            name: candidate(effect, voltage=all(voltage)) for name, effect in effects.items()
+        }
         self.parameters = tuple(unknowns(parameters, self._free, self._values, ()))
         self.units = {name: UNITS[name] for name in self._free}
         self.subsystems = {name: SUBSYSTEM_OF.get(name, "drive") for name in self._free}

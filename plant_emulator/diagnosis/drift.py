@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.laws import acting
 from plant_emulator.diagnosis.relations import (
+    ARMATURE,
     DRIVE,
     GEAR,
     MOTOR,
+    ROWS,
     Measured,
     delayed_reference,
     flux,
@@ -36,43 +37,51 @@ WIDE = 2.0
 # Dead times that are tried, over that of the set, and their prior standard deviation.
 DEAD_TIMES = np.linspace(0.7, 1.3, 61)
 
-Slope = tuple[int, "Array"]
+Slope = dict[int, "Array"]
 
 
 def slopes(m: Measured, q: Inside, p: Mapping[str, float]) -> dict[str, Slope]:
-    """Relation and derivative by parameter, shape (n - 1,) [relation over parameter]."""
+    """Derivatives of the relations by parameter, shape (n - 1,) each [relation over parameter]."""
     xi, speed = p["gear_ratio"], np.abs(q.speed) / p["gear_ratio"]
     k = flux(q.speed, p)
-    weak = np.where(k < p["flux_constant"], q.current, 0.0)
+    weak = np.where(k < p["flux_constant"], 1.0, 0.0)
+    by_flux = {
+        "flux_constant": 1.0 - weak,
+        "flux_constant_1": weak * k / p["flux_constant_1"],
+        "flux_constant_2": -weak * k / (p["flux_constant_2"] + np.abs(q.speed)),
+    }
     power = q.moving * speed ** p["gear_friction_exponent"]
     growth = p["gear_viscous_friction"] * power * np.log(np.maximum(speed, 1e-9))
     drum = (q.load + q.wheel_torque * p["drum_radius"] / p["wheel_radius"]) / p["drum_inertia"]
     return {
-        "flux_constant": (MOTOR, np.where(k < p["flux_constant"], 0.0, q.current)),
-        "flux_constant_1": (MOTOR, weak * k / p["flux_constant_1"]),
-        "flux_constant_2": (MOTOR, weak * k / (p["flux_constant_2"] + np.abs(q.speed))),
-        "motor_inertia": (MOTOR, -q.acceleration),
-        "gear_coulomb_friction": (GEAR, -q.moving / xi),
-        "gear_viscous_friction": (GEAR, -power / xi),
-        "gear_friction_exponent": (GEAR, -growth / xi),
-        "drum_inertia": (GEAR, -drum / xi),
-        "dead_time": (DRIVE, -middle(np.gradient(delayed_reference(m, p["dead_time"]), m.time))),
+        **{n: {MOTOR: f * q.current, ARMATURE: f * q.speed} for n, f in by_flux.items()},
+        "armature_resistance": {ARMATURE: q.current},
+        "motor_inertia": {MOTOR: -q.acceleration},
+        "gear_coulomb_friction": {GEAR: -q.moving / xi},
+        "gear_viscous_friction": {GEAR: -power / xi},
+        "gear_friction_exponent": {GEAR: -growth / xi},
+        "drum_inertia": {GEAR: -drum / xi},
+        "dead_time": {DRIVE: -middle(np.gradient(delayed_reference(m, p["dead_time"]), m.time))},
     }
 
 
 def columns(m: Measured, q: Inside, p: Mapping[str, float], stds: Mapping[str, float]) -> Array:
-    """One column a free parameter of the relations, in its standard deviation, (3, n - 1, k).
+    """One column a free parameter of the relations, in its standard deviation, (ROWS, n - 1, k).
 
     stds : prior standard deviations of the free parameters by name
     """
     known = slopes(m, q, p)
-    drifting = [acting({known[n][0]: std}, known[n][1][:, None]) for n, std in stds.items()]
-    return np.concatenate(drifting, axis=-1)
+    found = np.zeros((ROWS, len(m.intervals), len(stds)))
+    for column, (name, std) in enumerate(stds.items()):
+        for row, slope in known[name].items():
+            found[row, :, column] = std * slope
+    return found
 
 
 def priors(parameters: ParameterSet, free: Sequence[str]) -> dict[str, float]:
     """Standard deviations of those free parameters that the relations hold; no prior: a half."""
     wanted = (
+        "armature_resistance",
         "flux_constant",
         "flux_constant_1",
         "flux_constant_2",

@@ -16,6 +16,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.hats import hats, of_time
 from plant_emulator.diagnosis.relations import (
+    ARMATURE,
     DRIVE,
     GEAR,
     MOTOR,
@@ -114,14 +115,14 @@ def inside(m: Measured, drum_speed: Array, p: Mapping[str, float]) -> Inside:
 
 @dataclass(frozen=True)
 class Law:
-    """A group of columns of a run, shape (3, n, k); own : coefficients of this run only."""
+    """A group of columns of a run, shape (ROWS, n, k); own : coefficients of this run only."""
 
     rows: Array
     own: bool = False
 
 
 def acting(where: Mapping[int, float], columns: Array) -> Array:
-    """Columns (n, k) that act in these relations with these factors, shape (3, n, k)."""
+    """Columns (n, k) that act in these relations with these factors, shape (ROWS, n, k)."""
     rows = np.zeros((ROWS, *columns.shape))
     for row, weight in where.items():
         rows[row] = weight * columns
@@ -141,7 +142,10 @@ def _both(largest: float, count: int) -> Array:
 
 
 def motor(q: Inside, top: Mapping[str, float]) -> list[Law]:
-    """A torque on the motor: by speed, current, flux and current, acceleration, time."""
+    """A torque on the motor: by speed, current, flux and current, acceleration, time.
+
+    And where it shows: an electromotive force by speed, a resistance by current and time.
+    """
     speed, current = hats(np.abs(q.speed), _knots(top["speed"], 9)), q.current / CURRENT
     rates = np.stack([q.acceleration, q.acceleration * current, current * np.abs(q.current)], -1)
     flowing = np.tanh(q.current**2)
@@ -155,6 +159,10 @@ def motor(q: Inside, top: Mapping[str, float]) -> list[Law]:
         Law(acting({MOTOR: 1.0}, rates / ACCELERATION)),
         Law(acting({MOTOR: 1.0}, _times(slow, current)), own=True),
         Law(acting({MOTOR: 1.0}, _times(slow, q.moving)), own=True),
+        Law(acting({ARMATURE: 1.0}, _times(speed, q.moving))),
+        Law(acting({ARMATURE: 1.0}, _times(speed, current))),
+        Law(acting({ARMATURE: 1.0}, hats(q.current, _both(top["current"], 12)))),
+        Law(acting({ARMATURE: 1.0}, _times(slow, current)), own=True),
     ]
 
 
@@ -195,6 +203,8 @@ def gear(q: Inside, top: Mapping[str, float]) -> list[Law]:
 def drive(q: Inside, top: Mapping[str, float]) -> list[Law]:
     """A shift of the speed that the drive asks for: by the reference's rates, current, time.
 
+    And where it shows: a voltage between drive and armature by current, or by time.
+
     The converter's ripple, folded down by the sampling, makes the current look larger or smaller
     alike in both directions; what ails the flux changes its sign with the current.
     """
@@ -209,6 +219,8 @@ def drive(q: Inside, top: Mapping[str, float]) -> list[Law]:
         Law(acting(where, hats(q.current, _both(top["current"], 12)))),
         Law(acting(where, of_time(q.time, SLOW)), own=True),
         Law(acting(where, of_time(q.time, FAST, 40)), own=True),
+        Law(acting({ARMATURE: 1.0}, hats(q.current, _both(top["current"], 12)))),
+        Law(acting({ARMATURE: 1.0}, of_time(q.time, SLOW)), own=True),
     ]
 
 

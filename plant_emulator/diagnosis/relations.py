@@ -3,16 +3,17 @@
 Over every interval between two samples, with means of what acts in it (thesis, eq. 3.10, 3.20,
 3.34 with the drum's torque eliminated, and 3.1-3.8 solved for the reference):
 
-    motor   J_m omega_m' - k Phi(omega_m) i - T = 0
-    gear    T + (J_g omega_m'/xi + J_d omega_d' + T_f(omega_m/xi) - T_d) / xi = 0
-    drive   omega_m + e - omega_ref(t - b) = 0,   e : speed error that the current tells of
+    motor     J_m omega_m' - k Phi(omega_m) i - T = 0
+    gear      T + (J_g omega_m'/xi + J_d omega_d' + T_f(omega_m/xi) - T_d) / xi = 0
+    drive     omega_m + e - omega_ref(t - b) = 0,   e : speed error that the current tells of
+    armature  u - R_a i - L_a i' - k Phi(omega_m) omega_m = 0,   where the voltage is logged
 
 No relation needs a simulation, or to know whether gear and drum touch: momentum is kept in the gap
-too. The drive's works backwards through both controllers: u = R_a i + L_a i' + k Phi omega_m gives
+too. The drive's works backwards through both controllers: u, logged or from the armature's, gives
 i_ref = i + u/K_c - (its part that the integrator holds), i_ref gives e the same way. At a limit it
 tells nothing.
 
-Noise is propagated: the relations are linear in the noise of omega_m, omega_d, i and T at two
+Noise is propagated: the relations are linear in the noise of omega_m, omega_d, i, T and u at two
 samples, so their covariance over the run is banded and its Cholesky factor whitens them. A jump
 within an interval adds what the mean of its ends leaves open, jump^2/12. At standstill friction
 takes any value up to its level.
@@ -25,6 +26,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.log import VOLTAGE
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -33,9 +36,10 @@ if TYPE_CHECKING:
     from plant_emulator.estimates import Array
     from plant_emulator.recording import Recording
 
-MOTOR, GEAR, DRIVE = range(3)
-ROWS = 3
-NOISES = ("motor_speed", "drum_speed", "armature_current", "shaft_torque")
+MOTOR, GEAR, DRIVE, ARMATURE = range(4)
+# Of a run with its voltage; without it the armature's, the last one, is not there.
+ROWS = 4
+NOISES = ("motor_speed", "drum_speed", "armature_current", "shaft_torque", VOLTAGE)
 # A difference of two samples that is no noise: three deviations of it.
 JUMP = 3.0 * np.sqrt(2.0)
 # Four deviations of the smoothed motor speed [rad/s]: below, its sign and the friction are open.
@@ -79,6 +83,7 @@ class Measured:
     """The signals of a run [SI], shape (n,) each; noise : standard deviations in NOISES' order.
 
     speed : the motor's, smoothed; drum_torque : of the truck over each interval, shape (n - 1,)
+    voltage : of the armature; None: not logged
     missing_current : relations with the current then tell nothing
     """
 
@@ -89,6 +94,7 @@ class Measured:
     drum_speed: Array
     current: Array
     torque: Array
+    voltage: Array | None
     noise: Array
     speed: Array
     drum_torque: Array
@@ -99,6 +105,11 @@ class Measured:
     def intervals(self) -> Array:
         """Lengths of the intervals [s], shape (n - 1,)."""
         return np.diff(self.time)
+
+    @property
+    def rows(self) -> int:
+        """How many relations the run has."""
+        return ROWS if self.voltage is not None else ARMATURE
 
 
 def measured(recording: Recording, p: Mapping[str, float]) -> Measured:
@@ -119,6 +130,7 @@ def measured(recording: Recording, p: Mapping[str, float]) -> Measured:
         drum_speed=log["drum_speed"],
         current=current,
         torque=log["shaft_torque"],
+        voltage=log[VOLTAGE] if VOLTAGE in recording.channels else None,
         noise=noise,
         speed=smoothed_speed(log.time, *signals, noise, p, use_current=not missing),
         drum_torque=p["drum_radius"] / p["wheel_radius"] * wheel[1:],
@@ -186,9 +198,10 @@ def told_reference(
 
     nominal : the delayed reference, for the integrators while the drive is limited
     """
-    k = flux(m.speed, p)
-    voltage = p["armature_resistance"] * m.current + k * m.motor_speed
-    voltage += p["armature_inductance"] * np.gradient(m.current, m.time)
+    voltage = m.voltage
+    if voltage is None:
+        voltage = p["armature_resistance"] * m.current + flux(m.speed, p) * m.motor_speed
+        voltage += p["armature_inductance"] * np.gradient(m.current, m.time)
     steps = np.diff(m.time, prepend=2.0 * m.time[0] - m.time[1])
     told = np.empty_like(m.time)
     limited = np.zeros(len(told), bool)
@@ -211,22 +224,23 @@ def told_reference(
 
 @dataclass(frozen=True)
 class Relations:
-    """The three relations of a run, shape (3, n - 1) [N m, N m, rad/s], and what whitens them."""
+    """The relations of a run, shape (3 or 4, n - 1) [N m, N m, rad/s, V], and what whitens them."""
 
     value: Array
     factor: Array
 
     def white(self, rows: Array) -> Array:
-        """Rows of shape (3, n - 1, k), whitened, shape (3 (n - 1), k)."""
+        """Rows of shape (r, n - 1, k), whitened, shape (r (n - 1), k); rows beyond are left out."""
         from scipy.linalg import solve_banded
 
-        stacked = np.moveaxis(rows, 0, 1).reshape(ROWS * rows.shape[1], -1)
+        count = len(self.value)
+        stacked = np.moveaxis(rows[:count], 0, 1).reshape(count * rows.shape[1], -1)
         below = len(self.factor) - 1
         return np.asarray(solve_banded((below, 0), self.factor, stacked))
 
 
 def values(m: Measured, p: Mapping[str, float]) -> tuple[Array, NDArray[np.bool_]]:
-    """What is left of the three relations, shape (3, n - 1), and where the drive is limited."""
+    """What is left of the relations, shape (m.rows, n - 1), and where the drive is limited."""
     xi, step = p["gear_ratio"], m.intervals
     acceleration = np.diff(m.motor_speed) / step
     motor = p["motor_inertia"] * acceleration - middle(flux(m.speed, p) * m.current)
@@ -237,4 +251,8 @@ def values(m: Measured, p: Mapping[str, float]) -> tuple[Array, NDArray[np.bool_
     nominal = delayed_reference(m, p["dead_time"])
     told, limited = told_reference(m, p, nominal)
     rows = [motor - middle(m.torque), middle(m.torque) + driven / xi, middle(told - nominal)]
+    if m.voltage is not None:
+        induced = p["armature_inductance"] * np.diff(m.current) / step
+        emf = flux(m.speed, p) * m.motor_speed
+        rows.append(middle(m.voltage - p["armature_resistance"] * m.current - emf) - induced)
     return np.stack(rows), limited[1:] | limited[:-1]

@@ -17,7 +17,6 @@ from plant_emulator.diagnosis.evidence import Evidence, Linear, Products, unrest
 from plant_emulator.diagnosis.relations import (
     DRIVE,
     GEAR,
-    ROWS,
     Relations,
     base_speed,
     measured,
@@ -91,7 +90,7 @@ class Site:
             return None
         m = measured(replace(recording, log=log), self.fitted)
         left, limited = values(replace(m, speed=m.motor_speed), self.fitted)
-        left[-1, limited] = 0.0
+        left[DRIVE, limited] = 0.0
         return left, limited
 
     @cached_property
@@ -150,7 +149,7 @@ class Site:
         away = fitted.z - expected(fitted)
         speed = [fitted.residuals[k][0] - fitted.jacobians[k][0] @ away for k in runs]
         relation = [
-            (r.value - d @ self.prior)[..., None]
+            (r.value - (d @ self.prior)[: len(r.value)])[..., None]
             for r, d in zip(self.relations, self.drifting, strict=True)
         ]
         y = self.table.shared(relation, [s[:, None] for s in speed])
@@ -183,6 +182,9 @@ class Site:
             if group[0].own
             else self.table.shared([law.rows for law in group], none)
             for group in zip(*runs, strict=True)
+            if any(
+                law.rows[: len(r.value)].any() for law, r in zip(group, self.relations, strict=True)
+            )
         ]
 
     def _speed_sensor(self) -> list[Array]:
@@ -242,6 +244,10 @@ class Site:
         found = self.evidence(blocks)
         if "drive" not in blocks:
             return found.log
-        count = ROWS * sum(len(m.intervals) for m in self.signals)
+        ends = np.cumsum([r.value.size for r in self.relations])
+        own = [
+            part[DRIVE :: len(r.value)]
+            for part, r in zip(np.split(found.left, ends)[:-1], self.relations, strict=True)
+        ]
         slope = np.concatenate([q.demand_rate for q in self.inside])
-        return found.log + unrest(found.left[DRIVE:count:ROWS], slope)
+        return found.log + unrest(np.concatenate(own), slope)

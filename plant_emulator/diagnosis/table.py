@@ -26,7 +26,7 @@ class Table:
     def shared(self, relation: Columns, speed: Columns) -> Array:
         """Columns whose coefficients all runs share; None: zeros.
 
-        relation : shape (3, n - 1, k) a run, not whitened; speed : (n, k) a run, over the noise
+        relation : shape (ROWS, n - 1, k) a run, not whitened; speed : (n, k) a run, over the noise
         """
         width = next(a.shape[-1] for a in (*relation, *speed) if a is not None)
         parts = [

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 # A screen has 24 lines; the last is the prompt's.
 HEIGHT = 23
 MOST_RANKED = 6
+# Columns of the table of the gap that leave its bars some room.
+MOST_CHANNELS = 5
 NAME, CELL = 29, 9
 LABEL = 13
 EVIDENCE_DECIMALS = 1
@@ -165,7 +167,7 @@ def _shrinkage(gap: Mapping[str, Any], width: int) -> list[str]:
     most = max((t for t in times.values() if t is not None), default=None)
     if most is None:
         return []
-    channels = list(floor)[:4]
+    channels = list(floor)[:MOST_CHANNELS]
     bar = width - LABEL - 7 - CELL * len(channels)
     title = "held-out gap over noise, % of range"
     head = "".join(f"{name:>{CELL}}" for name in _short(channels))

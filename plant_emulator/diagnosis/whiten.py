@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.relations import (
+    ARMATURE,
     DRIVE,
     GEAR,
     MOTOR,
-    ROWS,
     STILL,
     VOID,
     Measured,
@@ -53,7 +53,7 @@ def relations(
         value = value - left
         variance = extra_variance(m, p, limited) + (0.5 * left) ** 2
     if m.missing_current:
-        variance[[MOTOR, DRIVE]] += VOID
+        variance[[MOTOR, *range(DRIVE, m.rows)]] += VOID
     return Relations(value, factor(m, p, variance))
 
 
@@ -66,9 +66,9 @@ def near(limited: NDArray[np.bool_], m: Measured) -> NDArray[np.bool_]:
 
 
 def extra_variance(m: Measured, p: Mapping[str, float], limited: NDArray[np.bool_]) -> Array:
-    """Variance of each relation beside the sensors' noise, shape (3, n - 1)."""
+    """Variance of each relation beside the sensors' noise, shape (m.rows, n - 1)."""
     k = flux(m.speed, p)[1:]
-    variance = np.zeros((ROWS, len(m.intervals)))
+    variance = np.zeros((m.rows, len(m.intervals)))
     variance[MOTOR] = jump(m.torque, m.noise[3]) + k**2 * jump(m.current, m.noise[2])
     level = 3.0 * p["gear_coulomb_friction"] / p["gear_ratio"]
     still = np.minimum(np.abs(m.speed[1:]), np.abs(m.speed[:-1])) < STILL
@@ -76,20 +76,27 @@ def extra_variance(m: Measured, p: Mapping[str, float], limited: NDArray[np.bool
     variance[GEAR] = jump(m.torque, m.noise[3])
     variance[GEAR] += np.where(still, level**2 + m.truck * BRAKE**2, 0.0)
     variance[DRIVE] = np.where(limited, VOID, 0.0)
+    if m.voltage is not None:
+        # Where the current jumps, the voltage that makes it do so falls between the samples.
+        surge = 12.0 * (p["armature_inductance"] / m.intervals) ** 2
+        variance[ARMATURE] = jump(m.voltage, m.noise[4])
+        variance[ARMATURE] += (p["armature_resistance"] ** 2 + surge) * jump(m.current, m.noise[2])
     return variance
 
 
 def sensitivities(m: Measured, p: Mapping[str, float]) -> tuple[Array, Array]:
-    """Relations by noise of unit variance at begin and end, shape (3, 4, n - 1) each."""
+    """Relations by noise of unit variance at begin and end, shape (m.rows, 5, n - 1) each."""
     xi, step, n = p["gear_ratio"], m.intervals, len(m.intervals)
     k, zero, half = flux(m.speed, p), np.zeros(n), np.full(n, 0.5)
 
     def at(sign: float, slope: Array) -> Array:
-        motor = [sign * p["motor_inertia"] / step, zero, -0.5 * slope, -half]
+        motor = [sign * p["motor_inertia"] / step, zero, -0.5 * slope, -half, zero]
         inertia = sign * p["gear_inertia"] / step / xi**2
-        gear = [inertia, sign * p["drum_inertia"] / step / xi, zero, half]
-        drive = [half, zero, half / p["speed_gain"], zero]
-        return np.array([motor, gear, drive]) * m.noise[None, :, None]
+        gear = [inertia, sign * p["drum_inertia"] / step / xi, zero, half, zero]
+        drive = [half, zero, half / p["speed_gain"], zero, zero]
+        current = -0.5 * p["armature_resistance"] - sign * p["armature_inductance"] / step
+        armature = [-0.5 * slope, zero, current, zero, half]
+        return np.array([motor, gear, drive, armature])[: m.rows] * m.noise[None, :, None]
 
     return at(-1.0, k[:-1]), at(1.0, k[1:])
 
@@ -99,13 +106,13 @@ def factor(m: Measured, p: Mapping[str, float], variance: Array) -> Array:
     from scipy.linalg import cholesky_banded
 
     begin, end = sensitivities(m, p)
-    n = len(m.intervals)
-    banded = np.zeros((2 * ROWS, ROWS * n))
-    for r in range(ROWS):
-        for c in range(ROWS):
+    n, rows = len(m.intervals), m.rows
+    banded = np.zeros((2 * rows, rows * n))
+    for r in range(rows):
+        for c in range(rows):
             if r >= c:
-                banded[r - c, c::ROWS] = (begin[r] * begin[c] + end[r] * end[c]).sum(0)
+                banded[r - c, c::rows] = (begin[r] * begin[c] + end[r] * end[c]).sum(0)
             shared = (begin[r][:, 1:] * end[c][:, :-1]).sum(0)
-            banded[ROWS + r - c, c::ROWS][: n - 1] = shared
-        banded[0, r::ROWS] += variance[r]
+            banded[rows + r - c, c::rows][: n - 1] = shared
+        banded[0, r::rows] += variance[r]
     return np.asarray(cholesky_banded(banded, lower=True))
