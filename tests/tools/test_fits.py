@@ -47,8 +47,9 @@ def test_another_estimator_ends_at_our_optimum(
 ) -> None:
     """lmfit's leastsq is MINPACK's Levenberg-Marquardt with its own differences.
 
-    To four digits, but for what the log says so little of that a hundredth of its standard error
-    is more than that.
+    To four digits, but for what the log says so little of that 0.03 of its standard error is more
+    than that: from starts 0.002 to 0.03 apart leastsq itself ends up to 0.015 of it off, where the
+    sum of squares is a few 1e-4 above ours.
     """
     import lmfit
 
@@ -69,5 +70,5 @@ def test_another_estimator_ends_at_our_optimum(
     assert found.chisqr == pytest.approx(ours.estimate.cost, rel=1e-6)
     for p in ours.parameters:
         theirs = float(np.exp(found.params[p.name].value))
-        within = max(1e-4 * p.value, 0.01 * p.standard_error)
+        within = max(1e-4 * p.value, 0.03 * p.standard_error)
         assert abs(theirs - p.value) <= within, p.name
