@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from itertools import combinations
 from typing import TYPE_CHECKING, cast
 
@@ -10,8 +11,9 @@ import numpy as np
 
 from plant_emulator import logs
 from plant_emulator.errors import DiagnosisError
+from plant_emulator.log import VOLTAGE, without_voltage
 from plant_emulator.one_bench import one_bench
-from plant_emulator.preflight import preflight
+from plant_emulator.preflight import NAMES, preflight
 from plant_emulator.recording import Recording, recording
 
 if TYPE_CHECKING:
@@ -49,10 +51,35 @@ def admitted(
         checked = preflight(log, parameters.value("gear_ratio"))
         recordings.append(recording(log, cast("Hold | None", hold), checked.use))
         notes += checked.notes
+    recordings, told = alike(recordings)
+    notes += told
     taken = [r.log for r in recordings]
     distinct([(log.source, samples(log)) for log in taken])
     one_bench(taken, parameters.values())
     return recordings, notes
+
+
+def alike(recordings: list[Recording]) -> tuple[list[Recording], list[str]]:
+    """The runs, all with their voltage or none: what it shows could else be neither fitted where it
+    is not, nor predicted from there.
+    """
+    having = [VOLTAGE in r.channels for r in recordings]
+    if all(having) or not any(having):
+        return recordings, []
+    first = recordings[having.index(False)].log.source
+    note = f"{first}: no {NAMES[VOLTAGE]} that can be used; it is left out of the other logs too"
+    return [_without_voltage(r) for r in recordings], [note]
+
+
+def _without_voltage(run: Recording) -> Recording:
+    kept = [k for k, name in enumerate(run.channels) if name != VOLTAGE]
+    return replace(
+        run,
+        log=without_voltage(run.log),
+        channels=tuple(run.channels[k] for k in kept),
+        noise=run.noise[kept],
+        use=run.use[kept],
+    )
 
 
 def unlabelled(log: Log | AxisLog) -> None:

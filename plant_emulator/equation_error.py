@@ -54,7 +54,8 @@ def start_values(
     values : all parameters of the bench; those not free are believed
     """
     tables = [_table(log) for log in logs]
-    table = {name: np.concatenate([t[name] for t in tables]) for name in tables[0]}
+    common = [name for name in tables[0] if all(name in t for t in tables)]
+    table = {name: np.concatenate([t[name] for t in tables]) for name in common}
     found = _flux(table, values, free) if "armature_current" in table else {}
     return found | _mechanical(table, values, free)
 

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 # Held fixed unless asked for: a log shows it only through J_g + xi^2 J_m.
 NOT_FREE = frozenset({"gear_inertia"})
-# Given, since without the voltage the current loop hides it; free where that is logged.
-IN_VOLTAGE = ("armature_resistance",)
+# Given, since without the voltage the current loop hides them; free where that is logged.
+IN_VOLTAGE = ("armature_resistance", "flux_constant")
 # A parameter may leave its value in the set by this factor either way.
 BOUND_FACTOR = 5.0
 
@@ -77,4 +77,5 @@ def free_parameters(
         for p in parameters
         if p.kind == "estimated" and p.name not in NOT_FREE and p.value > 0.0
     ]
-    return tuple(dict.fromkeys(names)) or (*estimated, *(IN_VOLTAGE if voltage else ()))
+    shown = [n for n in IN_VOLTAGE if voltage and parameters[n].kind == "given"]
+    return tuple(dict.fromkeys(names)) or (*estimated, *shown)

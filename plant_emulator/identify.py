@@ -98,7 +98,8 @@ def identify(
 ) -> Identification:
     """Estimate the free parameters of a bench from its logs.
 
-    free : names; none: all that the set calls estimated but gear_inertia
+    free : names; none: all that the set calls estimated but gear_inertia, and what a logged voltage
+        shows
     effects : values of effects that the bench has, by effect and parameter; what of them is a run's
         own is fitted too, or taken from its log
     progress : called with a stage's name and how far it has come, 0 to 1

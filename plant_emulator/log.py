@@ -7,7 +7,7 @@ format.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 # Channels that a simulation is compared on, and one more where a log has it.
 COMPARED = ("motor_speed", "drum_speed", "armature_current", "shaft_torque")
 VOLTAGE = "armature_voltage"
+# Share of a channel's largest value below which it does not move, but is rounded.
+STILL = 1e-9
 
 
 @dataclass(frozen=True)
@@ -48,5 +50,14 @@ def compared(log: Log) -> tuple[str, ...]:
 
     The voltage only where it moves: a column of it that nobody feeds stays where it is.
     """
-    moves = VOLTAGE in log and np.ptp(log[VOLTAGE]) > 0.0
-    return (*(name for name in COMPARED if name in log), *((VOLTAGE,) if moves else ()))
+    given = tuple(name for name in COMPARED if name in log)
+    if VOLTAGE not in log:
+        return given
+    moves = np.ptp(log[VOLTAGE]) > STILL * np.max(np.abs(log[VOLTAGE]))
+    return (*given, VOLTAGE) if moves else given
+
+
+def without_voltage(log: Log) -> Log:
+    """The log as it would be if nobody had connected the voltage."""
+    signals = {name: values for name, values in log.signals.items() if name != VOLTAGE}
+    return replace(log, signals=signals)

@@ -25,15 +25,17 @@ if TYPE_CHECKING:
     from plant_emulator.parameters import ParameterSet
 
 
-def planned_run(name: str, parameters: ParameterSet) -> Recording:
+def planned_run(
+    name: str, parameters: ParameterSet, channels: tuple[str, ...] = COMPARED
+) -> Recording:
     """A drive program as it would be recorded, without noise but judged by the sensors' noise."""
     log = simulated(name, parameters, {}, hold=None, start="middle")
     return Recording(
         log,
         run_of(log),
-        COMPARED,
-        np.array([SENSORS[channel][0] for channel in COMPARED]),
-        np.ones((len(COMPARED), len(log.time)), bool),
+        channels,
+        np.array([SENSORS[channel][0] for channel in channels]),
+        np.ones((len(channels), len(log.time)), bool),
     )
 
 
@@ -58,7 +60,8 @@ def prepared(
         parameters = parameters.with_values(fitted.values)
         values, states = parameters.values(), tuple(dict(s) for s in fitted.states)
     planned = [name for name in names if name not in recorded]
-    recordings += [planned_run(name, parameters) for name in planned]
+    channels = recordings[0].channels if recordings else COMPARED
+    recordings += [planned_run(name, parameters, channels) for name in planned]
     model = BenchRecipe(tuple(recordings), parameters).build()
     point = Point(
         effects=(),

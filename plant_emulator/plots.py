@@ -42,6 +42,9 @@ def draw_validation(pairs: Sequence[tuple[Log, Log]], path: str) -> None:
         for row, name in enumerate(names):
             if name in compared(log):
                 _draw(axes[2 * row][column], axes[2 * row + 1][column], log, simulation, name)
+            else:
+                axes[2 * row][column].set_visible(False)
+                axes[2 * row + 1][column].set_visible(False)
         axes[-1][column].set_xlabel("time [s]")
     axes[0][0].legend(loc="upper right")
     figure.savefig(path, dpi=120, format=Path(path).suffix.removeprefix(".") or "png")

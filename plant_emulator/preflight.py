@@ -55,6 +55,8 @@ STEADY_SPEED, STEADY_RATE, STEADY_TIME = 30.0, 10.0, 0.5
 WRONG_SIGN = 0.5
 # Current that no bench of this kind needs at steady speed [A].
 LARGEST_CURRENT = 200.0
+# Flux of a motor of this kind [V s/rad]: its voltage at steady speed over that speed.
+VOLTS_PER_SPEED = (0.2, 5.0)
 # Ratio of motor to drum speed over the gear ratio that scales, slip and noise cannot explain.
 RATIO_WITHIN = 0.2
 
@@ -77,17 +79,25 @@ def preflight(measured: Log, gear_ratio: float) -> Preflight:
     _moves(measured)
     _one_gear(measured, gear_ratio)
     _signs(measured, interval)
-    if "armature_current" not in measured:
+    if "armature_current" not in measured and VOLTAGE not in measured:
         notes.append(
             f"{measured.source}: without {NAMES['armature_current']} the flux (K_1, K_2) shows in "
             "the speeds only where the voltage is at its limit"
         )
-    if VOLTAGE in measured and VOLTAGE not in compared(measured):
-        notes.append(f"{measured.source}: {NAMES[VOLTAGE]} does not move; it is left out")
+    wrong = _wrong_voltage(measured, interval)
     use = {}
     for name in compared(measured):
-        use[name], told = _counting(measured, name)
+        if name == VOLTAGE and wrong:
+            continue
+        try:
+            use[name], told = _counting(measured, name)
+        except LogError as error:
+            if name != VOLTAGE:
+                raise
+            told = [f"{error}: it is left out"]
         notes += told
+    if wrong:
+        notes.append(f"{measured.source}: {NAMES[VOLTAGE]} {wrong}; it is left out")
     return Preflight(use, tuple(notes))
 
 
@@ -151,11 +161,7 @@ def _signs(measured: Log, interval: float) -> None:
     """The commissioning check: without a truck the motor drives at steady forward speed."""
     if "wheel_torque" in measured:
         return
-    half = max(1, round(0.5 * STEADY_TIME / interval))
-    speed = measured["motor_speed"]
-    rate = np.full(len(speed), np.inf)
-    rate[half:-half] = np.abs(speed[2 * half :] - speed[: -2 * half]) / (2 * half * interval)
-    steady = (rate < STEADY_RATE) & (speed > STEADY_SPEED)
+    steady = _steady(measured, interval)
     if not steady.any():
         return
     torque = float(np.median(measured["shaft_torque"][steady]))
@@ -164,13 +170,6 @@ def _signs(measured: Log, interval: float) -> None:
             f"{measured.source}: {NAMES['shaft_torque']} is {torque:+.1f} while the motor drives "
             "at steady forward speed; it must be negative there: change its sign"
         )
-    if VOLTAGE in compared(measured):
-        voltage = float(np.median(measured[VOLTAGE][steady]))
-        if voltage < 0.0:
-            raise LogError(
-                f"{measured.source}: {NAMES[VOLTAGE]} is {voltage:+.1f} while the motor drives at "
-                "steady forward speed; it must be positive there: change its sign"
-            )
     if "armature_current" not in measured:
         return
     current = float(np.median(measured["armature_current"][steady]))
@@ -180,6 +179,34 @@ def _signs(measured: Log, interval: float) -> None:
             f"drives at steady forward speed; 0 to {LARGEST_CURRENT:g} is possible there: check "
             "its sign and unit"
         )
+
+
+def _steady(measured: Log, interval: float) -> Use:
+    """Samples at steady forward speed."""
+    half = max(1, round(0.5 * STEADY_TIME / interval))
+    speed = measured["motor_speed"]
+    rate = np.full(len(speed), np.inf)
+    rate[half:-half] = np.abs(speed[2 * half :] - speed[: -2 * half]) / (2 * half * interval)
+    return np.asarray((rate < STEADY_RATE) & (speed > STEADY_SPEED))
+
+
+def _wrong_voltage(measured: Log, interval: float) -> str:
+    """What is wrong with a voltage, which no log needs; nothing: it can be used."""
+    if VOLTAGE not in measured:
+        return ""
+    if VOLTAGE not in compared(measured):
+        return "does not move"
+    steady = _steady(measured, interval)
+    if not steady.any():
+        return ""
+    ratio = float(np.median(measured[VOLTAGE][steady] / measured["motor_speed"][steady]))
+    low, high = VOLTS_PER_SPEED
+    if low < ratio < high:
+        return ""
+    return (
+        f"is {ratio:+.3g} V for each rad/s at steady forward speed, where {low:g} to {high:g} is "
+        "possible (check its sign and unit, and that its sensor is connected)"
+    )
 
 
 def _counting(measured: Log, name: str) -> tuple[Use, list[str]]:

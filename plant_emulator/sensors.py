@@ -1,8 +1,8 @@
 """Noise and resolution of the bench's sensors, for logs that should look measured.
 
 White noise of the standard deviations and steps of quantisation that the independent bench's noisy
-logs have; those have no voltage, whose figures are those of an isolating amplifier of 0.2 % of
-500 V. The reference is not measured and stays exact.
+logs have; those have no voltage, whose figures are assumed: 0.2 % of 500 V. The reference is not
+measured and stays exact.
 """
 
 from __future__ import annotations

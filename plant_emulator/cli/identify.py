@@ -49,7 +49,8 @@ def command(
 ) -> None:
     """Fit the bench's parameters to LOGs, all at once.
 
-    Without --free all parameters that the set calls estimated, except gear_inertia. The start
+    Without --free all parameters that the set calls estimated, except gear_inertia, and with a
+    logged voltage also armature_resistance and flux_constant. The start
     position in the backlash gap is fitted for every log. Standard errors come from the residuals,
     with their autocorrelation.
     """

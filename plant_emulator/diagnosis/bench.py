@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 # Tolerance of a run with a truck, whose every sample is a corner: twice as fast as the usual one,
 # and it moves the residual by less than a hundredth of the noise (rms).
 WITH_TRUCK = 1e-4
+# How what an effect needs begins that the voltage shows.
+LOG_VOLTAGE = f"log {VOLTAGE_COLUMN}"
 # Positions in the gap that a predicted run is tried from.
 GAPS = 41
 
@@ -82,7 +84,7 @@ def candidate(effect: Effect, *, voltage: bool = False) -> Candidate:
         fixed={name: value for name, value in plausible.items() if name not in free},
         units={f"{effect.name}_{key}": d.unit for key, d in effect.parameters.items()},
         title=effect.description.partition("\n")[0].rstrip("."),
-        needs="" if voltage and VOLTAGE_COLUMN in effect.needs else effect.needs,
+        needs="" if voltage and effect.needs.startswith(LOG_VOLTAGE) else effect.needs,
         untold=tuple(untold),
         exact=effect.exact,
     )

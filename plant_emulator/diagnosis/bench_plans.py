@@ -14,7 +14,7 @@ import numpy as np
 
 from plant_emulator.errors import UnsettledError
 from plant_emulator.experiments import noise_levels
-from plant_emulator.log import VOLTAGE, Log
+from plant_emulator.log import VOLTAGE, Log, compared
 from plant_emulator.preflight import LEAST_MOTION
 from plant_emulator.programs import PROGRAMS, SpeedProgram, TravelProgram, in_words
 from plant_emulator.recording import Recording
@@ -127,7 +127,7 @@ def lacks(logs: Sequence[Log], base_speed: float) -> dict[str, tuple[str, ...]]:
     fastest = max(float(log["motor_speed"].max()) for log in logs)
     backwards = min(float(log["speed_reference"].min()) for log in logs) < -LEAST_MOTION
     missing = (
-        (not any(VOLTAGE in log for log in logs), VOLTAGE_COLUMN, ("drive", "motor")),
+        (not any(VOLTAGE in compared(log) for log in logs), VOLTAGE_COLUMN, ("drive", "motor")),
         (
             fastest < base_speed,
             f"a run above {base_speed:.0f} rad/s, where the field is weakened",

@@ -7,7 +7,8 @@ unknown law of its own quantities (`laws`), next to all parameters that drift, a
 asked how much more probable that makes all measurements (`evidence`). The pattern tells them apart:
 
     torque sensor          motor's and gear's relation, with opposite sign
-    motor / gear / drive   that relation alone
+    motor / gear / drive   that relation alone; where the voltage is logged, motor and drive the
+                           armature's too
     drum                   the gear's relation, and the drum's speed in the gap and at contact
     drum's speed sensor    the drum's speed, also while gear and drum touch
     gap and shaft          the drum's speed only after a flight through the gap

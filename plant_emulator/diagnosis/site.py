@@ -15,6 +15,7 @@ from plant_emulator.diagnosis import drift, drum_laws, laws
 from plant_emulator.diagnosis.drum_side import TORQUE, DrumSide, expected, is_torque
 from plant_emulator.diagnosis.evidence import Evidence, Linear, Products, unrest
 from plant_emulator.diagnosis.relations import (
+    ARMATURE,
     DRIVE,
     GEAR,
     Relations,
@@ -26,6 +27,7 @@ from plant_emulator.diagnosis.relations import (
 from plant_emulator.diagnosis.table import Table
 from plant_emulator.diagnosis.whiten import relations
 from plant_emulator.errors import UnsettledError
+from plant_emulator.recording import voltage_errors
 from plant_emulator.search import GAP_POSITION
 from plant_emulator.simulate import simulate
 
@@ -138,10 +140,21 @@ class Site:
         ]
 
     @cached_property
-    def nuisance(self) -> tuple[Array, Array]:
-        """Columns of drift in the relations, and of the smoothing's noise in the drum's speed."""
+    def nuisance(self) -> tuple[Array, ...]:
+        """Columns of drift in the relations, of the smoothing's noise in the drum's speed, and of
+        what the sensor of a logged voltage may be off by.
+        """
         none = [None] * len(self.signals)
-        return self.table.shared(self.drifting, none), self.table.own_speed(self.spread)
+        found = self.table.shared(self.drifting, none), self.table.own_speed(self.spread)
+        if all(m.voltage is None for m in self.signals):
+            return found
+        p, known = self.values, [float(m.voltage is not None) for m in self.signals]
+        told = [p["armature_resistance"] * q.current + q.flux * q.speed for q in self.inside]
+        sensor = [
+            laws.acting({ARMATURE: there}, voltage_errors(voltage))
+            for there, voltage in zip(known, told, strict=True)
+        ]
+        return (*found, self.table.own_relations(sensor))
 
     def linear(self, fitted: Estimate) -> Linear:
         """Data and drift, the drum's speed linearised at a fit of the drum's side."""

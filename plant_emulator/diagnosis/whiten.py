@@ -93,7 +93,9 @@ def sensitivities(m: Measured, p: Mapping[str, float]) -> tuple[Array, Array]:
         motor = [sign * p["motor_inertia"] / step, zero, -0.5 * slope, -half, zero]
         inertia = sign * p["gear_inertia"] / step / xi**2
         gear = [inertia, sign * p["drum_inertia"] / step / xi, zero, half, zero]
-        drive = [half, zero, half / p["speed_gain"], zero, zero]
+        told = half / p["speed_gain"]
+        voltage = zero if m.voltage is None else told / p["current_gain"]
+        drive = [half, zero, told, zero, voltage]
         current = -0.5 * p["armature_resistance"] - sign * p["armature_inductance"] / step
         armature = [-0.5 * slope, zero, current, zero, half]
         return np.array([motor, gear, drive, armature])[: m.rows] * m.noise[None, :, None]

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from plant_emulator.kernel_types import Record
 
 SUBSYSTEM = "drive"
-NEEDS = "log armature_voltage_V: the current loop hides what the converter loses"
+NEEDS = "log armature_voltage_V as the drive asks for it: the current loop hides what is lost"
 # The current after a reversal is steep: of two pauses 1 ms apart each has a valley of its own.
 PARAMETERS = {
     "pause": EffectParameter(

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from plant_emulator.kernel_types import Record
 
 SUBSYSTEM = "drive"
-NEEDS = "a run above base speed up to the voltage limit, or armature_voltage_V logged"
+NEEDS = "a run above base speed up to the voltage limit"
 PARAMETERS = {
     "source_resistance": EffectParameter(
         neutral=0.0, lower=0.0, upper=4.0, plausible=1.5, unit="ohm", meaning="R_s"

@@ -1,6 +1,7 @@
 """Identification against an independent bench with known parameters."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 from time import process_time
 
@@ -338,7 +339,18 @@ def repeats(nominal: ParameterSet, log: Log, count: int) -> Sequence[np.ndarray]
 def test_intervals_cover_the_truth_at_their_rate(nominal: ParameterSet, bench_log: Reader) -> None:
     errors = np.array(repeats(nominal, bench_log("bench_nominal/program1"), 60))
     covered = np.abs(errors) <= 1.96
-    names = (*FREE, "armature_resistance")  # the logs have the voltage
+    names = (*FREE, "armature_resistance", "flux_constant")  # the logs have the voltage
     shares = zip(names, covered.mean(0), strict=True)
     print("95 % intervals cover", {n: float(c) for n, c in shares})
     assert 0.90 <= covered.mean() <= 0.99
+
+
+def test_logs_with_and_without_a_current_start_a_fit_together(
+    nominal: ParameterSet, bench_log: Reader
+) -> None:
+    whole, other = (bench_log(f"bench_practice/practice_004/program{k}") for k in (1, 2))
+    signals = {k: v for k, v in other.signals.items() if k != "armature_current"}
+    logs = [whole, replace(other, signals=signals)]
+    found = start_values(logs, nominal.values(), FREE)
+    assert found["drum_inertia"] == pytest.approx(312.69, rel=0.05)
+    assert "flux_constant_1" not in found

@@ -15,6 +15,7 @@ LEVELS = {
     "armature_current": (0.25, 0.048828),
     "shaft_torque": (0.25, 0.024414),
     "wheel_torque": (2.0, 0.7324),
+    "armature_voltage": (1.0, 0.24414),  # assumed: the data have none
 }
 TIME = 0.01 * np.arange(20_000)
 STILL = Log(TIME, {"speed_reference": np.ones(20_000), **{k: np.full(20_000, 7.0) for k in LEVELS}})

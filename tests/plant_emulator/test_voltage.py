@@ -1,23 +1,26 @@
 """What a logged armature voltage shows that no other channel does."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from plant_emulator.admission import alike
 from plant_emulator.diagnosis.bench import BenchModel
 from plant_emulator.diagnosis.contest import null_fit
 from plant_emulator.diagnosis.detect import as_answer, detectability
+from plant_emulator.diagnosis.drift import slopes
+from plant_emulator.diagnosis.explain import STRUCTURED
+from plant_emulator.diagnosis.laws import inside
 from plant_emulator.diagnosis.locate import WORTH, locate
-from plant_emulator.diagnosis.relations import ARMATURE, DRIVE, GEAR, MOTOR, measured
+from plant_emulator.diagnosis.relations import ARMATURE, DRIVE, GEAR, MOTOR, measured, values
 from plant_emulator.diagnosis.whiten import relations
-from plant_emulator.errors import LogError
 from plant_emulator.kernel import kernel
-from plant_emulator.log import COMPARED, VOLTAGE, Log, compared
+from plant_emulator.log import COMPARED, VOLTAGE, Log, compared, without_voltage
 from plant_emulator.parameters import ParameterSet
 from plant_emulator.preflight import preflight
-from plant_emulator.recording import Recording, recording
+from plant_emulator.recording import OFFSET, Recording, recording
 from plant_emulator.sensors import SENSORS, noisy
 from plant_emulator.simulate import run_of, simulate, values_of
 
@@ -29,21 +32,27 @@ def driven(
     inputs: Log,
     nominal: ParameterSet,
     effects: Mapping[str, Mapping[str, float]] | None = None,
+    seed: int = 2,
     **changed: float,
 ) -> Log:
     """A run of a bench with its voltage, stepped finely, with the sensors' noise."""
     values = values_of(nominal, effects) | changed
-    return noisy(simulate(run_of(inputs), values, gap_position=0.3, step=1e-3), seed=2)
+    return noisy(simulate(run_of(inputs), values, gap_position=0.3, step=1e-3), seed)
 
 
-def two_runs(
+def runs_of(
     bench_log: Reader,
     nominal: ParameterSet,
     effects: Mapping[str, Mapping[str, float]] | None = None,
+    programs: Sequence[int] = (1, 2),
     **changed: float,
 ) -> list[Recording]:
-    inputs = [replace(bench_log(f"bench_nominal/program{k}"), source=f"run {k}") for k in (1, 2)]
-    return [recording(driven(one, nominal, effects, **changed)) for one in inputs]
+    inputs = {
+        k: replace(bench_log(f"bench_nominal/program{k}"), source=f"run {k}") for k in programs
+    }
+    return [
+        recording(driven(one, nominal, effects, seed, **changed)) for seed, one in inputs.items()
+    ]
 
 
 def with_voltage(log: Log, voltage: np.ndarray) -> Log:
@@ -60,11 +69,98 @@ def test_column_of_the_voltage_that_nobody_feeds_is_left_out_and_told(bench_log:
     assert recording(dead).channels == COMPARED
 
 
-def test_voltage_of_the_wrong_sign_is_told(bench_log: Reader, nominal: ParameterSet) -> None:
+@pytest.mark.parametrize("factor", [-1.0, 10.0, 1000.0, 1e-3])
+def test_voltage_of_the_wrong_sign_or_unit_is_left_out_and_told(
+    bench_log: Reader, nominal: ParameterSet, factor: float
+) -> None:
     log = driven(bench_log("bench_nominal/program1"), nominal)
-    with pytest.raises(LogError, match=r"^run.csv: armature_voltage_V is -\d+\.\d while the motor"):
-        preflight(with_voltage(log, -log[VOLTAGE]), 62.6)
+    checked = preflight(with_voltage(log, factor * log[VOLTAGE]), 62.6)
+    (note,) = checked.notes
+    assert note.startswith("run.csv: armature_voltage_V is ")
+    assert note.endswith("sensor is connected); it is left out")
+    assert recording(log, use=checked.use).channels == COMPARED
     assert preflight(log, 62.6).notes == ()
+
+
+def test_voltage_of_a_sensor_that_is_not_connected_is_left_out(bench_log: Reader) -> None:
+    log = bench_log("bench_practice/practice_002/program1")
+    floating = with_voltage(log, 0.3 * np.random.default_rng(1).standard_normal(len(log.time)))
+    assert "connected" in preflight(floating, 62.6).notes[0]
+    assert VOLTAGE not in preflight(floating, 62.6).use
+
+
+def test_voltage_at_the_end_of_its_range_for_most_of_a_run_is_left_out(
+    bench_log: Reader, nominal: ParameterSet
+) -> None:
+    log = driven(bench_log("bench_nominal/program3"), nominal)
+    checked = preflight(with_voltage(log, np.minimum(log[VOLTAGE], 250.0)), 62.6)
+    assert len(checked.notes) == 1
+    assert "end of its range" in checked.notes[0]
+    assert checked.notes[0].endswith("it is left out")
+    assert set(checked.use) == set(COMPARED)
+
+
+def test_runs_have_their_voltage_all_or_none(bench_log: Reader, nominal: ParameterSet) -> None:
+    logs = [driven(bench_log(f"bench_nominal/program{k}"), nominal) for k in (1, 2)]
+    one = replace(without_voltage(logs[0]), source="one.csv")
+    runs, notes = alike([recording(one), recording(logs[1])])
+    assert [r.channels for r in runs] == [COMPARED, COMPARED]
+    assert runs[1].noise.shape == (4,)
+    assert runs[1].use.shape == (4, len(logs[1].time))
+    assert notes == [
+        "one.csv: no armature_voltage_V that can be used; it is left out of the other logs too"
+    ]
+    runs, notes = alike([recording(log) for log in logs])
+    assert VOLTAGE in runs[0].channels
+    assert notes == []
+
+
+def test_what_the_sensor_may_be_off_by_weighs_no_more_than_its_prior(
+    bench_log: Reader, nominal: ParameterSet
+) -> None:
+    """Three standard deviations of its offset add 9 at most, not 9 a sample: 18 and more with what
+    they have in common with the noise.
+    """
+    run = recording(driven(bench_log("bench_nominal/program1"), nominal))
+    off = replace(run, log=with_voltage(run.log, run.log[VOLTAGE] + 3.0 * OFFSET))
+    values = nominal.values()
+    before, after = (np.sum(r.settled(values, 0.3)[-1] ** 2) for r in (run, off))
+    # 3 standard deviations of the offset cost 9 at most, far from 9 a sample.
+    assert abs(after - before) < 9.0 + 6.0 * 3.0
+    assert before == pytest.approx(len(run.log.time), rel=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("gain", "offset"), [(1.0, 0.0), (1.002, 0.0), (0.995, 0.0), (1.0, 1.0)])
+def test_sensor_that_is_a_little_off_is_no_gap(
+    bench_log: Reader, nominal: ParameterSet, gain: float, offset: float
+) -> None:
+    runs = [
+        recording(with_voltage(r.log, gain * r.log[VOLTAGE] + offset))
+        for r in runs_of(bench_log, nominal)
+    ]
+    found = null_fit(BenchModel(runs, nominal, {}), range(2))
+    assert found.chi_squared == pytest.approx(1.0, abs=0.03)
+    assert found.structure < STRUCTURED
+    assert locate(runs, nominal, found).gain < WORTH
+
+
+def test_derivatives_of_the_relations_are_those_of_finite_differences(
+    bench_log: Reader, nominal: ParameterSet
+) -> None:
+    """What is left with a parameter taken too small, over how much: its column in `slopes`."""
+    log = simulate(run_of(bench_log("bench_nominal/program1")), nominal.values())
+    true = nominal.values()
+    m = measured(recording(log), true)
+    q = inside(m, m.drum_speed, true)
+    for name, by_row in slopes(m, q, true).items():
+        step = 1e-3 * true[name]
+        low = values(replace(m, speed=m.motor_speed), {**true, name: true[name] - step})[0]
+        here = values(replace(m, speed=m.motor_speed), true)[0]
+        for row, slope in by_row.items():
+            difference = (low[row] - here[row]) / step
+            scale = np.dot(difference, slope) / np.dot(slope, slope)
+            assert scale == pytest.approx(1.0, abs=0.15), (name, row)
 
 
 def test_armature_s_relation_leaves_only_white_noise(
@@ -102,7 +198,7 @@ def test_log_without_voltage_has_three_relations(bench_log: Reader, nominal: Par
 def test_resistance_is_free_where_the_voltage_shows_it(
     bench_log: Reader, nominal: ParameterSet
 ) -> None:
-    runs = two_runs(bench_log, nominal, armature_resistance=1.2 * 0.424)
+    runs = runs_of(bench_log, nominal, armature_resistance=1.2 * 0.424)
     found = null_fit(BenchModel(runs, nominal, {}), range(2))
     error = found.errors["armature_resistance"]
     assert found.values["armature_resistance"] == pytest.approx(1.2 * 0.424, abs=4.0 * error)
@@ -116,16 +212,11 @@ def test_warm_armature_shows_in_the_voltage_and_only_there(
     bench_log: Reader, nominal: ParameterSet, logged: bool
 ) -> None:
     effects = {HEATING: kernel().effects[HEATING]}
-    runs = two_runs(bench_log, nominal)
+    runs = runs_of(bench_log, nominal, programs=(1, 2, 3))
     if not logged:
-        runs = [
-            recording(
-                replace(r.log, signals={k: v for k, v in r.log.signals.items() if k != VOLTAGE})
-            )
-            for r in runs
-        ]
+        runs = [recording(without_voltage(r.log)) for r in runs]
     model = BenchModel(runs, nominal, effects)
-    (found,) = detectability(model, null_fit(model, range(2)), range(2))
+    (found,) = detectability(model, null_fit(model, range(3)), range(3))
     entry = as_answer(found, model.candidates[HEATING])
     if logged:
         assert found.norm > 7.0
@@ -141,6 +232,7 @@ def test_warm_armature_shows_in_the_voltage_and_only_there(
     [
         (HEATING, {"temperature_coefficient": 0.008, "heat_capacity": 200.0}, "motor"),
         ("armature_reaction", {}, "motor"),
+        ("reference_filter", {}, "drive"),
     ],
 )
 def test_place_of_what_the_voltage_shows(
@@ -151,9 +243,8 @@ def test_place_of_what_the_voltage_shows(
     subsystem: str,
 ) -> None:
     own = {**kernel().effects[effect].plausible(), **sizes}
-    runs = two_runs(bench_log, nominal, {effect: own})
-    model = BenchModel(runs, nominal, {})
-    found = locate(runs, nominal, null_fit(model, range(2)))
+    runs = runs_of(bench_log, nominal, {effect: own}, (1, 2, 3))
+    found = locate(runs, nominal, null_fit(BenchModel(runs, nominal, {}), range(3)))
     assert found.gain > WORTH
     assert found.subsystem == subsystem
 

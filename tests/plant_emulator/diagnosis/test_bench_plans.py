@@ -30,7 +30,7 @@ def test_what_logs_lack_is_told_of_the_blocks_that_it_tells_of():
     everything = driven(
         "program1",
         wheel_torque=np.zeros(1851),
-        armature_voltage=np.zeros(1851),
+        armature_voltage=np.linspace(0.0, 300.0, 1851),
         shell_temperature=np.full(1851, 288.0),
     )
     assert lacks([everything], 190.0) == {"gear": ("a run in the other direction",)}
