@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.details import Step
 
 WIDTH = 760.0
-LONGEST_LABEL = 30
+LONGEST_LABEL = 33
 # The waterfall: plot from LEFT to RIGHT, a row a step.
-LEFT, RIGHT, ROW, TOP = 205.0, 585.0, 34.0, 26.0
+LEFT, RIGHT, ROW, TOP = 245.0, 585.0, 34.0, 26.0
 
 
 def picture(height: float, told: str, *content: str) -> Markup:
