@@ -18,6 +18,7 @@ from plant_emulator.covariance import data_errors
 from plant_emulator.errors import UnsettledError
 from plant_emulator.log import COMPARED, VOLTAGE, Log
 from plant_emulator.programs import PROGRAMS, SpeedProgram
+from plant_emulator.recording import Recording
 from plant_emulator.search import GAP_POSITION
 from plant_emulator.simulate import run_of, simulate
 
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
     from plant_emulator.estimates import Array, Residual
     from plant_emulator.identify import Identification
-    from plant_emulator.recording import Recording
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,10 +111,17 @@ def _information(
     time, reference = program.reference()
     run = run_of(Log(time, {"speed_reference": reference}, program.name))
 
+    planned = Recording(
+        simulate(run, values),
+        run,
+        tuple(noise),
+        np.array(list(noise.values())),
+        np.ones((len(noise), len(time)), bool),
+    )
+
     def residual(trial: Mapping[str, float]) -> Array:
         trial = {**values, **trial}
-        simulated = simulate(run, trial, gap_position=trial.pop(GAP_POSITION))
-        return np.stack([simulated[name] / level for name, level in noise.items()])
+        return planned.settled(trial, trial.pop(GAP_POSITION))
 
     residuals: list[Residual] = [residual]
     count = len(found.parameters)

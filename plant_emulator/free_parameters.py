@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 # Held fixed unless asked for: a log shows it only through J_g + xi^2 J_m.
 NOT_FREE = frozenset({"gear_inertia"})
-# Given, since without the voltage the current loop hides them; free where that is logged.
+# Given: the current loop hides R_a without the voltage, which with it also wants the right K_m.
 IN_VOLTAGE = ("armature_resistance", "flux_constant")
 # A parameter may leave its value in the set by this factor either way.
 BOUND_FACTOR = 5.0

@@ -60,7 +60,7 @@ def prepared(
         parameters = parameters.with_values(fitted.values)
         values, states = parameters.values(), tuple(dict(s) for s in fitted.states)
     planned = [name for name in names if name not in recorded]
-    channels = recordings[0].channels if recordings else COMPARED
+    channels = max((r.channels for r in recordings), key=len, default=COMPARED)
     recordings += [planned_run(name, parameters, channels) for name in planned]
     model = BenchRecipe(tuple(recordings), parameters).build()
     point = Point(

@@ -45,7 +45,9 @@ def draw_validation(pairs: Sequence[tuple[Log, Log]], path: str) -> None:
             else:
                 axes[2 * row][column].set_visible(False)
                 axes[2 * row + 1][column].set_visible(False)
-        axes[-1][column].set_xlabel("time [s]")
+        last = [axis for axis in axes[:, column] if axis.get_visible()][-1]
+        last.set_xlabel("time [s]")
+        last.tick_params(labelbottom=True)
     axes[0][0].legend(loc="upper right")
     figure.savefig(path, dpi=120, format=Path(path).suffix.removeprefix(".") or "png")
 

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant_emulator.errors import LogError
-from plant_emulator.log import VOLTAGE, Array, Log, compared
+from plant_emulator.log import VOLTAGE, Array, Log, compared, without_voltage
 from plant_emulator.noise import FLOOR, noise
 from register_maps.signals import LOG_COLUMNS
 
@@ -55,7 +55,7 @@ STEADY_SPEED, STEADY_RATE, STEADY_TIME = 30.0, 10.0, 0.5
 WRONG_SIGN = 0.5
 # Current that no bench of this kind needs at steady speed [A].
 LARGEST_CURRENT = 200.0
-# Flux of a motor of this kind [V s/rad]: its voltage at steady speed over that speed.
+# Flux of a motor of this kind [V s/rad]: most of its voltage is that times its speed.
 VOLTS_PER_SPEED = (0.2, 5.0)
 # Ratio of motor to drum speed over the gear ratio that scales, slip and noise cannot explain.
 RATIO_WITHIN = 0.2
@@ -79,25 +79,24 @@ def preflight(measured: Log, gear_ratio: float) -> Preflight:
     _moves(measured)
     _one_gear(measured, gear_ratio)
     _signs(measured, interval)
-    if "armature_current" not in measured and VOLTAGE not in measured:
-        notes.append(
-            f"{measured.source}: without {NAMES['armature_current']} the flux (K_1, K_2) shows in "
-            "the speeds only where the voltage is at its limit"
-        )
-    wrong = _wrong_voltage(measured, interval)
+    wrong = _wrong_voltage(measured)
+    if wrong:
+        notes.append(f"{measured.source}: {NAMES[VOLTAGE]} {wrong}; it is left out")
+        measured = without_voltage(measured)
     use = {}
     for name in compared(measured):
-        if name == VOLTAGE and wrong:
-            continue
         try:
             use[name], told = _counting(measured, name)
         except LogError as error:
             if name != VOLTAGE:
                 raise
-            told = [f"{error}: it is left out"]
+            told = [f"{error}; it is left out"]
         notes += told
-    if wrong:
-        notes.append(f"{measured.source}: {NAMES[VOLTAGE]} {wrong}; it is left out")
+    if "armature_current" not in measured and VOLTAGE not in use:
+        notes.append(
+            f"{measured.source}: without {NAMES['armature_current']} the flux (K_1, K_2) shows in "
+            "the speeds only where the voltage is at its limit"
+        )
     return Preflight(use, tuple(notes))
 
 
@@ -161,7 +160,11 @@ def _signs(measured: Log, interval: float) -> None:
     """The commissioning check: without a truck the motor drives at steady forward speed."""
     if "wheel_torque" in measured:
         return
-    steady = _steady(measured, interval)
+    half = max(1, round(0.5 * STEADY_TIME / interval))
+    speed = measured["motor_speed"]
+    rate = np.full(len(speed), np.inf)
+    rate[half:-half] = np.abs(speed[2 * half :] - speed[: -2 * half]) / (2 * half * interval)
+    steady = (rate < STEADY_RATE) & (speed > STEADY_SPEED)
     if not steady.any():
         return
     torque = float(np.median(measured["shaft_torque"][steady]))
@@ -181,32 +184,23 @@ def _signs(measured: Log, interval: float) -> None:
         )
 
 
-def _steady(measured: Log, interval: float) -> Use:
-    """Samples at steady forward speed."""
-    half = max(1, round(0.5 * STEADY_TIME / interval))
-    speed = measured["motor_speed"]
-    rate = np.full(len(speed), np.inf)
-    rate[half:-half] = np.abs(speed[2 * half :] - speed[: -2 * half]) / (2 * half * interval)
-    return np.asarray((rate < STEADY_RATE) & (speed > STEADY_SPEED))
-
-
-def _wrong_voltage(measured: Log, interval: float) -> str:
+def _wrong_voltage(measured: Log) -> str:
     """What is wrong with a voltage, which no log needs; nothing: it can be used."""
     if VOLTAGE not in measured:
         return ""
     if VOLTAGE not in compared(measured):
         return "does not move"
-    steady = _steady(measured, interval)
-    if not steady.any():
-        return ""
-    ratio = float(np.median(measured[VOLTAGE][steady] / measured["motor_speed"][steady]))
-    low, high = VOLTS_PER_SPEED
-    if low < ratio < high:
-        return ""
-    return (
-        f"is {ratio:+.3g} V for each rad/s at steady forward speed, where {low:g} to {high:g} is "
-        "possible (check its sign and unit, and that its sensor is connected)"
-    )
+    speed, (low, high) = measured["motor_speed"], VOLTS_PER_SPEED
+    for words, turning in (("forward", speed > STEADY_SPEED), ("reverse", speed < -STEADY_SPEED)):
+        if not turning.any():
+            continue
+        ratio = float(np.median(measured[VOLTAGE][turning] / speed[turning]))
+        if not low < ratio < high:
+            return (
+                f"is {ratio:+.3g} V for each rad/s at {words} speed, where {low:g} to {high:g} is "
+                "possible (check its sign and unit, and that its sensor is connected)"
+            )
+    return ""
 
 
 def _counting(measured: Log, name: str) -> tuple[Use, list[str]]:

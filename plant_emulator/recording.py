@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.errors import IdentificationError, UnsettledError
-from plant_emulator.log import VOLTAGE, Array, Log, compared
+from plant_emulator.log import VOLTAGE, Array, Log, compared, without_voltage
 from plant_emulator.noise import noise
 from plant_emulator.simulate import TOLERANCE, Hold, Run, run_of, simulate
 
@@ -98,11 +98,13 @@ def recording(
     """A log as it is fitted.
 
     use : samples that count, by channel; all where a channel is not named, but for a voltage, which
-        is then left out
+        is then left out, of the log too; None: all of all channels
     """
     channels = tuple(
         name for name in compared(log) if name != VOLTAGE or name in (use or {VOLTAGE})
     )
+    if VOLTAGE not in channels:
+        log = without_voltage(log)
     everything = np.ones(len(log.time), bool)
     counted = np.stack([(use or {}).get(name, everything) for name in channels])
     levels = [noise(log[name], counted[k]) for k, name in enumerate(channels)]

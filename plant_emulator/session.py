@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 
 from plant_emulator import logs
 from plant_emulator.kernel import kernel
-from plant_emulator.log import Log
+from plant_emulator.log import Log, without_voltage
 from plant_emulator.programs import PROGRAMS, SpeedProgram, program
 from plant_emulator.recording import recording
 from plant_emulator.search import GAP_POSITION
@@ -50,7 +50,7 @@ def followed(
     left = {name: own for name, own in parameters.effects.items() if name not in effects}
     known = kernel().effects if left else {}
     if start == "fit" and any(p.per_run for name in left for p in known[name].parameters.values()):
-        measured = with_own(recording(log, cast("Hold | None", hold)), left)
+        measured = with_own(recording(without_voltage(log), cast("Hold | None", hold)), left)
         own = {**values, **measured.own, **fit_states(measured, values, states_of(left))}
         return simulate(measured.run, own, gap_position=own.pop(GAP_POSITION))
     run = run_of(log, cast("Hold | None", hold))

@@ -16,7 +16,7 @@ import numpy as np
 from plant_emulator.errors import UnsettledError
 from plant_emulator.integrate import CHANNELS
 from plant_emulator.kernel import kernel_for
-from plant_emulator.log import Array, Log, compared
+from plant_emulator.log import COMPARED, Array, Log
 from plant_emulator.sensors import SENSORS
 
 if TYPE_CHECKING:
@@ -168,10 +168,13 @@ def values_of(
 
 
 def whitened(measured: Log, simulated: Log) -> float:
-    """Mean square of the residual in units of the sensors' noise, over the compared channels."""
+    """Mean square of the residual in units of the sensors' noise, over the compared channels but
+    the voltage, whose sensor may be off.
+    """
     squares = [
         np.mean(((measured[name] - simulated[name]) / SENSORS[name][0]) ** 2)
-        for name in compared(measured)
+        for name in COMPARED
+        if name in measured
     ]
     return float(np.mean(squares))
 

@@ -174,6 +174,9 @@ def traces(
 
 
 def _simulated(run: Run, channel: int, residual: Array) -> Array:
-    """The prediction behind a whitened residual; NaN where a sample does not count."""
+    """The prediction behind a whitened residual; NaN where a sample does not count.
+
+    Of a voltage it holds what its sensor is off by.
+    """
     whitened = np.where(residual[channel] == 0.0, np.nan, residual[channel])
     return np.asarray(run.measured[channel] - whitened * run.noise[channel])

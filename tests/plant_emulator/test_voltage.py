@@ -78,8 +78,21 @@ def test_voltage_of_the_wrong_sign_or_unit_is_left_out_and_told(
     (note,) = checked.notes
     assert note.startswith("run.csv: armature_voltage_V is ")
     assert note.endswith("sensor is connected); it is left out")
-    assert recording(log, use=checked.use).channels == COMPARED
+    left = recording(log, use=checked.use)
+    assert left.channels == COMPARED
+    assert VOLTAGE not in left.log
     assert preflight(log, 62.6).notes == ()
+
+
+def test_voltage_without_a_sign_is_left_out_of_a_reverse_run(
+    bench_log: Reader, nominal: ParameterSet
+) -> None:
+    log = driven(bench_log("bench_nominal/program1"), nominal)
+    turned = {name: -channel for name, channel in log.signals.items() if name != VOLTAGE}
+    reverse = Log(log.time, {**turned, VOLTAGE: log[VOLTAGE]}, "run.csv")
+    (note,) = preflight(reverse, 62.6).notes
+    assert " V for each rad/s at reverse speed" in note
+    assert preflight(with_voltage(reverse, -log[VOLTAGE]), 62.6).notes == ()
 
 
 def test_voltage_of_a_sensor_that_is_not_connected_is_left_out(bench_log: Reader) -> None:
