@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from itertools import combinations
 from typing import TYPE_CHECKING, cast
 
@@ -11,18 +10,23 @@ import numpy as np
 
 from plant_emulator import logs
 from plant_emulator.errors import DiagnosisError
-from plant_emulator.log import VOLTAGE, without_voltage
+from plant_emulator.log import VOLTAGE
 from plant_emulator.one_bench import one_bench
 from plant_emulator.preflight import NAMES, preflight
-from plant_emulator.recording import Recording, recording
+from plant_emulator.recording import recording
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
 
     from plant_emulator.diagnosis.axis_signals import AxisLog
     from plant_emulator.log import Array, Log
     from plant_emulator.parameters import ParameterSet
+    from plant_emulator.recording import Recording
     from plant_emulator.simulate import Hold
+
+    Used = Mapping[str, NDArray[np.bool_]]
 
 # Columns that tell the answer, by how a word of their name begins: nobody may see them before.
 TELLING = re.compile(
@@ -43,43 +47,35 @@ def admitted(
 
     DiagnosisError or LogError says what cannot be used.
     """
-    recordings: list[Recording] = []
+    taken: list[Log] = []
+    uses: list[Used] = []
     notes: list[str] = []
     for path in paths:
         log = logs.read(path)
         unlabelled(log)
         checked = preflight(log, parameters.value("gear_ratio"))
-        recordings.append(recording(log, cast("Hold | None", hold), checked.use))
+        taken.append(log)
+        uses.append(checked.use)
         notes += checked.notes
-    recordings, told = alike(recordings)
-    notes += told
-    taken = [r.log for r in recordings]
+    uses, told = alike(taken, uses)
     distinct([(log.source, samples(log)) for log in taken])
     one_bench(taken, parameters.values())
-    return recordings, notes
+    recordings = [
+        recording(log, cast("Hold | None", hold), use) for log, use in zip(taken, uses, strict=True)
+    ]
+    return recordings, notes + told
 
 
-def alike(recordings: list[Recording]) -> tuple[list[Recording], list[str]]:
-    """The runs, all with their voltage or none: what it shows could else be neither fitted where it
-    is not, nor predicted from there.
+def alike(read: Sequence[Log], uses: Sequence[Used]) -> tuple[list[Used], list[str]]:
+    """The samples of every log that count, all with their voltage or none: what it shows could else
+    be neither fitted where it is not, nor predicted from there. And a note where one is left out.
     """
-    having = [VOLTAGE in r.channels for r in recordings]
+    having = [VOLTAGE in use for use in uses]
     if all(having) or not any(having):
-        return recordings, []
-    first = recordings[having.index(False)].log.source
+        return list(uses), []
+    first = read[having.index(False)].source
     note = f"{first}: no {NAMES[VOLTAGE]} that can be used; it is left out of the other logs too"
-    return [_without_voltage(r) for r in recordings], [note]
-
-
-def _without_voltage(run: Recording) -> Recording:
-    kept = [k for k, name in enumerate(run.channels) if name != VOLTAGE]
-    return replace(
-        run,
-        log=without_voltage(run.log),
-        channels=tuple(run.channels[k] for k in kept),
-        noise=run.noise[kept],
-        use=run.use[kept],
-    )
+    return [{n: counted for n, counted in use.items() if n != VOLTAGE} for use in uses], [note]
 
 
 def unlabelled(log: Log | AxisLog) -> None:

@@ -80,7 +80,7 @@ class Control:
         for _ in range(request["scans"]):
             self.emulator.scan()
 
-    def _status(self, request: dict[str, Any]) -> dict[str, Any]:  # noqa: ARG002
+    def _status(self, request: dict[str, Any]) -> dict[str, Any]:  # noqa: ARG002 - all requests have one signature
         plc = self.emulator.plc
         return {
             "time": plc.time,
@@ -97,9 +97,9 @@ class Control:
             "pace": asdict(self.pace.report()) if self.pace else None,
         }
 
-    def _log(self, request: dict[str, Any]) -> dict[str, list[float]]:  # noqa: ARG002
+    def _log(self, request: dict[str, Any]) -> dict[str, list[float]]:  # noqa: ARG002 - all requests have one signature
         log = self.emulator.log()
         return {"time": log.time.tolist(), **{k: v.tolist() for k, v in log.signals.items()}}
 
-    def _stop(self, request: dict[str, Any]) -> None:  # noqa: ARG002
+    def _stop(self, request: dict[str, Any]) -> None:  # noqa: ARG002 - all requests have one signature
         self.stop()

@@ -100,11 +100,9 @@ def recording(
     use : samples that count, by channel; all where a channel is not named, but for a voltage, which
         is then left out, of the log too; None: all of all channels
     """
-    channels = tuple(
-        name for name in compared(log) if name != VOLTAGE or name in (use or {VOLTAGE})
-    )
-    if VOLTAGE not in channels:
+    if use is not None and VOLTAGE not in use:
         log = without_voltage(log)
+    channels = compared(log)
     everything = np.ones(len(log.time), bool)
     counted = np.stack([(use or {}).get(name, everything) for name in channels])
     levels = [noise(log[name], counted[k]) for k, name in enumerate(channels)]

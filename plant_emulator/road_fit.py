@@ -27,8 +27,6 @@ from plant_emulator.road_prior import (
 from plant_emulator.road_whiten import Whitener, whitener
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from plant_emulator.log import Array
     from plant_emulator.road import RoadParameters
     from plant_emulator.road_run import RoadRun
@@ -165,7 +163,8 @@ def differences(run: RoadRun, values: Array, free: Indices) -> Array:
         changed[index] += by
         return run.residual(parameters(changed))
 
-    slope: Callable[[int], Array] = lambda index: (  # noqa: E731
-        (moved(index, STEPS[index]) - moved(index, -STEPS[index])) / (2.0 * STEPS[index])
-    )
+    def slope(index: int) -> Array:
+        step = STEPS[index]
+        return np.asarray((moved(index, step) - moved(index, -step)) / (2.0 * step))
+
     return np.stack([slope(int(index)) for index in free], axis=1)

@@ -79,7 +79,7 @@ class PlcServer:
     async def stop(self) -> None:
         """Stop listening and close every connection."""
         if self._listener is not None:
-            await self._listener.shutdown()  # type: ignore[no-untyped-call]
+            await self._listener.shutdown()  # type: ignore[no-untyped-call]  # pymodbus declares none here
             self._listener = None
 
     async def misbehave(self, names: frozenset[str]) -> None:
@@ -115,7 +115,7 @@ class _Handler(ServerRequestHandler):
     """One connection. What leaves it passes the faults first."""
 
     def __init__(self, listener: ModbusTcpServer, plc: PlcServer) -> None:
-        super().__init__(listener, None, None, None)  # type: ignore[no-untyped-call]
+        super().__init__(listener, None, None, None)  # type: ignore[no-untyped-call]  # pymodbus declares none here
         self.plc = plc
 
     def send(self, data: bytes, addr: tuple[Any, ...] | None = None) -> None:

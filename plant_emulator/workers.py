@@ -90,7 +90,7 @@ class Cluster:
                 f"--scheduler {address}: {error}; an address like tcp://host:8786 is expected"
             ) from error
         try:
-            self._client: Any = distributed.Client(address, timeout=10)  # type: ignore[no-untyped-call]
+            self._client: Any = distributed.Client(address, timeout=10)  # type: ignore[no-untyped-call]  # Dask declares none here
         except OSError as error:
             raise EmulatorError(f"--scheduler {address}: no scheduler answers ({error})") from error
         self._recipes: dict[str, Any] = {}

@@ -109,7 +109,7 @@ class AxisModel:
 
         return residual
 
-    def loud(self, run: int, where: Point, state: Mapping[str, float]) -> None:  # noqa: ARG002
+    def loud(self, run: int, where: Point, state: Mapping[str, float]) -> None:  # noqa: ARG002 - `Model`'s signature
         """See `Model`: the motion is fed, but smoothed."""
         return
 
@@ -123,22 +123,22 @@ class AxisModel:
 
     def start_states(
         self,
-        run: int,  # noqa: ARG002
-        effects: Sequence[str],  # noqa: ARG002
-        values: Mapping[str, float],  # noqa: ARG002
+        run: int,  # noqa: ARG002 - `Model`'s signature
+        effects: Sequence[str],  # noqa: ARG002 - `Model`'s signature
+        values: Mapping[str, float],  # noqa: ARG002 - `Model`'s signature
     ) -> dict[str, float]:
         """See `Model`."""
         return self._level()
 
-    def located(self, where: Point, runs: Sequence[int]) -> None:  # noqa: ARG002
+    def located(self, where: Point, runs: Sequence[int]) -> None:  # noqa: ARG002 - `Model`'s signature
         """See `Model`: one channel has no blocks to tell apart."""
         return
 
-    def with_planned(self, where: Point, runs: Sequence[int]) -> AxisModel:  # noqa: ARG002
+    def with_planned(self, where: Point, runs: Sequence[int]) -> AxisModel:  # noqa: ARG002 - `Model`'s signature
         """See `Model`: an axis has no drive programs."""
         return self
 
-    def lacks(self, runs: Sequence[int]) -> dict[str, tuple[str, ...]]:  # noqa: ARG002
+    def lacks(self, runs: Sequence[int]) -> dict[str, tuple[str, ...]]:  # noqa: ARG002 - `Model`'s signature
         """See `Model`: what an effect needs is told with the effect."""
         return {}
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from plant_emulator.diagnosis.bench_plans import COLD_SHELL, VOLTAGE_COLUMN, lacks, planned
+from plant_emulator.diagnosis.bench_plans import COLD_SHELL, lacks, planned
 from plant_emulator.diagnosis.locate import locate
 from plant_emulator.diagnosis.model import Candidate, Run
 from plant_emulator.diagnosis.relations import base_speed
@@ -21,6 +21,7 @@ from plant_emulator.free_parameters import free_parameters, unknowns
 from plant_emulator.kernel import kernel, know
 from plant_emulator.log import VOLTAGE
 from plant_emulator.parameters import UNITS
+from plant_emulator.preflight import NAMES
 from plant_emulator.scans import scanned
 from plant_emulator.search import GAP_POSITION, Search
 from plant_emulator.simulate import TOLERANCE, values_of
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
 # and it moves the residual by less than a hundredth of the noise (rms).
 WITH_TRUCK = 1e-4
 # How what an effect needs begins that the voltage shows.
-LOG_VOLTAGE = f"log {VOLTAGE_COLUMN}"
+LOG_VOLTAGE = f"log {NAMES[VOLTAGE]}"
 # Positions in the gap that a predicted run is tried from.
 GAPS = 41
 
@@ -191,7 +192,7 @@ class BenchModel:
         values = {**self._fixed(run, where.effects), **where.values, **state}
         return loud(self._recordings[run], values, values.pop(GAP_POSITION))
 
-    def nominal(self, runs: Sequence[int]) -> dict[str, float]:  # noqa: ARG002
+    def nominal(self, runs: Sequence[int]) -> dict[str, float]:  # noqa: ARG002 - `Model`'s signature
         """See `Model`: the parameter set's."""
         return {u.name: u.prior for u in self.parameters}
 

@@ -15,13 +15,12 @@ import numpy as np
 from plant_emulator.errors import UnsettledError
 from plant_emulator.experiments import noise_levels
 from plant_emulator.log import VOLTAGE, Log, compared
-from plant_emulator.preflight import LEAST_MOTION
+from plant_emulator.preflight import LEAST_MOTION, NAMES
 from plant_emulator.programs import PROGRAMS, SpeedProgram, TravelProgram, in_words
 from plant_emulator.recording import Recording
 from plant_emulator.search import GAP_POSITION
 from plant_emulator.simulate import run_of, simulate
 from plant_emulator.travel import travel
-from register_maps.signals import LOG_COLUMNS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -35,7 +34,6 @@ if TYPE_CHECKING:
 SAME_REFERENCE, SHOWN = 5.0, 0.9
 # Shell of a gear that stood over night, and from where on one is no longer cold [K].
 COLD_SHELL, NO_LONGER_COLD = 293.15, 298.15
-VOLTAGE_COLUMN = next(name for name, column in LOG_COLUMNS.items() if column.signal == VOLTAGE)
 
 
 def shows(log: Log, program: Program) -> bool:
@@ -127,7 +125,7 @@ def lacks(logs: Sequence[Log], base_speed: float) -> dict[str, tuple[str, ...]]:
     fastest = max(float(log["motor_speed"].max()) for log in logs)
     backwards = min(float(log["speed_reference"].min()) for log in logs) < -LEAST_MOTION
     missing = (
-        (not any(VOLTAGE in compared(log) for log in logs), VOLTAGE_COLUMN, ("drive", "motor")),
+        (not any(VOLTAGE in compared(log) for log in logs), NAMES[VOLTAGE], ("drive", "motor")),
         (
             fastest < base_speed,
             f"a run above {base_speed:.0f} rad/s, where the field is weakened",
