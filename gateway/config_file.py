@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from gateway.config import Config, changed, from_document
+from gateway.configuration.config import Config, changed, from_document
+from gateway.configuration.keys import check_text
 from gateway.errors import ConfigError
 from gateway.friction import friction_of_file
-from gateway.keys import check_text
 
 
 def load(path: str | Path) -> Config:

@@ -4,7 +4,7 @@ import re
 import tomllib
 from pathlib import Path
 
-from gateway.config import from_document
+from gateway.configuration.config import from_document
 
 README = (Path(__file__).parents[1] / "README.md").read_text("utf-8")
 

@@ -21,13 +21,14 @@ from fits import Fits, Fitted
 from study import ERROR_BOUND, LONG_STEP, PROGRAM, Study
 from timing import alone, duration, side_by_side
 
-from plant_emulator import kernel, parameter_sets
-from plant_emulator.bench import Bench
+from plant_emulator import parameter_sets
 from plant_emulator.effects import names as effect_names
-from plant_emulator.simulate import LARGEST_STEP, simulate
+from plant_emulator.simulation.bench import Bench
+from plant_emulator.simulation.simulate import LARGEST_STEP, simulate
+from plant_emulator.solver import kernel
 
 if TYPE_CHECKING:
-    from plant_emulator.log import Array
+    from plant_emulator.signals.log import Array
 
 # How far the converged solutions may differ.
 INDEPENDENT = 1e-6
@@ -39,8 +40,8 @@ DIAGNOSIS_BUDGET = 60.0
 FIRST_RESULT = """
 import sys
 from plant_emulator import parameter_sets, programs
-from plant_emulator.log import Log
-from plant_emulator.simulate import run_of, simulate
+from plant_emulator.signals.log import Log
+from plant_emulator.simulation.simulate import run_of, simulate
 time, reference = programs.PROGRAMS[sys.argv[1]].reference()
 simulate(run_of(Log(time, {"speed_reference": reference})), parameter_sets.load().values())
 """

@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import peers
 
-from plant_emulator import logs, parameter_sets, programs
-from plant_emulator.free_parameters import free_parameters
-from plant_emulator.identify import identify
-from plant_emulator.recording import recording
-from plant_emulator.search import GAP_POSITION
+from plant_emulator import logs, parameter_sets
+from plant_emulator.estimation.free_parameters import free_parameters
+from plant_emulator.estimation.search import GAP_POSITION
+from plant_emulator.identification.identify import identify
+from plant_emulator.recordings.recording import recording
+from plant_emulator.simulation import programs
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from plant_emulator.identify import Identification
-    from plant_emulator.log import Array
+    from plant_emulator.identification.identify import Identification
+    from plant_emulator.signals.log import Array
 
 LOG = Path(__file__).resolve().parent.parent / "tests/data/bench_practice/practice_008"
 PROGRAM = "program1"

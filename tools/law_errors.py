@@ -22,19 +22,19 @@ from threadpoolctl import threadpool_limits
 from plant_emulator import effects, logs, parameter_sets
 from plant_emulator.blind import draw, laws, score
 from plant_emulator.blind.generate import measured, true_logs
-from plant_emulator.diagnosis import answer
-from plant_emulator.diagnosis.bench import BenchRecipe
-from plant_emulator.diagnosis.inquiry import Inquiry
-from plant_emulator.diagnosis.pool import Here, model_of
-from plant_emulator.kernel import kernel, know
-from plant_emulator.recording import recording
+from plant_emulator.diagnosis.execution.pool import Here, model_of
+from plant_emulator.diagnosis.machines.bench import BenchRecipe
+from plant_emulator.diagnosis.report import answer
+from plant_emulator.diagnosis.selection.inquiry import Inquiry
+from plant_emulator.recordings.recording import recording
+from plant_emulator.solver.kernel import kernel, know
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from plant_emulator.blind.case import Case
-    from plant_emulator.parameters import ParameterSet
-    from plant_emulator.recording import Recording
+    from plant_emulator.model.parameters import ParameterSet
+    from plant_emulator.recordings.recording import Recording
 
 COLUMNS = ("effect", "parameter", "true", "estimated", "standard_error")
 

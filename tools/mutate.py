@@ -26,11 +26,11 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 EVERY = "tests/gateway/test_every_regulator.py"
 TARGETS = {
-    "gateway.limits": ("tests/gateway/test_limits.py",),
-    "gateway.supervisor": ("tests/gateway/test_supervisor.py",),
-    "gateway.samples": ("tests/gateway/test_samples.py",),
-    "gateway.checks": ("tests/gateway/test_checks.py",),
-    "gateway.command": ("tests/gateway/test_command.py",),
+    "gateway.cycle.limits": ("tests/gateway/test_limits.py",),
+    "gateway.cycle.supervisor": ("tests/gateway/test_supervisor.py",),
+    "gateway.cycle.samples": ("tests/gateway/test_samples.py",),
+    "gateway.cycle.checks": ("tests/gateway/test_checks.py",),
+    "gateway.cycle.command": ("tests/gateway/test_command.py",),
     "gateway.regulators.thesis": (EVERY, "tests/gateway/test_thesis_regulator.py"),
     "gateway.regulators.compensated": (EVERY, "tests/gateway/test_compensated_regulator.py"),
 }

@@ -11,13 +11,16 @@ import numpy as np
 import peers
 from timing import Action, alone
 
-from plant_emulator import kernel, parameter_sets, programs
-from plant_emulator.integrate import CHANNELS
-from plant_emulator.log import Array, Log
-from plant_emulator.simulate import LARGEST_STEP, run_of, simulate
+from plant_emulator import parameter_sets
+from plant_emulator.signals.log import Array, Log
+from plant_emulator.simulation import programs
+from plant_emulator.simulation.simulate import LARGEST_STEP, run_of, simulate
+from plant_emulator.solver.integrate import CHANNELS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from plant_emulator.solver import kernel
 
 PROGRAM = "program1"
 # Worst channel's NRMSD that we may have [%], and how many times ours a peer may have.

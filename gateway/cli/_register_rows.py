@@ -5,8 +5,8 @@ from typing import Final
 
 import click
 
-from gateway.device import Device
-from gateway.inspection import Row, Words, constant_words, in_other_order, shown, swapped
+from gateway.link.device import Device
+from gateway.link.inspection import Row, Words, constant_words, in_other_order, shown, swapped
 from register_maps.register_map import Register
 
 PAPER: Final = ("name", "signal", "address", "form", "type", "order", "raw to", "range", "access")

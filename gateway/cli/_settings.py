@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import click
 
-from gateway.keys import CONTROL
+from gateway.configuration.keys import CONTROL
 
 
 def assignments(values: Sequence[str]) -> dict[str, str]:

@@ -7,13 +7,14 @@ from typing import Any
 import click
 
 import register_maps
-from gateway import device, inspection, review
 from gateway.cli._settings import assignments
 from gateway.cli._types import Command, OutputFile
-from gateway.config import Config
 from gateway.config_file import load, with_values
-from gateway.finding import Finding, holds
-from gateway.plc import LinkError
+from gateway.configuration.config import Config
+from gateway.link import device, inspection
+from gateway.link.plc import LinkError
+from gateway.review import review
+from gateway.review.finding import Finding, holds
 from register_maps.register_map import RegisterMap
 
 COLOURS = {"error": "red", "warning": "yellow", "info": "green"}

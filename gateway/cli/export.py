@@ -4,9 +4,9 @@ from pathlib import Path
 
 import click
 
-from gateway import export, recording
 from gateway.cli._types import Command, OutputFile
-from gateway.header import map_of
+from gateway.recordings import export, recording
+from gateway.recordings.header import map_of
 
 EXAMPLE = """
 \b

@@ -12,8 +12,8 @@ from gateway.cli._settings import assignments
 from gateway.cli._types import PICTURES, Command, Number, OutputFile
 
 if TYPE_CHECKING:
-    from gateway.config import Config
-    from gateway.losses_report import Losses
+    from gateway.configuration.config import Config
+    from gateway.reports.losses_report import Losses
 
 EXAMPLE = """
 \b
@@ -81,8 +81,9 @@ def command(
 
     Exit code 1: the sweep did not come to its end; 2: the run does not show the friction.
     """
-    from gateway import config_file, losses_report
-    from gateway.config import Config
+    from gateway import config_file
+    from gateway.configuration.config import Config
+    from gateway.reports import losses_report
 
     if files and (speeds is not None or hold is not None):
         raise click.UsageError("--speeds and --hold are for a live sweep; a file has had its own")
@@ -111,8 +112,10 @@ def command(
 
 def found(files: Sequence[Path], settings: "Config | None") -> "Losses":
     """The losses in files; the bench is that of `settings`, of a recording, or the thesis's."""
-    from gateway import losses, losses_fit, losses_report, losses_source
-    from gateway.config import Config
+    from gateway.configuration.config import Config
+    from gateway.losses import losses, losses_fit
+    from gateway.recordings import losses_source
+    from gateway.reports import losses_report
 
     sources = [losses_source.read(path) for path in files]
     sections: list[losses.Section] = []
@@ -145,9 +148,10 @@ def _swept(
 ) -> Path:
     """The recording of a sweep on the live bench."""
     import register_maps
-    from gateway import daemon, review
     from gateway.errors import ConfigError, GatewayError
-    from gateway.losses_live import Progress, swept_config
+    from gateway.losses.losses_live import Progress, swept_config
+    from gateway.review import review
+    from gateway.runtime import daemon
 
     config = swept_config(settings, speeds, hold)
     register_map = register_maps.load(config.plc.map)

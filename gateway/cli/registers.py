@@ -10,7 +10,8 @@ import click
 import register_maps
 from gateway.cli._register_rows import FOUND, LIVE, PAPER, compared, in_hex, live, paper, table
 from gateway.cli._types import LONGEST, Command, Number, OutputFile
-from gateway.device import (
+from gateway.errors import PlcError
+from gateway.link.device import (
     Device,
     encoded,
     is_exact,
@@ -19,14 +20,7 @@ from gateway.device import (
     writable,
     write_value,
 )
-from gateway.errors import PlcError
-from gateway.inspection import (
-    Reading,
-    Row,
-    Words,
-    shown,
-    verify,
-)
+from gateway.link.inspection import Reading, Row, Words, shown, verify
 from register_maps.register_map import Register, RegisterMap
 from register_maps.signals import RESERVED
 

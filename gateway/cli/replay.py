@@ -9,15 +9,18 @@ import click
 import numpy as np
 
 import register_maps
-from gateway import config_file, log, losses, losses_source, recording, replay, replay_log
+from gateway import config_file
 from gateway.cli._settings import assignments
 from gateway.cli._types import PICTURES, Command, OutputFile
-from gateway.config import Config
-from gateway.cycle import Output
-from gateway.evaluation import cruise, road_speed, traction_energy
-from gateway.header import config_of, map_of
-from gateway.record import number
-from gateway.replay_report import Compared, draw, write_csv
+from gateway.configuration.config import Config
+from gateway.cycle.cycle import Output
+from gateway.cycle.record import number
+from gateway.losses import losses
+from gateway.offline import replay, replay_log
+from gateway.offline.evaluation import cruise, road_speed, traction_energy
+from gateway.recordings import log, losses_source, recording
+from gateway.recordings.header import config_of, map_of
+from gateway.reports.replay_report import Compared, draw, write_csv
 from gateway.road_load import road_load
 
 EXAMPLE = """

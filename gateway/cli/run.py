@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import click
 
 import register_maps
-from gateway import daemon
 from gateway.cli._settings import assignments
 from gateway.cli._types import Command, Number
 from gateway.config_file import load, with_values
+from gateway.runtime import daemon
 
 if TYPE_CHECKING:
-    from gateway.config import Config
+    from gateway.configuration.config import Config
     from register_maps.register_map import RegisterMap
 
 EXAMPLE = """
@@ -52,7 +52,7 @@ def command(config: Path, *, shadow: bool, duration: float | None, values: tuple
 
 def refusals(config: "Config", register_map: "RegisterMap") -> Iterator[str]:
     """What the review holds to be an error: place, value, and what would be right, one a line."""
-    from gateway.review import review  # numpy's eigenvalues: done with before real time begins
+    from gateway.review.review import review
 
     for one in review(config, register_map):
         if one.severity == "error":

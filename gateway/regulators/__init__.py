@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 from gateway.errors import ConfigError
 
 if TYPE_CHECKING:
-    from gateway.config import Config
+    from gateway.configuration.config import Config
     from gateway.regulators.window import Demand, Window
 
 

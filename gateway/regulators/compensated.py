@@ -15,7 +15,7 @@ Beyond the thesis's regulator:
 
 from dataclasses import dataclass, replace
 
-from gateway.config import Config
+from gateway.configuration.config import Config
 from gateway.friction import Friction, friction_torque
 from gateway.regulators.window import Demand, Window
 from gateway.road_load import RoadLoad, road_load

@@ -16,7 +16,7 @@ in the thesis: no slope is sent that the PLC could follow between two writes.
 
 from dataclasses import dataclass, replace
 
-from gateway.config import Config
+from gateway.configuration.config import Config
 from gateway.friction import Friction, friction_torque
 from gateway.regulators.window import Demand, Window
 from gateway.road_load import RoadLoad, road_load

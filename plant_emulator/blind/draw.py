@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.blind.catalogue import Range
     from plant_emulator.effects import Effect, EffectParameter
-    from plant_emulator.parameters import ParameterSet
+    from plant_emulator.model.parameters import ParameterSet
 
 DECK: dict[Kind, int] = {"none": 2, "drift": 3, "effect": 10, "two": 2, "outside": 3}
 KINDS = [kind for kind in get_args(Kind) for _ in range(DECK[kind])]

@@ -6,18 +6,18 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from plant_emulator.errors import UnsettledError
-from plant_emulator.log import Log
-from plant_emulator.programs import SpeedProgram, program
-from plant_emulator.sensors import noisy
-from plant_emulator.simulate import run_of, simulate, values_of
-from plant_emulator.travel import travel
+from plant_emulator.signals.log import Log
+from plant_emulator.simulation.programs import SpeedProgram, program
+from plant_emulator.simulation.sensors import noisy
+from plant_emulator.simulation.simulate import run_of, simulate, values_of
+from plant_emulator.simulation.travel import travel
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from plant_emulator.blind.case import Case
-    from plant_emulator.parameters import ParameterSet
-    from plant_emulator.simulate import Run
+    from plant_emulator.model.parameters import ParameterSet
+    from plant_emulator.simulation.simulate import Run
 
 # A fiftieth of a sample [s]; the diagnosis simulates with adapted steps up to a whole one. Halved
 # so many times at most where a stage of the truth does not settle.

@@ -14,18 +14,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from plant_emulator.blind.detectable import noise_levels
-from plant_emulator.log import COMPARED
-from plant_emulator.recording import Recording
-from plant_emulator.search import GAP_POSITION
-from plant_emulator.simulate import run_of, values_of
-from plant_emulator.start_states import fit_states, states_of, with_own
+from plant_emulator.estimation.search import GAP_POSITION
+from plant_emulator.estimation.start_states import fit_states, states_of, with_own
+from plant_emulator.recordings.recording import Recording
+from plant_emulator.signals.log import COMPARED
+from plant_emulator.simulation.simulate import run_of, values_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.estimates import Array
-    from plant_emulator.log import Log
-    from plant_emulator.parameters import ParameterSet
+    from plant_emulator.estimation.estimates import Array
+    from plant_emulator.model.parameters import ParameterSet
+    from plant_emulator.signals.log import Log
 
 # A channel counts from this gap on, in the noise.
 OPEN = 1.1

@@ -52,8 +52,8 @@ def command(cases: int, seed: int, out: str | None, workers: int, json_file: str
     DIR/manifest.json.
     """
     from plant_emulator.blind.summary import lines
-    from plant_emulator.blind.trial import Trial
     from plant_emulator.cli._progress import progress
+    from plant_emulator.workflows.blind_trial.trial import Trial
 
     path = Path(out or f"blind_trial_seed_{seed}")
     trial = Trial(path, seed, cases)

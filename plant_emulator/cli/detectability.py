@@ -27,9 +27,9 @@ def command(
 
     And which effects they cannot tell apart, and what they lack for the rest.
     """
-    from plant_emulator import known_set
-    from plant_emulator.diagnosis.detect import as_answer, detectability
-    from plant_emulator.planning import prepared
+    from plant_emulator.diagnosis.design.detect import as_answer, detectability
+    from plant_emulator.parameter_sets import known_set
+    from plant_emulator.workflows.planning import prepared
 
     model, point, notes = prepared(runs, known_set.load(parameters), reference)
     for note in notes:

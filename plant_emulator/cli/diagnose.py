@@ -85,18 +85,19 @@ def command(
     """
     from threadpoolctl import threadpool_limits
 
-    from plant_emulator import known_set, parameter_sets
+    from plant_emulator import parameter_sets
     from plant_emulator.cli._progress import progress
     from plant_emulator.diagnosis.diagnose import Diagnose
-    from plant_emulator.diagnosis.terminal import lines
-    from plant_emulator.diagnosis_session import (
+    from plant_emulator.diagnosis.report.terminal import lines
+    from plant_emulator.parameter_sets import known_set
+    from plant_emulator.workflows.diagnosis_session import (
         axis_loaded,
         calibration,
         laws_apart,
         loaded,
         parameter_set,
     )
-    from plant_emulator.workers import pool_of
+    from plant_emulator.workflows.workers import pool_of
 
     given = known_set.load(parameters, own)
     if model == "axis":
@@ -132,7 +133,7 @@ def command(
                 err=True,
             )
     if report:
-        from plant_emulator.diagnosis.report import html
+        from plant_emulator.diagnosis.report.report import html
 
         Path(report).write_text(html(found.answer, found.details), encoding="utf-8")
     if json_file:

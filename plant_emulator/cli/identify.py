@@ -54,10 +54,11 @@ def command(
     position in the backlash gap is fitted for every log. Standard errors come from the residuals,
     with their autocorrelation.
     """
-    from plant_emulator import effects, known_set, parameter_sets
+    from plant_emulator import effects, parameter_sets
     from plant_emulator.cli._progress import progress
-    from plant_emulator.identification import identified
-    from plant_emulator.identification_report import spreadsheet
+    from plant_emulator.identification.identification_report import spreadsheet
+    from plant_emulator.parameter_sets import known_set
+    from plant_emulator.workflows.identification import identified
 
     own = effects.parse(effect_texts)
     with progress() as tell:
@@ -77,7 +78,7 @@ def command(
     if table:
         Path(table).write_text(spreadsheet(result.found), encoding="utf-8")
     if plot:
-        from plant_emulator.plots import draw_validation
+        from plant_emulator.workflows.plots import draw_validation
 
         draw_validation(result.pairs, plot)
     if json_file:

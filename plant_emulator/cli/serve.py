@@ -98,8 +98,8 @@ def command(
     The first line printed says where it listens. It ends on Ctrl-C or SIGTERM and then says how
     well it kept real time.
     """
-    from plant_emulator.emulator import Options
-    from plant_emulator.serving import serve
+    from plant_emulator.emulator.emulator import Options
+    from plant_emulator.emulator.serving import serve
 
     options = Options(
         host=host,

@@ -44,10 +44,11 @@ def command(
     A log's start position in the backlash gap is fitted to it unless --start middle; a program
     starts in the middle of the gap.
     """
-    from plant_emulator import effects, known_set, logs
+    from plant_emulator import effects, logs
     from plant_emulator.logs import csv
-    from plant_emulator.sensors import noisy
-    from plant_emulator.session import simulated
+    from plant_emulator.parameter_sets import known_set
+    from plant_emulator.simulation.sensors import noisy
+    from plant_emulator.workflows.session import simulated
 
     log = simulated(
         program,

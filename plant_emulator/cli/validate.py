@@ -48,11 +48,12 @@ def command(
 
     Val1 = 100 (1 - NRMSD), Val2 = 100 (1 - sum|e| / sum|y|), percent.
     """
-    from plant_emulator import effects, known_set
+    from plant_emulator import effects
     from plant_emulator import logs as log_files
-    from plant_emulator.identification_report import measures, table_of, table_rows
-    from plant_emulator.session import followed
-    from plant_emulator.validate import validate, zero_phase
+    from plant_emulator.identification.identification_report import measures, table_of, table_rows
+    from plant_emulator.parameter_sets import known_set
+    from plant_emulator.simulation.validate import validate, zero_phase
+    from plant_emulator.workflows.session import followed
 
     values, effect_values = known_set.load(parameters), effects.parse(effect_texts)
     measured = [log_files.read(path) for path in logs]
@@ -62,7 +63,7 @@ def command(
     fits = {log.source: validate(log, simulation) for log, simulation in pairs}
     answer: dict[str, Any] = {"schema": "validation/1", "logs": measures(fits)}
     if plot:
-        from plant_emulator.plots import draw_validation
+        from plant_emulator.workflows.plots import draw_validation
 
         draw_validation(pairs, plot)
     if table:

@@ -5,33 +5,34 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from plant_emulator.diagnosis import answer as parts
-from plant_emulator.diagnosis import place, shrink, verdict
-from plant_emulator.diagnosis.advice import Advice
-from plant_emulator.diagnosis.calibration import confidence
-from plant_emulator.diagnosis.details import Details
-from plant_emulator.diagnosis.explain import NOISE_LEFT, THRESHOLD
-from plant_emulator.diagnosis.held_out import NOMINAL, HeldOut
-from plant_emulator.diagnosis.inquiry import Inquiry
-from plant_emulator.diagnosis.pool import model_of
-from plant_emulator.diagnosis.rest import rest_of
-from plant_emulator.diagnosis.rules import SECOND
-from plant_emulator.diagnosis.steps import Task
-from plant_emulator.diagnosis.terms import in_terms
-from plant_emulator.diagnosis.told import Told
+from plant_emulator.diagnosis.calibration.calibration import confidence
+from plant_emulator.diagnosis.design.advice import Advice
+from plant_emulator.diagnosis.execution.pool import model_of
+from plant_emulator.diagnosis.execution.told import Told
+from plant_emulator.diagnosis.fitting.explain import NOISE_LEFT, THRESHOLD
+from plant_emulator.diagnosis.fitting.steps import Task
+from plant_emulator.diagnosis.fitting.terms import in_terms
+from plant_emulator.diagnosis.prediction import shrink
+from plant_emulator.diagnosis.prediction.held_out import NOMINAL, HeldOut
+from plant_emulator.diagnosis.prediction.rest import rest_of
+from plant_emulator.diagnosis.report import answer as parts
+from plant_emulator.diagnosis.report.details import Details
+from plant_emulator.diagnosis.selection import place, verdict
+from plant_emulator.diagnosis.selection.inquiry import Inquiry
+from plant_emulator.diagnosis.selection.rules import SECOND
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.calibration import Case
-    from plant_emulator.diagnosis.contest import Point
-    from plant_emulator.diagnosis.explain import Contender, Explanation
-    from plant_emulator.diagnosis.held_out import Plan
+    from plant_emulator.diagnosis.calibration.calibration import Case
+    from plant_emulator.diagnosis.execution.pool import Pool, Recipe
+    from plant_emulator.diagnosis.execution.told import Progress
+    from plant_emulator.diagnosis.fitting.contest import Point
+    from plant_emulator.diagnosis.fitting.explain import Contender, Explanation
     from plant_emulator.diagnosis.model import Model
-    from plant_emulator.diagnosis.pool import Pool, Recipe
-    from plant_emulator.diagnosis.shrink import Gap, Prediction
-    from plant_emulator.diagnosis.told import Progress
-    from plant_emulator.diagnosis.verdict import Verdict
+    from plant_emulator.diagnosis.prediction.held_out import Plan
+    from plant_emulator.diagnosis.prediction.shrink import Gap, Prediction
+    from plant_emulator.diagnosis.selection.verdict import Verdict
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from plant_emulator.diagnosis.contest import Point
-    from plant_emulator.estimates import Array, Residual, Unknown
-    from plant_emulator.fed_noise import Loud
+    from plant_emulator.diagnosis.fitting.contest import Point
+    from plant_emulator.estimation.estimates import Array, Residual, Unknown
+    from plant_emulator.recordings.fed_noise import Loud
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,13 +6,13 @@ An effect is a module with
     NEEDS        the sensor or manoeuvre without which a log hardly shows it, if there is one
     PARAMETERS   name -> EffectParameter; all at their neutral values = the effect is not there
     MEMORIES     name -> Memory, if it remembers anything (a lag, a temperature)
-    and one function for each law of `plant_emulator.laws` that it changes, of the law's name:
+    and one function for each law of `plant_emulator.model.laws` that it changes, of the law's name:
     law(value, s, p) -> value, value being what the nominal law and the effects before it gave.
 
 Inside, a parameter is `p.<effect>_<parameter>`, a memory `s.<effect>_<memory>`. At the neutral
 value a function must return `value` itself, so that the run stays bit for bit as it was; the
-conformance tests in tests/plant_emulator/test_every_effect.py see to that for every file in this
-folder.
+conformance tests in tests/plant_emulator/effects/test_every_effect.py see to that for every file in
+this folder.
 """
 
 from __future__ import annotations

@@ -7,15 +7,15 @@ from math import inf, isfinite
 from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
-from plant_emulator import laws
 from plant_emulator.errors import ParameterError
-from plant_emulator.parameters import UNITS
+from plant_emulator.model import laws
+from plant_emulator.model.parameters import UNITS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from types import ModuleType
 
-    from plant_emulator.kernel_types import Record
+    from plant_emulator.model.kernel_types import Record
 
 SUBSYSTEMS = (
     "drive",

@@ -17,7 +17,7 @@ from plant_emulator.errors import LogError
 if TYPE_CHECKING:
     from types import ModuleType
 
-    from plant_emulator.log import Log
+    from plant_emulator.signals.log import Log
 
 HEAD = 4096
 

@@ -11,7 +11,7 @@ from register_maps.csv_log import GZIP, parse
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from plant_emulator.log import Log
+    from plant_emulator.signals.log import Log
 
 NAME = "CSV"
 SUFFIXES = (".csv", ".csv.gz")

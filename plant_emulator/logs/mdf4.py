@@ -10,7 +10,7 @@ from register_maps import mdf4_log
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from plant_emulator.log import Log
+    from plant_emulator.signals.log import Log
 
 NAME = "MDF4"
 SUFFIXES = (".mf4",)

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from plant_emulator.errors import ParameterError
-from plant_emulator.parameters import EFFECTS, ORIGIN, ParameterSet, parameter_set
+from plant_emulator.model.parameters import EFFECTS, ORIGIN, ParameterSet, parameter_set
 
 if TYPE_CHECKING:
-    from plant_emulator.parameters import Parameter
+    from plant_emulator.model.parameters import Parameter
 
 FOLDER = Path(__file__).parent
 DEFAULT = "thesis_table_3_1"

@@ -3,16 +3,16 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from gateway import cycle
-from gateway.config import Config
-from gateway.cycle import Observation, Output
+from gateway.configuration.config import Config
+from gateway.cycle import cycle
+from gateway.cycle.cycle import Observation, Output
+from gateway.cycle.supervisor import State
 from gateway.reasons import Reason
-from gateway.supervisor import State
 from plant_emulator import parameter_sets
-from plant_emulator.bench import Bench
-from plant_emulator.plc import SCAN, Plc
-from plant_emulator.plc_surroundings import Backlash, Switches, Truck
-from plant_emulator.truck import Forklift, ReplayedTorque
+from plant_emulator.emulator.plc.plc import SCAN, Plc
+from plant_emulator.emulator.plc.plc_surroundings import Backlash, Switches, Truck
+from plant_emulator.simulation.bench import Bench
+from plant_emulator.simulation.truck import Forklift, ReplayedTorque
 from register_maps import load
 from register_maps.codec import decode_measurement, encode_measurement, encode_setpoint
 from register_maps.signals import Measurement

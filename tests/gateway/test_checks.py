@@ -5,10 +5,10 @@ from math import inf
 
 import pytest
 
-from gateway.checks import check
-from gateway.config import Config
+from gateway.configuration.config import Config
+from gateway.cycle.checks import check
+from gateway.cycle.supervisor import State
 from gateway.reasons import Reason
-from gateway.supervisor import State
 from register_maps.signals import Alarm, Interlock, Measurement, Status
 
 CONFIG = Config()

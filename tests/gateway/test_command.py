@@ -5,12 +5,12 @@ from math import inf
 
 import pytest
 
-from gateway import command
-from gateway.command import Command
-from gateway.config import Config, from_document
-from gateway.limits import Limit, Limited
+from gateway.configuration.config import Config, from_document
+from gateway.cycle import command
+from gateway.cycle.command import Command
+from gateway.cycle.limits import Limit, Limited
+from gateway.cycle.supervisor import State
 from gateway.reasons import Reason
-from gateway.supervisor import State
 from register_maps import load
 from register_maps.signals import Control, Measurement, Mode, Status
 

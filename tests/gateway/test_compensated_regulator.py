@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gateway.config import Config
+from gateway.configuration.config import Config
 from gateway.friction import friction_torque
 from gateway.regulators import compensated
 from gateway.regulators.window import Window

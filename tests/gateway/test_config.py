@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 import gateway
-from gateway.config import Config, config_hash, from_document
 from gateway.config_file import load, with_values
-from gateway.config_sections import SECTIONS
+from gateway.configuration.config import Config, config_hash, from_document
+from gateway.configuration.config_sections import SECTIONS
+from gateway.configuration.keys import keys
 from gateway.errors import ConfigError
-from gateway.keys import keys
 
 EXAMPLES = Path(gateway.__file__).parent / "examples"
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gateway import cycle
-from gateway.config import Config
+from gateway.configuration.config import Config
+from gateway.cycle import cycle
+from gateway.cycle.supervisor import State
 from gateway.errors import ConfigError
 from gateway.reasons import Reason
-from gateway.supervisor import State
-from plant_emulator.truck import Forklift, road_speed
+from plant_emulator.simulation.truck import Forklift, road_speed
 from register_maps import load
 from register_maps.codec import encode_setpoint
 from register_maps.signals import Alarm, Control, Interlock, Measurement, Mode, Status

@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from gateway.cli.replay import command as replay
-from gateway.evaluation import agreement, cruise, road_speed, traction_energy
+from gateway.offline.evaluation import agreement, cruise, road_speed, traction_energy
 
 NOMINAL = Path(__file__).parents[1] / "data" / "bench_nominal"
 

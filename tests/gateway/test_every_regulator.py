@@ -5,7 +5,7 @@ from math import isfinite
 import pytest
 
 from gateway import regulators
-from gateway.config import Config
+from gateway.configuration.config import Config
 from gateway.errors import ConfigError
 from gateway.regulators.window import Window
 

@@ -3,9 +3,9 @@
 import pytest
 
 import register_maps
-from gateway.device import encoded, writable
 from gateway.errors import ConfigError
-from gateway.inspection import Reading, Row, in_other_order, mbpoll, shown, verify
+from gateway.link.device import encoded, writable
+from gateway.link.inspection import Reading, Row, in_other_order, mbpoll, shown, verify
 from register_maps.codec import encode_measurement
 from register_maps.register_map import RegisterMap
 from register_maps.signals import SIGNALS, Measurement, Status

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.limits import HOLD, Limit, Limits, limit
-from plant_emulator import plc_reference
+from gateway.cycle.limits import HOLD, Limit, Limits, limit
+from plant_emulator.emulator.plc import plc_reference
 
 # At rates of 100 up and 200 down, 10 ms are worth 1 up and 2 down.
 LIMITS = Limits(speed_max=500.0, rate_up=100.0, rate_down=200.0, deviation=40.0, stale=0.1)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from gateway.live import View, state_line, status_table
-from gateway.record import NOTHING, Tick
+from gateway.cycle.record import NOTHING, Tick
+from gateway.recordings.live import View, state_line, status_table
 from tests.gateway.test_recorder import LAYOUT, tick
 
 HEADER = {

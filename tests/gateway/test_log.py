@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway.log import LogError, read
+from gateway.recordings.log import LogError, read
 
 HEADER = "time_s,speed_reference_rad_s,motor_speed_rad_s,drum_speed_rad_s,shaft_torque_Nm"
 ROWS = "0.0,0,0,0,0\n0.01,1,0.5,0.01,-2\n"

@@ -8,16 +8,17 @@ import numpy as np
 import pytest
 
 import register_maps
-from gateway import export, log, replay
-from gateway.config import Config
+from gateway.configuration.config import Config
+from gateway.cycle.supervisor import State
 from gateway.errors import BugError
-from gateway.header import config_of, header, map_of
-from gateway.loop import Loop
-from gateway.plc import LinkError, TcpLink
+from gateway.link.plc import LinkError, TcpLink
+from gateway.offline import replay
 from gateway.reasons import Reason
-from gateway.recording import Recording, encode_header, read
-from gateway.supervisor import State
-from plant_emulator.process import EmulatorProcess
+from gateway.recordings import export, log
+from gateway.recordings.header import config_of, header, map_of
+from gateway.recordings.recording import Recording, encode_header, read
+from gateway.runtime.loop import Loop
+from plant_emulator.emulator.process import EmulatorProcess
 from register_maps.register_map import RegisterMap
 
 pytestmark = pytest.mark.slow

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gateway.config import BenchConfig
+from gateway.configuration.config import BenchConfig
 from gateway.errors import ConfigError
-from gateway.losses import LossesError, Trace, steady
-from gateway.losses_source import _mean_torque, read
+from gateway.losses.losses import LossesError, Trace, steady
+from gateway.recordings.losses_source import _mean_torque, read
 
 DATA = Path(__file__).parents[1] / "data"
 BENCH = BenchConfig()

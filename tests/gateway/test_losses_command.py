@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 from gateway.cli import main
 from gateway.config_file import load_friction
 from gateway.friction import friction_torque, from_friction
-from plant_emulator.process import EmulatorProcess
+from plant_emulator.emulator.process import EmulatorProcess
 from tests.system.gateway_process import until, until_armed
 
 DATA = Path(__file__).parents[1] / "data"

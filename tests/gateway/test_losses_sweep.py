@@ -6,11 +6,11 @@ from math import pi
 import numpy as np
 import pytest
 
-from gateway.config import Config, from_document
+from gateway.configuration.config import Config, from_document
+from gateway.cycle.supervisor import State
 from gateway.errors import ConfigError
-from gateway.losses_live import Progress, swept_config
+from gateway.losses.losses_live import Progress, swept_config
 from gateway.reasons import Reason
-from gateway.supervisor import State
 from register_maps.signals import Mode, PlcState, Status
 from tests.gateway.closed_loop import ClosedLoop
 

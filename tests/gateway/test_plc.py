@@ -9,9 +9,9 @@ from contextlib import contextmanager
 
 import pytest
 
-from gateway.connector import Connector
 from gateway.errors import ConfigError
-from gateway.plc import LinkError, TcpLink
+from gateway.link.connector import Connector
+from gateway.link.plc import LinkError, TcpLink
 from gateway.reasons import Reason
 from tests.gateway.peer import Answer, Peer, Request, frame, normal, peer
 

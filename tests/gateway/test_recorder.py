@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gateway.cycle.record import COMMANDED, MEASURED, NOTHING, Layout, Tick
 from gateway.errors import GatewayError
-from gateway.record import COMMANDED, MEASURED, NOTHING, Layout, Tick
-from gateway.recorder import Job, Recorder
-from gateway.recording import RecordingError, encode_header, is_recording, read
+from gateway.recordings.recorder import Job, Recorder
+from gateway.recordings.recording import RecordingError, encode_header, is_recording, read
 from register_maps.signals import Control, Measurement, Mode, Setpoint, Status
 
 LAYOUT = Layout(read_count=3, write_count=2)
@@ -218,7 +218,7 @@ def test_a_full_disk_is_told_in_one_line_and_keeps_every_whole_record(
 GATEWAY_THAT_IS_KILLED = """
 import os, signal, sys
 from pathlib import Path
-from gateway.recorder import Job, Recorder
+from gateway.recordings.recorder import Job, Recorder
 from tests.gateway.test_recorder import HEADER, LAYOUT, tick
 if __name__ == "__main__":
     recorder = Recorder(Job(path=Path(sys.argv[1]), header=HEADER, layout=LAYOUT))

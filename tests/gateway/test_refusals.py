@@ -12,11 +12,11 @@ from click.testing import CliRunner, Result
 import register_maps
 from gateway.cli import main
 from gateway.cli.registers import command as registers
-from gateway.connector import resolve
-from gateway.device import encoded
 from gateway.errors import ConfigError, PlcError
+from gateway.link.connector import resolve
+from gateway.link.device import encoded
 from plant_emulator import logs
-from plant_emulator.log import Log
+from plant_emulator.signals.log import Log
 
 PROGRAM3 = Path(__file__).parents[1] / "data" / "bench_nominal" / "program3.csv.gz"
 

@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from gateway.cli.registers import command
-from plant_emulator.process import EmulatorProcess
+from plant_emulator.emulator.process import EmulatorProcess
 
 pytestmark = pytest.mark.slow
 

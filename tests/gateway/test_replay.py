@@ -16,16 +16,16 @@ from click.testing import CliRunner, Result
 from pyarrow import parquet
 
 import register_maps
-from gateway import log, recording
 from gateway.cli import main
 from gateway.cli.export import command as export
 from gateway.cli.replay import command as replay
-from gateway.config import Config
-from gateway.cycle import CycleState, Observation, initial, step
-from gateway.header import header
-from gateway.record import NOTHING, Layout, Tick
-from gateway.recording import encode_header
-from gateway.supervisor import State
+from gateway.configuration.config import Config
+from gateway.cycle.cycle import CycleState, Observation, initial, step
+from gateway.cycle.record import NOTHING, Layout, Tick
+from gateway.cycle.supervisor import State
+from gateway.recordings import log, recording
+from gateway.recordings.header import header
+from gateway.recordings.recording import encode_header
 from register_maps.codec import decode_measurement, encode_measurement, encode_setpoint
 from register_maps.signals import Alarm, Interlock, Measurement, PlcState, Status
 

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gateway.link.reply import Asked, objection, split
 from gateway.reasons import Reason
-from gateway.reply import Asked, objection, split
 
 READ_TWO = Asked(transaction=0x0107, unit=1, function=3, length=6)
 """FC3, two registers: a normal PDU is function code, byte count 4, four bytes."""

@@ -6,13 +6,13 @@ from dataclasses import replace
 import pytest
 
 from gateway.cli import main
-from gateway.config import Config, from_document
 from gateway.config_file import load
-from gateway.device import Device
-from gateway.finding import holds
-from gateway.review import review
-from gateway.review_loop import rho_of
-from plant_emulator.process import EmulatorProcess
+from gateway.configuration.config import Config, from_document
+from gateway.link.device import Device
+from gateway.review.finding import holds
+from gateway.review.review import review
+from gateway.review.review_loop import rho_of
+from plant_emulator.emulator.process import EmulatorProcess
 from register_maps import load as load_map
 
 MAP = load_map("bench_int16")

@@ -5,7 +5,7 @@ from math import atan, sin
 
 import pytest
 
-from gateway.config import Config
+from gateway.configuration.config import Config
 from gateway.road_load import road_load
 
 CONFIG = Config()

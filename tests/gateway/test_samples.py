@@ -5,10 +5,10 @@ from math import inf, nan
 
 import pytest
 
-from gateway import samples
-from gateway.config import Config
+from gateway.configuration.config import Config
+from gateway.cycle import samples
+from gateway.cycle.samples import Samples
 from gateway.reasons import Reason
-from gateway.samples import Samples
 from register_maps import load
 from register_maps.signals import Measurement, Status
 

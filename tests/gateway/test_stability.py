@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from gateway.stability import Loop, is_stable, smallest_mass, spectral_radius
+from gateway.review.stability import Loop, is_stable, smallest_mass, spectral_radius
 
 INERTIA = 312.71242 / 0.645**2
 LOOP = Loop(period=0.01, dead_time=0.064, averaged=True)

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
+from gateway.cycle.supervisor import TRANSITIONS, Event, Facts, State, Supervisor, advance
 from gateway.reasons import Reason
-from gateway.supervisor import TRANSITIONS, Event, Facts, State, Supervisor, advance
 
 GOOD = Facts(
     now=10.0,

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gateway.config import Config
+from gateway.configuration.config import Config
 from gateway.regulators import thesis
 from gateway.regulators.window import Window
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.timing import WIDTH, Histogram
+from gateway.runtime.timing import WIDTH, Histogram
 
 
 @given(st.lists(st.floats(0.0, 0.15), min_size=1, max_size=200), st.sampled_from([0.5, 0.99]))

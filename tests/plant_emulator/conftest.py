@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from plant_emulator import compiler, effects, logs, parameter_sets
-from plant_emulator.kernel import Kernel, build
-from plant_emulator.log import Log
-from plant_emulator.parameters import ParameterSet
+from plant_emulator import effects, logs, parameter_sets
+from plant_emulator.model.parameters import ParameterSet
+from plant_emulator.signals.log import Log
+from plant_emulator.solver import compiler
+from plant_emulator.solver.kernel import Kernel, build
 
 DATA = Path(__file__).parents[1] / "data"
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from plant_emulator import compiler
-from plant_emulator.kernel import Kernel, kernel
-from plant_emulator.log import Array, Log
-from plant_emulator.programs import sample_times
-from plant_emulator.simulate import run_of
-from plant_emulator.simulate import simulate as simulate_run
+from plant_emulator.signals.log import Array, Log
+from plant_emulator.simulation.programs import sample_times
+from plant_emulator.simulation.simulate import run_of
+from plant_emulator.simulation.simulate import simulate as simulate_run
+from plant_emulator.solver import compiler
+from plant_emulator.solver.kernel import Kernel, kernel
 
 needs_compiler = pytest.mark.skipif(
     not compiler.ENABLED, reason="is about the compiler, which NUMBA_DISABLE_JIT switches off"

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gateway import log as gateway_log
+from gateway.recordings import log as gateway_log
 from plant_emulator import logs as emulator_logs
 from plant_emulator.errors import LogError
 

@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from gateway import log as gateway_log
+from gateway.recordings import log as gateway_log
 from plant_emulator import logs as emulator_logs
 from plant_emulator.errors import LogError
 

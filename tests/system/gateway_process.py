@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from gateway import recording
-from plant_emulator.process import EmulatorProcess
+from gateway.recordings import recording
+from plant_emulator.emulator.process import EmulatorProcess
 
 CONFIG = """
 [plc]

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from gateway import recording
 from gateway.cli import main
-from gateway.supervisor import State
+from gateway.cycle.supervisor import State
+from gateway.recordings import recording
 from plant_emulator import logs
 
 pytestmark = pytest.mark.slow

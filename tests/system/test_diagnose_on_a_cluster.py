@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from plant_emulator.errors import EmulatorError
-from plant_emulator.workers import Cluster
+from plant_emulator.workflows.workers import Cluster
 from tests.plant_emulator.diagnosis import axis_truth
-from tests.plant_emulator.test_workers import Number
+from tests.plant_emulator.workflows.test_workers import Number
 
 pytestmark = pytest.mark.slow
 

@@ -8,7 +8,7 @@ import time
 import pytest
 
 from plant_emulator import logs
-from plant_emulator.process import EmulatorProcess, ProcessError
+from plant_emulator.emulator.process import EmulatorProcess, ProcessError
 
 
 def started(*arguments: str) -> subprocess.Popen[str]:

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from gateway import recording
-from plant_emulator import faults
-from plant_emulator.process import EmulatorProcess
+from gateway.recordings import recording
+from plant_emulator.emulator.plc import faults
+from plant_emulator.emulator.process import EmulatorProcess
 from tests.system.gateway_process import Gateway, gateway, until, until_armed
 
 pytestmark = pytest.mark.slow

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from plant_emulator.process import EmulatorProcess
+from plant_emulator.emulator.process import EmulatorProcess
 from register_maps import load
 from register_maps.codec import decode_measurement, decode_setpoint
 from tests.conftest import missing

@@ -4,7 +4,7 @@ import signal
 
 import pytest
 
-from plant_emulator.process import EmulatorProcess
+from plant_emulator.emulator.process import EmulatorProcess
 from tests.system.gateway_process import gateway, until, until_armed
 
 pytestmark = pytest.mark.slow

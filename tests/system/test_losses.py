@@ -14,11 +14,11 @@ from rich.console import Console
 
 import plant_emulator
 from gateway.cli import main
-from gateway.config import Config
-from gateway.demo_operator import Session, operate_fast
-from gateway.demo_view import Screen
-from gateway.losses_live import swept_config
-from plant_emulator.process import EmulatorProcess
+from gateway.configuration.config import Config
+from gateway.demo.demo_operator import Session, operate_fast
+from gateway.demo.demo_view import Screen
+from gateway.losses.losses_live import swept_config
+from plant_emulator.emulator.process import EmulatorProcess
 
 pytestmark = pytest.mark.slow
 

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from plant_emulator import parameter_sets, programs
-from plant_emulator.log import Log
-from plant_emulator.simulate import run_of, simulate
+from plant_emulator import parameter_sets
+from plant_emulator.signals.log import Log
+from plant_emulator.simulation import programs
+from plant_emulator.simulation.simulate import run_of, simulate
 
 ROOT = Path(__file__).resolve().parents[2]
 KEYS = {"name", "ours", "peer", "peers", "unit", "ratio", "target", "holds"}

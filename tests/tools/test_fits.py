@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from plant_emulator.identify import FINAL_TOLERANCE
+from plant_emulator.identification.identify import FINAL_TOLERANCE
 
 if TYPE_CHECKING:
-    from plant_emulator.identify import Identification
+    from plant_emulator.identification.identify import Identification
 
 TOOLS = str(Path(__file__).resolve().parents[2] / "tools")
 

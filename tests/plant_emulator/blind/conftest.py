@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from plant_emulator import kernel as kernels
 from plant_emulator.blind import laws
 from plant_emulator.blind.case import Case, Hidden
 from plant_emulator.effects import Effect
+from plant_emulator.solver import kernel as kernels
 
 
 @pytest.fixture(scope="package", autouse=True)

@@ -10,8 +10,8 @@ from plant_emulator.blind.catalogue import INSIDE
 from plant_emulator.blind.draw import PROGRAMS as ALWAYS
 from plant_emulator.blind.draw import draw, kinds
 from plant_emulator.effects import Effect
-from plant_emulator.parameters import ParameterSet
-from plant_emulator.programs import PROGRAMS, SpeedProgram
+from plant_emulator.model.parameters import ParameterSet
+from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram
 
 
 @pytest.fixture(scope="module")

@@ -7,10 +7,10 @@ from plant_emulator import effects
 from plant_emulator.blind import laws
 from plant_emulator.blind.catalogue import INSIDE, OUTSIDE
 from plant_emulator.effects import Effect
-from plant_emulator.log import COMPARED, Log
-from plant_emulator.parameters import ParameterSet
-from plant_emulator.sensors import SENSORS
-from plant_emulator.simulate import run_of, simulate, values_of
+from plant_emulator.model.parameters import ParameterSet
+from plant_emulator.signals.log import COMPARED, Log
+from plant_emulator.simulation.sensors import SENSORS
+from plant_emulator.simulation.simulate import run_of, simulate, values_of
 from tests.plant_emulator.runs import linear, with_truck
 
 UP = linear((0.2, 0.0), (2.2, 330.0), (4.0, 0.0), duration=5.0)

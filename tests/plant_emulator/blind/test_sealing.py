@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from plant_emulator.blind.folder import Folder
 from plant_emulator.blind.sealing import opened, sealed
 from plant_emulator.errors import EmulatorError, InputError
+from plant_emulator.workflows.blind_trial.folder import Folder
 from tests.plant_emulator.blind.conftest import case_with, hidden
 
 CASE = case_with(hidden("torque_sensor_offset", "torque_sensor", offset=0.5))

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from plant_emulator import logs
-from plant_emulator.blind.examiner import Examiner
-from plant_emulator.blind.folder import ROOT, program_hash
-from plant_emulator.blind.trial import Trial
 from plant_emulator.cli import main
-from plant_emulator.log import Log
-from plant_emulator.parameters import ParameterSet
-from plant_emulator.sensors import noisy
-from plant_emulator.simulate import run_of, simulate
+from plant_emulator.model.parameters import ParameterSet
+from plant_emulator.signals.log import Log
+from plant_emulator.simulation.sensors import noisy
+from plant_emulator.simulation.simulate import run_of, simulate
+from plant_emulator.workflows.blind_trial.examiner import Examiner
+from plant_emulator.workflows.blind_trial.folder import ROOT, program_hash
+from plant_emulator.workflows.blind_trial.trial import Trial
 from tests.plant_emulator.runs import linear
 
 # Tells every file that a process opens and every module that it has in the end.
@@ -61,7 +61,7 @@ def test_diagnosis_opens_no_answer_and_knows_no_law_of_the_trial(
     assert found.answer is not None
     assert found.answer["schema"] == "gap-diagnosis/1"
     told = record.read_text().splitlines()
-    assert "module plant_emulator.diagnosis.contest" in told
+    assert "module plant_emulator.diagnosis.fitting.contest" in told
     assert any(line.startswith("open ") and "program1.csv.gz" in line for line in told)
     assert not [line for line in told if str(folder) in line or "sealed" in line]
     assert not [line for line in told if "plant_emulator/blind" in line]
@@ -190,9 +190,9 @@ def test_command_refuses_a_folder_of_another_seed(
 
 
 def test_program_hash_follows_the_source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from plant_emulator.blind import folder as module
+    from plant_emulator.workflows.blind_trial import folder as module
 
-    assert (ROOT / "plant_emulator" / "kernel.py").is_file()
+    assert (ROOT / "plant_emulator" / "solver" / "kernel.py").is_file()
     for package in ("plant_emulator", "register_maps"):
         (tmp_path / package).mkdir()
     source = tmp_path / "plant_emulator" / "laws.py"

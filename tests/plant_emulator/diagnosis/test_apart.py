@@ -5,13 +5,13 @@ from collections.abc import Callable
 
 import pytest
 
-from plant_emulator.diagnosis import apart
-from plant_emulator.diagnosis.bench import BenchModel
-from plant_emulator.diagnosis.contest import Point, null_fit
-from plant_emulator.kernel import kernel
-from plant_emulator.log import Log
-from plant_emulator.parameters import ParameterSet
-from plant_emulator.recording import recording
+from plant_emulator.diagnosis.fitting.contest import Point, null_fit
+from plant_emulator.diagnosis.machines.bench import BenchModel
+from plant_emulator.diagnosis.selection import apart
+from plant_emulator.model.parameters import ParameterSet
+from plant_emulator.recordings.recording import recording
+from plant_emulator.signals.log import Log
+from plant_emulator.solver.kernel import kernel
 from tests.plant_emulator.diagnosis.test_contest import TIME, Line
 
 BenchLog = Callable[[str], Log]

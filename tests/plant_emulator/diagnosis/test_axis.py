@@ -9,20 +9,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.axis import AxisModel, AxisRecipe
-from plant_emulator.diagnosis.axis_effects import EFFECTS
-from plant_emulator.diagnosis.axis_signals import AxisLog, prepared
-from plant_emulator.diagnosis.bands import power
-from plant_emulator.diagnosis.contest import Point, linearised, null_fit
 from plant_emulator.diagnosis.diagnose import Diagnose
-from plant_emulator.diagnosis.explain import Explanation
-from plant_emulator.diagnosis.held_out import NOMINAL, HeldOut, Plan
-from plant_emulator.diagnosis.looks import glance, look
-from plant_emulator.diagnosis.pool import Here
-from plant_emulator.diagnosis.signature import signature
-from plant_emulator.diagnosis.tangents import Tangents
-from plant_emulator.diagnosis_session import plan_of
+from plant_emulator.diagnosis.execution.pool import Here
+from plant_emulator.diagnosis.fitting.contest import Point, linearised, null_fit
+from plant_emulator.diagnosis.fitting.explain import Explanation
+from plant_emulator.diagnosis.fitting.looks import glance, look
+from plant_emulator.diagnosis.fitting.signature import signature
+from plant_emulator.diagnosis.fitting.tangents import Tangents
+from plant_emulator.diagnosis.machines.axis import AxisModel, AxisRecipe
+from plant_emulator.diagnosis.machines.axis_effects import EFFECTS
+from plant_emulator.diagnosis.machines.axis_signals import AxisLog, prepared
+from plant_emulator.diagnosis.prediction.bands import power
+from plant_emulator.diagnosis.prediction.held_out import NOMINAL, HeldOut, Plan
 from plant_emulator.errors import LogError
+from plant_emulator.workflows.diagnosis_session import plan_of
 
 spec = importlib.util.spec_from_file_location(
     "axis_truth", Path(__file__).with_name("axis_truth.py")

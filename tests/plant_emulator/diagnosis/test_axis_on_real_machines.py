@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from plant_emulator import axis_log
-from plant_emulator.diagnosis.axis import AxisModel
-from plant_emulator.diagnosis.bands import BANDS, power
-from plant_emulator.diagnosis.contest import Point, linearised, null_fit
-from plant_emulator.diagnosis.looks import glance, look
-from plant_emulator.diagnosis.signature import signature
-from plant_emulator.diagnosis.tangents import Tangents
-from plant_emulator.estimation import estimate
+from plant_emulator.diagnosis.fitting.contest import Point, linearised, null_fit
+from plant_emulator.diagnosis.fitting.looks import glance, look
+from plant_emulator.diagnosis.fitting.signature import signature
+from plant_emulator.diagnosis.fitting.tangents import Tangents
+from plant_emulator.diagnosis.machines.axis import AxisModel
+from plant_emulator.diagnosis.prediction.bands import BANDS, power
+from plant_emulator.estimation.estimation import estimate
+from plant_emulator.workflows import axis_log
 
 ROOT = Path(__file__).parents[3]
 DATA = ROOT / os.environ.get("REAL_DATA", "../shared/data")

@@ -7,14 +7,14 @@ from math import pi
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.contest import fit, linearised, null_fit
-from plant_emulator.diagnosis.looks import look
+from plant_emulator.diagnosis.fitting.contest import fit, linearised, null_fit
+from plant_emulator.diagnosis.fitting.looks import look
+from plant_emulator.diagnosis.fitting.signature import signature
+from plant_emulator.diagnosis.fitting.tangents import Tangents, gain_turned
 from plant_emulator.diagnosis.model import Candidate
-from plant_emulator.diagnosis.shrink import Fold, refitted
-from plant_emulator.diagnosis.signature import signature
-from plant_emulator.diagnosis.tangents import Tangents, gain_turned
-from plant_emulator.estimates import Array, Unknown
-from plant_emulator.scans import scanned
+from plant_emulator.diagnosis.prediction.shrink import Fold, refitted
+from plant_emulator.estimation.estimates import Array, Unknown
+from plant_emulator.estimation.scans import scanned
 from tests.plant_emulator.diagnosis.test_contest import TIME, Line, explained, linear, noisy
 
 # One that the samples of a run of 2 s tell from others 0.5 Hz off, anywhere within 5.2 Hz.

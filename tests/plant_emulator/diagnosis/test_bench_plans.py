@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from plant_emulator.diagnosis.bench_plans import lacks, shows, undriven
-from plant_emulator.estimates import Array
-from plant_emulator.log import Log
-from plant_emulator.programs import PROGRAMS, in_words
+from plant_emulator.diagnosis.machines.bench_plans import lacks, shows, undriven
+from plant_emulator.estimation.estimates import Array
+from plant_emulator.signals.log import Log
+from plant_emulator.simulation.programs import PROGRAMS, in_words
 
 
 def driven(name: str, factor: float = 1.0, **more: Array) -> Log:

@@ -10,8 +10,8 @@ from click.testing import CliRunner, Result
 
 from plant_emulator import effects
 from plant_emulator.cli import main
-from plant_emulator.diagnosis.bench import candidate
-from plant_emulator.diagnosis.detect import Detectability, as_answer, reached, smallest
+from plant_emulator.diagnosis.design.detect import Detectability, as_answer, reached, smallest
+from plant_emulator.diagnosis.machines.bench import candidate
 
 
 def test_smallest_size_lies_where_the_signature_reaches_seven_times_the_noise() -> None:

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant_emulator import estimation
-from plant_emulator.diagnosis.contest import Point, fit
 from plant_emulator.diagnosis.diagnose import Diagnose, Diagnosis
-from plant_emulator.diagnosis.held_out import HeldOut, Plan
-from plant_emulator.diagnosis.pool import Here
-from plant_emulator.diagnosis.shrink import Fold, predict
-from plant_emulator.estimates import Array
+from plant_emulator.diagnosis.execution.pool import Here
+from plant_emulator.diagnosis.fitting.contest import Point, fit
+from plant_emulator.diagnosis.prediction.held_out import HeldOut, Plan
+from plant_emulator.diagnosis.prediction.shrink import Fold, predict
+from plant_emulator.estimation import estimation
+from plant_emulator.estimation.estimates import Array
 from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, noisy
 
 EACH_IN_TURN = Plan(fitted=(0, 1, 2), folds=(((1, 2), (0,)), ((0, 2), (1,)), ((0, 1), (2,))))

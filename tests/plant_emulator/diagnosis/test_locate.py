@@ -6,14 +6,14 @@ from dataclasses import replace
 import pytest
 
 from plant_emulator import parameter_sets
-from plant_emulator.diagnosis.bench import BenchModel
-from plant_emulator.diagnosis.contest import null_fit
-from plant_emulator.diagnosis.locate import WORTH, Location, among, locate
-from plant_emulator.kernel import kernel
-from plant_emulator.log import Log
-from plant_emulator.recording import recording
-from plant_emulator.sensors import noisy
-from plant_emulator.simulate import run_of, simulate, values_of
+from plant_emulator.diagnosis.fitting.contest import null_fit
+from plant_emulator.diagnosis.localisation.locate import WORTH, Location, among, locate
+from plant_emulator.diagnosis.machines.bench import BenchModel
+from plant_emulator.recordings.recording import recording
+from plant_emulator.signals.log import Log
+from plant_emulator.simulation.sensors import noisy
+from plant_emulator.simulation.simulate import run_of, simulate, values_of
+from plant_emulator.solver.kernel import kernel
 
 PARAMETERS = parameter_sets.load("thesis_table_3_1")
 SUBSYSTEMS = {

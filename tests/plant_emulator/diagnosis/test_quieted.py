@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from plant_emulator.diagnosis.contest import Point, null_fit
-from plant_emulator.diagnosis.inquiry import Inquiry
-from plant_emulator.diagnosis.pool import Here
-from plant_emulator.diagnosis.quieted import Quieted, quieted
-from plant_emulator.estimates import Array
-from plant_emulator.fed_noise import Loud
+from plant_emulator.diagnosis.execution.pool import Here
+from plant_emulator.diagnosis.fitting.contest import Point, null_fit
+from plant_emulator.diagnosis.fitting.quieted import Quieted, quieted
+from plant_emulator.diagnosis.selection.inquiry import Inquiry
+from plant_emulator.estimation.estimates import Array
+from plant_emulator.recordings.fed_noise import Loud
 from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, noisy
 
 # What the fed input's noise adds to every sample by its one standard deviation.

@@ -6,11 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.relations import DRIVE, GEAR, MOTOR, measured, smoothed_speed, values
-from plant_emulator.diagnosis.whiten import relations
-from plant_emulator.log import Log
-from plant_emulator.parameters import ParameterSet
-from plant_emulator.recording import Recording, recording
+from plant_emulator.diagnosis.localisation.relations import (
+    DRIVE,
+    GEAR,
+    MOTOR,
+    measured,
+    smoothed_speed,
+    values,
+)
+from plant_emulator.diagnosis.localisation.whiten import relations
+from plant_emulator.model.parameters import ParameterSet
+from plant_emulator.recordings.recording import Recording, recording
+from plant_emulator.signals.log import Log
 
 
 @pytest.fixture

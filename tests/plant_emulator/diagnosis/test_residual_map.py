@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.phases import CRUISE, phases
-from plant_emulator.diagnosis.residual_map import Cell, residual_map
-from plant_emulator.log import Log
-from plant_emulator.recording import Recording, recording
+from plant_emulator.diagnosis.localisation.phases import CRUISE, phases
+from plant_emulator.diagnosis.localisation.residual_map import Cell, residual_map
+from plant_emulator.recordings.recording import Recording, recording
+from plant_emulator.signals.log import Log
 
 BASE_SPEED = 190.0
 

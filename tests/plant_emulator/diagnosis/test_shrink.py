@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from plant_emulator.diagnosis.model import Run
-from plant_emulator.diagnosis.shrink import (
+from plant_emulator.diagnosis.prediction.shrink import (
     Prediction,
     block_lengths,
     closed_fraction,
@@ -13,7 +13,7 @@ from plant_emulator.diagnosis.shrink import (
     gap,
     interval,
 )
-from plant_emulator.estimates import Array
+from plant_emulator.estimation.estimates import Array
 
 
 def prediction(*channels: Array) -> Prediction:

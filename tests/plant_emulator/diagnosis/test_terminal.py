@@ -2,7 +2,7 @@
 
 import pytest
 
-from plant_emulator.diagnosis.terminal import lines
+from plant_emulator.diagnosis.report.terminal import lines
 from plant_emulator.diagnosis.wording import number, percent, with_error
 from tests.plant_emulator.diagnosis import answers
 

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from plant_emulator.diagnosis.contest import null_fit
-from plant_emulator.diagnosis.verdict import Verdict, decide, shifts
+from plant_emulator.diagnosis.fitting.contest import null_fit
+from plant_emulator.diagnosis.selection.verdict import Verdict, decide, shifts
 from tests.plant_emulator.diagnosis.test_contest import TIME, Line, explained, linear, noisy
 
 LINE = 2.0 + 3.0 * TIME

@@ -1,0 +1,1 @@
+"""The configuration as checked records: PLC, loop, truck, regulator, limits."""

@@ -1,0 +1,157 @@
+"""The gateway's configuration, and the document that it is written as.
+
+A `Config` keeps its `document`, the whole of what was configured in the units of the file with all
+defaults written out, so that a recording can carry it and `from_document` makes the same again.
+What the sections hold stands in `config_sections.py`, files are read in `config_file.py`; this
+module does not touch any.
+"""
+
+import hashlib
+import json
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, get_type_hints
+
+from gateway import regulators
+from gateway.configuration.config_sections import (
+    RPM,
+    SECTIONS,
+    BenchConfig,
+    LimitsConfig,
+    LoopConfig,
+    PlcConfig,
+    RecordingConfig,
+    RegulatorConfig,
+    TruckConfig,
+)
+from gateway.configuration.keys import checked, keys
+from gateway.configuration.losses_speeds import Sweep, from_sweep
+from gateway.errors import ConfigError
+from gateway.friction import THESIS, from_friction
+
+__all__ = ["RPM", "BenchConfig", "Config", "changed", "config_hash", "from_document"]
+
+Document = dict[str, dict[str, Any]]
+Place = Callable[[str, str], str]
+SWEEP = "sweep"
+
+
+def _defaults() -> Document:
+    written: Document = {
+        name: {key.name: key.default for key in keys(section).values() if key.default is not None}
+        for name, section in SECTIONS.items()
+    }
+    written["regulator"]["friction"] = THESIS.document
+    return written
+
+
+@dataclass(frozen=True, kw_only=True)
+class Config:
+    """Everything that is configured. Changed with `with_values`, so that `document` stays true.
+
+    sweep : steady speeds that are held instead of a road load; None: none
+    document : sections, keys and values as in a file, defaults written out; JSON can hold it
+    """
+
+    plc: PlcConfig = field(default_factory=PlcConfig)
+    loop: LoopConfig = field(default_factory=LoopConfig)
+    bench: BenchConfig = field(default_factory=BenchConfig)
+    truck: TruckConfig = field(default_factory=TruckConfig)
+    regulator: RegulatorConfig = field(default_factory=RegulatorConfig)
+    limits: LimitsConfig = field(default_factory=LimitsConfig)
+    recording: RecordingConfig = field(default_factory=RecordingConfig)
+    sweep: Sweep | None = None
+    document: Document = field(default_factory=_defaults)
+
+    def with_values(self, values: Mapping[str, str]) -> "Config":
+        """The same with `{"section.key": "value as in TOML"}` instead."""
+        return from_document(changed(self.document, values), place=_set_place)
+
+
+def changed(document: Document, values: Mapping[str, str]) -> Document:
+    """A document with `{"section.key": "value as in TOML"}` put in."""
+    result = {section: dict(entries) for section, entries in document.items()}
+    for name, text in values.items():
+        section, _, key = name.partition(".")
+        result.setdefault(section, {})[key] = _parsed(text)
+    return result
+
+
+def _parsed(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text  # a bare word, as one types it on a command line
+
+
+def _set_place(section: str, key: str) -> str:
+    return f"{section}.{key}"
+
+
+def from_document(document: Mapping[str, Any], *, place: Place = _set_place) -> Config:
+    """The configuration in a document; `place` names where a key stands, for the error."""
+    written = _defaults()
+    sections: dict[str, Any] = {}
+    for name, entries in document.items():
+        if name == SWEEP:
+            sections[name] = from_sweep(entries, place(name, "").rstrip(" ."))
+            written[name] = dict(entries)
+            continue
+        if name not in SECTIONS or not isinstance(entries, Mapping):
+            raise ConfigError(
+                "unknown section", place=place(name, ""), value=name, expected=", ".join(SECTIONS)
+            )
+        written[name] |= entries
+    for name, section in SECTIONS.items():
+        sections[name] = _section(name, section, written[name], place)
+    _form_of_road_load(document, place)
+    _known_regulator(sections["regulator"], place)
+    return Config(**sections, document=written)
+
+
+def _section(name: str, section: type, entries: Mapping[str, Any], place: Place) -> Any:
+    known = {key.name: (field_name, key) for field_name, key in keys(section).items()}
+    hints = get_type_hints(section)
+    values = {}
+    for entry, value in entries.items():
+        where = place(name, entry)
+        if section is RegulatorConfig and entry == "friction":
+            values["friction"] = from_friction(value, where)
+            continue
+        if entry not in known:
+            expected = ", ".join(sorted(known))
+            raise ConfigError("unknown key", place=where, value=entry, expected=expected)
+        field_name, key = known[entry]
+        values[field_name] = checked(key, hints[field_name], value, where)
+    return section(**values)
+
+
+def _form_of_road_load(document: Mapping[str, Any], place: Place) -> None:
+    """Road load is told once: either by crr or by f0 .. f2."""
+    truck = document.get("truck", {})
+    given = [key for key in ("f0_N", "f1_N_per_m_s", "f2_N_per_m2_s2") if key in truck]
+    if given and "f0_N" not in truck:
+        raise ConfigError(
+            "road load without its constant part",
+            place=place("truck", given[0]),
+            value=truck[given[0]],
+            expected="f0_N beside it",
+        )
+
+
+def _known_regulator(section: RegulatorConfig, place: Place) -> None:
+    """A regulator is one of the files there are; a name from elsewhere would be a path."""
+    if section.name not in regulators.names():
+        raise ConfigError(
+            "unknown regulator",
+            place=place("regulator", "name"),
+            value=section.name,
+            expected=" or ".join(regulators.names()),
+        )
+
+
+def config_hash(config: Config) -> str:
+    """SHA-256 over the document: the same for the same configuration however it was written."""
+    text = json.dumps(config.document, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()

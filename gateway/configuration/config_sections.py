@@ -1,0 +1,148 @@
+"""The sections of the gateway's configuration: frozen records in SI, with the keys of the TOML.
+
+Each field declares its key once: name as in the file, factor to SI, range or choice, default.
+"""
+
+import math
+from dataclasses import dataclass
+
+from gateway.configuration.keys import declared
+from gateway.friction import THESIS, Friction
+
+RPM = 2.0 * math.pi / 60.0
+MILLI = 1e-3
+PERCENT = 1e-2
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlcConfig:
+    """Where the PLC is, and how long it may take [s]."""
+
+    host: str = declared("host", "127.0.0.1")
+    port: int = declared("port", 5020, lower=1, upper=65535)
+    unit: int = declared("unit", 1, lower=0, upper=255)
+    map: str = declared("map", "bench_int16")
+    timeout: float = declared("timeout_ms", 40.0, scale=MILLI, lower=1.0, upper=1000.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopConfig:
+    """The clock. `stale`: age at which a sample is of no more use; `overruns`: deadlines in a row
+    that may be missed."""
+
+    period: float = declared("period_ms", 10.0, scale=MILLI, lower=1.0, upper=200.0)
+    stale: float = declared("stale_ms", 100.0, scale=MILLI, lower=5.0, upper=1000.0)
+    overruns: int = declared("overruns", 15, lower=1, upper=1000)
+    realtime: bool = declared("realtime", True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchConfig:
+    """The bench as the regulator knows it (thesis, Table 3.1), and the filters in its PLC.
+
+    torque_filter, speed_filter : time constants of first-order filters before the PLC's values [s]
+    """
+
+    drum_inertia: float = declared("drum_inertia_kg_m2", 312.69, lower=1.0, upper=1e5)
+    gear_inertia: float = declared("gear_inertia_kg_m2", 0.02242, lower=0.0, upper=1e4)
+    drum_radius: float = declared("drum_radius_m", 0.645, lower=0.05, upper=5.0)
+    gear_ratio: float = declared("gear_ratio", 62.6, lower=1.0, upper=1000.0)
+    dead_time: float = declared("dead_time_ms", 63.947, scale=MILLI, lower=0.0, upper=500.0)
+    torque_filter: float = declared("torque_filter_ms", 0.0, scale=MILLI, lower=0.0, upper=1000.0)
+    speed_filter: float = declared("speed_filter_ms", 0.0, scale=MILLI, lower=0.0, upper=1000.0)
+    flux_constant: float = declared("flux_constant", 1.8506, lower=0.01, upper=100.0)
+    flux_constant_1: float = declared("flux_constant_1", 366.83, lower=1.0, upper=1e5)
+    flux_constant_2: float = declared("flux_constant_2", 8.0644, lower=0.0, upper=1e3)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TruckConfig:
+    """The truck that the bench imitates.
+
+    crr, crr_v : rolling resistance [1], and its part with the drum's speed [s] (thesis, eq 4.11)
+    f0, f1, f2 : road load instead of crr, crr_v [N], [N s/m], [N s^2/m^2]; None: crr holds
+    grade : rise over run [1]; top_speed, acceleration, braking : what the run will ask for
+    """
+
+    mass: float = declared("mass_kg", 3640.0, lower=50.0, upper=1e5)
+    load: float = declared("load_kg", 0.0, lower=0.0, upper=1e5)
+    wheel_radius: float = declared("wheel_radius_m", 0.1715, lower=0.02, upper=2.0)
+    crr: float = declared("crr", 0.011721, lower=0.0, upper=0.2)
+    crr_v: float = declared("crr_v", 9.3882e-6, lower=0.0, upper=0.1)
+    f0: float | None = declared("f0_N", None, lower=0.0, upper=1e5)
+    f1: float | None = declared("f1_N_per_m_s", None, lower=-1e4, upper=1e4)
+    f2: float | None = declared("f2_N_per_m2_s2", None, lower=-1e3, upper=1e3)
+    grade: float = declared("grade_percent", 0.0, scale=PERCENT, lower=-50.0, upper=50.0)
+    top_speed: float = declared("top_speed_km_h", 14.0, scale=1.0 / 3.6, lower=0.1, upper=100.0)
+    acceleration: float = declared("acceleration_m_s2", 0.65, lower=0.0, upper=10.0)
+    braking: float = declared("braking_m_s2", 1.05, lower=0.0, upper=10.0)
+
+    @property
+    def total_mass(self) -> float:
+        """Mass with its load [kg]."""
+        return self.mass + self.load
+
+
+@dataclass(frozen=True, kw_only=True)
+class RegulatorConfig:
+    """Which regulator, and what it knows.
+
+    lead : [s] of the emulated acceleration added; trim : gain on virtual minus drum speed [1];
+        at 0.8 the shaft torque rings after a reversal, with 64 ms dead time and 10 ms scan
+    under_compensation : share of the friction left out; _slow : the same at standstill, from where
+        it falls to the other at 0.5 rad/s of the drum
+    torque_offset : what the sensor shows at no torque [N m]
+    breakaway : torque over the road load at which a standing truck starts to roll [N m at the drum]
+    """
+
+    name: str = declared("name", "compensated")
+    torque: str = declared(
+        "torque", "integrated", choices=("integrated", "averaged", "instantaneous")
+    )
+    lead: float = declared("lead_s", 0.085, lower=0.0, upper=1.0)
+    trim: float = declared("trim", 0.5, lower=0.0, upper=5.0)
+    under_compensation: float = declared(
+        "under_compensation_percent", 0.3, scale=PERCENT, lower=0.0, upper=20.0
+    )
+    under_compensation_slow: float = declared(
+        "under_compensation_slow_percent", 2.0, scale=PERCENT, lower=0.0, upper=20.0
+    )
+    torque_offset: float = declared("torque_offset_Nm", 0.0, lower=-20.0, upper=20.0)
+    breakaway: float = declared("breakaway_Nm", 30.0, lower=0.0, upper=2000.0)
+    friction: Friction = THESIS
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitsConfig:
+    """What no setpoint may exceed. Speeds are the motor's.
+
+    rate_up, rate_down : slopes; deviation : setpoint from measured speed
+    overspeed : measured speed at which the run ends; current : that the PLC may use
+    watchdog : after which the PLC ramps down by itself
+    """
+
+    speed_max: float = declared("speed_max_rpm", 4830.0, scale=RPM, lower=1.0, upper=4830.0)
+    rate_up: float = declared("rate_up_rpm_s", 3000.0, scale=RPM, lower=1.0, upper=30000.0)
+    rate_down: float = declared("rate_down_rpm_s", 3000.0, scale=RPM, lower=1.0, upper=30000.0)
+    deviation: float = declared("deviation_rpm", 400.0, scale=RPM, lower=1.0, upper=4830.0)
+    overspeed: float = declared("overspeed_rpm", 5070.0, scale=RPM, lower=1.0, upper=6000.0)
+    current: float = declared("current_limit_A", 72.0, lower=0.0, upper=72.0)
+    watchdog: float = declared("watchdog_ms", 200.0, scale=MILLI, lower=50.0, upper=1000.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordingConfig:
+    """Where recordings go."""
+
+    dir: str = declared("dir", "recordings")
+
+
+SECTIONS: dict[str, type] = {
+    "plc": PlcConfig,
+    "loop": LoopConfig,
+    "bench": BenchConfig,
+    "truck": TruckConfig,
+    "regulator": RegulatorConfig,
+    "limits": LimitsConfig,
+    "recording": RecordingConfig,
+}

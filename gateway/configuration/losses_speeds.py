@@ -1,0 +1,72 @@
+"""The steady speeds of a sweep, and their reading from a document (pure).
+
+A configuration with a `sweep` holds these speeds one after the other instead of a road load. It is
+put there by whoever wants the losses, so that the recording tells what was asked.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from math import pi
+from typing import TYPE_CHECKING, Any, Final
+
+from gateway.errors import ConfigError
+
+if TYPE_CHECKING:
+    from gateway.configuration.config import Config
+
+RPM: Final = 2.0 * pi / 60.0
+RANGES: Final = {"hold_s": (3.0, 3600.0), "rate_rpm_s": (10.0, 3000.0)}
+SLOWEST_RPM, FASTEST_RPM = 60.0, 4830.0
+DEFAULT: Final = (200.0, 400.0, 800.0, 1400.0, 2100.0, 2900.0, 3700.0, 4500.0)
+"""[rpm] Dense where the friction bends; the drum's rim then moves at 0.8 .. 17.5 km/h."""
+HOLD_S: Final = 8.0
+RATE_RPM_S: Final = 300.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sweep:
+    """speeds : of the motor, in their order [rad/s]; hold : each for so long [s]
+    rate : slope from one to the next [rad/s^2]
+    """
+
+    speeds: tuple[float, ...]
+    hold: float
+    rate: float
+
+    @classmethod
+    def of(cls, config: "Config") -> "Sweep":
+        """The sweep of a configuration that has one."""
+        assert config.sweep is not None
+        return config.sweep
+
+    @property
+    def duration(self) -> float:
+        """From standstill to standstill [s]."""
+        stops = (0.0, *self.speeds, 0.0)
+        ways = sum(abs(to - since) for since, to in pairwise(stops))
+        return ways / self.rate + self.hold * len(self.speeds)
+
+
+def from_sweep(table: object, place: str) -> Sweep:
+    """The sweep in a table with speeds_rpm, hold_s, rate_rpm_s; `place` names it in the error."""
+    if not isinstance(table, Mapping) or set(table) != {"speeds_rpm", *RANGES}:
+        wanted = ", ".join(("speeds_rpm", *RANGES))
+        raise ConfigError("no sweep", place=place, value=table, expected=f"a table with {wanted}")
+    speeds = table["speeds_rpm"]
+    if not isinstance(speeds, list) or not speeds:
+        where = f"{place}.speeds_rpm"
+        raise ConfigError("no speeds", place=where, value=speeds, expected="a list of rpm")
+    return Sweep(
+        speeds=tuple(
+            RPM * _number(f"{place}.speeds_rpm", one, SLOWEST_RPM, FASTEST_RPM) for one in speeds
+        ),
+        hold=_number(f"{place}.hold_s", table["hold_s"], *RANGES["hold_s"]),
+        rate=RPM * _number(f"{place}.rate_rpm_s", table["rate_rpm_s"], *RANGES["rate_rpm_s"]),
+    )
+
+
+def _number(place: str, value: Any, low: float, high: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+        raise ConfigError("bad value", place=place, value=value, expected=f"{low:g} .. {high:g}")
+    return float(value)

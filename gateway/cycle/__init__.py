@@ -1,0 +1,1 @@
+"""One tick of the daemon, pure: supervisor, commands, samples, checks, limits."""

@@ -1,0 +1,251 @@
+"""One tick of the gateway, pure: observation -> supervisor -> regulator -> limits -> command block.
+
+`step` knows no clock and no chance: the same configuration, map and observations give the same
+outputs, bit for bit. That is how a recording is replayed.
+
+The regulator runs in every state that has samples, so that shadow shows what it would do; what it
+wants is used in RUN only. Until the PLC has confirmed the start it is seeded anew at every sample,
+so that the first setpoint is the measured speed. In RAMPDOWN the setpoint goes from the last one to
+zero without asking any measurement. Writing begins in ARMED, with enable off, because the PLC
+starts on its rising edge; it goes on in SAFE, so that a lost last command does not stay in force.
+"""
+
+from dataclasses import dataclass, field, replace
+from math import isfinite
+from typing import Any, cast
+
+from gateway import regulators
+from gateway.configuration.config import Config
+from gateway.cycle import command, limits, losses_sweep, samples
+from gateway.cycle.checks import check
+from gateway.cycle.command import Command
+from gateway.cycle.limits import Limit, Limited, Limits
+from gateway.cycle.samples import Samples
+from gateway.cycle.supervisor import Facts, Reason, State, Supervisor, advance
+from gateway.errors import ConfigError
+from gateway.regulators import Regulator
+from gateway.regulators.window import Demand
+from register_maps.register_map import RegisterMap
+from register_maps.signals import Measurement, Setpoint, Status
+
+UNLINKED = frozenset({State.OFF, State.CONNECT})
+FOLLOWED = Limit.NOT_FINITE | Limit.DEVIATION
+"""Limits that the regulator must know of, or it goes on from where the bench never was. The slope
+limit is not among them: what it delays is caught up with. Nor are stale data: they end the run."""
+BRIDGED = 2.0
+"""Periods for which a demand goes on along its slope without a new sample."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Observation:
+    """What one tick has seen.
+
+    now : monotonic time of the reading [s]
+    measurement : the decoded block, None: there is none, and `fault` says why
+    fault : what was wrong with this tick's reading, or else with the write before it
+    shadow : never write; stop_requested : SIGTERM, Ctrl-C or the end of the demo
+    overruns : deadlines missed in a row up to this tick
+    """
+
+    now: float
+    measurement: Measurement | None
+    fault: Reason | None = None
+    shadow: bool = False
+    stop_requested: bool = False
+    overruns: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Output:
+    """What one tick decided.
+
+    setpoint : the command block to write, None: write nothing
+    demand : motor speed that the regulator wants, before the limits [rad/s]; None: no sample yet
+    age : of the newest sample [s], None: there was none
+    reason : why the last run ended, or why the bench cannot be armed
+    """
+
+    setpoint: Setpoint | None
+    demand: float | None
+    state: State
+    reason: Reason | None
+    age: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class CycleState:
+    """All that one tick hands to the next.
+
+    regulator : its state, None: no sample yet; demand : what it wanted at `demanded` [s]
+    """
+
+    params: Any
+    limits: Limits
+    supervisor: Supervisor = field(default_factory=Supervisor)
+    samples: Samples = field(default_factory=Samples)
+    regulator: Any = None
+    demand: Demand | None = None
+    demanded: float = 0.0
+    command: Command = field(default_factory=Command)
+
+
+def initial(config: Config, register_map: RegisterMap) -> CycleState:
+    """State before the first tick; raises ConfigError where map and configuration do not fit."""
+    needed = samples.NEEDS[config.regulator.torque]
+    if register_map.register(needed) is None:
+        raise ConfigError(
+            f"the register map {register_map.name} has no {needed}",
+            place="[regulator] torque",
+            value=config.regulator.torque,
+            expected=" or ".join(
+                kind for kind, signal in samples.NEEDS.items() if register_map.register(signal)
+            ),
+        )
+    return CycleState(
+        params=_regulator(config).Params.of(config),
+        limits=Limits(
+            speed_max=config.limits.speed_max,
+            rate_up=config.limits.rate_up,
+            rate_down=config.limits.rate_down,
+            deviation=config.limits.deviation,
+            stale=config.loop.stale,
+        ),
+    )
+
+
+def _regulator(config: Config) -> Regulator:
+    """What decides on the demand: the configured regulator, or the sweep where there is one."""
+    if config.sweep is not None:
+        return cast("Regulator", losses_sweep)
+    return regulators.load(config.regulator.name)
+
+
+def step(
+    config: Config, register_map: RegisterMap, state: CycleState, observation: Observation
+) -> tuple[CycleState, Output]:
+    """One tick."""
+    now = observation.now
+    read = samples.take(state.samples, observation.measurement, observation.fault, now)
+    read = samples.weighed(config, register_map, read)
+    sent = command.answered(state.command, observation.measurement, observation.fault)
+    sent = command.echoed(register_map, sent, read.newest if read.is_new else None, now)
+    state = replace(state, samples=read, command=sent)
+    supervisor = advance(state.supervisor, _facts(config, state, observation))
+    if supervisor.state is State.RUN and state.supervisor.state is not State.RUN:
+        state = _bumpless(state, now)
+    state = _regulated(config, replace(state, supervisor=supervisor), now)
+    limited = _limited(config, state, now)
+    state = _followed(config, state, limited, now)
+    state, setpoint = _written(config, register_map, state, limited, now)
+    return state, Output(
+        setpoint=setpoint,
+        demand=None if state.demand is None else state.demand.speed,
+        state=supervisor.state,
+        reason=supervisor.reason,
+        age=None if read.newest is None else read.age(now),
+    )
+
+
+def _facts(config: Config, state: CycleState, observation: Observation) -> Facts:
+    now, newest, sent = observation.now, state.samples.newest, state.command
+    status = Status(0) if newest is None else newest.status
+    before = state.supervisor.state
+    return Facts(
+        now=now,
+        link=samples.complaint(state.samples, now, config.loop.stale),
+        write=command.complaint(sent, now, config.loop.stale),
+        check=None
+        if newest is None
+        else check(
+            config,
+            newest,
+            state=before,
+            overruns=observation.overruns,
+            echo_age=0.0 if sent.echo is None else state.samples.sequence_moved - sent.echo_moved,
+            other_age=now - sent.other_wrote,
+        ),
+        remote=Status.REMOTE in status,
+        confirmed=command.confirmed(config, status),
+        at_rest=state.command.speed == 0.0,
+        stop_requested=observation.stop_requested,
+        shadow=observation.shadow,
+    )
+
+
+def _bumpless(state: CycleState, now: float) -> CycleState:
+    """A run begins: the measured speed counts as the last setpoint, the wait for an echo starts."""
+    newest = state.samples.newest
+    measured = 0.0 if newest is None else newest.motor_speed
+    speed = min(max(measured, 0.0), state.limits.speed_max)
+    started = replace(state.command, speed=speed, written=now, echo_moved=now)
+    return replace(state, command=started)
+
+
+def _regulated(config: Config, state: CycleState, now: float) -> CycleState:
+    """State after the regulator has seen this tick's window, if there is one."""
+    newest, supervisor = state.samples.newest, state.supervisor
+    if newest is None or supervisor.state in UNLINKED:
+        return replace(state, regulator=None, demand=None)
+    regulator = _regulator(config)
+    starting = supervisor.state is State.RUN and not supervisor.confirmed
+    if starting or state.regulator is None:
+        seeded = regulator.seed(state.params, newest.motor_speed, newest.drum_speed)
+        measured = Demand(speed=max(newest.motor_speed, 0.0))
+        return replace(state, regulator=seeded, demand=measured, demanded=now)
+    if state.samples.window is None:
+        return state
+    after, demand = regulator.update(state.params, state.regulator, state.samples.window)
+    if config.regulator.torque == "instantaneous":
+        demand = replace(demand, rate=0.0)  # the thesis's staircase, kept to show what it does
+    return replace(state, regulator=after, demand=demand, demanded=now)
+
+
+def _limited(config: Config, state: CycleState, now: float) -> Limited:
+    """What the limits pass of what this state wants."""
+    last, newest = state.command, state.samples.newest
+    wanted = _wanted(config, state, now)
+    stopping = newest is None or state.supervisor.state is not State.RUN
+    return limits.limit(
+        wanted.speed,
+        wanted.rate,
+        last=last.speed,
+        measured=last.speed if newest is None or stopping else newest.motor_speed,
+        age=0.0 if stopping else state.samples.age(now),
+        dt=now - last.written,
+        limits=state.limits,
+    )
+
+
+def _wanted(config: Config, state: CycleState, now: float) -> Demand:
+    """Motor speed that this state wants: in RUN the regulator's, on along its slope for a while."""
+    demand = state.demand
+    if state.supervisor.state is not State.RUN or demand is None:
+        return Demand(speed=0.0)
+    since = min(now - state.demanded, BRIDGED * config.loop.period)
+    return replace(demand, speed=demand.speed + demand.rate * since)
+
+
+def _followed(config: Config, state: CycleState, limited: Limited, now: float) -> CycleState:
+    """State after the regulator has been told, once, what the limits did to a demand of its."""
+    newest, demand = state.samples.newest, state.demand
+    is_told = state.supervisor.state is State.RUN and state.demanded == now
+    if not (is_told and limited.by & FOLLOWED) or newest is None or demand is None:
+        return state
+    regulator = _regulator(config)
+    if not isfinite(demand.speed):
+        after = regulator.seed(state.params, newest.motor_speed, newest.drum_speed)
+    else:
+        after = regulator.follow(state.params, state.regulator, demand.speed, limited.speed)
+    return replace(state, regulator=after)
+
+
+def _written(
+    config: Config, register_map: RegisterMap, state: CycleState, limited: Limited, now: float
+) -> tuple[CycleState, Setpoint | None]:
+    """The command block of this tick, and the state that knows of it."""
+    if state.supervisor.state not in command.WRITING:
+        return replace(state, command=command.nothing(state.command, now)), None
+    after = command.following(register_map, state.command, limited, now)
+    return replace(state, command=after), command.block(
+        config, register_map, after, limited, enable=state.supervisor.state in command.ENABLING
+    )

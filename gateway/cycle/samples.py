@@ -1,0 +1,174 @@
+"""Which readings are new samples, how old the newest is, and what lies between two of them.
+
+A PLC that is polled as fast as it scans now and then shows the same sample twice: that is neither
+news nor a fault. It is stale when heartbeat or sequence number have not moved for too long. A poll
+that was lost is bridged: the torque integral and the speeds of the next sample span the gap.
+
+Nothing is regulated on a window that cannot be: over which the PLC's clock has not advanced, or not
+as ours has, or whose mean torque no sensor could have shown. One such window is left out; when none
+that can be used has come for too long, there is no fresh sample.
+"""
+
+from dataclasses import dataclass, replace
+from math import exp, inf
+
+from gateway.configuration.config import Config
+from gateway.reasons import Reason
+from gateway.regulators.window import Window
+from register_maps.codec import difference
+from register_maps.register_map import RegisterMap
+from register_maps.signals import Measurement
+
+LINK_IS_DOWN = frozenset({Reason.NOT_CONNECTED, Reason.CONNECTION_LOST})
+"""Faults that no waiting for the next poll cures."""
+SCAN = 0.01
+"""[s] in which the PLC makes one sample, and over which it takes its mean torque."""
+OUT_OF_STEP, JITTER = 0.5, 0.05
+"""How far two clocks may differ over a window: as a share of it, and [s] besides."""
+MEMORY = 0.5
+"""[s] over which a clock that is always too fast or too slow is noticed."""
+APART, SWING = 20.0, 200.0
+"""[N m] that the mean of a window may differ from the PLC's mean of its last scan: when the window
+is that scan, and by how much more when the rest of it is all of the window."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Samples:
+    """newest : the last good reading; before : the sample before it that was another one
+
+    heartbeat_moved, sequence_moved : when they last did [s]
+    fault : the first since the last good reading; down : the link is known to be gone
+    is_new : this tick has brought a new sample; before_came : when the one before it came [s]
+    window : what lies between the two, None: nothing new, or nothing that can be used
+    used : when the last window came that can be [s]; doubt : why a later one cannot
+    ahead : by how much the PLC's clock has got ahead of ours in the last MEMORY [s]
+    """
+
+    newest: Measurement | None = None
+    before: Measurement | None = None
+    heartbeat_moved: float = -inf
+    sequence_moved: float = -inf
+    fault: Reason | None = None
+    down: bool = False
+    is_new: bool = False
+    before_came: float = -inf
+    window: Window | None = None
+    used: float = -inf
+    doubt: Reason = Reason.STALE
+    ahead: float = 0.0
+
+    def age(self, now: float) -> float:
+        """Age of the newest sample [s]."""
+        return now - min(self.heartbeat_moved, self.sequence_moved)
+
+
+def take(
+    samples: Samples, measurement: Measurement | None, fault: Reason | None, now: float
+) -> Samples:
+    """Samples after one reading; whether its window can be used is for `weighed` to say."""
+    samples = replace(samples, is_new=False, window=None)
+    if measurement is None:
+        first = samples.fault or fault or Reason.STALE
+        return replace(samples, fault=first, down=fault in LINK_IS_DOWN)
+    if measurement.sequence_start != measurement.sequence_end:
+        return replace(samples, fault=samples.fault or Reason.TORN_IMAGE, down=False)
+    last = samples.newest
+    beats = last is None or measurement.plc_heartbeat != last.plc_heartbeat
+    moves = last is None or measurement.sequence_start != last.sequence_start
+    return replace(
+        samples,
+        newest=measurement,
+        before=last if moves else samples.before,
+        before_came=samples.sequence_moved if moves else samples.before_came,
+        heartbeat_moved=now if beats else samples.heartbeat_moved,
+        sequence_moved=now if moves else samples.sequence_moved,
+        fault=None,
+        down=False,
+        is_new=moves,
+    )
+
+
+def complaint(samples: Samples, now: float, stale: float) -> Reason | None:
+    """Why there is no fresh sample; None: there is one."""
+    if samples.down or samples.newest is None:
+        return samples.fault or Reason.STALE
+    if samples.age(now) <= stale:
+        return samples.doubt if now - samples.used > stale else None
+    if samples.fault is not None:
+        return samples.fault
+    frozen = samples.heartbeat_moved <= samples.sequence_moved
+    return Reason.HEARTBEAT_FROZEN if frozen else Reason.SEQUENCE_FROZEN
+
+
+def weighed(config: Config, register_map: RegisterMap, samples: Samples) -> Samples:
+    """Samples with the window that a new one ends, or with why it cannot be used."""
+    now, before = samples.newest, samples.before
+    if not samples.is_new or now is None or before is None:
+        return samples
+    own = samples.sequence_moved - samples.before_came
+    duration = difference(now.plc_time, before.plc_time, register_map.modulus("plc_time"))
+    if not _in_step(duration, own):
+        return replace(samples, doubt=Reason.PLC_CLOCK)
+    samples = replace(samples, ahead=samples.ahead * exp(-own / MEMORY) + duration - own)
+    if abs(samples.ahead) > OUT_OF_STEP * MEMORY:
+        return replace(samples, doubt=Reason.PLC_CLOCK)
+    torque = _torque(config.regulator.torque, register_map, now, before, duration)
+    if not _is_possible(register_map, torque, now.shaft_torque_mean, duration):
+        return replace(samples, doubt=Reason.TORQUE_IMPLAUSIBLE)
+    window = Window(
+        duration=duration,
+        shaft_torque=torque - config.regulator.torque_offset,
+        motor_speed=now.motor_speed,
+        drum_speed=now.drum_speed,
+        drum_speed_change=now.drum_speed - before.drum_speed,
+        shell_temperature=_shell_temperature(now),
+    )
+    return replace(samples, window=window, used=samples.sequence_moved)
+
+
+def _in_step(duration: float, own: float) -> bool:
+    """Whether a window took about as long by the PLC's clock as by ours."""
+    allowed = OUT_OF_STEP * max(duration, own) + JITTER
+    return duration > 0.0 and abs(duration - own) <= allowed
+
+
+def _is_possible(
+    register_map: RegisterMap, torque: float, of_scan: float | None, duration: float
+) -> bool:
+    """Whether a sensor may have shown this mean torque [N m]; `of_scan`: the PLC's own mean."""
+    register = register_map.register("shaft_torque")
+    if register is not None:
+        lowest, highest = sorted(register.si_unit.to_si(end) for end in register.range)
+        if not lowest <= torque <= highest:
+            return False
+    if of_scan is None:
+        return True
+    rest = max(0.0, 1.0 - SCAN / duration)
+    return abs(torque - of_scan) <= APART + SWING * rest
+
+
+NEEDS = {
+    "integrated": "shaft_torque_integral",
+    "averaged": "shaft_torque_mean",
+    "instantaneous": "shaft_torque",
+}
+"""The signal that each choice of `regulator.torque` reads."""
+
+
+def _torque(
+    kind: str, register_map: RegisterMap, now: Measurement, before: Measurement, duration: float
+) -> float:
+    """Torque of the window [N m]; where its signal is missing in a sample, that at its end."""
+    if kind == "averaged" and now.shaft_torque_mean is not None:
+        return now.shaft_torque_mean
+    last, first = now.shaft_torque_integral, before.shaft_torque_integral
+    if kind == "integrated" and last is not None and first is not None:
+        return difference(last, first, register_map.modulus("shaft_torque_integral")) / duration
+    return now.shaft_torque
+
+
+def _shell_temperature(measurement: Measurement) -> float | None:
+    """Mean of the thermocouples that work [K]."""
+    both = (measurement.shell_temperature_1, measurement.shell_temperature_2)
+    working = [one for one in both if one is not None]
+    return sum(working) / len(working) if working else None

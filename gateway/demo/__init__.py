@@ -1,0 +1,1 @@
+"""The demo: the gateway drives the emulated bench over a real socket."""

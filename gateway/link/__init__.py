@@ -1,0 +1,1 @@
+"""The Modbus link to the PLC: client, reconnection, checks of every reply, inspection."""

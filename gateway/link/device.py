@@ -1,0 +1,156 @@
+"""A device as the operator meets it: connect, read all registers of a map, twice, and hang up."""
+
+import math
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Final
+
+from gateway.errors import ConfigError
+from gateway.link.inspection import Reading, Words, mbpoll
+from gateway.link.plc import READ_HOLDING, READ_INPUT, LinkError, TcpLink
+from register_maps.codec import CodecError, decode_value, encode_value, scaled
+from register_maps.register_map import Block, Register, RegisterMap
+from register_maps.signals import RESERVED, SIGNALS
+from register_maps.units import UNITS
+
+POLL: Final = 0.002
+VERIFY_PAUSE: Final = 0.15
+"""[s] Between the readings of `verify`: many scans of a PLC."""
+
+
+@contextmanager
+def opened(host: str, port: int, unit: int, timeout: float) -> Iterator[TcpLink]:
+    """A link that is connected, for a command that may wait."""
+    link = TcpLink(host, port, unit, timeout)
+    deadline = time.monotonic() + timeout
+    try:
+        while not _connects(link, deadline):
+            time.sleep(POLL)
+        yield link
+    finally:
+        link.close()
+
+
+def _connects(link: TcpLink, deadline: float) -> bool:
+    try:
+        link.connect()
+    except LinkError:
+        if time.monotonic() > deadline:
+            raise
+        return False
+    return True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Device:
+    """Where a device is."""
+
+    host: str
+    port: int
+    unit: int
+    timeout: float
+
+    @contextmanager
+    def link(self) -> Iterator[TcpLink]:
+        """A connection to it."""
+        with opened(self.host, self.port, self.unit, self.timeout) as link:
+            yield link
+
+    def mbpoll(self, register: Register, words: Words | None = None) -> str:
+        """The equivalent call."""
+        return mbpoll(register, self.host, self.port, self.unit, writing=words)
+
+
+def two_readings(device: Device, register_map: RegisterMap) -> list[Reading]:
+    """Two readings, many scans apart."""
+    with device.link() as link:
+        first = read_all(link, register_map)
+        time.sleep(VERIFY_PAUSE)
+        return [first, read_all(link, register_map)]
+
+
+def read_all(link: TcpLink, register_map: RegisterMap) -> Reading:
+    """Words of each register, by blocks as the loop reads them, single where a block is refused."""
+    reading: dict[str, Words | str] = {}
+    for block in (register_map.measurement, register_map.command):
+        inside = [register for register in register_map.registers if block.holds(register)]
+        try:
+            words = _read(link, block)
+        except LinkError:
+            reading.update({register.name: _alone(link, register) for register in inside})
+        else:
+            reading.update({register.name: _part(words, block, register) for register in inside})
+    for register in register_map.registers:
+        if register.name not in reading:
+            reading[register.name] = _alone(link, register)
+    return reading
+
+
+def _read(link: TcpLink, block: Block) -> Words:
+    return link.read(
+        block.start, block.count, READ_INPUT if block.table == "input" else READ_HOLDING
+    )
+
+
+def _part(words: Words, block: Block, register: Register) -> Words:
+    return words[register.address - block.start : register.end - block.start]
+
+
+def _alone(link: TcpLink, register: Register) -> Words | str:
+    block = Block(table=register.table, start=register.address, count=register.raw.words)
+    try:
+        link.connect()
+        return _read(link, block)
+    except LinkError as error:
+        return str(error)
+
+
+def write_value(link: TcpLink, register: Register, words: Words) -> Words:
+    """Write one register, by function code 6 or 16; the words that it reads back."""
+    if len(words) == 1:
+        link.write_one(register.address, words[0])
+    else:
+        link.write(register.address, words)
+    return link.read(register.address, len(words))
+
+
+def writable(register_map: RegisterMap, name: str) -> Register:
+    """The register of that name, if the map lets one write it."""
+    allowed = {
+        found.name: found
+        for found in register_map.registers
+        if found.access == "write" and found.signal != RESERVED
+    }
+    if name not in allowed:
+        raise ConfigError(
+            "no register that may be written",
+            place=register_map.name,
+            value=name,
+            expected=f"one of {', '.join(allowed)}",
+        )
+    return allowed[name]
+
+
+def encoded(register: Register, scaled_value: float) -> Words:
+    """Words of a value in the register's unit, if the map's range has it."""
+    value = UNITS[register.unit].to_si(scaled_value)
+    if SIGNALS[register.signal].type is not float and not value.is_integer():
+        raise ConfigError(
+            "not whole", place=register.name, value=scaled_value, expected="a whole number"
+        )
+    try:
+        return encode_value(register, int(value) if value.is_integer() else value)
+    except CodecError as error:
+        raise ConfigError(
+            error.kind, place=register.name, value=scaled_value, expected=error.allowed
+        ) from error
+
+
+def is_exact(register: Register, words: Words, scaled_value: float) -> bool:
+    """Whether the words are this value, not only the nearest one that the register can hold."""
+    value = decode_value(register, words)
+    return value is not None and math.isclose(
+        scaled(register, value), scaled_value, rel_tol=1e-9, abs_tol=1e-9
+    )

@@ -1,0 +1,236 @@
+"""The link to the PLC: the only place that knows pymodbus, and strict where pymodbus is not.
+
+pymodbus accepts a reply with another function code or another number of registers, connects
+(blocking) inside a request, and measures its time-out by the wall clock. Here a reply counts only
+when gateway.link.reply has nothing against its bytes, connecting never blocks, and time-outs run on
+the monotonic clock. A connection is given up after the second failure in a row, and at once when
+its bytes are out of step. A late reply to a request that was given up is recognised by its
+transaction id and dropped. An exception that no retry cures (1, 2, 3: the map or the unit is
+wrong) before the first good reply makes the next attempt wait 2 s.
+"""
+
+import logging
+import select
+import socket
+import time
+from collections.abc import Callable, Sequence
+from typing import Final, Protocol
+
+from pymodbus.client import ModbusTcpClient
+from pymodbus.exceptions import ConnectionException, ModbusException
+from pymodbus.pdu import ModbusPDU
+
+from gateway.errors import PlcError
+from gateway.link.connector import LAST_DELAY, Connector
+from gateway.link.reply import Asked, Objection, objection
+from gateway.reasons import Reason
+
+READ_HOLDING: Final = 3
+READ_INPUT: Final = 4
+WRITE_ONE: Final = 6
+WRITE_MANY: Final = 16
+FAILURES_TO_CLOSE: Final = 2
+PERMANENT: Final = frozenset({1, 2, 3})
+
+logging.getLogger("pymodbus").setLevel(
+    logging.CRITICAL + 1
+)  # every failure is reported by us, once
+
+
+class LinkError(PlcError):
+    """The link gave no good reply, with the reason."""
+
+    def __init__(self, reason: Reason, text: str) -> None:
+        super().__init__(text)
+        self.reason = reason
+
+
+class PlcLink(Protocol):
+    """What the loop needs of a PLC. Each method but `close` raises LinkError."""
+
+    def connect(self) -> None:
+        """Have a connection: start or continue an attempt, never wait for it."""
+
+    def read(self, address: int, count: int, function: int = READ_HOLDING) -> tuple[int, ...]:
+        """The words of one block, by one request."""
+
+    def write(self, address: int, words: Sequence[int]) -> None:
+        """Write one block by one request."""
+
+    def close(self) -> None:
+        """End the connection."""
+
+
+class TcpLink:
+    """One Modbus TCP connection to one unit, one request outstanding."""
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        unit: int,
+        timeout: float,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._peer = f"{host}:{port}"
+        self._unit = unit
+        self._timeout = timeout
+        self._connector = Connector(host, port, clock)
+        self._client: _Client | None = None
+        self._given_up: set[int] = set()
+        self._failures = 0
+        self._proven = False
+        self._last = Objection(reason=Reason.NOT_CONNECTED, text="not connected yet")
+
+    def connect(self) -> None:
+        """Have a connection: start or continue an attempt, never wait for it."""
+        if self._client is not None:
+            return
+        connection = self._connector.poll()
+        if connection is None:
+            if self._connector.problem:
+                self._last = Objection(
+                    reason=Reason.NOT_CONNECTED, text=f"cannot connect: {self._connector.problem}"
+                )
+            raise self._error(self._last)
+        self._client = _Client(connection, self._timeout)
+        self._given_up.clear()
+        self._failures = 0
+
+    def read(self, address: int, count: int, function: int = READ_HOLDING) -> tuple[int, ...]:
+        """The words of one block, by one request."""
+        client = self._connected()
+        ask = (
+            client.read_input_registers if function == READ_INPUT else client.read_holding_registers
+        )
+        reply = self._ask(
+            lambda: ask(address, count=count, device_id=self._unit), function, 2 + 2 * count
+        )
+        if len(reply.registers) != count:
+            raise self._fail(_wrong_count(f"{len(reply.registers)} registers, expected {count}"))
+        self._proven = True
+        return tuple(reply.registers)
+
+    def write(self, address: int, words: Sequence[int]) -> None:
+        """Write one block by one request."""
+        client = self._connected()
+        reply = self._ask(
+            lambda: client.write_registers(address, list(words), device_id=self._unit),
+            WRITE_MANY,
+            5,
+        )
+        if (reply.address, reply.count) != (address, len(words)):
+            raise self._fail(
+                _wrong_count(
+                    f"{reply.count} registers at {reply.address} confirmed, "
+                    f"expected {len(words)} at {address}"
+                )
+            )
+
+    def write_one(self, address: int, word: int) -> None:
+        """Write one register (function code 6)."""
+        client = self._connected()
+        reply = self._ask(
+            lambda: client.write_register(address, word, device_id=self._unit), WRITE_ONE, 5
+        )
+        if (reply.address, list(reply.registers)) != (address, [word]):
+            raise self._fail(_wrong_count(f"echo {reply.registers} at {reply.address}"))
+
+    def close(self) -> None:
+        """End the connection, and any attempt."""
+        self._connector.close()
+        if self._client is not None:
+            self._client.close()  # type: ignore[no-untyped-call]  # pymodbus declares none here
+            self._client = None
+
+    def _connected(self) -> "_Client":
+        if self._client is None:
+            raise self._error(self._last)
+        return self._client
+
+    def _ask(self, call: Callable[[], ModbusPDU], function: int, length: int) -> ModbusPDU:
+        """The reply to one request, with nothing against it; `length` of its PDU in bytes."""
+        client = self._connected()
+        client.begin()
+        reply, refusal = _attempt(call)
+        asked = Asked(
+            transaction=client.transaction.next_tid,
+            unit=self._unit,
+            function=function,
+            length=length,
+        )
+        self._given_up.discard(asked.transaction)  # ids come round again after 65000 requests
+        against = refusal or objection(client.received, asked, self._given_up)
+        if against is not None:
+            if against.reason is Reason.TIMEOUT:
+                self._given_up.add(asked.transaction)
+            raise self._fail(against)
+        if reply is None:
+            raise self._fail(_wrong_count("reply cannot be decoded"))
+        self._failures = 0
+        self._connector.succeeded()
+        return reply
+
+    def _fail(self, against: Objection) -> LinkError:
+        """Draw the consequences for the connection; the error to raise."""
+        self._last = against
+        if against.exception is None:
+            self._failures += 1
+        if self._failures >= FAILURES_TO_CLOSE or against.out_of_step:
+            self._hang_up(None)
+        elif against.exception in PERMANENT and not self._proven:
+            self._hang_up(LAST_DELAY)
+        return self._error(against)
+
+    def _hang_up(self, delay: float | None) -> None:
+        self.close()
+        self._connector.failed(delay)
+
+    def _error(self, against: Objection) -> LinkError:
+        return LinkError(against.reason, f"{self._peer} unit {self._unit}: {against.text}")
+
+
+class _Client(ModbusTcpClient):
+    """pymodbus on a connection of ours: never connects by itself, keeps what it received."""
+
+    def __init__(self, connection: socket.socket, timeout: float) -> None:
+        super().__init__("", timeout=timeout, retries=0)
+        self.socket = connection
+        self.received = b""
+        self._deadline = 0.0
+
+    def begin(self) -> None:
+        """Start the time-out of one request."""
+        self.received = b""
+        self._deadline = time.monotonic() + self.comm_params.timeout_connect
+
+    def connect(self) -> bool:
+        return self.socket is not None
+
+    def recv(self, size: int | None) -> bytes:  # noqa: ARG002 - pymodbus's signature
+        connection = self.socket
+        remaining = self._deadline - time.monotonic()
+        if connection is None or remaining <= 0.0:
+            return b""
+        if not select.select([connection], [], [], remaining)[0]:
+            return b""
+        chunk = connection.recv(4096)
+        if not chunk:
+            raise ConnectionException("closed by the peer")
+        self.received += chunk
+        return chunk
+
+
+def _attempt(call: Callable[[], ModbusPDU]) -> tuple[ModbusPDU | None, Objection | None]:
+    """The reply as pymodbus sees it, and the objection when the connection itself failed."""
+    try:
+        return call(), None
+    except (ConnectionException, OSError) as error:
+        text = f"connection lost: {getattr(error, 'strerror', None) or error}"
+        return None, Objection(reason=Reason.CONNECTION_LOST, text=text, out_of_step=True)
+    except ModbusException:
+        return None, None
+
+
+def _wrong_count(text: str) -> Objection:
+    return Objection(reason=Reason.WRONG_COUNT, text=text)

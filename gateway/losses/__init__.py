@@ -1,0 +1,1 @@
+"""The analysis of parasitic losses: steady sections, fit of the friction law."""

@@ -1,0 +1,241 @@
+"""Steady stretches of a run, and the torque that the bench itself takes there (pure).
+
+At steady speed without a truck the motor gives what friction takes, so the sensor between motor and
+gear shows the parasitic loss of the bench (what 40 CFR 1066.255 has dynamometers verify):
+
+    T_f = -xi mean(T_meas) - (J_g + J_d) mean(theta_d'')            (thesis, eq 4.9 with T_w' = 0)
+
+The second term is small, and exact also while the drum floats in the backlash, where its speed does
+not change. A stretch counts as steady while half a second before and half a second after any of its
+moments differ by less than STEADY allows. What cannot be used is left out, with the reason.
+
+What this cannot tell: a constant error of the torque sensor is in the friction found, as the bench
+turns forward only (0..4830 rpm); a regulator that reads the same sensor is right all the same.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.configuration.config import BenchConfig
+from gateway.errors import GatewayError
+
+Array = NDArray[np.float64]
+
+HALF: Final = 0.5
+"""[s] Before and after a moment, over which its slope is taken."""
+LONGEST: Final = 2.4 * HALF
+"""[s] For the samples of both halves together: with a gap between them they say nothing."""
+STEADY: Final = 0.5
+"""[rad/s^2] of the motor: the drum's inertia then takes 2.5 N m, under 1 % of the friction."""
+MOVING: Final = 5.0
+"""[rad/s] of the motor; slower is standstill."""
+SHORTEST, WORTH_NAMING = 1.0, 0.2
+"""[s] Of a stretch that is used; of one that is told of when it is not."""
+COARSEST: Final = 0.5 * HALF
+"""[s] Between two samples."""
+APART: Final = 0.1
+"""Of drum and gear, relative: more is a wrong ratio, scale or a channel that stands."""
+DRIFT: Final = 0.02
+"""Change of speed over a stretch, relative to its mean."""
+BATCHES: Final = 5
+UNSTEADY: Final = 0.15
+"""Between the batches of a stretch, relative to the mean torque: more is not one load."""
+
+
+class LossesError(GatewayError):
+    """The run does not show the friction of the bench."""
+
+    exit_code = 2
+
+
+class SignError(LossesError):
+    """The commissioning check: the torque has the wrong sign where the motor must drive."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trace:
+    """A run in SI, by name: shape (n,) each. `shaft_torque`: mean up to each sample, if known."""
+
+    name: str
+    time: Array
+    motor_speed: Array
+    drum_speed: Array
+    shaft_torque: Array
+    shell_temperature: Array | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """A steady stretch of a run: from, to [s], means in SI; `friction` at the gear output [N m].
+
+    standard_error : of the friction, by the scatter of the torque [N m]
+    shell_temperature : [K], None: not known
+    """
+
+    run: str
+    start: float
+    end: float
+    motor_speed: float
+    gear_speed: float
+    shaft_torque: float
+    friction: float
+    standard_error: float
+    shell_temperature: float | None = None
+
+    @property
+    def duration(self) -> float:
+        """Its length [s]."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeftOut:
+    """A stretch of a run that is not used: from, to [s], motor speed [rad/s], and why."""
+
+    run: str
+    start: float
+    end: float
+    motor_speed: float
+    why: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Steady:
+    """What a run holds."""
+
+    sections: tuple[Section, ...]
+    left_out: tuple[LeftOut, ...]
+
+
+def steady(trace: Trace, bench: BenchConfig, torque_offset: float = 0.0) -> Steady:
+    """The steady stretches of a run, with the friction in each; torque_offset of the sensor [N m].
+
+    Raises LossesError where the torque has the sign of a truck that pushes, or of a sensor whose
+    sign is wrong.
+    """
+    every = float(np.median(np.diff(trace.time)))
+    if every > COARSEST:
+        raise LossesError(
+            f"a sample every {every:g} s; expected one every {COARSEST:g} s or faster"
+        )
+    sections: list[Section] = []
+    left_out: list[LeftOut] = []
+    for part in _stretches(trace):
+        why = _objection(trace, part, bench.gear_ratio)
+        if why:
+            left_out.append(_left_out(trace, part, why))
+        else:
+            sections.append(_section(trace, part, bench, torque_offset))
+    _refuse_sign(sections)
+    return Steady(sections=_pooled(sections), left_out=tuple(left_out))
+
+
+def _stretches(trace: Trace) -> Iterator[slice]:
+    """Where the motor turns at a speed that does not change, samples."""
+    still = np.abs(_slope(trace.time, trace.motor_speed)) < STEADY
+    turning = still & (np.abs(trace.motor_speed) > MOVING)
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], turning.astype(np.int8), [0]))))
+    for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
+        if trace.time[last] - trace.time[first] >= WORTH_NAMING:
+            yield slice(int(first), int(last) + 1)
+
+
+def _slope(time: Array, values: Array) -> Array:
+    """Mean of the HALF second after less that of the one before, by their distance; inf where
+    there are none. A gap in the log makes the slope around it unknown."""
+    count = max(1, round(HALF / float(np.median(np.diff(time)))))
+    slope = np.full_like(values, np.inf)
+    if len(values) <= 2 * count:
+        return slope
+    mean_time, mean_value = _moving_mean(time, count), _moving_mean(values, count)
+    inside = slice(count, len(values) - count + 1)
+    span = mean_time[count:] - mean_time[:-count]
+    slope[inside] = (mean_value[count:] - mean_value[:-count]) / span
+    over_a_gap = time[2 * count - 1 :] - time[: len(time) - 2 * count + 1] > LONGEST
+    slope[inside][over_a_gap] = np.inf
+    return slope
+
+
+def _moving_mean(values: Array, count: int) -> Array:
+    total = np.concatenate(([0.0], np.cumsum(values - values[0])))
+    mean: Array = values[0] + (total[count:] - total[:-count]) / count
+    return mean
+
+
+def _objection(trace: Trace, part: slice, gear_ratio: float) -> str:
+    """Why a stretch cannot be used; empty: it can."""
+    time, speed, torque = trace.time[part], trace.motor_speed[part], trace.shaft_torque[part]
+    if speed.mean() < 0.0:
+        return "turns backwards; the bench is rated for 0..4830 rpm, forward only"
+    if time[-1] - time[0] < SHORTEST:
+        return f"only {time[-1] - time[0]:.2f} s steady; expected {SHORTEST:g} s"
+    change = abs(float(np.polyfit(time - time[0], speed, 1)[0])) * (time[-1] - time[0])
+    if change > DRIFT * speed.mean():
+        return f"speed drifts by {100.0 * change / speed.mean():.1f} %; expected {DRIFT:.0%}"
+    gear, drum = speed.mean() / gear_ratio, float(trace.drum_speed[part].mean())
+    if abs(gear - drum) > APART * gear:
+        return f"gear {gear:.3f} rad/s and drum {drum:.3f} rad/s do not belong together"
+    spread, mean = float(np.ptp(_batch_means(torque))), abs(float(torque.mean()))
+    if spread > UNSTEADY * mean:
+        return f"torque is not steady: its means differ by {spread:.1f} N m of {mean:.1f} N m"
+    return ""
+
+
+def _batch_means(values: Array) -> Array:
+    return np.array([batch.mean() for batch in np.array_split(values, BATCHES)])
+
+
+def _left_out(trace: Trace, part: slice, why: str) -> LeftOut:
+    time = trace.time[part]
+    speed = float(trace.motor_speed[part].mean())
+    start, end = float(time[0]), float(time[-1])
+    return LeftOut(run=trace.name, start=start, end=end, motor_speed=speed, why=why)
+
+
+def _section(trace: Trace, part: slice, bench: BenchConfig, torque_offset: float) -> Section:
+    """Friction in one steady stretch, with the standard error of its own batches."""
+    xi, inertia = bench.gear_ratio, bench.gear_inertia + bench.drum_inertia
+    time, torque = trace.time[part], trace.shaft_torque[part] - torque_offset
+    acceleration = float(np.polyfit(time - time[0], trace.drum_speed[part], 1)[0])
+    motor_speed, mean = float(trace.motor_speed[part].mean()), float(torque.mean())
+    scatter = float(_batch_means(torque).std(ddof=1)) / np.sqrt(BATCHES)
+    shell = trace.shell_temperature
+    return Section(
+        run=trace.name,
+        start=float(time[0]),
+        end=float(time[-1]),
+        motor_speed=motor_speed,
+        gear_speed=motor_speed / xi,
+        shaft_torque=mean,
+        friction=-xi * mean - inertia * acceleration,
+        standard_error=float(xi * scatter),
+        shell_temperature=None if shell is None else float(shell[part].mean()),
+    )
+
+
+def _refuse_sign(sections: list[Section]) -> None:
+    wrong = [one for one in sections if one.shaft_torque > 0.0]
+    if not wrong:
+        return
+    worst = max(wrong, key=lambda one: one.shaft_torque)
+    raise SignError(
+        f"the sign of the shaft torque is wrong, or a truck pushes the drum: at steady forward "
+        f"speed the sensor shows {worst.shaft_torque:+.2f} N m ({worst.start:.1f} .. "
+        f"{worst.end:.1f} s, {worst.motor_speed * 30.0 / np.pi:.0f} rpm; {len(wrong)} of "
+        f"{len(sections)} steady stretches); expected below zero, as the motor drives"
+    )
+
+
+def _pooled(sections: list[Section]) -> tuple[Section, ...]:
+    """The same with one noise for all: a stretch has too few batches to know its own."""
+    if not sections:
+        return ()
+    power = np.mean([one.standard_error**2 * one.duration for one in sections])
+    return tuple(
+        Section(**{**vars(one), "standard_error": float(np.sqrt(power / one.duration))})
+        for one in sections
+    )

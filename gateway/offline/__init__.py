@@ -1,0 +1,1 @@
+"""The replay of logs and recordings through the regulator, and its evaluation."""

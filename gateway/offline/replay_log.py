@@ -1,0 +1,84 @@
+"""A log of the bench through the tick: what would the gateway have asked for (pure).
+
+The samples are fed as the PLC would have sent them, after a second at rest in which the operator
+switches remote on: so everything that rules on the bench rules here, supervisor, regulator and
+limits. The torque integral is that of the logged torque, linear between samples. The loop is open:
+the logged bench followed the log's reference, not the setpoint that comes out, so a difference in
+speed integrates; what is compared is one setpoint with the other.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.configuration.config import Config
+from gateway.cycle.cycle import Observation, Output, initial, step
+from gateway.cycle.supervisor import State
+from register_maps.register_map import RegisterMap
+from register_maps.signals import Alarm, Interlock, Measurement, PlcState, Status
+
+Column = NDArray[np.float64]
+
+REST: Final = 1.0
+"""[s] Before the log: half of it with remote off, so that remote on is a wish of now."""
+STANDING: Final = Status.READY | Status.WARM | Status.WATCHDOG_OK | Status.EMERGENCY_STOP_OK
+RUNNING: Final = Status.ENABLED | Status.ROAD_LOAD
+ALL_CLOSED: Final = Interlock(sum(Interlock))
+
+
+def replay(
+    config: Config, register_map: RegisterMap, time: Column, columns: Mapping[str, Column]
+) -> list[Output]:
+    """Every sample of a log through the tick: times [s] and columns by signal, in SI."""
+    state = initial(config, register_map)
+    running, outputs = False, []
+    for measurement, remote in _samples(time, columns):
+        status = STANDING | (Status.REMOTE if remote else 0) | (RUNNING if running else 0)
+        plc_state = PlcState.ROAD_LOAD if running else PlcState.READY
+        seen = replace(measurement, status=status, plc_state=plc_state)
+        observation = Observation(now=measurement.plc_time, measurement=seen)
+        state, output = step(config, register_map, state, observation)
+        running = output.state in (State.RUN, State.RAMPDOWN)
+        outputs.append(output)
+    return outputs[-len(time) :]
+
+
+def _samples(times: Column, columns: Mapping[str, Column]) -> Iterator[tuple[Measurement, bool]]:
+    """What the PLC would have sent, and whether remote was on."""
+    step_size = float(np.median(np.diff(times)))
+    resting = max(4, round(REST / step_size))
+    integral, before, last = 0.0, 0.0, 0.0
+    for index in range(-resting, len(times)):
+        row = {name: float(column[max(index, 0)]) for name, column in columns.items()}
+        torque = row["shaft_torque"]
+        time = float(times[index]) if index >= 0 else float(times[0]) + index * step_size
+        mean = 0.5 * (torque + before) if index > -resting else torque
+        integral += mean * (time - last) if index > -resting else 0.0
+        last, before = time, torque
+        yield _measurement(row, index + resting, time, mean, integral), index >= -resting // 2
+
+
+def _measurement(
+    row: dict[str, float], number: int, time: float, mean: float, integral: float
+) -> Measurement:
+    return Measurement(
+        sequence_start=number,
+        sequence_end=number,
+        plc_heartbeat=number,
+        plc_time=time,
+        status=STANDING,
+        alarm=Alarm(0),
+        interlock=ALL_CLOSED,
+        motor_speed=row["motor_speed"],
+        drum_speed=row["drum_speed"],
+        shaft_torque=row["shaft_torque"],
+        shaft_torque_mean=mean,
+        shaft_torque_integral=integral,
+        speed_reference=row["speed_reference"],
+        armature_current=row.get("armature_current"),
+        armature_voltage=row.get("armature_voltage"),
+        shell_temperature_1=row.get("shell_temperature"),
+    )

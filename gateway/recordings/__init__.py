@@ -1,0 +1,1 @@
+"""The recordings: recorder process, screen, file format, header, export, runs of files."""

@@ -1,0 +1,164 @@
+"""A recording as a log: the log's columns, and the gateway's own beside them.
+
+One row for each new sample of the PLC, timed by the PLC's clock: ticks without a reading, and
+readings of a sample that was read before, have no row, because a log's time increases and its
+values are finite.
+"""
+
+import csv
+import gzip
+from collections.abc import Callable, Set
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gateway.cycle.record import READ, WRITTEN
+from gateway.errors import ConfigError
+from gateway.recordings.recording import Recording
+from register_maps import mdf4_log, parquet_log
+from register_maps.log_table import Column, LogTableError
+from register_maps.register_map import RegisterMap
+from register_maps.signals import LOG_COLUMNS, SIGNALS
+from register_maps.units import UNITS
+
+Columns = dict[str, Any]
+"""Column name with unit -> values."""
+
+OWN: Final = {
+    "tick": "tick",
+    "demand_motor_speed_rad_s": "demand",
+    "setpoint_motor_speed_rad_s": "setpoint_speed_setpoint",
+    "sample_age_s": "age",
+    "period_s": "period",
+    "lateness_s": "lateness",
+    "latency_s": "latency",
+    "missed_deadlines": "missed",
+    "dropped_records": "dropped",
+}
+SUFFIXES: Final = {
+    "1": "",
+    "s": "_s",
+    "rad/s": "_rad_s",
+    "N m": "_Nm",
+    "N m s": "_Nms",
+    "A": "_A",
+    "V": "_V",
+    "K": "_K",
+}
+
+
+def columns(recording: Recording, register_map: RegisterMap) -> Columns:
+    """Every column that the recording can fill."""
+    rows = recording.records[fresh(recording)]
+    found: Columns = {}
+    for column in LOG_COLUMNS.values():
+        if column.measured is not None:
+            unit = UNITS[column.unit]
+            found[column.column] = (rows[f"measured_{column.measured}"] - unit.shift) / unit.factor
+    found["time_s"] = elapsed(found["time_s"], register_map.modulus("plc_time"))
+    found |= {name: rows[field] for name, field in OWN.items()}
+    found["gateway_time_s"] = rows["now"] - recording.header["started"]
+    found["written"] = (rows["flags"] & WRITTEN) > 0
+    found["state"] = np.array([recording.state(code) for code in rows["state"]])
+    found["reason"] = np.array([recording.reason(code) for code in rows["reason"]])
+    found["fault"] = np.array([recording.reason(code) for code in rows["fault"]])
+    found |= _other_signals(rows, {column.measured for column in LOG_COLUMNS.values()})
+    return {name: values for name, values in found.items() if not _missing(values)}
+
+
+def began(recording: Recording) -> datetime:
+    """When the time of the columns was zero: the date of the first sample that was read."""
+    date = datetime.fromisoformat(recording.header["date"])
+    rows = recording.records[fresh(recording)]
+    waited = float(rows["now"][0] - recording.header["started"]) if len(rows) else 0.0
+    return date + timedelta(seconds=waited)
+
+
+def fresh(recording: Recording) -> NDArray[np.intp]:
+    """Ticks that read a sample which no tick before had read."""
+    read = np.flatnonzero(recording.records["flags"] & READ)
+    samples = recording.records["measured_plc_time"][read]
+    known = np.isfinite(samples)
+    read, samples = read[known], samples[known]
+    new: NDArray[np.intp] = read[np.diff(samples, prepend=np.nan) != 0.0]
+    return new
+
+
+def elapsed(time: NDArray[np.float64], modulus: float | None) -> NDArray[np.float64]:
+    """Time since the first sample, the PLC's clock unwrapped [s]."""
+    steps = np.diff(time, prepend=time[:1])
+    return np.cumsum(steps if modulus is None else np.mod(steps, modulus))
+
+
+def _other_signals(rows: Any, taken: Set[str | None]) -> Columns:
+    """Measured signals that have no column in a log, in SI."""
+    return {
+        f"{signal.name}{SUFFIXES[signal.unit]}": rows[f"measured_{signal.name}"]
+        for signal in SIGNALS.values()
+        if signal.kind == "measurement" and signal.name not in taken
+    }
+
+
+def _missing(values: Any) -> bool:
+    return values.dtype.kind == "f" and bool(len(values)) and bool(np.isnan(values).all())
+
+
+def write_csv(path: Path, found: Columns) -> None:
+    """Write the columns so that reading them gives the same numbers."""
+    opened: Callable[..., Any] = gzip.open if path.name.endswith(".gz") else open
+    with opened(path, "wt", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(found)
+        writer.writerows(
+            zip(*(map(_text, values.tolist()) for values in found.values()), strict=True)
+        )
+
+
+def _text(value: object) -> str:
+    if isinstance(value, bool):
+        return str(int(value))
+    return "" if value != value else str(value)  # noqa: PLR0124 - NaN: there is none
+
+
+def with_units(found: Columns) -> list[Column]:
+    """The columns as files hold them that keep the unit as metadata: by signal, with unit."""
+    return [
+        Column(name=signal, unit=unit, values=values)
+        for (signal, unit), values in zip(map(split_unit, found), found.values(), strict=True)
+    ]
+
+
+def split_unit(column: str) -> tuple[str, str]:
+    """Signal and unit of a column's name."""
+    if column in LOG_COLUMNS:
+        return LOG_COLUMNS[column].signal, LOG_COLUMNS[column].unit
+    # The longest, because _rad_s ends in _s; no suffix fits every name.
+    fitting = {suffix: unit for unit, suffix in SUFFIXES.items() if column.endswith(suffix)}
+    suffix = max(fitting, key=len)
+    return column.removesuffix(suffix), fitting[suffix]
+
+
+def write(path: Path, found: Columns, start: datetime) -> None:
+    """Write the columns in the form that the file's name asks for.
+
+    start : when their time was zero
+    """
+    try:
+        if path.name.endswith((".csv", ".csv.gz")):
+            write_csv(path, found)
+        elif path.name.endswith(".parquet"):
+            path.write_bytes(parquet_log.encode(with_units(found)))
+        elif path.name.endswith(".mf4"):
+            path.write_bytes(mdf4_log.encode(with_units(found), start))
+        else:
+            raise ConfigError(
+                "unknown form",
+                place="--to",
+                value=str(path),
+                expected="one of .csv, .csv.gz, .parquet, .mf4",
+            )
+    except LogTableError as error:
+        raise ConfigError(str(error), place="--to") from error

@@ -1,0 +1,95 @@
+"""What the operator sees while the gateway runs, drawn by the recorder's process.
+
+One line for each change of state or reason, and on a terminal a table under it that is drawn anew
+a few times a second. Units here are the operator's: rpm, km/h, Nm, ms.
+"""
+
+import math
+import sys
+from collections.abc import Callable
+from typing import Any, Final, Self
+
+import numpy as np
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+from gateway.cycle.record import NOTHING, SHADOW, Layout
+
+RPM: Final = 60.0 / (2.0 * math.pi)
+
+
+class View:
+    """Shows batches of records."""
+
+    def __init__(self, header: dict[str, Any], layout: Layout) -> None:
+        self._header = header
+        self._type = np.dtype(layout.formats)
+        self._shown: tuple[int, int] | None = None
+        self._console = Console(highlight=False, soft_wrap=True)
+        self._live = Live(console=self._console, auto_refresh=False, transient=True)
+
+    def __call__(self, batch: bytes) -> None:
+        """Show whole records."""
+        records = np.frombuffer(batch, dtype=self._type)
+        for record in records:
+            self._line(record)
+        if self._live.is_started and len(records):
+            self._live.update(status_table(self._header, records[-1]), refresh=True)
+
+    def __enter__(self) -> Self:
+        if sys.stdout.isatty():
+            self._live.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._live.stop()
+
+    def _line(self, record: np.void) -> None:
+        current = (int(record["state"]), int(record["reason"]))
+        if current != self._shown:
+            self._shown = current
+            self._console.print(state_line(self._header, record), markup=False)
+
+
+def state_line(header: dict[str, Any], record: np.void) -> str:
+    """Time since the start, state, reason with its text, and this tick's fault."""
+    state = header["states"][str(record["state"])]
+    parts = [f"{record['now'] - header['started']:9.3f} s  {state:9s}"]
+    if record["reason"] != NOTHING:
+        parts.append(explained(header, record["reason"]))
+    if record["fault"] not in (NOTHING, record["reason"]):
+        parts.append(f"fault {explained(header, record['fault'])}")
+    return "  ".join(parts).rstrip()
+
+
+def explained(header: dict[str, Any], reason: int) -> str:
+    """Code and text of a reason; a dash where there is none."""
+    return ": ".join(header["reasons"][str(reason)]) if reason != NOTHING else "-"
+
+
+def status_table(header: dict[str, Any], record: np.void) -> Table:
+    """The newest tick in the operator's units."""
+    table = Table(title=header["title"], show_header=False, min_width=48)
+    table.add_column(style="bold")
+    table.add_column(justify="right")
+    state = header["states"][str(record["state"])]
+    table.add_row("state", state + (" (shadow)" if record["flags"] & SHADOW else ""))
+    table.add_row("reason", explained(header, record["reason"]))
+    for label, field, show in ROWS:
+        value = float(record[field])
+        table.add_row(label, show(value) if math.isfinite(value) else "-")
+    table.add_row("missed deadlines", str(record["missed"]))
+    return table
+
+
+ROWS: Final[tuple[tuple[str, str, Callable[[float], str]], ...]] = (
+    ("setpoint, motor", "setpoint_speed_setpoint", lambda v: f"{v * RPM:.1f} rpm"),
+    ("demand, motor", "demand", lambda v: f"{v * RPM:.1f} rpm"),
+    ("motor", "measured_motor_speed", lambda v: f"{v * RPM:.1f} rpm"),
+    ("drum", "measured_drum_speed", lambda v: f"{v:.3f} rad/s"),
+    ("shaft torque", "measured_shaft_torque", lambda v: f"{v:.2f} Nm"),
+    ("armature current", "measured_armature_current", lambda v: f"{v:.2f} A"),
+    ("sample age", "age", lambda v: f"{v * 1e3:.0f} ms"),
+    ("latency", "latency", lambda v: f"{v * 1e3:.2f} ms"),
+)

@@ -1,0 +1,1 @@
+"""Tables and pictures of a replay and of a loss measurement."""

@@ -1,0 +1,1 @@
+"""The review before a start: limits, bounds, loop stability, register map."""

@@ -1,0 +1,85 @@
+"""Whether the register map carries what the regulator reads, and every command that may come."""
+
+from collections.abc import Iterator
+
+from gateway.configuration.config import Config
+from gateway.cycle.command import driven
+from gateway.cycle.samples import NEEDS
+from gateway.review.finding import Finding
+from register_maps.codec import CodecError, Value, encode_value
+from register_maps.register_map import RegisterMap
+from register_maps.signals import Control, Mode
+
+UNENDING = 2**31
+"""Commands that a counter which does not wrap has to hold: 248 days at 100 Hz."""
+
+
+def measurements(config: Config, register_map: RegisterMap) -> Iterator[Finding]:
+    """Whether the torque and the temperature that are configured can be read."""
+    needed = NEEDS[config.regulator.torque]
+    if register_map.register(needed) is None:
+        yield Finding(
+            severity="error",
+            where="regulator.torque",
+            what=f"the register map {register_map.name} has no {needed}",
+            value=config.regulator.torque,
+            allowed=" or ".join(
+                kind for kind, signal in NEEDS.items() if _has(register_map, signal)
+            ),
+        )
+    if config.regulator.friction.temperature_coefficient and not any(
+        _has(register_map, f"shell_temperature_{number}") for number in (1, 2)
+    ):
+        yield Finding(
+            severity="warning",
+            where="regulator.friction",
+            what="friction depends on the shell's temperature, which the register map has not",
+            value=config.regulator.friction.temperature_coefficient,
+            allowed="0 without a shell temperature",
+        )
+
+
+def _has(register_map: RegisterMap, signal: str) -> bool:
+    return register_map.register(signal) is not None
+
+
+def commands(config: Config, register_map: RegisterMap) -> Iterator[Finding]:
+    """Whether every command that the limits let pass fits into its register.
+
+    What does not fit is refused when it is written, which is in the middle of a run.
+    """
+    for signal, why, values in _needs(config, register_map):
+        register = register_map.register(signal)
+        if register is None:
+            continue
+        for value in values:
+            try:
+                encode_value(register, value)
+            except CodecError as error:
+                yield Finding(
+                    severity="error",
+                    where="plc.map",
+                    what=f"register {register.name} of {register_map.name} cannot hold what "
+                    f"{why} asks of it",
+                    value=str(error.value),
+                    allowed=error.allowed,
+                )
+
+
+def _needs(
+    config: Config, register_map: RegisterMap
+) -> Iterator[tuple[str, str, tuple[Value, ...]]]:
+    """Signal, what asks for it, and the ends of what is asked for [SI]."""
+    most = config.limits
+    last = int(register_map.modulus("command_sequence") or UNENDING) - 1
+    yield "speed_setpoint", "limits.speed_max_rpm", (0.0, most.speed_max)
+    yield "speed_rate", "limits.rate_up_rpm_s", (most.rate_up,)
+    yield "speed_rate", "limits.rate_down_rpm_s", (-most.rate_down,)
+    yield "ramp_limit", "the larger of the limits' rates", (max(most.rate_up, most.rate_down),)
+    yield "current_limit", "limits.current_limit_A", (most.current,)
+    yield "watchdog_timeout", "limits.watchdog_ms", (most.watchdog,)
+    yield "control", "the start", (Control(0), Control.ENABLE)
+    yield "mode", "the run", (Mode.READY, driven(config))
+    yield "map_version", "the version of the map", (register_map.version,)
+    for signal in ("command_sequence", "gateway_heartbeat"):
+        yield signal, "the count of commands", (0, last)

@@ -1,0 +1,1 @@
+"""The running daemon: its loop in real time, its processes."""

@@ -1,0 +1,149 @@
+"""The gateway as a whole: link, loop and recorder put together, and signals that ask it to stop.
+
+The loop runs in the calling process, which is asked for real time; the recorder has a process of
+its own. The first SIGINT or SIGTERM asks for a ramp-down; the second ends at once, and the PLC's
+watchdog ramps down.
+"""
+
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+from gateway.configuration.config import Config
+from gateway.cycle.cycle import Output
+from gateway.cycle.record import Layout
+from gateway.cycle.supervisor import State
+from gateway.errors import GatewayError
+from gateway.link.plc import TcpLink
+from gateway.reasons import Reason
+from gateway.recordings.header import header
+from gateway.recordings.recorder import Job, Recorder
+from gateway.recordings.recording import SUFFIX
+from gateway.runtime.loop import Loop, MonotonicClock
+from gateway.runtime.realtime import real_time
+from register_maps.register_map import RegisterMap
+
+BY_OPERATOR: Final = frozenset({Reason.STOP_REQUESTED, Reason.REMOTE_OFF})
+AT_FAULT: Final = frozenset({State.CONNECT, State.ARMED, State.RAMPDOWN, State.SAFE})
+"""States whose reason is the peer's; ARMED has one when what is written does not get through."""
+APART: Final = 1.0
+"""[s] A second signal sooner than this is the first once more: some send to process and group."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ended:
+    """How a run went. Times in seconds; `reason`: why it ended, None: because it was asked to."""
+
+    recording: Path
+    reason: Reason | None
+    cycles: int
+    missed: int
+    dropped: int
+    latency: dict[str, float]
+    lateness: dict[str, float]
+    real_time: str
+
+
+class _Stop:
+    """Whether to stop: by a signal, or because the time is over."""
+
+    def __init__(self, until: float | None) -> None:
+        self._until = until
+        self._first = 0.0
+        self.asked = False
+
+    def signalled(self, number: int, _frame: object) -> None:
+        """First: ask; second: end at once."""
+        now = time.monotonic()
+        if self.asked and now - self._first > APART:
+            raise GatewayError(f"stopped at once by a second {signal.Signals(number).name}")
+        self._first = now if not self.asked else self._first
+        self.asked = True
+
+    def __call__(self) -> bool:
+        return self.asked or (self._until is not None and time.monotonic() >= self._until)
+
+
+def _never(output: Output) -> bool:  # noqa: ARG001 - a run that only its operator ends
+    return False
+
+
+def _is_over(loop: Loop, over: Callable[[Output], bool]) -> bool:
+    return loop.before_stop is not None and over(loop.before_stop)
+
+
+def run(
+    config: Config,
+    register_map: RegisterMap,
+    *,
+    shadow: bool = False,
+    duration: float | None = None,
+    view: bool = True,
+    over: Callable[[Output], bool] = _never,
+) -> Ended:
+    """Run the gateway until it is asked to stop, for so long [s], or until a tick says `over`."""
+    link = TcpLink(config.plc.host, config.plc.port, config.plc.unit, config.plc.timeout)
+    granted = real_time() if config.loop.realtime else nullcontext("not asked for")
+    with granted as real:
+        started = time.monotonic()
+        stop = _Stop(None if duration is None else started + duration)
+        told = header(config, register_map, started=started, shadow=shadow, real_time=real)
+        with _signals(stop):
+            recorder = Recorder(
+                Job(path=_new_file(config), header=told, layout=Layout.of(register_map), view=view)
+            )
+            try:
+                loop = Loop(
+                    config=config,
+                    register_map=register_map,
+                    link=link,
+                    sink=recorder,
+                    clock=MonotonicClock(),
+                    shadow=shadow,
+                )
+                loop.run(lambda: stop() or _is_over(loop, over))
+            finally:
+                recorder.close()
+    return _ended(loop, recorder, real)
+
+
+def _new_file(config: Config) -> Path:
+    """Named after the moment, so that files sort by time."""
+    return Path(config.recording.dir) / f"{datetime.now(UTC):%Y%m%dT%H%M%S.%fZ}{SUFFIX}"
+
+
+@contextmanager
+def _signals(stop: _Stop) -> Iterator[None]:
+    before = {
+        number: signal.signal(number, stop.signalled) for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def fault_of(before: Output | None) -> Reason | None:
+    """Whose fault the end was, by the last output before a stop; None: the operator's wish."""
+    if before is None or before.state not in AT_FAULT or before.reason in BY_OPERATOR:
+        return None
+    return before.reason
+
+
+def _ended(loop: Loop, recorder: Recorder, real: str) -> Ended:
+    return Ended(
+        recording=recorder.path,
+        reason=fault_of(loop.before_stop),
+        cycles=loop.cycles,
+        missed=loop.missed,
+        dropped=recorder.dropped,
+        latency=loop.latency.summary(),
+        lateness=loop.lateness.summary(),
+        real_time=real,
+    )

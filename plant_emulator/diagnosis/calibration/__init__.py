@@ -1,0 +1,1 @@
+"""What cases with known truth taught: confidence of an answer, model-form error of a size."""

@@ -1,0 +1,1 @@
+"""The design of experiments: detectable effects, and the run that separates hypotheses."""

@@ -1,0 +1,1 @@
+"""The fit of hypotheses: joint fit, nuisance projection, random effects, evidence."""

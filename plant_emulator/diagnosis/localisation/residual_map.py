@@ -1,0 +1,151 @@
+"""How large the gap of each channel is where: by phase, speed, load, direction, frequency, time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from plant_emulator.diagnosis.localisation.phases import PHASES, field_weakened, phases
+from plant_emulator.signals.smoothing import smooth
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from plant_emulator.estimation.estimates import Array
+    from plant_emulator.recordings.recording import Recording
+
+# Bands of frequency [Hz], as far as the sampling goes.
+BANDS = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
+SPEEDS = (0.0, 25.0, 50.0, 100.0, 200.0, 300.0, 400.0)  # rad/s at the motor
+TIMES = (0.0, 5.0, 10.0, 20.0, 40.0, 80.0)  # since the start [s]
+# Load is told apart from none by this torque at the sensor [N m], four deviations of its noise.
+LOADED = 1.0
+# Motion, for the direction [rad/s at the motor].
+MOVING = 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell:
+    """The gap of a channel within a bin of an axis, and the sensor's noise [SI].
+
+    gap : rms of measured minus simulated; samples : that it was taken over
+    """
+
+    channel: str
+    axis: str
+    bin: str
+    gap: float
+    noise: float
+    samples: int
+
+    def as_entry(self) -> dict[str, Any]:
+        """As the answer's map has it."""
+        return {"channel": self.channel, self.axis: self.bin, "gap": self.gap, "noise": self.noise}
+
+
+def residual_map(
+    recordings: Sequence[Recording], residuals: Sequence[Array], base_speed: float
+) -> tuple[Cell, ...]:
+    """All cells of all axes.
+
+    residuals : of every run, over the noise, shape (channels, samples)
+    base_speed : above which the field is weakened [rad/s]
+    """
+    masks = [bins(r, base_speed) for r in recordings]
+    keys = dict.fromkeys(key for mask in masks for key in mask)
+    cells = [
+        cell for axis, name in keys for cell in _cells(recordings, residuals, masks, (axis, name))
+    ]
+    return (*cells, *_frequency_cells(recordings, residuals))
+
+
+def bins(recording: Recording, base_speed: float) -> dict[tuple[str, str], NDArray[np.bool_]]:
+    """Samples of a run by axis and bin."""
+    log = recording.log
+    time, speed = log.time, smooth(log.time, log["motor_speed"], 0.1)
+    torque = smooth(time, log["shaft_torque"], 0.1)
+    phase = phases(time, log["speed_reference"], log["motor_speed"])
+    found = {("phase", name): phase == k for k, name in enumerate(PHASES[:-1])}
+    found["phase", PHASES[-1]] = field_weakened(speed, base_speed)
+    found |= {("speed", n): m for n, m in _parts(np.abs(speed), SPEEDS, "rad/s")}
+    found["load", "driving"] = torque * speed < -LOADED * np.abs(speed)
+    found["load", "braking"] = torque * speed > LOADED * np.abs(speed)
+    found["load", "none"] = np.abs(torque) <= LOADED
+    found["direction", "forward"] = speed > MOVING
+    found["direction", "backward"] = speed < -MOVING
+    return found | {("time", n): m for n, m in _parts(time - time[0], TIMES, "s")}
+
+
+def _parts(
+    value: Array, edges: Sequence[float], unit: str
+) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+    """Bins of a quantity between edges, the last one open."""
+    for low, high in zip(edges, (*edges[1:], np.inf), strict=True):
+        name = f"{low:g} to {high:g} {unit}" if high < np.inf else f"from {low:g} {unit}"
+        yield name, (value >= low) & (value < high)
+
+
+def _cells(
+    recordings: Sequence[Recording],
+    residuals: Sequence[Array],
+    masks: Sequence[Mapping[tuple[str, str], NDArray[np.bool_]]],
+    key: tuple[str, str],
+) -> Iterator[Cell]:
+    """One bin's cells, all runs pooled; a channel's noise is that of the runs' samples in it."""
+    for channel in dict.fromkeys(c for r in recordings for c in r.channels):
+        squares = variance = samples = 0.0
+        for r, residual, mask in zip(recordings, residuals, masks, strict=True):
+            if channel not in r.channels or key not in mask:
+                continue
+            row = r.channels.index(channel)
+            inside = residual[row][mask[key] & r.use[row]]
+            squares += float(np.sum(inside**2)) * r.noise[row] ** 2
+            variance += len(inside) * r.noise[row] ** 2
+            samples += len(inside)
+        if samples:
+            yield _cell(channel, key, squares / samples, variance / samples, samples)
+
+
+def _cell(channel: str, key: tuple[str, str], square: float, noise: float, samples: float) -> Cell:
+    return Cell(
+        channel=channel,
+        axis=key[0],
+        bin=key[1],
+        gap=float(np.sqrt(square)),
+        noise=float(np.sqrt(noise)),
+        samples=int(samples),
+    )
+
+
+def _frequency_cells(recordings: Sequence[Recording], residuals: Sequence[Array]) -> Iterator[Cell]:
+    """Bands of frequency; gap and noise are what lies within the band (Parseval)."""
+    for channel in dict.fromkeys(c for r in recordings for c in r.channels):
+        for low, high in pairwise(BANDS):
+            squares = variance = samples = degrees = 0.0
+            for r, residual in zip(recordings, residuals, strict=True):
+                if channel not in r.channels:
+                    continue
+                row = r.channels.index(channel)
+                inside, power = _band(r.log.time, residual[row], low, high)
+                n = len(r.log.time)
+                squares += power * r.noise[row] ** 2
+                variance += inside * r.noise[row] ** 2
+                samples, degrees = samples + n, degrees + inside
+            if degrees:
+                key = ("frequency", f"{low:g} to {high:g} Hz")
+                yield _cell(channel, key, squares / samples, variance / samples, degrees)
+
+
+def _band(time: Array, residual: Array, low: float, high: float) -> tuple[float, float]:
+    """Degrees of freedom in a band, and the sum of squares there."""
+    n = len(residual)
+    frequency = np.fft.rfftfreq(n, float(np.median(np.diff(time))))
+    weight = np.where((frequency == 0.0) | ((n % 2 == 0) & (frequency == frequency[-1])), 1.0, 2.0)
+    inside = (frequency >= low) & (frequency < high)
+    power = np.abs(np.fft.rfft(residual)) ** 2 / n
+    return float(weight[inside].sum()), float((weight * power)[inside].sum())

@@ -1,0 +1,1 @@
+"""The machines that can be diagnosed: the bench, and a single motor-driven axis."""

@@ -1,0 +1,284 @@
+"""The bench as the diagnosis sees it."""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from plant_emulator.diagnosis.localisation.locate import locate
+from plant_emulator.diagnosis.localisation.relations import base_speed
+from plant_emulator.diagnosis.machines.bench_plans import COLD_SHELL, lacks, planned
+from plant_emulator.diagnosis.model import Candidate, Run
+from plant_emulator.effects import from_file
+from plant_emulator.estimation.equation_error import start_values
+from plant_emulator.estimation.estimates import Unknown
+from plant_emulator.estimation.free_parameters import free_parameters, unknowns
+from plant_emulator.estimation.scans import scanned
+from plant_emulator.estimation.search import GAP_POSITION, Search
+from plant_emulator.estimation.start_states import states_of, with_own
+from plant_emulator.model.parameters import UNITS
+from plant_emulator.recordings.fed_noise import loud
+from plant_emulator.recordings.preflight import NAMES
+from plant_emulator.signals.log import VOLTAGE
+from plant_emulator.simulation.simulate import TOLERANCE, values_of
+from plant_emulator.solver.kernel import kernel, know
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from plant_emulator.diagnosis.fitting.contest import Point
+    from plant_emulator.effects import Effect
+    from plant_emulator.estimation.estimates import Array, Residual
+    from plant_emulator.model.parameters import ParameterSet
+    from plant_emulator.recordings.fed_noise import Loud
+    from plant_emulator.recordings.recording import Recording
+
+# Tolerance of a run with a truck, whose every sample is a corner: twice as fast as the usual one,
+# and it moves the residual by less than a hundredth of the noise (rms).
+WITH_TRUCK = 1e-4
+# How what an effect needs begins that the voltage shows.
+LOG_VOLTAGE = f"log {NAMES[VOLTAGE]}"
+# Positions in the gap that a predicted run is tried from.
+GAPS = 41
+
+
+def candidate(effect: Effect, *, voltage: bool = False) -> Candidate:
+    """An effect's declaration as unknowns of a fit; voltage : whether all logs have it."""
+    sizes: list[Unknown] = []
+    shapes: list[Unknown] = []
+    states: list[Unknown] = []
+    untold: list[Unknown] = []
+    for key, declared in effect.parameters.items():
+        unknown = Unknown(
+            name=f"{effect.name}_{key}",
+            start=declared.plausible,
+            lower=declared.lower,
+            upper=declared.upper,
+            logarithmic=False,
+            scale=declared.std or abs(declared.plausible - declared.neutral) or 1.0,
+            prior=declared.plausible,
+            std=declared.std,
+            step=declared.step,
+            angle=declared.angle,
+        )
+        if declared.std is not None:
+            (states if declared.per_run else shapes).append(unknown)
+        elif declared.per_run:
+            untold += [unknown] if declared.measured is None else []
+        elif declared.plausible != declared.neutral:
+            sizes.append(unknown)
+    free = {u.name for u in (*sizes, *shapes, *states)}
+    neutral = {f"{effect.name}_{k}": d.neutral for k, d in effect.parameters.items()}
+    plausible = {f"{effect.name}_{k}": d.plausible for k, d in effect.parameters.items()}
+    return Candidate(
+        name=effect.name,
+        subsystem=effect.subsystem,
+        sizes=tuple(sizes),
+        shapes=tuple(shapes),
+        states=tuple(states),
+        neutral={u.name: neutral[u.name] for u in sizes},
+        fixed={name: value for name, value in plausible.items() if name not in free},
+        units={f"{effect.name}_{key}": d.unit for key, d in effect.parameters.items()},
+        title=effect.description.partition("\n")[0].rstrip("."),
+        needs="" if voltage and effect.needs.startswith(LOG_VOLTAGE) else effect.needs,
+        untold=tuple(untold),
+        exact=effect.exact,
+    )
+
+
+# Where the parameters of the model belong.
+SUBSYSTEMS = {
+    "drive": ("dead_time", "speed_gain", "speed_integral_time", "current_gain"),
+    "motor": (
+        "armature_resistance",
+        "flux_constant",
+        "flux_constant_1",
+        "flux_constant_2",
+        "motor_inertia",
+    ),
+    "motor_shaft": ("motor_shaft_stiffness",),
+    "gear": (
+        "gear_inertia",
+        "gear_ratio",
+        "gear_coulomb_friction",
+        "gear_viscous_friction",
+        "gear_friction_exponent",
+    ),
+    "backlash_shaft": ("backlash_half_gap", "drum_shaft_damping", "drum_shaft_stiffness"),
+    "drum": ("drum_inertia",),
+}
+SUBSYSTEM_OF = {name: place for place, names in SUBSYSTEMS.items() for name in names}
+CHANNEL_UNITS = {
+    "motor_speed": "rad/s",
+    "drum_speed": "rad/s",
+    "armature_current": "A",
+    "shaft_torque": "N m",
+    "armature_voltage": "V",
+}
+
+
+class BenchModel:
+    """The bench and its logs; see `Model`.
+
+    Effects that the parameter set has belong to the bench: what they have of each run's own is a
+    state of every fit, their sizes stay. Its blocks are then not told apart, since their relations
+    know the nominal equations only.
+    """
+
+    reaches_noise = True
+
+    def __init__(
+        self,
+        recordings: Sequence[Recording],
+        parameters: ParameterSet,
+        effects: Mapping[str, Effect],
+        free: Sequence[str] = (),
+    ) -> None:
+        voltage = [VOLTAGE in r.channels for r in recordings]
+        self._free = free_parameters(parameters, free, voltage=any(voltage))
+        self._effects = effects
+        self._values = values_of(parameters)
+        self._set = parameters
+        known = {**kernel().effects, **effects}
+        plausible = {name: effect.plausible() for name, effect in effects.items()}
+        everything = {**plausible, **parameters.effects}
+        self._recordings = [with_own(r, everything, known) for r in recordings]
+        self._given = {f"{e}_{key}" for e, own in parameters.effects.items() for key in own}
+        self.states = states_of(parameters.effects, known)
+        self.candidates = {
+            name: candidate(effect, voltage=all(voltage)) for name, effect in effects.items()
+        }
+        self.parameters = tuple(unknowns(parameters, self._free, self._values, ()))
+        self.units = {name: UNITS[name] for name in self._free}
+        self.subsystems = {name: SUBSYSTEM_OF.get(name, "drive") for name in self._free}
+        self.runs = [
+            Run(
+                source=r.log.source,
+                channels=r.channels,
+                units=tuple(CHANNEL_UNITS[name] for name in r.channels),
+                time=r.log.time,
+                measured=np.stack([r.log[name] for name in r.channels]),
+                noise=r.noise,
+                fed=r.run.truck,
+            )
+            for r in recordings
+        ]
+
+    def _fixed(self, run: int, effects: Sequence[str]) -> dict[str, float]:
+        """Values that no fit changes: of the set, of the effects, and what the log tells."""
+        there = {k: v for name in effects for k, v in self.candidates[name].fixed.items()}
+        told = self._recordings[run].own
+        own = {k: v for k, v in told.items() if k in there or k in self._given}
+        return {**self._values, **there, **own}
+
+    def residual(self, run: int, effects: Sequence[str]) -> Residual:
+        """See `Model`."""
+        recording, fixed = self._recordings[run], self._fixed(run, effects)
+        tolerance = WITH_TRUCK if recording.run.truck else TOLERANCE
+
+        def residual(found: Mapping[str, float]) -> Array:
+            trial = {**fixed, **found}
+            return recording.residual(trial, trial.pop(GAP_POSITION), tolerance)
+
+        return residual
+
+    def loud(self, run: int, where: Point, state: Mapping[str, float]) -> Loud | None:
+        """See `Model`."""
+        values = {**self._fixed(run, where.effects), **where.values, **state}
+        return loud(self._recordings[run], values, values.pop(GAP_POSITION))
+
+    def nominal(self, runs: Sequence[int]) -> dict[str, float]:  # noqa: ARG002 - `Model`'s signature
+        """See `Model`: the parameter set's."""
+        return {u.name: u.prior for u in self.parameters}
+
+    def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
+        """See `Model`."""
+        recordings = [self._recordings[k] for k in runs]
+        search = Search(recordings, self._values, self._free)
+        search.values |= start_values([r.log for r in recordings], self._values, self._free)
+        search.scan()
+        found = {name: search.values[name] for name in self._free}
+        if self._given:
+            return found, [self.start_states(k, (), found) for k in runs]
+        return found, [{GAP_POSITION: gap} for gap in search.gaps]
+
+    def start_states(
+        self, run: int, effects: Sequence[str], values: Mapping[str, float]
+    ) -> dict[str, float]:
+        """See `Model`."""
+        given = [u for u in self.states if u.name != GAP_POSITION]
+        own = {u.name: u.start for name in effects for u in self.candidates[name].states}
+        own |= {u.name: u.start for u in given}
+        everything = {**self._fixed(run, effects), **own, **values}
+        search = Search([self._recordings[run]], everything, ())
+        search.scan_gaps(GAPS)
+        found = {GAP_POSITION: search.gaps[0], **own}
+        residual = self.residual(run, effects)
+        # Each effect's alone: all of several together are too many.
+        for states in (given, *(self.candidates[name].states for name in effects)):
+            found = scanned(lambda trial: residual({**values, **trial}), found, states)
+        return found
+
+    def located(self, where: Point, runs: Sequence[int]) -> Mapping[str, Any] | None:
+        """See `Model`."""
+        if self._given:
+            return None
+        return locate([self._recordings[k] for k in runs], self._set, where).as_answer()
+
+    def with_planned(self, where: Point, runs: Sequence[int]) -> BenchModel:
+        """See `Model`: drive programs that no log shows, starting as the last run did."""
+        warm = {**self._fixed(runs[-1], where.effects), **where.values, **where.states[-1]}
+        fitted = self._set.with_values({name: where.values[name] for name in self._free})
+        more = planned(self._recordings, fitted, warm, {**warm, **self._cold(where.effects)})
+        return BenchModel([*self._recordings, *more], self._set, self._effects, self._free)
+
+    def lacks(self, runs: Sequence[int]) -> dict[str, tuple[str, ...]]:
+        """See `Model`."""
+        return lacks([self._recordings[k].log for k in runs], base_speed(self._values))
+
+    def _cold(self, effects: Sequence[str]) -> dict[str, float]:
+        """What of these effects is of another value where the gear starts cold."""
+        tables = {name: self._effects[name].parameters for name in effects}
+        return {
+            f"{name}_{key}": COLD_SHELL
+            for name, own in tables.items()
+            for key, p in own.items()
+            if p.per_run and p.unit == "K" and any(q.measured for q in own.values())
+        }
+
+
+@dataclass(frozen=True)
+class BenchRecipe:
+    """What builds a `BenchModel` on another process.
+
+    without : effects that are taken out of the library; own : paths of a user's own effect files
+    """
+
+    recordings: tuple[Recording, ...]
+    parameters: ParameterSet
+    without: tuple[str, ...] = ()
+    own: tuple[Path, ...] = ()
+
+    def contestants(self) -> dict[str, Effect]:
+        """The effects in the contest by name, of those that this process knows: without those
+        that the bench has.
+        """
+        left_out = {*self.without, *self.parameters.effects}
+        return {n: effect for n, effect in kernel().effects.items() if n not in left_out}
+
+    def build(self) -> BenchModel:
+        """The model; this process then knows the user's own effects."""
+        know(*(from_file(path) for path in self.own))
+        return BenchModel(self.recordings, self.parameters, self.contestants())
+
+    def digest(self) -> str:
+        """Hash of all that the model is made of, the text of a user's own effects too: a cluster's
+        worker outlives an edit of it.
+        """
+        texts = [path.read_bytes() for path in self.own]
+        return hashlib.sha256(pickle.dumps((self, texts))).hexdigest()

@@ -1,0 +1,1 @@
+"""How far the gap shrinks: held-out runs, bootstrap intervals, unmodelled remainder."""

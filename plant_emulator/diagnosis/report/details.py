@@ -1,0 +1,63 @@
+"""What a report draws beside the answer itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.diagnosis.prediction.rest import Rest
+    from plant_emulator.estimation.estimates import Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trace:
+    """A channel of a held-out run, measured and predicted, shape (n,) each [unit].
+
+    recalibrated : the same equations, parameters re-estimated; explained : with the effects named
+        NaN where a sample does not count
+    noise : standard deviation of the sensor's noise
+    """
+
+    source: str
+    channel: str
+    unit: str
+    time: Array
+    measured: Array
+    recalibrated: Array
+    explained: Array
+    noise: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """A step of the waterfall: the held-out gap, in the noise, with its 95 % interval.
+
+    gap : rms of the whitened held-out residual over all channels; 1: the noise floor
+    """
+
+    label: str
+    gap: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Details:
+    """Everything but the answer.
+
+    settings : how to repeat it: command, version, date, hashes of logs and sets, thresholds
+    notes : what the preflight told of the logs
+    rest : of a machine in outline, of which more than the noise is left
+    maps : the gap without effects by channel and bin of an axis (phase, speed, load, direction,
+        frequency, time), in the form of the answer's map
+    """
+
+    traces: tuple[Trace, ...]
+    waterfall: tuple[Step, ...]
+    settings: Mapping[str, str]
+    notes: tuple[str, ...]
+    rest: Rest | None = None
+    maps: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict)

@@ -1,0 +1,95 @@
+"""The effects of one round of a contest against each other."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from plant_emulator.diagnosis.fitting.explain import NOISE_LEFT, Contender, excess
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from plant_emulator.diagnosis.fitting.contest import Point
+    from plant_emulator.diagnosis.fitting.signature import Signature
+
+# What keeps an effect in a round: the fall of its cost [fall of the best one], more of it beside
+# one that leaves nothing but noise, or that it is no further behind the best than a first look may
+# be wrong [chi squared].
+KEPT, KEPT_BESIDE_NOISE, NEAR = 0.25, 0.5, 50.0
+
+
+def explained(contenders: Sequence[Contender]) -> bool:
+    """Whether an effect leaves nothing but noise."""
+    return any(point.chi_squared <= NOISE_LEFT for point in points_of(contenders))
+
+
+def closed(contenders: Sequence[Contender], base: Point, share: float) -> bool:
+    """Whether an effect closes so much of what a fit leaves beyond the noise."""
+    return any(excess(point) <= (1.0 - share) * excess(base) for point in points_of(contenders))
+
+
+def contender_of(name: str, shown: Signature | None, point: Point | None) -> Contender:
+    """An effect after its first look."""
+    if shown is None:
+        return Contender(effect=name, norm=0.0, raw=0.0, imitated_by="", point=None)
+    return Contender(
+        effect=name, norm=shown.norm, raw=shown.raw, imitated_by=shown.imitated_by, point=point
+    )
+
+
+def beside(point: Point, base: Point) -> Contender:
+    """The effect that a fit has beside those of another."""
+    (name,) = set(point.effects) - set(base.effects)
+    return Contender(effect=name, norm=0.0, raw=0.0, imitated_by="", point=point)
+
+
+def better_of(first: Sequence[Contender], second: Sequence[Contender]) -> list[Contender]:
+    """Of two fits of the same effect the better one."""
+    others = {c.effect: c for c in second if c.point is not None}
+    return [min(c, others.get(c.effect, c), key=cost_of) for c in first]
+
+
+def best_few(contenders: Sequence[Contender], base: Point, most: int) -> list[Contender]:
+    """Those whose cost is least, without those that fall far behind the best."""
+    order = sorted(with_point(contenders), key=cost_of)
+    if not order:
+        return []
+    least = cost_of(order[0])
+    kept = KEPT_BESIDE_NOISE if explained(order[:1]) else KEPT
+    reach = max(least + NEAR, base.cost - kept * (base.cost - least))
+    return [c for c in order[:most] if cost_of(c) <= reach]
+
+
+def cost_of(contender: Contender) -> float:
+    """Of its fit; infinite where it does not show."""
+    return contender.point.cost if contender.point is not None else float("inf")
+
+
+def least_cost(contenders: Sequence[Contender]) -> float:
+    """Of all; infinite where none shows."""
+    return min(map(cost_of, contenders), default=float("inf"))
+
+
+def with_point(contenders: Sequence[Contender]) -> list[Contender]:
+    """Those that show."""
+    return [c for c in contenders if c.point is not None]
+
+
+def points_of(contenders: Sequence[Contender]) -> Iterator[Point]:
+    """The fits of those that show."""
+    return (c.point for c in contenders if c.point is not None)
+
+
+def best_of(contenders: Sequence[Contender]) -> Point | None:
+    """The fit whose cost is least; None where no effect shows.
+
+    Beside another one that has to have a size: what else differs from run to run is left of a law
+    slightly other than the library's as well.
+    """
+    sure = [p for p in points_of(contenders) if len(p.effects) == 1 or not p.unsure]
+    return min(sure, key=lambda p: p.cost, default=None)
+
+
+def costs_of(contenders: Sequence[Contender]) -> dict[str, float]:
+    """The cost of those that show, by effect."""
+    return {c.effect: c.point.cost for c in contenders if c.point is not None}

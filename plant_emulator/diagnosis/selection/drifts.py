@@ -1,0 +1,68 @@
+"""The fit without effects, and the drift of some of its runs, from which a contest may start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from plant_emulator.diagnosis.fitting.explain import excess
+from plant_emulator.diagnosis.fitting.steps import Task, spread, start
+from plant_emulator.diagnosis.selection.rules import noise_only
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from plant_emulator.diagnosis.execution.pool import Pool, Recipe
+    from plant_emulator.diagnosis.fitting.contest import Point
+
+# Mean square that a fit to a few runs leaves where its drift is one to start from on all.
+LITTLE = 2.0
+# What all runs leave alone, as a part of what they leave together, where the fit to all may be
+# astray.
+APART = 0.2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drifts:
+    """The fits without effects of one diagnosis on its pool; runs : by number."""
+
+    pool: Pool
+    recipe: Recipe
+    runs: tuple[int, ...]
+
+    def of_all(self) -> Point:
+        """The fit to all runs."""
+        (null,) = self.pool.map(start, self.recipe, [self.runs])
+        return null
+
+    def of_some(self, null: Point) -> tuple[list[Point], bool]:
+        """Drift of some runs as it is on all, to start from; and whether these need no effect.
+
+        Runs that need none show drift that no effect has led astray, and the others show the effect
+        that they need as it is. Otherwise that of runs that leave little; or that of every run,
+        where they leave much less alone than together. Empty where it is none of these.
+
+        null : the fit to all runs
+        """
+        found = self.pool.map(start, self.recipe, [(run,) for run in self.runs])
+        alone = dict(zip(self.runs, found, strict=True))
+        for enough in (noise_only, _little):
+            runs = tuple(run for run, point in alone.items() if enough(point))
+            if not 1 < len(runs) < len(self.runs):
+                continue
+            (joint,) = self.pool.map(start, self.recipe, [runs])
+            if enough(joint):
+                return self._spread({runs: joint}), enough is noise_only
+        if sum(map(excess, alone.values())) >= APART * excess(null):
+            return [], False
+        return self._spread({(run,): point for run, point in alone.items()}), False
+
+    def _spread(self, points: Mapping[tuple[int, ...], Point]) -> list[Point]:
+        """Fits to some runs as they are on all, by these runs."""
+        tasks = [Task(base=point, runs=self.runs, known=runs) for runs, point in points.items()]
+        return list(self.pool.map(spread, self.recipe, tasks))
+
+
+def _little(point: Point) -> bool:
+    """Whether a fit leaves little enough to have its drift from."""
+    return point.chi_squared <= LITTLE

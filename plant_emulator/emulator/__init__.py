@@ -1,0 +1,1 @@
+"""The running emulator: clock, Modbus server, process, and the emulated PLC in `plc`."""

@@ -1,0 +1,229 @@
+"""The emulated PLC: one `scan` every 10 ms around a bench, no clock and no socket.
+
+A scan first lets the bench run to the present under the reference that the scan before decided,
+then reads the command, decides its state and the reference of the next 10 ms, and shows a
+measurement. So a command acts from the scan that first sees it, and nothing shown is ahead of time.
+
+The watchdog is fed by accepted commands whose heartbeat moved. Once it has bitten, the drum is
+ramped down and only a new edge of CTRL.enable (0 -> 1) starts again, as after any other stop.
+An alarm stays until it is acknowledged: by CTRL.fault_reset (edge) or by the operator's moving the
+remote switch.
+"""
+
+from collections.abc import Sequence
+from math import floor, inf, pi
+
+from plant_emulator.emulator.plc import plc_reference as reference
+from plant_emulator.emulator.plc.plc_command import Inbox
+from plant_emulator.emulator.plc.plc_fast_task import FastTask
+from plant_emulator.emulator.plc.plc_state import RUNNING, TRANSITIONS, Event
+from plant_emulator.emulator.plc.plc_surroundings import CLOSED, Backlash, Bench, Switches, Truck
+from plant_emulator.simulation.bench import BenchSamples
+from register_maps.register_map import RegisterMap
+from register_maps.signals import Alarm, Control, Interlock, Measurement, Mode, PlcState, Status
+
+SCAN = 0.01
+STEPS = 10
+STEP = SCAN / STEPS
+
+STANDSTILL = 1.0  # motor, 0.016 rad/s at the drum
+# 5 % over what the reference may reach: the drive overshoots a ramp by less than 1 %.
+OVERSPEED = 1.05 * reference.SPEED_MAX
+# Nominal friction belongs to a shell of about 32 degC; below 30 degC the gear counts as cold.
+WARM_SHELL = 303.15
+PULSES_PER_REVOLUTION = 4096
+DRIVEN = (Mode.SPEED, Mode.ROAD_LOAD)
+
+
+class Plc:
+    """The PLC's program and its memory; `scan` is all that it does.
+
+    samples : what the bench did in the last scan
+    """
+
+    samples: BenchSamples
+
+    def __init__(
+        self,
+        bench: Bench,
+        register_map: RegisterMap,
+        *,
+        backlash: Backlash,
+        truck: Truck | None = None,
+    ) -> None:
+        self.bench, self.register_map = bench, register_map
+        self.backlash, self.truck = backlash, truck
+        self.scans = 0
+        self.state = PlcState.INIT
+        self.alarm = Alarm(0)
+        self.inbox = Inbox(register_map)
+        self.path = [0.0] * STEPS
+        self.reference = 0.0
+        self.fast_task = FastTask(STEP)
+        self.switches = Switches()
+        self.road_load_since: float | None = None
+        self._at_limit = False
+        self._current_limit = self.inbox.command.current_limit
+        field = register_map.register("field_current")
+        # The bench has no field circuit; where the map cannot say so, an unused input shows zero.
+        self._field_current = None if field is None or field.not_available is not None else 0.0
+        self._age_max = _largest(register_map, "command_age")
+        self._scan_time_max = _largest(register_map, "scan_time_max")
+
+    @property
+    def time(self) -> float:
+        """PLC time [s]: that of the sample last shown."""
+        return self.scans * SCAN
+
+    def scan(
+        self, words: Sequence[int] | None, switches: Switches, scan_time_max: float = 0.0
+    ) -> Measurement:
+        """Measurement after one scan.
+
+        words : the command block as it now stands, None until it is first written
+        scan_time_max : longest scan so far [s], measured outside
+        """
+        self._advance()
+        self.scans += 1
+        moved = switches.remote != self.switches.remote
+        self.switches = switches
+        if not self.inbox.read(words, self.time):
+            self.alarm |= Alarm.SETPOINT_REJECTED
+        acknowledged = moved or Control.FAULT_RESET in self.inbox.edges
+        if acknowledged:
+            self.alarm = Alarm(0)
+        self._decide(acknowledged)
+        self._plan()
+        return self._measurement(scan_time_max)
+
+    def _advance(self) -> None:
+        wheel, brake = 0.0, 0.0
+        if self.truck is not None and self.scans:
+            wheel, brake = self.truck.torques(self.time, float(self.samples.drum_speed[-1]))
+        self.samples = self.bench.advance(self.path, wheel_torque=wheel, brake_torque=brake)
+        self.fast_task.take(self.samples.shaft_torque)
+
+    def _decide(self, acknowledged: bool) -> None:
+        """Go to the next state, if anything asks for one."""
+        if self.samples.motor_speed[-1] > OVERSPEED:
+            self.alarm |= Alarm.OVERSPEED
+        for event in self._events(acknowledged):
+            if (self.state, event) in TRANSITIONS:
+                self._enter(TRANSITIONS[self.state, event])
+                return
+
+    def _events(self, acknowledged: bool) -> list[Event]:
+        command, remote = self.inbox.command, self.switches.remote
+        wanted = Control.ENABLE in command.control and command.mode in DRIVEN
+        runs = wanted and remote and self.inbox.watchdog_ok(self.time)
+        starts = runs and Control.ENABLE in self.inbox.edges
+        tripped = self.switches.interlock != CLOSED or Alarm.OVERSPEED in self.alarm
+        stands = abs(float(self.samples.motor_speed[-1])) < STANDSTILL
+        road_load = command.mode is Mode.ROAD_LOAD
+        happens = {
+            Event.TRIPPED: tripped,
+            Event.RESET: acknowledged,
+            Event.STARTED: True,
+            Event.STOP: not runs,
+            Event.STOPPED: stands and self.path[-1] == 0.0,
+            Event.START_SPEED: starts and not road_load,
+            Event.START_ROAD_LOAD: starts and road_load,
+            Event.TO_SPEED: not road_load,
+            Event.TO_ROAD_LOAD: road_load,
+        }
+        return [event for event in Event if happens[event]]
+
+    def _enter(self, state: PlcState) -> None:
+        if state is PlcState.RAMP_DOWN and not self.inbox.watchdog_ok(self.time):
+            self.alarm |= Alarm.COMMUNICATION
+        if state is PlcState.ROAD_LOAD:
+            self.road_load_since = self.time
+        if self.truck is not None:
+            self.truck.follow(state, self.time)
+        self.state = state
+
+    def _plan(self) -> None:
+        """Decide the reference of the next scan, and hand the drive its current limit."""
+        if self.inbox.command.current_limit != self._current_limit:
+            self._current_limit = self.inbox.command.current_limit
+            self.bench.limit_current(self._current_limit)
+        target = self._target()
+        self.reference = self.path[-1]
+        self.path = reference.trajectory(self.reference, target, STEP, STEPS)
+        current = abs(float(self.samples.armature_current[-1]))
+        self._at_limit = (
+            reference.limited(self.path, target, STEP)
+            or current > 0.999 * self.inbox.command.current_limit
+        )
+
+    def _target(self) -> reference.Target:
+        if self.state in RUNNING:
+            return reference.Target(
+                speed=self.inbox.command.speed,
+                slope=self.inbox.command.rate,
+                slew=self.inbox.command.slew,
+                age=self.inbox.age(self.time),
+            )
+        if self.state is PlcState.FAULT:
+            return reference.STOP_AT_ONCE
+        return reference.ramp_down(self.inbox.command.slew)
+
+    def _status(self) -> Status:
+        temperature = self.samples.shell_temperature
+        twist = self.backlash.twist(self.samples.motor_angle, self.samples.drum_angle)
+        bits = {
+            Status.READY: self.state is PlcState.READY,
+            Status.ENABLED: self.state in RUNNING,
+            Status.REMOTE: self.switches.remote,
+            Status.ROAD_LOAD: self.state is PlcState.ROAD_LOAD,
+            Status.AT_LIMIT: self._at_limit,
+            Status.GAP: abs(twist) < self.backlash.half_gap,
+            Status.WARM: temperature > WARM_SHELL,
+            Status.WATCHDOG_OK: self.inbox.watchdog_ok(self.time),
+            Status.EMERGENCY_STOP_OK: Interlock.EMERGENCY_STOP in self.switches.interlock,
+            Status.FAULT: self.state is PlcState.FAULT,
+        }
+        return Status(sum(bit for bit, holds in bits.items() if holds))
+
+    def _measurement(self, scan_time_max: float) -> Measurement:
+        now = self.samples
+        return Measurement(
+            sequence_start=self.scans,
+            plc_heartbeat=self.scans,
+            plc_time=self.time,
+            status=self._status(),
+            plc_state=self.state,
+            alarm=self.alarm,
+            alarm_reserved=0,
+            motor_speed=float(now.motor_speed[-1]),
+            drum_speed=float(now.drum_speed[-1]),
+            shaft_torque=self.fast_task.torque,
+            shaft_torque_mean=self.fast_task.mean,
+            armature_current=float(now.armature_current[-1]),
+            armature_voltage=float(now.armature_voltage[-1]),
+            speed_reference=self.path[-1],
+            shell_temperature_1=now.shell_temperature,
+            shell_temperature_2=now.shell_temperature,
+            field_current=self._field_current,
+            shaft_torque_integral=self.fast_task.integral,
+            drum_count=_pulses(now.drum_angle),
+            motor_count=_pulses(now.motor_angle),
+            command_sequence_echo=self.inbox.command.sequence,
+            command_age=min(self.inbox.age(self.time), self._age_max),
+            scan_time_max=min(scan_time_max, self._scan_time_max),
+            interlock=self.switches.interlock,
+            sequence_end=self.scans,
+        )
+
+
+def _pulses(angle: float) -> int:
+    """Pulses of an encoder after turning by that angle [rad]; the codec wraps them."""
+    return floor(angle * PULSES_PER_REVOLUTION / (2 * pi))
+
+
+def _largest(register_map: RegisterMap, signal: str) -> float:
+    """Largest SI value that the map can show: what runs longer stays there."""
+    register = register_map.register(signal)
+    if register is None:
+        return inf
+    return register.si_unit.to_si(register.raw.high * register.scale + register.offset)

@@ -1,0 +1,1 @@
+"""The parameter estimation: start values, bounded least squares, initial states, covariance."""

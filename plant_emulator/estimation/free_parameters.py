@@ -1,0 +1,81 @@
+"""Which parameters of the bench a fit may move, and within what (pure)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from plant_emulator.errors import IdentificationError
+from plant_emulator.estimation.estimates import Unknown
+from plant_emulator.estimation.search import GAP_POSITION
+from plant_emulator.estimation.start_states import GAP
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.model.parameters import ParameterSet
+
+# Held fixed unless asked for: a log shows it only through J_g + xi^2 J_m.
+NOT_FREE = frozenset({"gear_inertia"})
+# Given: the current loop hides R_a without the voltage, which with it also wants the right K_m.
+IN_VOLTAGE = ("armature_resistance", "flux_constant")
+# A parameter may leave its value in the set by this factor either way.
+BOUND_FACTOR = 5.0
+
+
+def unknowns(
+    parameters: ParameterSet,
+    free: Sequence[str],
+    start: Mapping[str, float],
+    gaps: Sequence[float],
+    states: Sequence[Unknown] = (GAP,),
+) -> list[Unknown]:
+    """The free parameters with their priors, and the states of every run.
+
+    start : values [SI] of the parameters; gaps : of every run, -1 to 1
+    """
+    wide = [
+        Unknown(
+            name=name,
+            start=start[name],
+            lower=parameters.value(name) / BOUND_FACTOR,
+            upper=parameters.value(name) * BOUND_FACTOR,
+            prior=parameters.value(name),
+            std=parameters[name].std,
+        )
+        for name in free
+    ]
+    return wide + [
+        replace(state, run=run, start=gap if state.name == GAP_POSITION else state.start)
+        for run, gap in enumerate(gaps)
+        for state in states
+    ]
+
+
+def free_parameters(
+    parameters: ParameterSet, names: Sequence[str] = (), *, voltage: bool = False
+) -> tuple[str, ...]:
+    """The names given, or all that the set calls estimated but those of NOT_FREE and zeros.
+
+    voltage : whether a log has it: what only the voltage shows is then free as well
+    """
+    for name in names:
+        if name not in parameters.values():
+            known = ", ".join(parameters.values())
+            raise IdentificationError(f"--free {name}: no parameter of the bench; known: {known}")
+        if parameters.value(name) == 0.0:
+            raise IdentificationError(
+                f"--free {name}: it is 0 in {parameters.name}; a fit needs a value above 0"
+            )
+        if parameters[name].kind == "calculated":
+            raise IdentificationError(
+                f"--free {name}: it is calculated from others; give it a value of its own, "
+                'kind = "estimated", in a parameter set'
+            )
+    estimated = [
+        p.name
+        for p in parameters
+        if p.kind == "estimated" and p.name not in NOT_FREE and p.value > 0.0
+    ]
+    shown = [n for n in IN_VOLTAGE if voltage and parameters[n].kind == "given"]
+    return tuple(dict.fromkeys(names)) or (*estimated, *shown)

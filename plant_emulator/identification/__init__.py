@@ -1,0 +1,1 @@
+"""The grey-box identification of the bench: fit, report, design of the next experiment."""

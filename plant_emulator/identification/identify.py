@@ -1,0 +1,242 @@
+"""Grey-box identification of the bench from its logs.
+
+ 1. Start values without simulation (`equation_error`).
+ 2. One-dimensional scans of what that leaves open: dead time, gap, shaft damping, and where in the
+    gap each run starts, by simulation and with a loss that forgives spikes at the wrong time.
+ 3. Bounded least squares on all simulated channels of all logs at once, whitened by the noise
+    measured in the logs (`estimation`), with the start in the gap as a free state of each run.
+    Should the residual stay above the noise, it starts again from the next best valleys.
+ 4. Of logs with a truck the best fit once more with the noise of the wheel torque (`fed_noise`).
+
+Prior knowledge is the value and standard deviation of each parameter in the set. It holds what the
+logs do not determine, and is given up for a parameter that the data alone determine better, so that
+a wrong set cannot pull the answer. A parameter counts as identifiable if the data alone bring its
+standard error under half of the prior one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from plant_emulator.estimation import estimation
+from plant_emulator.estimation.equation_error import start_values
+from plant_emulator.estimation.free_parameters import free_parameters, unknowns
+from plant_emulator.estimation.run_residuals import quieted_functions, residual_functions
+from plant_emulator.estimation.search import FINE_SCANS, GAP_POSITION, Search
+from plant_emulator.estimation.start_states import GAP, states_of, with_own
+from plant_emulator.signals.log import VOLTAGE
+from plant_emulator.simulation.simulate import TOLERANCE, values_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from plant_emulator.estimation.estimates import Estimate, Unknown
+    from plant_emulator.estimation.search import Progress
+    from plant_emulator.estimation.start_states import Effects
+    from plant_emulator.model.parameters import ParameterSet
+    from plant_emulator.recordings.recording import Recording
+
+# The last fit, but for a truck, whose staircase of references takes ten times as long: a step more
+# or less in the simulation then changes the cost by less than a thousandth of a standard error.
+FINAL_TOLERANCE = 1e-8
+# Share of the prior deviation (or of the value) under which a standard error is information.
+INFORMED = 0.5
+INFORMED_WITHOUT_PRIOR = 0.1
+# chi^2 per sample above which other valleys are tried.
+NOISE_REACHED = 1.2
+RETRIES = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """An estimated parameter [unit].
+
+    data_error : standard error that the data alone give; infinite: they say nothing
+    enough : the largest such error that still makes it identifiable
+    """
+
+    name: str
+    value: float
+    standard_error: float
+    data_error: float
+    enough: float
+    nominal: float
+    unit: str
+
+    at_bound: bool
+
+    @property
+    def identifiable(self) -> bool:
+        """Whether the data determine it, see the module's text."""
+        return self.data_error <= self.enough and not self.at_bound
+
+
+@dataclass(frozen=True, kw_only=True)
+class Identification:
+    """The fit of one bench; states : of every run, by name."""
+
+    parameter_set: ParameterSet
+    parameters: tuple[Parameter, ...]
+    states: tuple[Mapping[str, float], ...]
+    estimate: Estimate
+    chi_squared: float
+
+    @property
+    def gap_positions(self) -> tuple[float, ...]:
+        """Where in the gap each run starts, -1 to 1."""
+        return tuple(states[GAP_POSITION] for states in self.states)
+
+
+def identify(
+    recordings: Sequence[Recording],
+    parameters: ParameterSet,
+    free: Sequence[str] = (),
+    *,
+    effects: Effects | None = None,
+    progress: Progress | None = None,
+) -> Identification:
+    """Estimate the free parameters of a bench from its logs.
+
+    free : names; none: all that the set calls estimated but gear_inertia, and what a logged voltage
+        shows
+    effects : values of effects that the bench has, by effect and parameter; what of them is a run's
+        own is fitted too, or taken from its log
+    progress : called with a stage's name and how far it has come, 0 to 1
+    """
+    free = free_parameters(parameters, free, voltage=any(VOLTAGE in r.channels for r in recordings))
+    states = states_of(effects or {})
+    recordings = [with_own(r, effects or {}) for r in recordings]
+    values = values_of(parameters, effects)
+    search = Search(recordings, values, free, progress)
+    logs = [r.log for r in recordings]
+    search.values |= start_values(logs, values, free)
+    search.scan()
+    best = least_squares(recordings, parameters, free, search, states, progress)
+    for retry in range(RETRIES):
+        if chi_squared(best) <= NOISE_REACHED:
+            break
+        again = _next_valley(recordings, values, free, best, retry)
+        other = least_squares(recordings, parameters, free, again, states, progress)
+        search.simulations += again.simulations
+        best = min(best, other, key=lambda e: e.cost + e.penalty)
+    wanted = unknowns(parameters, free, search.values, search.gaps, states)
+    best = _with_fed_noise(recordings, search.values, free, wanted, best, progress)
+    best = replace(best, simulations=best.simulations + search.simulations)
+    return answer(best, parameters, free, len(recordings))
+
+
+def least_squares(
+    recordings: Sequence[Recording],
+    parameters: ParameterSet,
+    free: Sequence[str],
+    search: Search,
+    states: Sequence[Unknown] = (GAP,),
+    progress: Progress | None = None,
+) -> Estimate:
+    """Least squares from where a search has come to; priors that the data outdo are given up."""
+    coarse = residual_functions(recordings, search.values, free)
+    truck = any(recording.run.truck for recording in recordings)
+    tolerance = TOLERANCE if truck else FINAL_TOLERANCE
+    fine = residual_functions(recordings, search.values, free, tolerance)
+    tell = _telling(recordings, progress)
+    wanted = unknowns(parameters, free, search.values, search.gaps, states)
+    first = estimation.estimate(wanted, coarse, progress=tell)
+    last = estimation.estimate(_outdone(first), fine, progress=tell)
+    return replace(last, simulations=first.simulations + last.simulations)
+
+
+def _outdone(first: Estimate) -> list[Unknown]:
+    """The unknowns from where a fit has come to, without the priors that its data outdo."""
+    return [
+        replace(u, start=u.value(float(z)), std=None if error < u.scaled_std else u.std)
+        for u, z, error in zip(first.unknowns, first.z, first.data_errors, strict=True)
+    ]
+
+
+def _with_fed_noise(
+    recordings: Sequence[Recording],
+    values: Mapping[str, float],
+    free: Sequence[str],
+    wanted: Sequence[Unknown],
+    best: Estimate,
+    progress: Progress | None,
+) -> Estimate:
+    """The fit again with the noise of what is fed, known near the best one; see `fed_noise`.
+
+    wanted : the unknowns with all priors, which the data outdo less easily then
+    """
+    residuals = quieted_functions(recordings, values, free, best)
+    if residuals is None:
+        return best
+    tell = _telling(recordings, progress)
+    near = [replace(u, start=u.value(float(z))) for u, z in zip(wanted, best.z, strict=True)]
+    first = estimation.estimate(near, residuals, progress=tell)
+    last = estimation.estimate(_outdone(first), residuals, progress=tell)
+    simulations = best.simulations + first.simulations + last.simulations
+    return replace(last, simulations=simulations)
+
+
+def _telling(
+    recordings: Sequence[Recording], progress: Progress | None
+) -> Callable[[float], None] | None:
+    """What tells how far a fit has come; chi^2 falls to 1: half way is where it has fallen to 2."""
+    if progress is None:
+        return None
+    counted = sum(int(r.use.sum()) for r in recordings)
+    return lambda cost: progress("least squares", min(1.0, counted / max(cost, 1.0)))
+
+
+def _next_valley(
+    recordings: Sequence[Recording],
+    values: Mapping[str, float],
+    free: Sequence[str],
+    best: Estimate,
+    retry: int,
+) -> Search:
+    """A search that starts at the fit but with the gap moved out of its valley."""
+    search = Search(recordings, {**values, **best.parameters()}, free)
+    search.gaps = [best.states(k)[GAP_POSITION] for k in range(len(recordings))]
+    if retry:
+        search.values |= {
+            name: search.values[name] * (1.0 + 0.05 * (-1) ** retry)
+            for name in ("backlash_half_gap", "dead_time")
+            if name in free
+        }
+    search.scan(FINE_SCANS)
+    return search
+
+
+def chi_squared(found: Estimate) -> float:
+    """Mean square of the whitened residual; 1 where nothing but the noise is left."""
+    return found.cost / max(1, found.samples - len(found.unknowns))
+
+
+def answer(
+    found: Estimate, parameters: ParameterSet, free: Sequence[str], runs: int
+) -> Identification:
+    """The estimate in the parameters' own terms."""
+    estimated = [_parameter(found, k, parameters) for k in range(len(free))]
+    return Identification(
+        parameter_set=parameters.with_values({p.name: p.value for p in estimated}),
+        parameters=tuple(estimated),
+        states=tuple(found.states(k) for k in range(runs)),
+        estimate=found,
+        chi_squared=chi_squared(found),
+    )
+
+
+def _parameter(found: Estimate, k: int, parameters: ParameterSet) -> Parameter:
+    unknown = found.unknowns[k]
+    value = unknown.value(float(found.z[k]))
+    std = parameters[unknown.name].std
+    return Parameter(
+        name=unknown.name,
+        value=value,
+        standard_error=unknown.error(value, float(found.standard_errors[k])),
+        data_error=unknown.error(value, float(found.data_errors[k])),
+        nominal=parameters.value(unknown.name),
+        enough=INFORMED_WITHOUT_PRIOR * value if std is None else INFORMED * std,
+        unit=parameters[unknown.name].unit,
+        at_bound=not 1.001 * unknown.lower < value < unknown.upper / 1.001,
+    )

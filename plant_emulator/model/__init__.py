@@ -1,0 +1,1 @@
+"""The thesis's equations of the bench: laws, drive, gear, drum, one implicit stage, parameters."""

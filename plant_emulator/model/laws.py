@@ -1,0 +1,218 @@
+"""Constitutive laws of the bench, one function each, and the places where an effect can act.
+
+Every law is called as `law(s, p)`: s is the record of the implicit stage being solved (the present
+estimate of all speeds, torques and currents, see `stage.STAGE`), p the flat record of parameter
+values. An effect changes a law by a function of the same name, `law(value, s, p)`, that takes the
+value so far and returns the changed one (see `effects`); the kernel chains them. A law whose
+nominal value is 0 or 1 marks a term that the thesis neglects.
+
+The functions are plain scalar arithmetic, so that they run compiled and uncompiled alike.
+Angles and speeds: index m motor side, g gear output, d drum. All values SI.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from plant_emulator.model.kernel_types import Record
+
+# Shell temperature that the nominal friction belongs to, 32 degC [K] (thesis, section 3.5).
+WARM_SHELL = 305.15
+
+# --- drive ------------------------------------------------------------------------------------
+
+
+def dead_time(s: Record, p: Record) -> float:
+    """Dead time between the PLC's reference and the drive [s] (thesis, eq. 3.7)."""
+    return p.dead_time
+
+
+def reference(s: Record, p: Record) -> float:
+    """Speed reference that the drive acts on, after its dead time [rad/s] (thesis, eq. 3.7)."""
+    return s.delayed_reference
+
+
+def speed_limit(s: Record, p: Record) -> float:
+    """Largest speed reference [rad/s] (thesis, eq. 3.6)."""
+    return p.speed_limit
+
+
+def current_limit(s: Record, p: Record) -> float:
+    """Largest current reference [A] (thesis, eq. 3.5)."""
+    return p.armature_current_limit
+
+
+def voltage_limit(s: Record, p: Record) -> float:
+    """Largest armature voltage [V] (thesis, eq. 3.4)."""
+    return p.voltage_limit
+
+
+def integration_at_limit(s: Record, p: Record) -> float:
+    """Share of its error that an integrator takes in while its output is limited, outwards [1].
+
+    0: conditional integration. The thesis does not state its anti-windup; this is the usual one.
+    """
+    return 0.0
+
+
+def converter_voltage_drop(s: Record, p: Record) -> float:
+    """What the converter loses between the demanded and the armature voltage [V]."""
+    return 0.0
+
+
+def tachometer_gain(s: Record, p: Record) -> float:
+    """Motor speed that drive and log read, over the true one [1]."""
+    return 1.0
+
+
+# --- motor ------------------------------------------------------------------------------------
+
+
+def resistance(s: Record, p: Record) -> float:
+    """Armature resistance [ohm]."""
+    return p.armature_resistance
+
+
+def flux(s: Record, p: Record) -> float:
+    """Flux k Phi [N m/A], equally [V s/rad].
+
+    k Phi = min(K_m, K_1 / (K_2 + |omega_m|))                       (thesis, eq. 3.16-3.18)
+
+    Written with min and |omega_m| because the text asks for the constant flux "until" the weakened
+    one is lower, and for both directions of rotation.
+    """
+    weakened = p.flux_constant_1 / (p.flux_constant_2 + abs(s.motor_speed))
+    return min(p.flux_constant, weakened)
+
+
+def motor_coulomb_friction(s: Record, p: Record) -> float:
+    """Coulomb friction of the motor [N m], >= 0; the thesis neglects it (eq. 3.9)."""
+    return 0.0
+
+
+def motor_viscous_friction(s: Record, p: Record) -> float:
+    """Speed-proportional friction of the motor [N m s/rad], >= 0; neglected by the thesis."""
+    return 0.0
+
+
+# --- shafts and gear --------------------------------------------------------------------------
+
+
+def motor_shaft_damping(s: Record, p: Record) -> float:
+    """Damping of the shaft between motor and gear [N m s/rad], motor side; neglected (eq. 3.23)."""
+    return 0.0
+
+
+def gear_coulomb_friction(s: Record, p: Record) -> float:
+    """Level of the gear's Coulomb friction [N m], gear output, >= 0 (thesis, eq. 3.27)."""
+    return p.gear_coulomb_friction
+
+
+def gear_viscous_friction(s: Record, p: Record) -> float:
+    """Factor f_g of the gear's viscous friction [N m (s/rad)^delta_g] (thesis, eq. 3.27)."""
+    return p.gear_viscous_friction
+
+
+def gear_direction_factor(s: Record, p: Record) -> float:
+    """Gear friction of eq. 3.27 in this direction, s.gear_direction, over that of the table [1].
+
+    This law and the next two are evaluated at direction, speed and torques of the solution itself,
+    see `friction`: here an effect may depend on them.
+    """
+    return 1.0
+
+
+def gear_speed_friction(s: Record, p: Record) -> float:
+    """Further friction of the gear [N m] by its speed s.gear_speed; may fall with it."""
+    return 0.0
+
+
+def gear_load_friction(s: Record, p: Record) -> float:
+    """Further friction of the gear [N m] by its load, s.motor_shaft_torque, s.drum_shaft_torque.
+
+    It may change by less than the load itself does.
+    """
+    return 0.0
+
+
+def gear_torque(s: Record, p: Record) -> float:
+    """Further torque against the motion of the gear output [N m]."""
+    return 0.0
+
+
+def backlash_half_gap(s: Record, p: Record) -> float:
+    """Half of the gap, gear output [rad] (thesis, eq. 3.31)."""
+    return p.backlash_half_gap
+
+
+# --- drum -------------------------------------------------------------------------------------
+
+
+def drum_coulomb_friction(s: Record, p: Record) -> float:
+    """Coulomb friction of the drum bearings [N m], >= 0; neglected by the thesis (eq. 3.34)."""
+    return 0.0
+
+
+def drum_viscous_friction(s: Record, p: Record) -> float:
+    """Speed-proportional friction of the drum bearings [N m s/rad], >= 0; neglected (eq. 3.34)."""
+    return 0.0
+
+
+def drum_torque(s: Record, p: Record) -> float:
+    """Torque of the truck on the drum [N m]: (r_d / r_w) T_w (thesis, eq. 4.5)."""
+    return p.drum_radius / p.wheel_radius * s.wheel_torque
+
+
+# --- sensors ----------------------------------------------------------------------------------
+
+
+def measured_drum_speed(s: Record, p: Record) -> float:
+    """What the measuring wheel shows [rad/s]."""
+    return s.drum_speed
+
+
+def measured_armature_current(s: Record, p: Record) -> float:
+    """What the current sensor shows [A]."""
+    return s.armature_current
+
+
+def measured_shaft_torque(s: Record, p: Record) -> float:
+    """What the torque sensor shows [N m]: -T_mg, negative while the motor drives (eq. 3.26)."""
+    return -s.motor_shaft_torque
+
+
+def shell_temperature(s: Record, p: Record) -> float:
+    """What the thermocouples on the gearbox's shell show [K]; the nominal bench is warm."""
+    return WARM_SHELL
+
+
+LAWS = (
+    dead_time,
+    reference,
+    speed_limit,
+    current_limit,
+    voltage_limit,
+    integration_at_limit,
+    converter_voltage_drop,
+    tachometer_gain,
+    resistance,
+    flux,
+    motor_coulomb_friction,
+    motor_viscous_friction,
+    motor_shaft_damping,
+    gear_coulomb_friction,
+    gear_viscous_friction,
+    gear_direction_factor,
+    gear_speed_friction,
+    gear_load_friction,
+    gear_torque,
+    backlash_half_gap,
+    drum_coulomb_friction,
+    drum_viscous_friction,
+    drum_torque,
+    measured_drum_speed,
+    measured_armature_current,
+    measured_shaft_torque,
+    shell_temperature,
+)

@@ -1,0 +1,43 @@
+"""A parameter set whose effects are known, as the commands take it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from plant_emulator import effects, parameter_sets
+from plant_emulator.errors import ParameterError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.effects import Effect
+    from plant_emulator.model.parameters import ParameterSet
+
+
+def load(name: str, own: Sequence[str] = ()) -> ParameterSet:
+    """The set of that name or file; ParameterError also where an effect of it, or a parameter of
+    that, is unknown.
+
+    own : files of a user's own effects
+    """
+    found = parameter_sets.load(name)
+    if found.effects:
+        mine = {effect.name: effect for effect in effects.from_files([Path(file) for file in own])}
+        for key, values in found.effects.items():
+            _check(name, key, values, mine)
+    return found
+
+
+def _check(place: str, name: str, values: Mapping[str, float], own: Mapping[str, Effect]) -> None:
+    if name not in own and name not in effects.names():
+        raise ParameterError(
+            f"{place}: effects.{name}: unknown; one of your own needs its file "
+            "(diagnose --effects FILE.py, or in plant_emulator/effects); known: "
+            f"{', '.join([*effects.names(), *own])}"
+        )
+    effect = own[name] if name in own else effects.load(name)
+    for key in values:
+        if key not in effect.parameters:
+            known = ", ".join(effect.parameters)
+            raise ParameterError(f"{place}: effects.{name}.{key}: unknown; known: {known}")

@@ -1,0 +1,79 @@
+"""The two loops over samples that are compiled: the truck's travel, and a Kalman filter (pure).
+
+Each is one plain function without callees, so that numba's cache on disk knows all of it.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from plant_emulator.solver import compiler
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from plant_emulator.signals.log import Array
+
+
+@cache
+def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The loop, compiled at its first call."""
+    compiler.use_cache([__file__, str(compiler.__file__)], ["road"])
+    return compiler.compiled(function, on_disk=True)
+
+
+def travelled(
+    torque: Array,
+    held: NDArray[np.bool_],
+    period: float,
+    driving: float,
+    braking: float,
+    rolling: float,
+    viscous: float,
+    start: float,
+) -> Array:
+    """Velocity [m/s] under the true motor torque [N m], shape (n,).
+
+    driving, braking : acceleration per torque [m/s^2 / (N m)]; rolling [m/s^2], viscous [1/s]
+    A truck that comes to rest within a period goes on from rest for what is left of it. One loop
+    without callees, for the compiler's cache.
+    """
+    found = np.zeros(len(torque))
+    found[0] = start
+    for k in range(1, len(torque)):
+        if held[k]:
+            continue
+        before, time = found[k - 1], period
+        mean = 0.5 * (torque[k - 1] + torque[k])
+        if before != 0.0:
+            sign = 1.0 if before > 0.0 else -1.0
+            per_torque = driving if mean * sign > 0.0 else braking
+            rate = per_torque * mean - sign * (rolling + viscous * abs(before))
+            after = before + period * rate
+            if after * sign > 0.0:
+                found[k] = after
+                continue
+            time = after / rate
+        surplus = driving * abs(mean) - rolling
+        if surplus > 0.0:
+            found[k] = surplus * time if mean > 0.0 else -surplus * time
+    return found
+
+
+def foreseen(residuals: Array, gain: Array, stands: NDArray[np.bool_]) -> Array:
+    """Random walk in each column of residuals as known before each row, shape (m, columns).
+
+    walk <- walk + gain (residual - walk), 0 where the truck stands; gain and stands, shape (m,)
+    """
+    walk = np.zeros(residuals.shape)
+    for k in range(1, len(residuals)):
+        if not stands[k]:
+            for column in range(residuals.shape[1]):
+                before = walk[k - 1, column]
+                walk[k, column] = before + gain[k - 1] * (residuals[k - 1, column] - before)
+    return walk

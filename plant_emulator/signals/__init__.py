@@ -1,0 +1,1 @@
+"""Signals over time: the log record, the noise of its channels, smoothing."""

@@ -1,0 +1,1 @@
+"""What is simulated with the model: logs, drive programs, a truck's travel, the running bench."""

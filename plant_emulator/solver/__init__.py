@@ -1,0 +1,1 @@
+"""The time integration: method, stepper, dead time, and the compilation of model and effects."""

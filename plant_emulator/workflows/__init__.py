@@ -1,0 +1,1 @@
+"""What a command does from files to answer: reads logs, runs the pure core, dates the result."""

@@ -1,0 +1,90 @@
+"""Runs one diagnosis in a process of its own that gets nothing but the logs.
+
+The logs are copied to an empty temporary folder, which is all that the process is told of; it runs
+the command that a user types, which imports nothing of the trial.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from threading import Lock
+from typing import TYPE_CHECKING, Any
+
+from plant_emulator import parameter_sets
+from plant_emulator.workflows.blind_trial.folder import ROOT
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from plant_emulator.model.parameters import ParameterSet
+
+
+@dataclass(frozen=True)
+class Diagnosed:
+    """The answer and the saved parameter set; error: the last line of a failed diagnosis."""
+
+    answer: dict[str, Any] | None
+    saved: ParameterSet | None
+    error: str
+
+
+@dataclass
+class Examiner:
+    """Starts diagnoses, several side by side if need be, and can end them all."""
+
+    stopped: bool = False
+    _running: set[subprocess.Popen[str]] = field(default_factory=set)
+    _lock: Lock = field(default_factory=Lock)
+
+    def diagnose(self, logs: Sequence[Path]) -> Diagnosed:
+        """The diagnosis of these logs."""
+        with tempfile.TemporaryDirectory(prefix="blind-") as name:
+            folder = Path(name)
+            for log in logs:
+                shutil.copyfile(log, folder / log.name)
+            code, told = self._run([log.name for log in logs], folder)
+            if code != 0:
+                last = told.strip().splitlines()[-1:] or [f"exit code {code}"]
+                return Diagnosed(None, None, last[0])
+            answer = json.loads((folder / "answer.json").read_text(encoding="utf-8"))
+            return Diagnosed(answer, parameter_sets.load(str(folder / "set.toml")), "")
+
+    def _run(self, logs: Sequence[str], folder: Path) -> tuple[int, str]:
+        """Exit code and standard error of the command."""
+        command = [sys.executable, "-m", "plant_emulator", "diagnose", *logs]
+        command += ["--workers", "1", "--json", "answer.json", "--save", "set.toml"]
+        given = os.environ.get("PYTHONPATH", "")
+        with self._lock:
+            if self.stopped:
+                return -1, "stopped"
+            # A session of its own: an interrupt from the keyboard is the trial's to handle.
+            process = subprocess.Popen(
+                command,
+                cwd=folder,
+                env={**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{given}"},
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                text=True,
+                start_new_session=True,
+            )
+            self._running.add(process)
+        try:
+            _, told = process.communicate()
+        finally:
+            with self._lock:
+                self._running.discard(process)
+        return process.returncode, told
+
+    def stop(self) -> None:
+        """End all diagnoses that run, and start none any more."""
+        with self._lock:
+            self.stopped = True
+            for process in self._running:
+                process.terminate()

@@ -1,0 +1,62 @@
+"""Reads one channel of a truck's road log: a CSV file, plain or gzip-compressed, with its time.
+
+Columns `time_s` and `motor_torque_Nm` (load cell between the truck's motor and its gear, positive
+forwards) or `velocity_m_s` (measuring wheel); others are passed over. Each file has the clock and
+the rate of its own logger.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.errors import LogError
+from register_maps.csv_log import TIME, CsvLogError, parse
+from register_maps.signals import LOG_COLUMNS, LogColumn
+
+if TYPE_CHECKING:
+    from plant_emulator.signals.log import Array
+
+
+def channel(column: str, signal: str, unit: str) -> LogColumn:
+    """A column of a road log; whether it is there is judged by `read`, which knows the files."""
+    return LogColumn(
+        column=column, signal=signal, unit=unit, needed=False, measured=None, decimals=4
+    )
+
+
+TORQUE = channel("motor_torque_Nm", "motor_torque", "N m")
+VELOCITY = channel("velocity_m_s", "velocity", "m/s")
+ROLES = {TORQUE.column: "TORQUE", VELOCITY.column: "VELOCITY"}
+
+
+def read(path: str, wanted: LogColumn) -> tuple[Array, Array]:
+    """Time [s] and the channel, shape (n,) each; LogError names file, line and column."""
+    try:
+        columns = {TIME: LOG_COLUMNS[TIME], wanted.column: wanted}
+        found = parse(Path(path).read_bytes(), columns)
+    except CsvLogError as error:
+        raise LogError(f"{path}: {error}") from error
+    if wanted.signal not in found.signals:
+        swapped = next((name for name in found.other if name in ROLES), None)
+        hint = f", found {swapped}: the order is TORQUE VELOCITY" if swapped else ""
+        raise LogError(
+            f"{path}: line 1: column {wanted.column} is missing; the file given as "
+            f"{ROLES[wanted.column]} needs it{hint}"
+        )
+    return np.array(found.signals["time"]), np.array(found.signals[wanted.signal])
+
+
+def origin(*paths: str) -> list[str]:
+    """Where a result comes from: date, version of the program, logs with their SHA-256."""
+    digests = [hashlib.sha256(Path(path).read_bytes()).hexdigest() for path in paths]
+    logs = [f"{path}, SHA-256 {digest}" for path, digest in zip(paths, digests, strict=True)]
+    made = (
+        f"{datetime.now(tz=UTC):%Y-%m-%d %H:%M} UTC, road-load-bench {version('road-load-bench')}"
+    )
+    return [f"plant-emulator identify-truck, {made}", *logs]

@@ -1,0 +1,140 @@
+"""The steps of a diagnosis on local processes, or on a Dask cluster."""
+
+from __future__ import annotations
+
+from concurrent.futures import BrokenExecutor, CancelledError, ProcessPoolExecutor
+from contextlib import contextmanager
+from functools import partial
+from multiprocessing import get_context
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from threadpoolctl import threadpool_limits
+
+from plant_emulator.diagnosis.execution.pool import Here, model_of
+from plant_emulator.errors import EmulatorError, InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from plant_emulator.diagnosis.execution.pool import Pool, Recipe
+    from plant_emulator.diagnosis.model import Model
+
+Item = TypeVar("Item")
+Answer = TypeVar("Answer")
+
+
+def _step(function: Callable[[Model, Any], Any], recipe: Recipe, item: Any) -> Any:
+    with threadpool_limits(1):  # side by side, threads of one wait for those of the others
+        return function(model_of(recipe), item)
+
+
+@contextmanager
+def _lost(errors: tuple[type[Exception], ...], advice: str) -> Iterator[None]:
+    """Tell in one line of a worker that ended before its answer."""
+    try:
+        yield
+    except errors as error:
+        raise EmulatorError(f"{advice} ({type(error).__name__}: {error})") from error
+
+
+class Processes:
+    """On so many processes of this machine."""
+
+    def __init__(self, workers: int) -> None:
+        # spawned, not forked: a fork copies the locks of threads that it does not copy
+        self._executor = ProcessPoolExecutor(workers, get_context("spawn"))
+        self._told = partial(
+            _lost,
+            (BrokenExecutor,),
+            f"one of {workers} processes ended before its answer, as when memory runs out; fewer "
+            "--workers need less",
+        )
+
+    def map(
+        self, function: Callable[[Model, Item], Answer], recipe: Recipe, items: Sequence[Item]
+    ) -> Iterator[Answer]:
+        """See `Pool`."""
+        count = len(items)
+        with self._told():
+            answers = self._executor.map(_step, [function] * count, [recipe] * count, items)
+        return self._each(answers)
+
+    def _each(self, answers: Iterator[Answer]) -> Iterator[Answer]:
+        with self._told():
+            yield from answers
+
+    def close(self) -> None:
+        """End the processes."""
+        self._executor.shutdown(cancel_futures=True)
+
+
+class Cluster:
+    """On the workers of a Dask scheduler at that address."""
+
+    def __init__(self, address: str) -> None:
+        try:
+            import distributed
+            from distributed.comm.addressing import parse_address, parse_host_port
+            from distributed.comm.core import CommClosedError
+            from distributed.comm.registry import get_backend
+        except ImportError as error:
+            raise EmulatorError(
+                f"--scheduler {address}: {error}; pip install 'road-load-bench[cluster]' brings it"
+            ) from error
+        try:  # before a client starts its thread, which an error would leave behind
+            scheme, place = parse_address(address)
+            get_backend(scheme)
+            parse_host_port(place)
+        except ValueError as error:
+            raise InputError(
+                f"--scheduler {address}: {error}; an address like tcp://host:8786 is expected"
+            ) from error
+        try:
+            self._client: Any = distributed.Client(address, timeout=10)  # type: ignore[no-untyped-call]  # Dask declares none here
+        except OSError as error:
+            raise EmulatorError(f"--scheduler {address}: no scheduler answers ({error})") from error
+        self._recipes: dict[str, Any] = {}
+        self._told = partial(
+            _lost,
+            (distributed.KilledWorker, CommClosedError, CancelledError),
+            f"--scheduler {address}: a worker or the scheduler ended before its answer",
+        )
+
+    def map(
+        self, function: Callable[[Model, Item], Answer], recipe: Recipe, items: Sequence[Item]
+    ) -> Iterator[Answer]:
+        """See `Pool`."""
+        with self._told():
+            shared = self._given(recipe)
+            futures = [
+                self._client.submit(_step, function, shared, item, pure=False) for item in items
+            ]
+        return self._each(futures)
+
+    def _each(self, futures: Sequence[Any]) -> Iterator[Any]:
+        with self._told():
+            for future in futures:
+                yield future.result()
+
+    def _given(self, recipe: Recipe) -> Any:
+        """The recipe on the workers, sent once and kept there.
+
+        Let go after a step and sent again for the next one under the same name, it can be freed
+        late, with the steps that wait for it.
+        """
+        key = recipe.digest()
+        if key not in self._recipes:
+            self._recipes[key] = self._client.scatter(recipe, broadcast=True, hash=False)
+        return self._recipes[key]
+
+    def close(self) -> None:
+        """Leave the cluster, and nothing on it."""
+        self._recipes.clear()
+        self._client.close()
+
+
+def pool_of(workers: int, scheduler: str | None = None) -> Pool:
+    """The pool that the options --workers and --scheduler ask for."""
+    if scheduler is not None:
+        return Cluster(scheduler)
+    return Processes(workers) if workers > 1 else Here()

@@ -1,0 +1,138 @@
+"""The noise of a fed wheel torque, against draws of it, and what it does to an identification."""
+
+from itertools import count
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array
+
+from plant_emulator.errors import UnsettledError
+from plant_emulator.identification.identify import identify
+from plant_emulator.model.parameters import ParameterSet
+from plant_emulator.recordings.fed_noise import Loud, loud
+from plant_emulator.recordings.recording import Recording, recording
+from plant_emulator.signals.log import Log
+from plant_emulator.simulation.programs import TravelProgram, program
+from plant_emulator.simulation.sensors import SENSORS, noisy
+from plant_emulator.simulation.travel import travel
+
+GAP = 0.3
+
+
+@pytest.fixture(scope="module")
+def true_log(nominal: ParameterSet) -> Log:
+    """Program 6 without noise."""
+    known = program("program6")
+    assert isinstance(known, TravelProgram)
+    return travel(known, nominal, gap_position=GAP)
+
+
+@pytest.fixture(scope="module")
+def measured(true_log: Log) -> Recording:
+    return recording(noisy(true_log, 1))
+
+
+def test_direction_of_deviation_three_comes_out_with_variance_one() -> None:
+    direction = np.zeros((2, 50))
+    direction[0, 10], direction[1, 11] = 0.6, 0.8
+    random = np.random.default_rng(1)
+    draws = [
+        random.standard_normal((2, 50)) + 3.0 * random.standard_normal() * direction
+        for _ in range(4000)
+    ]
+    one = Loud(directions=csr_array(direction.T.reshape(1, -1)), deviations=np.array([3.0]))
+    along = [float(np.sum(direction * one.quieted(r))) for r in draws]
+    assert np.var(along) == pytest.approx(1.0, abs=0.1)
+    across = one.quieted(draws[0]) - draws[0]
+    assert np.count_nonzero(across) == 2, "all else stays"
+
+
+def test_directions_hold_what_drawn_noise_of_the_wheel_torque_does(
+    measured: Recording, true_log: Log, nominal: ParameterSet
+) -> None:
+    """Two gaps close while the truck drives: at its start, and when it brakes."""
+    found = loud(measured, nominal.values(), GAP)
+    assert found is not None
+    shape = (-1, len(true_log.time), len(measured.channels))
+    spikes = np.abs(found.directions.toarray().reshape(shape)).max(axis=2).argmax(axis=1)
+    assert sorted(np.round(true_log.time[spikes], 1).tolist()) == [2.4, 22.6]
+    random, torque = np.random.default_rng(2), true_log["wheel_torque"]
+    base = measured.fed(torque).residual(nominal.values(), GAP)
+    deviation = SENSORS["wheel_torque"][0]
+    raw, quiet = [], []
+    for _ in range(20):
+        fed = measured.fed(torque + deviation * random.standard_normal(len(torque)))
+        change = fed.residual(nominal.values(), GAP) - base
+        raw.append(found.along(change))
+        quiet.append(found.along(found.quieted(change)))
+    assert np.mean(np.square(raw)) > 20.0
+    assert np.mean(np.square(quiet)) < 2.0
+
+
+def test_samples_that_do_not_count_stay_zero(true_log: Log, nominal: ParameterSet) -> None:
+    counted = true_log.time < 22.55
+    log = noisy(true_log, 1)
+    part = recording(log, use={"armature_current": counted})
+    found = loud(part, nominal.values(), GAP)
+    assert found is not None
+    row = part.channels.index("armature_current")
+    quiet = found.quieted(part.residual(nominal.values(), GAP))
+    assert not quiet[row, ~counted].any()
+
+
+def test_log_without_a_truck_feeds_nothing(nominal: ParameterSet, true_log: Log) -> None:
+    signals = {k: v for k, v in noisy(true_log, 1).signals.items() if k != "wheel_torque"}
+    alone = recording(Log(true_log.time, signals, true_log.source))
+    assert loud(alone, nominal.values(), GAP) is None
+
+
+def test_drum_inertia_of_a_noisy_log_lies_within_its_standard_error(
+    true_log: Log, nominal: ParameterSet
+) -> None:
+    """With the sensors' noise alone it is 21 standard errors off."""
+    answer = identify([recording(noisy(true_log, 4000))], nominal, ["drum_inertia"])
+    (inertia,) = answer.parameters
+    assert abs(inertia.value - 312.69) < 3.5 * inertia.standard_error
+
+
+def test_window_whose_simulation_does_not_settle_tells_nothing(
+    measured: Recording, nominal: ParameterSet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain, settled, calls = loud(measured, nominal.values(), GAP), Recording.settled, count()
+
+    def unsettled(self: Recording, *values: Any) -> Any:
+        if next(calls) == 5:
+            raise UnsettledError("does not settle")
+        return settled(self, *values)
+
+    monkeypatch.setattr(Recording, "settled", unsettled)
+    found = loud(measured, nominal.values(), GAP)
+    assert plain is not None
+    assert found is not None
+    np.testing.assert_allclose(found.deviations, plain.deviations, rtol=0.05)
+
+
+def test_long_log_needs_no_more_simulations_than_a_short_one(
+    true_log: Log, nominal: ParameterSet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """60 windows of 0.25 s in 15 s, and the run itself; 30 s alone hold 120 windows."""
+    settled, calls = Recording.settled, count()
+
+    def counting(self: Recording, *values: Any) -> Any:
+        next(calls)
+        return settled(self, *values)
+
+    monkeypatch.setattr(Recording, "settled", counting)
+    assert loud(recording(noisy(true_log, 1)), nominal.values(), GAP) is not None
+    assert next(calls) == 61
+
+
+def test_run_that_cannot_be_simulated_has_no_directions(
+    measured: Recording, nominal: ParameterSet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unsettled(self: Recording, *values: Any) -> Any:
+        raise UnsettledError("does not settle")
+
+    monkeypatch.setattr(Recording, "settled", unsettled)
+    assert loud(measured, nominal.values(), GAP) is None

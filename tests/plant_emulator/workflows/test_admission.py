@@ -1,0 +1,105 @@
+"""Which logs are taken: without their own answer, each run once, and of one bench."""
+
+import gzip
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from plant_emulator import logs
+from plant_emulator.cli import main
+from plant_emulator.errors import DiagnosisError
+from plant_emulator.recordings.preflight import preflight
+from plant_emulator.recordings.recording import recording
+from plant_emulator.signals.log import Log
+from plant_emulator.workflows.admission import unlabelled
+from plant_emulator.workflows.diagnosis_session import planned
+from register_maps.signals import LOG_COLUMNS
+
+DATA = Path(__file__).parents[2] / "data"
+PROGRAM1 = DATA / "bench_nominal" / "program1.csv.gz"
+BenchLog = Callable[[str], Log]
+
+
+def refused(*arguments: str | Path) -> str:
+    """The one line of a refusal."""
+    result = CliRunner().invoke(main, [str(a) for a in arguments])
+    assert result.exit_code == 2, result.output
+    (line,) = result.stderr.splitlines()
+    return line
+
+
+@pytest.mark.parametrize(
+    "column",
+    ["label", "labels", "effects", "true_effect", "is_faulty", "class", "answer", "anomaly",
+     "scenario", "cause-of-gap", "drift_fg", "groundTruth", "isFaulty", "FAULT"],
+)  # fmt: skip
+def test_column_that_tells_the_answer_is_refused(column: str) -> None:
+    log = Log(np.zeros(1), {}, "run.csv", other=(column,))
+    with pytest.raises(DiagnosisError, match=f"run.csv: line 1: column {column} looks like"):
+        unlabelled(log)
+
+
+@pytest.mark.parametrize(
+    "column", [*LOG_COLUMNS, "effective_voltage_V", "brake_defined", "clock_s"]
+)
+def test_measured_column_is_no_answer(column: str) -> None:
+    unlabelled(Log(np.zeros(1), {}, "run.csv", other=(column,)))
+
+
+@pytest.mark.parametrize("command", ["diagnose", "detectability"])
+@pytest.mark.parametrize("packing", ["plain", "packed again", "later clock"])
+def test_same_run_in_another_packing_is_refused(tmp_path: Path, command: str, packing: str) -> None:
+    text = gzip.decompress(PROGRAM1.read_bytes())
+    copy = tmp_path / ("p1.csv" if packing == "plain" else "p1.csv.gz")
+    if packing == "later clock":
+        log = logs.read(PROGRAM1)
+        logs.write(replace(log, time=log.time + 7.0), copy)
+    else:
+        copy.write_bytes(text if packing == "plain" else gzip.compress(text, 1))
+    assert f"{copy}: the same run as {PROGRAM1}; give every run once" in refused(
+        command, PROGRAM1, copy
+    )
+
+
+def test_plan_is_not_made_from_a_log_that_tells_its_answer(tmp_path: Path) -> None:
+    head, *rows = gzip.decompress(PROGRAM1.read_bytes()).decode().splitlines()
+    told = tmp_path / "told.csv"
+    told.write_text("\n".join([f"{head},label", *(f"{row},1" for row in rows), ""]))
+    assert f"{told}: line 1: column label looks like the answer" in refused("detectability", told)
+
+
+def test_plan_is_not_made_from_logs_of_two_benches() -> None:
+    practice = DATA / "bench_practice"
+    first, second = (
+        practice / f"{name}.csv.gz" for name in ("practice_002/program1", "practice_001/program2")
+    )
+    assert "give logs of one bench" in refused("detectability", first, second)
+
+
+@pytest.mark.parametrize(
+    ("still", "told"), [("before", "in the first 60 % of it"), ("after", "in the last 40 % of it")]
+)
+def test_single_log_of_which_a_part_stands_still_is_refused(
+    bench_log: BenchLog, still: str, told: str
+) -> None:
+    log = bench_log("bench_practice/practice_004/program2")
+    count = 2 * len(log.time)
+    width = (count, 0) if still == "before" else (0, count)
+    signals = {name: np.pad(values, width) for name, values in log.signals.items()}
+    noise = np.random.default_rng(1).normal(0.0, 0.1, 3 * len(log.time))
+    signals["motor_speed"] = signals["motor_speed"] + noise
+    time = np.arange(3 * len(log.time), dtype=np.float64) * 0.01
+    whole = Log(time, signals, "run.csv")
+    use = preflight(whole, 62.6).use
+    with pytest.raises(DiagnosisError, match=f"run.csv: no held-out run is possible: {told}"):
+        planned([recording(whole, use=use)], 1)
+
+
+def test_single_log_that_moves_in_both_parts_is_taken(bench_log: BenchLog) -> None:
+    runs, plan = planned([recording(bench_log("bench_practice/practice_004/program2"))], 1)
+    assert len(runs) == 2
+    assert plan.as_fitted

@@ -1,0 +1,103 @@
+"""Steps on processes: the answers in their order, and one line where a process is lost."""
+
+import os
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from plant_emulator.cli import main
+from plant_emulator.diagnosis.execution import pool
+from plant_emulator.diagnosis.fitting import steps
+from plant_emulator.diagnosis.model import Model
+from plant_emulator.errors import EmulatorError, InputError
+from plant_emulator.workflows.workers import Cluster, Processes
+from tests.plant_emulator.diagnosis.test_contest import TIME, Line, noisy
+
+
+@dataclass
+class Number:
+    """A recipe whose model is a number."""
+
+    value: int
+
+    def build(self) -> Model:
+        """See `Recipe`."""
+        return cast("Model", self.value)
+
+    def digest(self) -> str:
+        """See `Recipe`."""
+        return str(self.value)
+
+
+def times(model: Any, item: int) -> int:
+    return int(model * item)
+
+
+def dies(_model: Any, _item: int) -> int:
+    os._exit(9)
+
+
+def test_answers_come_in_the_order_of_the_items() -> None:
+    workers = Processes(2)
+    try:
+        assert list(workers.map(times, Number(3), [1, 2, 3])) == [3, 6, 9]
+    finally:
+        workers.close()
+
+
+def test_lost_process_is_told_in_one_line() -> None:
+    workers = Processes(2)
+    try:
+        with pytest.raises(EmulatorError, match=r"2 processes ended.*fewer --workers") as one:
+            list(workers.map(dies, Number(3), [1, 2]))
+        with pytest.raises(EmulatorError, match="one of 2 processes ended"):  # and it stays so
+            list(workers.map(times, Number(3), [1, 2]))
+    finally:
+        workers.close()
+    assert one.value.exit_code == 1
+
+
+class Cleared(dict[Any, Any]):
+    """What another thread of the worker clears as soon as something stands there."""
+
+    def __setitem__(self, key: Any, value: Any) -> None:
+        super().__setitem__(key, value)
+        self.clear()
+
+
+def test_model_is_returned_though_another_thread_lets_it_go(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(pool, "_MODELS", Cleared())
+    model: Any = pool.model_of(Number(3))
+    assert model == 3
+
+
+def test_tangents_are_returned_though_another_thread_lets_them_go(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(steps, "_last", Cleared())
+    line = Line([noisy(2.0 + 3.0 * TIME + np.abs(TIME), 1)], ["kink"])
+    base = steps.start(line, (0,))
+    shown = steps.show(line, steps.Task(base=base, runs=(0,), effect="kink"))
+    assert shown is not None
+
+
+@pytest.mark.parametrize("address", ["nonsense", "foo://host:1", "tcp://127.0.0.1:x", "tcp://"])
+def test_address_that_cannot_be_is_wrong_usage(address: str) -> None:
+    pytest.importorskip("distributed")
+    with pytest.raises(InputError, match=f"--scheduler {address}: .*tcp://host:8786"):
+        Cluster(address)
+
+
+@pytest.mark.parametrize(
+    "option",
+    [("--reference", "linear"), ("--parameters", "thesis_table_3_1"), ("--save", "s.toml")],
+)
+def test_option_of_the_bench_is_refused_with_an_axis(option: tuple[str, str]) -> None:
+    result = CliRunner().invoke(main, ["diagnose", "--model", "axis", "run.csv", *option])
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert f"{option[0]} belongs to --model bench" in result.stderr
