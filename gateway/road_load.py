@@ -9,7 +9,7 @@ under the sign of the speed (eq 4.11), which would let a truck on a slope push i
 from dataclasses import dataclass
 from math import atan, copysign, cos, sin
 
-from gateway.configuration.config_sections import BenchConfig, TruckConfig
+from gateway.configuration.sections import BenchConfig, TruckConfig
 
 GRAVITY = 9.81
 

@@ -23,7 +23,7 @@ from timing import alone, duration, side_by_side
 
 from plant_emulator import parameter_sets
 from plant_emulator.effects import names as effect_names
-from plant_emulator.simulation.bench import Bench
+from plant_emulator.simulation.running_bench import Bench
 from plant_emulator.simulation.simulate import LARGEST_STEP, simulate
 from plant_emulator.solver import kernel
 

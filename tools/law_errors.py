@@ -25,7 +25,7 @@ from plant_emulator.blind.generate import measured, true_logs
 from plant_emulator.diagnosis.execution.pool import Here, model_of
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
 from plant_emulator.diagnosis.report import answer
-from plant_emulator.diagnosis.selection.inquiry import Inquiry
+from plant_emulator.diagnosis.selection.procedure import Inquiry
 from plant_emulator.recordings.recording import recording
 from plant_emulator.solver.kernel import kernel, know
 

@@ -15,7 +15,7 @@ from plant_emulator import parameter_sets
 from plant_emulator.signals.log import Array, Log
 from plant_emulator.simulation import programs
 from plant_emulator.simulation.simulate import LARGEST_STEP, run_of, simulate
-from plant_emulator.solver.integrate import CHANNELS
+from plant_emulator.solver.stepper import CHANNELS
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -108,8 +108,8 @@ def command(
     """
     from rich.console import Console
 
-    from gateway.demo.demo import demo
-    from gateway.demo.demo_options import LOADS, Options
+    from gateway.demo.options import LOADS, Options
+    from gateway.demo.run import demo
     from gateway.errors import GatewayError
 
     console = Console(stderr=json_file == "-")

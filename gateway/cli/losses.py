@@ -13,7 +13,7 @@ from gateway.cli._types import PICTURES, Command, Number, OutputFile
 
 if TYPE_CHECKING:
     from gateway.configuration.config import Config
-    from gateway.reports.losses_report import Losses
+    from gateway.reports.losses import Losses
 
 EXAMPLE = """
 \b
@@ -83,7 +83,7 @@ def command(
     """
     from gateway import config_file
     from gateway.configuration.config import Config
-    from gateway.reports import losses_report
+    from gateway.reports import losses as report
 
     if files and (speeds is not None or hold is not None):
         raise click.UsageError("--speeds and --hold are for a live sweep; a file has had its own")
@@ -98,43 +98,44 @@ def command(
         files = (_swept(settings, speeds, hold, quiet=json_file == "-"),)
     losses = found(files, settings)
     if json_file != "-":
-        click.echo(losses_report.summary(losses))
+        click.echo(report.summary(losses))
     if save is not None:
-        save.write_text(losses_report.toml(losses), encoding="utf-8")
+        save.write_text(report.toml(losses), encoding="utf-8")
     if table is not None:
-        losses_report.write_csv(table, losses)
+        report.write_csv(table, losses)
     if plot is not None:
-        losses_report.draw(plot, losses)
+        report.draw(plot, losses)
     if json_file is not None:
         with click.open_file(json_file, "w", encoding="utf-8") as file:
-            file.write(json.dumps(losses_report.answer(losses), indent=2) + "\n")
+            file.write(json.dumps(report.answer(losses), indent=2) + "\n")
 
 
 def found(files: Sequence[Path], settings: "Config | None") -> "Losses":
     """The losses in files; the bench is that of `settings`, of a recording, or the thesis's."""
     from gateway.configuration.config import Config
-    from gateway.losses import losses, losses_fit
-    from gateway.recordings import losses_source
-    from gateway.reports import losses_report
+    from gateway.losses.fit import fit as fit_friction
+    from gateway.losses.sections import LeftOut, LossesError, Section, steady
+    from gateway.recordings import steady_runs
+    from gateway.reports import losses as report
 
-    sources = [losses_source.read(path) for path in files]
-    sections: list[losses.Section] = []
-    left_out: list[losses.LeftOut] = []
+    sources = [steady_runs.read(path) for path in files]
+    sections: list[Section] = []
+    left_out: list[LeftOut] = []
     for source in sources:
         known = settings or source.config or Config()
         try:
-            steady = losses.steady(source.trace, known.bench, known.regulator.torque_offset)
-        except losses.LossesError as error:
-            raise losses.LossesError(f"{source.path}: {error}") from error
-        sections += steady.sections
-        left_out += steady.left_out
+            held = steady(source.trace, known.bench, known.regulator.torque_offset)
+        except LossesError as error:
+            raise LossesError(f"{source.path}: {error}") from error
+        sections += held.sections
+        left_out += held.left_out
     try:
-        fit = losses_fit.fit(sections)
-    except losses.LossesError as error:
+        fit = fit_friction(sections)
+    except LossesError as error:
         why = "".join(f"; left out: {one.why}" for one in left_out)
         names = ", ".join(str(path) for path in files)
-        raise losses.LossesError(f"{names}: {error}{why}") from error
-    return losses_report.Losses(
+        raise LossesError(f"{names}: {error}{why}") from error
+    return report.Losses(
         fit=fit,
         sections=sections,
         left_out=left_out,
@@ -149,7 +150,7 @@ def _swept(
     """The recording of a sweep on the live bench."""
     import register_maps
     from gateway.errors import ConfigError, GatewayError
-    from gateway.losses.losses_live import Progress, swept_config
+    from gateway.losses.live import Progress, swept_config
     from gateway.review import review
     from gateway.runtime import daemon
 

@@ -15,12 +15,12 @@ from gateway.cli._types import PICTURES, Command, OutputFile
 from gateway.configuration.config import Config
 from gateway.cycle.cycle import Output
 from gateway.cycle.record import number
-from gateway.losses import losses
-from gateway.offline import replay, replay_log
+from gateway.losses import sections
+from gateway.offline import log_replay, replay
 from gateway.offline.evaluation import cruise, road_speed, traction_energy
-from gateway.recordings import log, losses_source, recording
+from gateway.recordings import log, recording, steady_runs
 from gateway.recordings.header import config_of, map_of
-from gateway.reports.replay_report import Compared, draw, write_csv
+from gateway.reports.replay import Compared, draw, write_csv
 from gateway.road_load import road_load
 
 EXAMPLE = """
@@ -123,9 +123,9 @@ def _told(found: recording.Recording, left: list[replay.Difference], ticks: int)
 def _wrong_sign(found: log.Log, config: Config) -> str:
     """What the commissioning check says against the torque; empty: nothing, or a truck drives."""
     columns = found.columns
-    if np.any(np.abs(columns.get("wheel_torque", 0.0)) > losses_source.TRUCK):
+    if np.any(np.abs(columns.get("wheel_torque", 0.0)) > steady_runs.TRUCK):
         return ""
-    trace = losses.Trace(
+    trace = sections.Trace(
         name=found.path.name,
         time=found.time,
         motor_speed=columns["motor_speed"],
@@ -133,16 +133,16 @@ def _wrong_sign(found: log.Log, config: Config) -> str:
         shaft_torque=columns["shaft_torque"],
     )
     try:
-        losses.steady(trace, config.bench, config.regulator.torque_offset)
-    except losses.SignError as error:
+        sections.steady(trace, config.bench, config.regulator.torque_offset)
+    except sections.SignError as error:
         return str(error)
-    except losses.LossesError:
+    except sections.LossesError:
         return ""  # too coarse to tell, as such a log may be
     return ""
 
 
 def _log(found: log.Log, config: Config) -> Result:
-    outputs = replay_log.replay(
+    outputs = log_replay.replay(
         config, register_maps.load(config.plc.map), found.time, found.columns
     )
     compared = _compared(

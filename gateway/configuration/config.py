@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 from typing import Any, get_type_hints
 
 from gateway import regulators
-from gateway.configuration.config_sections import (
+from gateway.configuration.keys import checked, keys
+from gateway.configuration.sections import (
     RPM,
     SECTIONS,
     BenchConfig,
@@ -25,8 +26,7 @@ from gateway.configuration.config_sections import (
     RegulatorConfig,
     TruckConfig,
 )
-from gateway.configuration.keys import checked, keys
-from gateway.configuration.losses_speeds import Sweep, from_sweep
+from gateway.configuration.sweep_speeds import Sweep, from_sweep
 from gateway.errors import ConfigError
 from gateway.friction import THESIS, from_friction
 

@@ -16,7 +16,7 @@ from typing import Any, cast
 
 from gateway import regulators
 from gateway.configuration.config import Config
-from gateway.cycle import command, limits, losses_sweep, samples
+from gateway.cycle import command, limits, samples, sweep
 from gateway.cycle.checks import check
 from gateway.cycle.command import Command
 from gateway.cycle.limits import Limit, Limited, Limits
@@ -116,7 +116,7 @@ def initial(config: Config, register_map: RegisterMap) -> CycleState:
 def _regulator(config: Config) -> Regulator:
     """What decides on the demand: the configured regulator, or the sweep where there is one."""
     if config.sweep is not None:
-        return cast("Regulator", losses_sweep)
+        return cast("Regulator", sweep)
     return regulators.load(config.regulator.name)
 
 

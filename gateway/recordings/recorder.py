@@ -23,8 +23,8 @@ from typing import Any, Final
 
 from gateway.cycle.record import Layout
 from gateway.errors import GatewayError
-from gateway.recordings.live import View
 from gateway.recordings.recording import RecordingError, encode_header
+from gateway.recordings.screen import View
 
 BATCH: Final = 0.05
 """[s] Records are written this often."""

@@ -12,21 +12,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.tangents import Tangents
+from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
 from plant_emulator.errors import UnsettledError
-from plant_emulator.estimation.estimation import at, estimate
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
-from plant_emulator.estimation.search import GAP_POSITION
+from plant_emulator.estimation.least_squares import at, estimate
+from plant_emulator.estimation.start_search import GAP_POSITION
 from plant_emulator.recordings.recording import IMPOSSIBLE
 from plant_emulator.signals.log import COMPARED
-from plant_emulator.simulation.sensors import SENSORS
+from plant_emulator.simulation.sensor_noise import SENSORS
 from plant_emulator.simulation.simulate import run_of, simulate, values_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.blind.case import Case, Hidden
-    from plant_emulator.estimation.estimates import Array, Residual, Unknown
+    from plant_emulator.estimation.unknowns import Array, Residual, Unknown
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.signals.log import Log
 

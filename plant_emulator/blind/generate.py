@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from plant_emulator.errors import UnsettledError
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation.programs import SpeedProgram, program
-from plant_emulator.simulation.sensors import noisy
+from plant_emulator.simulation.sensor_noise import noisy
 from plant_emulator.simulation.simulate import run_of, simulate, values_of
-from plant_emulator.simulation.travel import travel
+from plant_emulator.simulation.travel_program import travel
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

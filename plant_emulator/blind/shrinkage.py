@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from plant_emulator.blind.detectable import noise_levels
-from plant_emulator.estimation.search import GAP_POSITION
-from plant_emulator.estimation.start_states import fit_states, states_of, with_own
+from plant_emulator.estimation.initial_states import fit_states, states_of, with_own
+from plant_emulator.estimation.start_search import GAP_POSITION
 from plant_emulator.recordings.recording import Recording
 from plant_emulator.signals.log import COMPARED
 from plant_emulator.simulation.simulate import run_of, values_of
@@ -23,7 +23,7 @@ from plant_emulator.simulation.simulate import run_of, values_of
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.estimation.estimates import Array
+    from plant_emulator.estimation.unknowns import Array
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.signals.log import Log
 

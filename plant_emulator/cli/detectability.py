@@ -27,11 +27,11 @@ def command(
 
     And which effects they cannot tell apart, and what they lack for the rest.
     """
-    from plant_emulator.diagnosis.design.detect import as_answer, detectability
-    from plant_emulator.parameter_sets import known_set
-    from plant_emulator.workflows.planning import prepared
+    from plant_emulator.diagnosis.design.detectability import as_answer, detectability
+    from plant_emulator.parameter_sets import with_effects
+    from plant_emulator.workflows.planned_runs import prepared
 
-    model, point, notes = prepared(runs, known_set.load(parameters), reference)
+    model, point, notes = prepared(runs, with_effects.load(parameters), reference)
     for note in notes:
         click.echo(f"note: {note}", err=True)
     found = detectability(model, point, range(len(runs)))

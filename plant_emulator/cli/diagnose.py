@@ -89,8 +89,8 @@ def command(
     from plant_emulator.cli._progress import progress
     from plant_emulator.diagnosis.diagnose import Diagnose
     from plant_emulator.diagnosis.report.terminal import lines
-    from plant_emulator.parameter_sets import known_set
-    from plant_emulator.workflows.diagnosis_session import (
+    from plant_emulator.parameter_sets import with_effects
+    from plant_emulator.workflows.diagnosis import (
         axis_loaded,
         calibration,
         laws_apart,
@@ -99,7 +99,7 @@ def command(
     )
     from plant_emulator.workflows.workers import pool_of
 
-    given = known_set.load(parameters, own)
+    given = with_effects.load(parameters, own)
     if model == "axis":
         _only_of_the_bench()
         run = axis_loaded(logs, held_out, without=without)
@@ -133,7 +133,7 @@ def command(
                 err=True,
             )
     if report:
-        from plant_emulator.diagnosis.report.report import html
+        from plant_emulator.diagnosis.report.html import html
 
         Path(report).write_text(html(found.answer, found.details), encoding="utf-8")
     if json_file:

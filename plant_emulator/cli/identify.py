@@ -56,8 +56,8 @@ def command(
     """
     from plant_emulator import effects, parameter_sets
     from plant_emulator.cli._progress import progress
-    from plant_emulator.identification.identification_report import spreadsheet
-    from plant_emulator.parameter_sets import known_set
+    from plant_emulator.identification.report import spreadsheet
+    from plant_emulator.parameter_sets import with_effects
     from plant_emulator.workflows.identification import identified
 
     own = effects.parse(effect_texts)
@@ -65,7 +65,7 @@ def command(
         result = identified(
             logs,
             held_out,
-            known_set.load(parameters),
+            with_effects.load(parameters),
             free,
             effects=own,
             hold=reference,
@@ -78,7 +78,7 @@ def command(
     if table:
         Path(table).write_text(spreadsheet(result.found), encoding="utf-8")
     if plot:
-        from plant_emulator.workflows.plots import draw_validation
+        from plant_emulator.workflows.validation_plot import draw_validation
 
         draw_validation(result.pairs, plot)
     if json_file:

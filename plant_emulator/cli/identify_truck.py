@@ -10,7 +10,7 @@ from plant_emulator.cli import _options
 from plant_emulator.cli._types import Command, Number, OutputFile
 
 if TYPE_CHECKING:
-    from plant_emulator.road_load.road_answer import RoadAnswer
+    from plant_emulator.road_load.answer import RoadAnswer
 
 EXAMPLE = """
 \b
@@ -70,11 +70,11 @@ def command(
     both directions where possible. Exit code 1: the numbers must not be used.
     """
     from plant_emulator.errors import EmulatorError
-    from plant_emulator.road_load.road import Truck
-    from plant_emulator.road_load.road_answer import answer
-    from plant_emulator.road_load.road_fit import fit
-    from plant_emulator.road_load.road_run import prepared
-    from plant_emulator.road_load.road_signal import signal
+    from plant_emulator.road_load.answer import answer
+    from plant_emulator.road_load.fit import fit
+    from plant_emulator.road_load.run import prepared
+    from plant_emulator.road_load.signal import signal
+    from plant_emulator.road_load.truck_model import Truck
     from plant_emulator.workflows import road_log
 
     truck = Truck(mass=mass, ratio=ratio, wheel_radius=wheel_radius, drum_radius=drum_radius)
@@ -83,7 +83,7 @@ def command(
     found = fit(prepared(shown, driven, truck), gain_uncertainty)
     said = answer(found)
     if plot:
-        from plant_emulator.workflows.road_plot import draw
+        from plant_emulator.workflows.road_load_plot import draw
 
         draw(found, plot)
     if json_file:
@@ -96,7 +96,7 @@ def command(
             f"{torque}, {velocity}: not converged: {'; '.join(said.problems)}{kept}"
         )
     if save:
-        from plant_emulator.road_load.road_table import table
+        from plant_emulator.road_load.truck_table import table
         from plant_emulator.workflows.road_log import origin
 
         with click.open_file(save, "w", encoding="utf-8") as file:

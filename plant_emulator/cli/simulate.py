@@ -46,13 +46,13 @@ def command(
     """
     from plant_emulator import effects, logs
     from plant_emulator.logs import csv
-    from plant_emulator.parameter_sets import known_set
-    from plant_emulator.simulation.sensors import noisy
-    from plant_emulator.workflows.session import simulated
+    from plant_emulator.parameter_sets import with_effects
+    from plant_emulator.simulation.sensor_noise import noisy
+    from plant_emulator.workflows.simulation import simulated
 
     log = simulated(
         program,
-        known_set.load(parameters),
+        with_effects.load(parameters),
         effects.parse(effect_texts),
         hold=reference,
         start=start,

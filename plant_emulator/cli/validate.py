@@ -50,12 +50,12 @@ def command(
     """
     from plant_emulator import effects
     from plant_emulator import logs as log_files
-    from plant_emulator.identification.identification_report import measures, table_of, table_rows
-    from plant_emulator.parameter_sets import known_set
-    from plant_emulator.simulation.validate import validate, zero_phase
-    from plant_emulator.workflows.session import followed
+    from plant_emulator.identification.report import measures, table_of, table_rows
+    from plant_emulator.parameter_sets import with_effects
+    from plant_emulator.simulation.fit_metrics import validate, zero_phase
+    from plant_emulator.workflows.simulation import followed
 
-    values, effect_values = known_set.load(parameters), effects.parse(effect_texts)
+    values, effect_values = with_effects.load(parameters), effects.parse(effect_texts)
     measured = [log_files.read(path) for path in logs]
     pairs = [(log, followed(log, values, effect_values, reference, start)) for log in measured]
     if cutoff is not None:
@@ -63,7 +63,7 @@ def command(
     fits = {log.source: validate(log, simulation) for log, simulation in pairs}
     answer: dict[str, Any] = {"schema": "validation/1", "logs": measures(fits)}
     if plot:
-        from plant_emulator.workflows.plots import draw_validation
+        from plant_emulator.workflows.validation_plot import draw_validation
 
         draw_validation(pairs, plot)
     if table:

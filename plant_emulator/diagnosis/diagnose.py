@@ -5,33 +5,33 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from plant_emulator.diagnosis.calibration.calibration import confidence
-from plant_emulator.diagnosis.design.advice import Advice
+from plant_emulator.diagnosis.calibration.confidence import confidence
+from plant_emulator.diagnosis.design.next_experiment import Advice
 from plant_emulator.diagnosis.execution.pool import model_of
-from plant_emulator.diagnosis.execution.told import Told
-from plant_emulator.diagnosis.fitting.explain import NOISE_LEFT, THRESHOLD
+from plant_emulator.diagnosis.execution.progress import Told
+from plant_emulator.diagnosis.fitting.derived_quantities import in_terms
+from plant_emulator.diagnosis.fitting.explanation import NOISE_LEFT, THRESHOLD
 from plant_emulator.diagnosis.fitting.steps import Task
-from plant_emulator.diagnosis.fitting.terms import in_terms
-from plant_emulator.diagnosis.prediction import shrink
+from plant_emulator.diagnosis.prediction import gap
 from plant_emulator.diagnosis.prediction.held_out import NOMINAL, HeldOut
-from plant_emulator.diagnosis.prediction.rest import rest_of
+from plant_emulator.diagnosis.prediction.remainder import rest_of
 from plant_emulator.diagnosis.report import answer as parts
 from plant_emulator.diagnosis.report.details import Details
-from plant_emulator.diagnosis.selection import place, verdict
-from plant_emulator.diagnosis.selection.inquiry import Inquiry
+from plant_emulator.diagnosis.selection import subsystem, verdict
+from plant_emulator.diagnosis.selection.procedure import Inquiry
 from plant_emulator.diagnosis.selection.rules import SECOND
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.calibration.calibration import Case
+    from plant_emulator.diagnosis.calibration.confidence import Case
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
-    from plant_emulator.diagnosis.execution.told import Progress
-    from plant_emulator.diagnosis.fitting.contest import Point
-    from plant_emulator.diagnosis.fitting.explain import Contender, Explanation
-    from plant_emulator.diagnosis.model import Model
+    from plant_emulator.diagnosis.execution.progress import Progress
+    from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation
+    from plant_emulator.diagnosis.fitting.joint_fit import Point
+    from plant_emulator.diagnosis.machine import Model
+    from plant_emulator.diagnosis.prediction.gap import Gap, Prediction
     from plant_emulator.diagnosis.prediction.held_out import Plan
-    from plant_emulator.diagnosis.prediction.shrink import Gap, Prediction
     from plant_emulator.diagnosis.selection.verdict import Verdict
 
 
@@ -117,8 +117,8 @@ class Diagnose:
         quiet: Recipe,
     ) -> Diagnosis:
         runs = [self.model.runs[run] for _, some in self.folds for run in some]
-        lengths = shrink.block_lengths(predicted[()])
-        gaps = {key: shrink.gap(runs, some, lengths) for key, some in predicted.items()}
+        lengths = gap.block_lengths(predicted[()])
+        gaps = {key: gap.gap(runs, some, lengths) for key, some in predicted.items()}
         location, maps = self._location(explained, found)
         final = parts.with_chance(explained) if found.effects else explained.null
         followed = _followed(explained, found)
@@ -190,13 +190,13 @@ class Diagnose:
     ) -> tuple[dict[str, Any], Mapping[str, Any]]:
         """The answer's location, and the residual map by axis."""
         task = Task(base=explained.null, runs=self.plan.fitted)
-        (located,) = self.pool.map(place.site, self.recipe, [task])
-        shares = place.evidence_shares(explained, self.model.candidates)
+        (located,) = self.pool.map(subsystem.site, self.recipe, [task])
+        shares = subsystem.evidence_shares(explained, self.model.candidates)
         if located is not None:
             shares = {entry["name"]: entry["share"] for entry in located["subsystems"]}
-        where = place.subsystem(found, self.model.candidates, shares)
+        where = subsystem.subsystem(found, self.model.candidates, shares)
         maps = {} if located is None else located["maps"]
-        return place.location(where, shares, located), maps
+        return subsystem.location(where, shares, located), maps
 
     def _closed(
         self, found: Verdict, followed: tuple[str, ...], gaps: Mapping[tuple[str, ...], Gap]
@@ -211,8 +211,8 @@ class Diagnose:
         if found.kind not in {"effect", "parameter"} or (found.effects and not followed):
             return None, None
         reference = gaps[NOMINAL] if found.kind == "parameter" else gaps[()]
-        interval = shrink.interval(reference, gaps[followed])
-        closed = shrink.closed_fraction(reference, gaps[followed])
+        interval = gap.interval(reference, gaps[followed])
+        closed = gap.closed_fraction(reference, gaps[followed])
         return closed, None if interval is None else list(interval)
 
     def _rank(
@@ -224,7 +224,7 @@ class Diagnose:
         terms: Mapping[str, list[dict[str, Any]]],
     ) -> dict[str, Any]:
         alone = gaps.get((contender.effect,))
-        gain = None if alone is None else shrink.closed_fraction(gaps[()], alone)
+        gain = None if alone is None else gap.closed_fraction(gaps[()], alone)
         candidate = self.model.candidates[contender.effect]
         errors = self.law_errors
         entry = parts.rank(contender, explained, found.effects, candidate, gain, errors)

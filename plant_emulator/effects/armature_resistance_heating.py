@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from plant_emulator.effects.declaration import EffectParameter, Memory
 
 if TYPE_CHECKING:
-    from plant_emulator.model.kernel_types import Record
+    from plant_emulator.model.records import Record
 
 SUBSYSTEM = "motor"
 NEEDS = "log armature_voltage_V: the current loop hides the resistance"

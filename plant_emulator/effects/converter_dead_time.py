@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 from plant_emulator.effects.declaration import EffectParameter, Memory
 
 if TYPE_CHECKING:
-    from plant_emulator.model.kernel_types import Record
+    from plant_emulator.model.records import Record
 
 SUBSYSTEM = "drive"
 NEEDS = "log armature_voltage_V as the drive asks for it: the current loop hides what is lost"

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from types import ModuleType
 
-    from plant_emulator.model.kernel_types import Record
+    from plant_emulator.model.records import Record
 
 SUBSYSTEMS = (
     "drive",

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from plant_emulator.effects.declaration import EffectParameter
 
 if TYPE_CHECKING:
-    from plant_emulator.model.kernel_types import Record
+    from plant_emulator.model.records import Record
 
 SUBSYSTEM = "drive"
 NEEDS = "a known course of the dead time: a drive's own cannot be reproduced, it shows as unrest"

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from plant_emulator.effects.declaration import EffectParameter, Memory
 
 if TYPE_CHECKING:
-    from plant_emulator.model.kernel_types import Record
+    from plant_emulator.model.records import Record
 
 SUBSYSTEM = "gear"
 # a < 0 is a phase of half a turn more: so a fit may start on the wrong side. The phase may leave

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from plant_emulator.effects.declaration import EffectParameter
 
 if TYPE_CHECKING:
-    from plant_emulator.model.kernel_types import Record
+    from plant_emulator.model.records import Record
 
 SUBSYSTEM = "speed_sensor"
 EXACT = True

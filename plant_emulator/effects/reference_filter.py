@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from plant_emulator.effects.declaration import EffectParameter, Memory
 
 if TYPE_CHECKING:
-    from plant_emulator.model.kernel_types import Record
+    from plant_emulator.model.records import Record
 
 SUBSYSTEM = "drive"
 PARAMETERS = {

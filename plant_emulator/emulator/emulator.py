@@ -15,12 +15,12 @@ import numpy as np
 from plant_emulator import effects, logs
 from plant_emulator.emulator.plc import faults
 from plant_emulator.emulator.plc.plc import STEPS, Plc
-from plant_emulator.emulator.plc.plc_surroundings import Backlash, Switches, Truck
+from plant_emulator.emulator.plc.surroundings import Backlash, Switches, Truck
 from plant_emulator.emulator.server import PlcServer
-from plant_emulator.parameter_sets import known_set
+from plant_emulator.parameter_sets import with_effects
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation import truck
-from plant_emulator.simulation.bench import Bench
+from plant_emulator.simulation.running_bench import Bench
 from register_maps import load
 from register_maps.codec import CodecError, encode_measurement
 from register_maps.register_map import Register, RegisterMap
@@ -173,7 +173,7 @@ def build(options: Options) -> Emulator:
     """An emulator at rest; raises on anything in the options that does not exist."""
     register_map = load(options.map)
     active_faults = tuple(faults.parse(text) for text in options.faults)
-    parameters = known_set.load(options.parameters)
+    parameters = with_effects.load(options.parameters)
     chosen = effects.parse(options.effects)
     # The first call compiles: better here than in the first scan.
     Bench(parameters, chosen).advance([0.0] * STEPS)

@@ -13,10 +13,10 @@ import sys
 from collections.abc import Callable
 
 from plant_emulator import logs
-from plant_emulator.emulator.control import Control
+from plant_emulator.emulator.control_channel import Control
 from plant_emulator.emulator.emulator import Emulator, Options, build
-from plant_emulator.emulator.pace import Pace
 from plant_emulator.emulator.plc.plc import SCAN
+from plant_emulator.emulator.scan_timer import Pace
 
 LIVE_EVERY = 1.0
 PRIORITY = 20

@@ -23,7 +23,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
-    from plant_emulator.estimation.estimates import Array
+    from plant_emulator.estimation.unknowns import Array
     from plant_emulator.signals.log import Log
 
 # Smoothing before the derivative [s]; longer than the sensors' noise, shorter than a ramp.

@@ -6,9 +6,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from plant_emulator.errors import IdentificationError
-from plant_emulator.estimation.estimates import Unknown
-from plant_emulator.estimation.search import GAP_POSITION
-from plant_emulator.estimation.start_states import GAP
+from plant_emulator.estimation.initial_states import GAP
+from plant_emulator.estimation.start_search import GAP_POSITION
+from plant_emulator.estimation.unknowns import Unknown
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

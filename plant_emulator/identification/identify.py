@@ -19,21 +19,21 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.estimation import estimation
+from plant_emulator.estimation import least_squares
 from plant_emulator.estimation.equation_error import start_values
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
-from plant_emulator.estimation.run_residuals import quieted_functions, residual_functions
-from plant_emulator.estimation.search import FINE_SCANS, GAP_POSITION, Search
-from plant_emulator.estimation.start_states import GAP, states_of, with_own
+from plant_emulator.estimation.initial_states import GAP, states_of, with_own
+from plant_emulator.estimation.residuals import quieted_functions, residual_functions
+from plant_emulator.estimation.start_search import FINE_SCANS, GAP_POSITION, Search
 from plant_emulator.signals.log import VOLTAGE
 from plant_emulator.simulation.simulate import TOLERANCE, values_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from plant_emulator.estimation.estimates import Estimate, Unknown
-    from plant_emulator.estimation.search import Progress
-    from plant_emulator.estimation.start_states import Effects
+    from plant_emulator.estimation.initial_states import Effects
+    from plant_emulator.estimation.start_search import Progress
+    from plant_emulator.estimation.unknowns import Estimate, Unknown
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
 
@@ -112,12 +112,12 @@ def identify(
     logs = [r.log for r in recordings]
     search.values |= start_values(logs, values, free)
     search.scan()
-    best = least_squares(recordings, parameters, free, search, states, progress)
+    best = fit_from(recordings, parameters, free, search, states, progress)
     for retry in range(RETRIES):
         if chi_squared(best) <= NOISE_REACHED:
             break
         again = _next_valley(recordings, values, free, best, retry)
-        other = least_squares(recordings, parameters, free, again, states, progress)
+        other = fit_from(recordings, parameters, free, again, states, progress)
         search.simulations += again.simulations
         best = min(best, other, key=lambda e: e.cost + e.penalty)
     wanted = unknowns(parameters, free, search.values, search.gaps, states)
@@ -126,7 +126,7 @@ def identify(
     return answer(best, parameters, free, len(recordings))
 
 
-def least_squares(
+def fit_from(
     recordings: Sequence[Recording],
     parameters: ParameterSet,
     free: Sequence[str],
@@ -141,8 +141,8 @@ def least_squares(
     fine = residual_functions(recordings, search.values, free, tolerance)
     tell = _telling(recordings, progress)
     wanted = unknowns(parameters, free, search.values, search.gaps, states)
-    first = estimation.estimate(wanted, coarse, progress=tell)
-    last = estimation.estimate(_outdone(first), fine, progress=tell)
+    first = least_squares.estimate(wanted, coarse, progress=tell)
+    last = least_squares.estimate(_outdone(first), fine, progress=tell)
     return replace(last, simulations=first.simulations + last.simulations)
 
 
@@ -171,8 +171,8 @@ def _with_fed_noise(
         return best
     tell = _telling(recordings, progress)
     near = [replace(u, start=u.value(float(z))) for u, z in zip(wanted, best.z, strict=True)]
-    first = estimation.estimate(near, residuals, progress=tell)
-    last = estimation.estimate(_outdone(first), residuals, progress=tell)
+    first = least_squares.estimate(near, residuals, progress=tell)
+    last = least_squares.estimate(_outdone(first), residuals, progress=tell)
     simulations = best.simulations + first.simulations + last.simulations
     return replace(last, simulations=simulations)
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from plant_emulator.model.laws import converter_voltage_drop
 
 if TYPE_CHECKING:
-    from plant_emulator.model.kernel_types import Record, State
+    from plant_emulator.model.records import Record, State
 
 # Step of the current over which a law's slope with it is taken [A].
 SHORT_OF_CURRENT = 1e-4

@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from plant_emulator.model.kernel_types import Record
+    from plant_emulator.model.records import Record
 
 # Shell temperature that the nominal friction belongs to, 32 degC [K] (thesis, section 3.5).
 WARM_SHELL = 305.15

@@ -15,9 +15,9 @@ import numpy as np
 
 from plant_emulator.errors import UnsettledError
 from plant_emulator.signals.log import COMPARED, Array, Log
-from plant_emulator.simulation.sensors import SENSORS
-from plant_emulator.solver.integrate import CHANNELS
+from plant_emulator.simulation.sensor_noise import SENSORS
 from plant_emulator.solver.kernel import kernel_for
+from plant_emulator.solver.stepper import CHANNELS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -9,7 +9,7 @@ from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 from plant_emulator.errors import ParameterError
-from plant_emulator.solver import compiler, integrate
+from plant_emulator.solver import compiler, stepper
 
 Function = Callable[..., Any]
 
@@ -42,7 +42,7 @@ def bind(
     bound = FunctionType(code, names, function.__name__)
     # numba's cache imports the module by its name; that of a user's effect file has none.
     bound.__module__ = function.__module__ if function.__module__ in sys.modules else __name__
-    cached = function in (integrate.run, integrate.advance)
+    cached = function in (stepper.run, stepper.advance)
     compiled[function] = compiler.compiled(bound, on_disk=cached)
     return compiled[function]
 

@@ -26,18 +26,27 @@ import numpy as np
 
 from plant_emulator import effects
 from plant_emulator.errors import ParameterError
-from plant_emulator.model import contact, drive, friction, laws, plant, stage
+from plant_emulator.model import drive, drum, gear, implicit_stage, laws, stage
 from plant_emulator.model.parameters import UNITS
-from plant_emulator.solver import binding, compiler, delay, integrate, sdirk
+from plant_emulator.solver import binding, compiler, dead_time, sdirk, stepper
 from plant_emulator.solver.binding import bind, own_functions
-from plant_emulator.solver.trial import memory_names, raise_in_effects, try_out
+from plant_emulator.solver.effect_check import memory_names, raise_in_effects, try_out
 
 if TYPE_CHECKING:
     from plant_emulator.effects import Effect
-    from plant_emulator.model.kernel_types import Record, State
+    from plant_emulator.model.records import Record, State
 
 Function = Callable[..., Any]
-MODULES: tuple[ModuleType, ...] = (laws, drive, contact, friction, plant, sdirk, delay, integrate)
+MODULES: tuple[ModuleType, ...] = (
+    laws,
+    drive,
+    drum,
+    gear,
+    implicit_stage,
+    sdirk,
+    dead_time,
+    stepper,
+)
 
 
 @dataclass(frozen=True)
@@ -228,13 +237,18 @@ def build(known: Mapping[str, Effect]) -> Kernel:
         for key, memory in effect.memories.items():
             names[f"{effect.name}_{key}__advance"] = bind(memory.advance, helpers)
     exec(compile(glue(known), "<glue>", "exec"), names)  # our own text, made from names
-    replaced: tuple[Function, ...] = (*laws.LAWS, plant.load, plant.store, plant.memories)
+    replaced: tuple[Function, ...] = (
+        *laws.LAWS,
+        implicit_stage.load,
+        implicit_stage.store,
+        implicit_stage.memories,
+    )
     for function in replaced:
         compiled[function] = compiler.compiled(names[function.__name__])
     if compiler.ENABLED:
         compiled |= {
-            integrate.private: compiler.private_copy(),
-            integrate.publish: compiler.write_back(),
+            stepper.private: compiler.private_copy(),
+            stepper.publish: compiler.write_back(),
         }
     for module in MODULES[1:]:
         for function in own_functions(module):
@@ -243,8 +257,8 @@ def build(known: Mapping[str, Effect]) -> Kernel:
         effects=known,
         parameters=(*UNITS, *effects.neutral(known)),
         stage=(*stage.STAGE, *memory_names(known)),
-        run=by_arrays(compiled[integrate.run], known),
-        advance=by_arrays(compiled[integrate.advance], known),
+        run=by_arrays(compiled[stepper.run], known),
+        advance=by_arrays(compiled[stepper.advance], known),
         starts=tuple(m.start for e in known.values() for m in e.memories.values()),
     )
 

@@ -19,11 +19,11 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import TYPE_CHECKING
 
-from plant_emulator.model.plant import load, solve_stage, store
+from plant_emulator.model.implicit_stage import load, solve_stage, store
 from plant_emulator.model.stage import GEAR_SPEED, MOTOR_SPEED
 
 if TYPE_CHECKING:
-    from plant_emulator.model.kernel_types import Record, State
+    from plant_emulator.model.records import Record, State
 
 GAMMA = 1.0 - 1.0 / sqrt(2.0)
 # Weights of the error estimate: order-3 quadrature at 0, gamma, 1 minus the method's.

@@ -12,26 +12,26 @@ from typing import TYPE_CHECKING, Any, cast
 
 from plant_emulator import logs
 from plant_emulator.errors import IdentificationError
-from plant_emulator.estimation.search import GAP_POSITION
-from plant_emulator.estimation.start_states import fit_states, states_of, with_own
-from plant_emulator.identification import identification_report
-from plant_emulator.identification.experiments import experiments
+from plant_emulator.estimation.initial_states import fit_states, states_of, with_own
+from plant_emulator.estimation.start_search import GAP_POSITION
+from plant_emulator.identification import report
+from plant_emulator.identification.experiment_design import experiments
 from plant_emulator.identification.identify import identify
 from plant_emulator.recordings.preflight import preflight
 from plant_emulator.recordings.recording import recording
+from plant_emulator.simulation.fit_metrics import validate
 from plant_emulator.simulation.simulate import Hold, simulate, values_of
-from plant_emulator.simulation.validate import validate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.estimation.search import Progress
-    from plant_emulator.identification.experiments import Experiment
+    from plant_emulator.estimation.start_search import Progress
+    from plant_emulator.identification.experiment_design import Experiment
     from plant_emulator.identification.identify import Identification
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
     from plant_emulator.signals.log import Log
-    from plant_emulator.simulation.validate import Fit
+    from plant_emulator.simulation.fit_metrics import Fit
 
     Pair = tuple[Log, Log]
 
@@ -55,7 +55,7 @@ class Result:
 
     def answer(self) -> dict[str, Any]:
         """The machine-readable answer."""
-        return identification_report.answer(
+        return report.answer(
             self.found,
             self.fitted,
             self.held_out,
@@ -66,11 +66,11 @@ class Result:
 
     def lines(self) -> list[str]:
         """The answer for the terminal."""
-        return identification_report.lines(self.found, self.fitted, self.held_out, self.experiments)
+        return report.lines(self.found, self.fitted, self.held_out, self.experiments)
 
     def parameter_set(self) -> ParameterSet:
         """The set to save."""
-        return identification_report.parameter_set(
+        return report.parameter_set(
             self.found,
             {log: self.hashes[log] for log in self.fitted},
             date=datetime.now(UTC).date().isoformat(),

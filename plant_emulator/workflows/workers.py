@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
-    from plant_emulator.diagnosis.model import Model
+    from plant_emulator.diagnosis.machine import Model
 
 Item = TypeVar("Item")
 Answer = TypeVar("Answer")

@@ -8,8 +8,8 @@ import pytest
 import gateway
 from gateway.config_file import load, with_values
 from gateway.configuration.config import Config, config_hash, from_document
-from gateway.configuration.config_sections import SECTIONS
 from gateway.configuration.keys import keys
+from gateway.configuration.sections import SECTIONS
 from gateway.errors import ConfigError
 
 EXAMPLES = Path(gateway.__file__).parent / "examples"

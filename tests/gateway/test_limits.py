@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.cycle.limits import HOLD, Limit, Limits, limit
-from plant_emulator.emulator.plc import plc_reference
+from plant_emulator.emulator.plc import reference
 
 # At rates of 100 up and 200 down, 10 ms are worth 1 up and 2 down.
 LIMITS = Limits(speed_max=500.0, rate_up=100.0, rate_down=200.0, deviation=40.0, stale=0.1)
@@ -126,7 +126,7 @@ def test_slope_downward_is_free_at_every_ceiling():
 
 
 def test_slope_is_followed_for_as_long_as_the_plc_does():
-    assert HOLD == plc_reference.HOLD
+    assert HOLD == reference.HOLD
 
 
 @pytest.mark.parametrize("rate", [nan, inf, -inf])

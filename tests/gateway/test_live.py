@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from gateway.cycle.record import NOTHING, Tick
-from gateway.recordings.live import View, state_line, status_table
+from gateway.recordings.screen import View, state_line, status_table
 from tests.gateway.test_recorder import LAYOUT, tick
 
 HEADER = {

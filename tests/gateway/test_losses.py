@@ -8,8 +8,8 @@ import pytest
 
 from gateway.configuration.config import BenchConfig
 from gateway.errors import ConfigError
-from gateway.losses.losses import LossesError, Trace, steady
-from gateway.recordings.losses_source import _mean_torque, read
+from gateway.losses.sections import LossesError, Trace, steady
+from gateway.recordings.steady_runs import _mean_torque, read
 
 DATA = Path(__file__).parents[1] / "data"
 BENCH = BenchConfig()

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from gateway.friction import friction_torque
-from gateway.losses.losses import LossesError, Section
-from gateway.losses.losses_fit import fit
+from gateway.losses.fit import fit
+from gateway.losses.sections import LossesError, Section
 
 SPEEDS = np.array([0.3, 0.7, 1.4, 2.3, 3.5, 4.8, 6.1, 7.5])
 LAW = (35.989, 345.38, 0.4418)

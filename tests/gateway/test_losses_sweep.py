@@ -9,7 +9,7 @@ import pytest
 from gateway.configuration.config import Config, from_document
 from gateway.cycle.supervisor import State
 from gateway.errors import ConfigError
-from gateway.losses.losses_live import Progress, swept_config
+from gateway.losses.live import Progress, swept_config
 from gateway.reasons import Reason
 from register_maps.signals import Mode, PlcState, Status
 from tests.gateway.closed_loop import ClosedLoop

@@ -10,8 +10,8 @@ from gateway.config_file import load
 from gateway.configuration.config import Config, from_document
 from gateway.link.device import Device
 from gateway.review.finding import holds
+from gateway.review.loop import rho_of
 from gateway.review.review import review
-from gateway.review.review_loop import rho_of
 from plant_emulator.emulator.process import EmulatorProcess
 from register_maps import load as load_map
 

@@ -15,9 +15,9 @@ from rich.console import Console
 import plant_emulator
 from gateway.cli import main
 from gateway.configuration.config import Config
-from gateway.demo.demo_operator import Session, operate_fast
-from gateway.demo.demo_view import Screen
-from gateway.losses.losses_live import swept_config
+from gateway.demo.operator import Session, operate_fast
+from gateway.demo.view import Screen
+from gateway.losses.live import swept_config
 from plant_emulator.emulator.process import EmulatorProcess
 
 pytestmark = pytest.mark.slow

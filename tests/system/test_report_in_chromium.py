@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from plant_emulator.diagnosis.report.report import html
+from plant_emulator.diagnosis.report.html import html
 from tests.plant_emulator.diagnosis import answers
 from tests.system.conftest import FITTED, PREDICTED, Diagnosed
 

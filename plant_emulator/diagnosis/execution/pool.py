@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from plant_emulator.diagnosis.model import Model
+    from plant_emulator.diagnosis.machine import Model
 
 Item = TypeVar("Item")
 Answer = TypeVar("Answer")

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.contest import Point, fit, linearised, template
+from plant_emulator.diagnosis.fitting.joint_fit import Point, fit, linearised, template
+from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
 from plant_emulator.diagnosis.fitting.signature import signs, sized
-from plant_emulator.diagnosis.fitting.tangents import Tangents
 from plant_emulator.diagnosis.fitting.valleys import best_states, loss_of, whole
-from plant_emulator.estimation.scans import cauchy_loss
+from plant_emulator.estimation.robust_scan import cauchy_loss
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.model import Model
+    from plant_emulator.diagnosis.machine import Model
 
 # Steps from some way off, how far off that is [standard errors], and at most [scales].
 FEW_SHAKEN, SHAKE, FARTHEST = 12, 30.0, 1.0

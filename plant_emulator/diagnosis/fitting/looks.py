@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.contest import WORTH, Point, fit
 from plant_emulator.diagnosis.fitting.elsewhere import smoothed
-from plant_emulator.diagnosis.fitting.explain import excess
+from plant_emulator.diagnosis.fitting.explanation import excess
+from plant_emulator.diagnosis.fitting.joint_fit import WORTH, Point, fit
 from plant_emulator.diagnosis.fitting.signature import FAR, signs, sized
 from plant_emulator.diagnosis.fitting.valleys import best_sizes, best_states
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from plant_emulator.diagnosis.fitting.signature import Signature
-    from plant_emulator.diagnosis.model import Model
-    from plant_emulator.estimation.estimates import Estimate
+    from plant_emulator.diagnosis.machine import Model
+    from plant_emulator.estimation.unknowns import Estimate
 
 # Steps of a first look, whose drift follows by secants: most of what ten find, the first four find.
 GLANCE = 5

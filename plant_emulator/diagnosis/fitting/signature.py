@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.tangents import gain_along, gain_turned
-from plant_emulator.estimation.scans import combinations
+from plant_emulator.diagnosis.fitting.nuisance_space import gain_along, gain_turned
+from plant_emulator.estimation.robust_scan import combinations
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from plant_emulator.diagnosis.fitting.contest import Point
-    from plant_emulator.diagnosis.fitting.tangents import Tangents
-    from plant_emulator.diagnosis.model import Candidate, Model
-    from plant_emulator.estimation.estimates import Array, Estimate, Unknown
+    from plant_emulator.diagnosis.fitting.joint_fit import Point
+    from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
+    from plant_emulator.diagnosis.machine import Candidate, Model
+    from plant_emulator.estimation.unknowns import Array, Estimate, Unknown
 
 # Sizes at which a signature is tried, in plausible sizes.
 SIZES = (0.03, 0.1, 0.3, 0.6, 1.0, 2.0)

@@ -5,14 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.contest import (
-    ADVANCED,
-    Point,
-    again,
-    linearised,
-    null_fit,
-    point,
-)
 from plant_emulator.diagnosis.fitting.elsewhere import (
     from_nominal,
     in_place,
@@ -21,13 +13,21 @@ from plant_emulator.diagnosis.fitting.elsewhere import (
     smoothed,
     vacated,
 )
+from plant_emulator.diagnosis.fitting.joint_fit import (
+    ADVANCED,
+    Point,
+    again,
+    linearised,
+    null_fit,
+    point,
+)
 from plant_emulator.diagnosis.fitting.looks import glance, glance_far, look, patient
+from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
 from plant_emulator.diagnosis.fitting.signature import signature
-from plant_emulator.diagnosis.fitting.tangents import Tangents
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.fitting.signature import Signature
-    from plant_emulator.diagnosis.model import Model
+    from plant_emulator.diagnosis.machine import Model
 
 
 @dataclass(frozen=True, kw_only=True)

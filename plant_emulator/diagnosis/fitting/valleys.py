@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.estimation.scans import cauchy_loss, scanned
+from plant_emulator.estimation.robust_scan import cauchy_loss, scanned
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.model import Candidate, Model
-    from plant_emulator.estimation.estimates import Array, Unknown
+    from plant_emulator.diagnosis.machine import Candidate, Model
+    from plant_emulator.estimation.unknowns import Array, Unknown
 
 # How far sizes of many valleys are looked for, in plausible sizes.
 WIDEST = 3.0

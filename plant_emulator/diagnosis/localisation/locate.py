@@ -26,15 +26,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from plant_emulator.diagnosis.localisation.block_regression import Site
 from plant_emulator.diagnosis.localisation.residual_map import Cell, residual_map
-from plant_emulator.diagnosis.localisation.site import Site
-from plant_emulator.estimation.search import GAP_POSITION
+from plant_emulator.estimation.start_search import GAP_POSITION
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.fitting.contest import Point
-    from plant_emulator.estimation.estimates import Array
+    from plant_emulator.diagnosis.fitting.joint_fit import Point
+    from plant_emulator.estimation.unknowns import Array
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
 

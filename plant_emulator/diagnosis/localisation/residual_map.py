@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from plant_emulator.diagnosis.localisation.phases import PHASES, field_weakened, phases
+from plant_emulator.diagnosis.localisation.operating_phases import PHASES, field_weakened, phases
 from plant_emulator.signals.smoothing import smooth
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from plant_emulator.estimation.estimates import Array
+    from plant_emulator.estimation.unknowns import Array
     from plant_emulator.recordings.recording import Recording
 
 # Bands of frequency [Hz], as far as the sampling goes.

@@ -20,20 +20,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.diagnosis.machine import Run
 from plant_emulator.diagnosis.machines.axis_candidates import NAMES, UNITS, candidate, scale_of
 from plant_emulator.diagnosis.machines.axis_effects import EFFECTS
 from plant_emulator.diagnosis.machines.axis_signals import SAMPLES, AxisRun, prepared, told
-from plant_emulator.diagnosis.model import Run
 from plant_emulator.errors import LogError
-from plant_emulator.estimation.estimates import Unknown
+from plant_emulator.estimation.unknowns import Unknown
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.fitting.contest import Point
+    from plant_emulator.diagnosis.fitting.joint_fit import Point
     from plant_emulator.diagnosis.machines.axis_effects import AxisEffect
     from plant_emulator.diagnosis.machines.axis_signals import AxisLog, Motion
-    from plant_emulator.estimation.estimates import Array, Residual
+    from plant_emulator.estimation.unknowns import Array, Residual
 
 LEVEL = "friction_level"
 LEVEL_STD = 0.1

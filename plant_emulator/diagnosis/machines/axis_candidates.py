@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.diagnosis.machine import Candidate, Term
 from plant_emulator.diagnosis.machines.axis_effects import Scale
-from plant_emulator.diagnosis.model import Candidate, Term
-from plant_emulator.estimation.estimates import Unknown
+from plant_emulator.estimation.unknowns import Unknown
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

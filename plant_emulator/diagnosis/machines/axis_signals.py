@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.prediction.bands import power
+from plant_emulator.diagnosis.prediction.frequency_bands import power
 from plant_emulator.errors import LogError
 from plant_emulator.signals.noise import noise
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from plant_emulator.estimation.estimates import Array
+    from plant_emulator.estimation.unknowns import Array
 
 ORDER = 4
 TOPS = (2.0, 5.0, 10.0, 20.0, 40.0)

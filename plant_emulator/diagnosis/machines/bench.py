@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from plant_emulator.diagnosis.localisation.locate import locate
-from plant_emulator.diagnosis.localisation.relations import base_speed
-from plant_emulator.diagnosis.machines.bench_plans import COLD_SHELL, lacks, planned
-from plant_emulator.diagnosis.model import Candidate, Run
+from plant_emulator.diagnosis.localisation.parity_relations import base_speed
+from plant_emulator.diagnosis.machine import Candidate, Run
+from plant_emulator.diagnosis.machines.bench_programs import COLD_SHELL, lacks, planned
 from plant_emulator.effects import from_file
 from plant_emulator.estimation.equation_error import start_values
-from plant_emulator.estimation.estimates import Unknown
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
-from plant_emulator.estimation.scans import scanned
-from plant_emulator.estimation.search import GAP_POSITION, Search
-from plant_emulator.estimation.start_states import states_of, with_own
+from plant_emulator.estimation.initial_states import states_of, with_own
+from plant_emulator.estimation.robust_scan import scanned
+from plant_emulator.estimation.start_search import GAP_POSITION, Search
+from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.model.parameters import UNITS
-from plant_emulator.recordings.fed_noise import loud
+from plant_emulator.recordings.input_noise import loud
 from plant_emulator.recordings.preflight import NAMES
 from plant_emulator.signals.log import VOLTAGE
 from plant_emulator.simulation.simulate import TOLERANCE, values_of
@@ -31,11 +31,11 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from plant_emulator.diagnosis.fitting.contest import Point
+    from plant_emulator.diagnosis.fitting.joint_fit import Point
     from plant_emulator.effects import Effect
-    from plant_emulator.estimation.estimates import Array, Residual
+    from plant_emulator.estimation.unknowns import Array, Residual
     from plant_emulator.model.parameters import ParameterSet
-    from plant_emulator.recordings.fed_noise import Loud
+    from plant_emulator.recordings.input_noise import Loud
     from plant_emulator.recordings.recording import Recording
 
 # Tolerance of a run with a truck, whose every sample is a corner: twice as fast as the usual one,

@@ -5,18 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.explain import DETECTABLE, THRESHOLD
-from plant_emulator.diagnosis.prediction import shrink
-from plant_emulator.diagnosis.prediction.shrink import Fold
+from plant_emulator.diagnosis.fitting.explanation import DETECTABLE, THRESHOLD
+from plant_emulator.diagnosis.prediction import gap
+from plant_emulator.diagnosis.prediction.gap import Fold
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
-    from plant_emulator.diagnosis.fitting.contest import Point
-    from plant_emulator.diagnosis.fitting.explain import Contender, Explanation
-    from plant_emulator.diagnosis.model import Model
-    from plant_emulator.diagnosis.prediction.shrink import Prediction
+    from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation
+    from plant_emulator.diagnosis.fitting.joint_fit import Point
+    from plant_emulator.diagnosis.machine import Model
+    from plant_emulator.diagnosis.prediction.gap import Prediction
 
 # Effects whose held-out gain is computed beside those accepted: the best ones only, each takes a
 # fit a fold.
@@ -65,7 +65,7 @@ class HeldOut:
             return self.plan.folds, ()
         usable, notes = [], []
         for fold, norms in zip(
-            self.plan.folds, self.pool.map(shrink.shown, self.recipe, tasks), strict=True
+            self.plan.folds, self.pool.map(gap.shown, self.recipe, tasks), strict=True
         ):
             hidden = [name for name, norm in norms.items() if norm < DETECTABLE]
             if not hidden:
@@ -98,7 +98,7 @@ class HeldOut:
                 keys.append(key)
                 tasks.append(self._fold(start, fitted, predicted, refitted=key != NOMINAL))
         found_all: dict[tuple[str, ...], list[Prediction]] = {}
-        answers = self.pool.map(shrink.predict, self.recipe, tasks)
+        answers = self.pool.map(gap.predict, self.recipe, tasks)
         for key, prediction in zip(keys, answers, strict=True):
             found_all.setdefault(key, []).append(prediction)
         return found_all

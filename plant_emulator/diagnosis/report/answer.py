@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from plant_emulator.diagnosis.calibration.law_error import scale
-from plant_emulator.diagnosis.fitting.explain import DETECTABLE, THRESHOLD
-from plant_emulator.diagnosis.prediction import shrink
+from plant_emulator.diagnosis.calibration.model_form_error import scale
+from plant_emulator.diagnosis.fitting.explanation import DETECTABLE, THRESHOLD
+from plant_emulator.diagnosis.prediction.gap import combined
 from plant_emulator.diagnosis.report.details import Step, Trace
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.fitting.contest import Point
-    from plant_emulator.diagnosis.fitting.explain import Contender, Explanation
-    from plant_emulator.diagnosis.model import Candidate, Run
-    from plant_emulator.diagnosis.prediction.shrink import Gap, Prediction
-    from plant_emulator.estimation.estimates import Array
+    from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation
+    from plant_emulator.diagnosis.fitting.joint_fit import Point
+    from plant_emulator.diagnosis.machine import Candidate, Run
+    from plant_emulator.diagnosis.prediction.gap import Gap, Prediction
+    from plant_emulator.estimation.unknowns import Array
 
 # Effects of no account that a ranking still shows.
 SHOWN = 5
@@ -141,7 +141,7 @@ def waterfall(gaps: Mapping[tuple[str, ...], Gap], accepted: Sequence[str]) -> t
     }
     steps = []
     for key, label in labels.items():
-        value, low, high = shrink.combined(gaps[key])
+        value, low, high = combined(gaps[key])
         steps.append(Step(label=label, gap=value, low=low, high=high))
     return (*steps, Step(label="noise floor", gap=1.0, low=1.0, high=1.0))
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.prediction.rest import Rest
-    from plant_emulator.estimation.estimates import Array
+    from plant_emulator.diagnosis.prediction.remainder import Rest
+    from plant_emulator.estimation.unknowns import Array
 
 
 @dataclass(frozen=True, kw_only=True)

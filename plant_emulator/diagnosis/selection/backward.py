@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.explain import MARGIN, NOISE_LEFT, weighed
+from plant_emulator.diagnosis.fitting.explanation import MARGIN, NOISE_LEFT, weighed
 from plant_emulator.diagnosis.selection.contenders import beside, best_of, costs_of, points_of
 from plant_emulator.diagnosis.selection.rules import FAINT, MOST_EFFECTS, noise_only
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from plant_emulator.diagnosis.fitting.contest import Point
-    from plant_emulator.diagnosis.fitting.explain import Contender
+    from plant_emulator.diagnosis.fitting.explanation import Contender
+    from plant_emulator.diagnosis.fitting.joint_fit import Point
     from plant_emulator.diagnosis.selection.rounds import Rounds
 
 

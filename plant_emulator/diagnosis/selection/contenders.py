@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.explain import NOISE_LEFT, Contender, excess
+from plant_emulator.diagnosis.fitting.explanation import NOISE_LEFT, Contender, excess
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from plant_emulator.diagnosis.fitting.contest import Point
+    from plant_emulator.diagnosis.fitting.joint_fit import Point
     from plant_emulator.diagnosis.fitting.signature import Signature
 
 # What keeps an effect in a round: the fall of its cost [fall of the best one], more of it beside

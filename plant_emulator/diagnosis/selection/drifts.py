@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.explain import excess
+from plant_emulator.diagnosis.fitting.explanation import excess
 from plant_emulator.diagnosis.fitting.steps import Task, spread, start
 from plant_emulator.diagnosis.selection.rules import noise_only
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
-    from plant_emulator.diagnosis.fitting.contest import Point
+    from plant_emulator.diagnosis.fitting.joint_fit import Point
 
 # Mean square that a fit to a few runs leaves where its drift is one to start from on all.
 LITTLE = 2.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.explain import excess
+from plant_emulator.diagnosis.fitting.explanation import excess
 from plant_emulator.diagnosis.fitting.steps import Task, once_more, refit
 from plant_emulator.diagnosis.fitting.valleys import WIDEST
 from plant_emulator.diagnosis.selection.contenders import better_of, with_point
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
-    from plant_emulator.diagnosis.fitting.contest import Point
-    from plant_emulator.diagnosis.fitting.explain import Contender
+    from plant_emulator.diagnosis.fitting.explanation import Contender
+    from plant_emulator.diagnosis.fitting.joint_fit import Point
     from plant_emulator.diagnosis.selection.restarts import Restarts
 
 # Best after a few steps that are fitted to convergence.

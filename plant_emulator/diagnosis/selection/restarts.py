@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.contest import ASTRAY, WORTH
-from plant_emulator.diagnosis.fitting.explain import excess
+from plant_emulator.diagnosis.fitting.explanation import excess
+from plant_emulator.diagnosis.fitting.joint_fit import ASTRAY, WORTH
 from plant_emulator.diagnosis.fitting.steps import Task, advance, follow, refit, shake, sift, swap
 from plant_emulator.diagnosis.selection.rules import noise_only
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
-    from plant_emulator.diagnosis.fitting.contest import Point
+    from plant_emulator.diagnosis.fitting.joint_fit import Point
 
 # Times that a fit that ran out of steps is taken up again.
 PATIENCE = 3

@@ -11,8 +11,8 @@ from dataclasses import replace
 from math import inf
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.contest import ASTRAY, WORTH
-from plant_emulator.diagnosis.fitting.explain import NOISE_LEFT, THRESHOLD
+from plant_emulator.diagnosis.fitting.explanation import NOISE_LEFT, THRESHOLD
+from plant_emulator.diagnosis.fitting.joint_fit import ASTRAY, WORTH
 from plant_emulator.diagnosis.fitting.steps import (
     Task,
     contend,
@@ -35,18 +35,18 @@ from plant_emulator.diagnosis.selection.contenders import (
     with_point,
 )
 from plant_emulator.diagnosis.selection.nominal import POLISHED, FromNominal, could_close
-from plant_emulator.diagnosis.selection.place import site
 from plant_emulator.diagnosis.selection.restarts import Restarts
 from plant_emulator.diagnosis.selection.rules import SECOND, noise_only
+from plant_emulator.diagnosis.selection.subsystem import site
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
-    from plant_emulator.diagnosis.fitting.contest import Point
-    from plant_emulator.diagnosis.fitting.explain import Contender
+    from plant_emulator.diagnosis.fitting.explanation import Contender
+    from plant_emulator.diagnosis.fitting.joint_fit import Point
     from plant_emulator.diagnosis.fitting.signature import Signature
-    from plant_emulator.diagnosis.model import Model
+    from plant_emulator.diagnosis.machine import Model
 
 RESTARTS = 3
 # Best of a round's first looks that are fitted; the best of these are fitted to convergence.

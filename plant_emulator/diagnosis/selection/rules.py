@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.explain import (
+from plant_emulator.diagnosis.fitting.explanation import (
     LEFT,
     NOISE_LEFT,
     STRUCTURED,
@@ -14,7 +14,7 @@ from plant_emulator.diagnosis.fitting.explain import (
 )
 
 if TYPE_CHECKING:
-    from plant_emulator.diagnosis.fitting.contest import Point
+    from plant_emulator.diagnosis.fitting.joint_fit import Point
 
 # More effects than that at once explain anything.
 MOST_EFFECTS = 2

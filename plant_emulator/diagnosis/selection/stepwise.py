@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.explain import NOISE_LEFT, THRESHOLD, Explanation, excess
+from plant_emulator.diagnosis.fitting.explanation import NOISE_LEFT, THRESHOLD, Explanation, excess
 from plant_emulator.diagnosis.selection.backward import Backward
 from plant_emulator.diagnosis.selection.contenders import (
     best_of,
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
-    from plant_emulator.diagnosis.fitting.contest import Point
-    from plant_emulator.diagnosis.fitting.explain import Contender
+    from plant_emulator.diagnosis.fitting.explanation import Contender
+    from plant_emulator.diagnosis.fitting.joint_fit import Point
 
 # Share of the gap that a better fit without effects closes when it has moved to another valley.
 MOVED = 0.5

@@ -5,17 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
-from plant_emulator.diagnosis.fitting.explain import STRUCTURED, adequate, evident
-from plant_emulator.diagnosis.prediction.rest import lies, shrinks
+from plant_emulator.diagnosis.fitting.explanation import STRUCTURED, adequate, evident
+from plant_emulator.diagnosis.prediction.remainder import lies, shrinks
 from plant_emulator.diagnosis.wording import number, percent
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.fitting.contest import Point
-    from plant_emulator.diagnosis.fitting.explain import Explanation
-    from plant_emulator.diagnosis.model import Candidate, Model
-    from plant_emulator.diagnosis.prediction.rest import Rest
+    from plant_emulator.diagnosis.fitting.explanation import Explanation
+    from plant_emulator.diagnosis.fitting.joint_fit import Point
+    from plant_emulator.diagnosis.machine import Candidate, Model
+    from plant_emulator.diagnosis.prediction.remainder import Rest
 
 Kind = Literal["effect", "parameter", "none", "unknown"]
 

@@ -13,12 +13,12 @@ remote switch.
 from collections.abc import Sequence
 from math import floor, inf, pi
 
-from plant_emulator.emulator.plc import plc_reference as reference
-from plant_emulator.emulator.plc.plc_command import Inbox
-from plant_emulator.emulator.plc.plc_fast_task import FastTask
-from plant_emulator.emulator.plc.plc_state import RUNNING, TRANSITIONS, Event
-from plant_emulator.emulator.plc.plc_surroundings import CLOSED, Backlash, Bench, Switches, Truck
-from plant_emulator.simulation.bench import BenchSamples
+from plant_emulator.emulator.plc import reference
+from plant_emulator.emulator.plc.command import Inbox
+from plant_emulator.emulator.plc.fast_task import FastTask
+from plant_emulator.emulator.plc.state import RUNNING, TRANSITIONS, Event
+from plant_emulator.emulator.plc.surroundings import CLOSED, Backlash, Bench, Switches, Truck
+from plant_emulator.simulation.running_bench import BenchSamples
 from register_maps.register_map import RegisterMap
 from register_maps.signals import Alarm, Control, Interlock, Measurement, Mode, PlcState, Status
 

@@ -9,7 +9,7 @@ from plant_emulator.blind.catalogue import INSIDE, OUTSIDE
 from plant_emulator.effects import Effect
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import COMPARED, Log
-from plant_emulator.simulation.sensors import SENSORS
+from plant_emulator.simulation.sensor_noise import SENSORS
 from plant_emulator.simulation.simulate import run_of, simulate, values_of
 from tests.plant_emulator.runs import linear, with_truck
 

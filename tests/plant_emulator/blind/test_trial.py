@@ -14,7 +14,7 @@ from plant_emulator import logs
 from plant_emulator.cli import main
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import Log
-from plant_emulator.simulation.sensors import noisy
+from plant_emulator.simulation.sensor_noise import noisy
 from plant_emulator.simulation.simulate import run_of, simulate
 from plant_emulator.workflows.blind_trial.examiner import Examiner
 from plant_emulator.workflows.blind_trial.folder import ROOT, program_hash
@@ -61,7 +61,7 @@ def test_diagnosis_opens_no_answer_and_knows_no_law_of_the_trial(
     assert found.answer is not None
     assert found.answer["schema"] == "gap-diagnosis/1"
     told = record.read_text().splitlines()
-    assert "module plant_emulator.diagnosis.fitting.contest" in told
+    assert "module plant_emulator.diagnosis.fitting.joint_fit" in told
     assert any(line.startswith("open ") and "program1.csv.gz" in line for line in told)
     assert not [line for line in told if str(folder) in line or "sealed" in line]
     assert not [line for line in told if "plant_emulator/blind" in line]

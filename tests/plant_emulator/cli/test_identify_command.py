@@ -13,8 +13,8 @@ from click.testing import CliRunner, Result
 from plant_emulator import logs, parameter_sets
 from plant_emulator.cli import main
 from plant_emulator.errors import UnsettledError
-from plant_emulator.estimation import estimation
-from plant_emulator.identification import experiments
+from plant_emulator.estimation import least_squares
+from plant_emulator.identification import experiment_design
 from plant_emulator.signals.log import Log
 
 DATA = Path(__file__).parents[2] / "data"
@@ -141,7 +141,7 @@ def test_fit_is_answered_where_no_program_can_give_advice(
     def unsettled(*_: object, **__: object) -> None:
         raise UnsettledError("program3: 1 implicit stages did not settle")
 
-    monkeypatch.setattr(experiments, "simulate", unsettled)
+    monkeypatch.setattr(experiment_design, "simulate", unsettled)
     result = identify(RUNS[0], "--json", "-")
     assert result.exit_code == 0
     answer = json.loads(result.stdout)
@@ -180,7 +180,7 @@ def test_what_is_left_out_is_told(identify: Command, tmp_path: Path) -> None:
 def test_fit_that_does_not_converge_says_so_and_fails(
     identify: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(estimation, "MAX_ITERATIONS", 1)
+    monkeypatch.setattr(least_squares, "MAX_ITERATIONS", 1)
     result = identify(RUNS[0], "--json", tmp_path / "a.json")
     assert result.exit_code == 1
     assert "the fit did not converge" in result.stderr

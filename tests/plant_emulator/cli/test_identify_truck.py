@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from plant_emulator.cli import main
-from plant_emulator.road_load.road_answer import answer, problems, velocity_fit
+from plant_emulator.road_load.answer import answer, problems, velocity_fit
 from tests.plant_emulator.road_load.test_road_practice import DATA, LABELS, case
 
 Array = np.ndarray

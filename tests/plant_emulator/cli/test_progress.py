@@ -4,7 +4,7 @@ from rich.progress import Progress
 
 from plant_emulator.cli._progress import teller
 from plant_emulator.diagnosis.execution.pool import Here
-from plant_emulator.diagnosis.execution.told import Told
+from plant_emulator.diagnosis.execution.progress import Told
 
 
 class Clock:

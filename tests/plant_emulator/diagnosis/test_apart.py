@@ -5,9 +5,9 @@ from collections.abc import Callable
 
 import pytest
 
-from plant_emulator.diagnosis.fitting.contest import Point, null_fit
+from plant_emulator.diagnosis.fitting.joint_fit import Point, null_fit
 from plant_emulator.diagnosis.machines.bench import BenchModel
-from plant_emulator.diagnosis.selection import apart
+from plant_emulator.diagnosis.selection import run_consistency
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
@@ -22,7 +22,7 @@ def told(nominal: ParameterSet, *logs: Log) -> str:
     model = BenchModel([recording(log) for log in logs], nominal, kernel().effects)
     runs = range(len(logs))
     found = [null_fit(model, (run,)) for run in runs]
-    return apart.between(model, runs, found, found[0])
+    return run_consistency.between(model, runs, found, found[0])
 
 
 class Outlined(Line):
@@ -58,7 +58,7 @@ def test_runs_of_an_outlined_machine_differ_where_each_alone_leaves_little(
     """
     model = Outlined([TIME, TIME])
     found = [fitted(2.0, squares), fitted(level, squares)]
-    told = apart.between(model, (0, 1), found, fitted(5.0, 10_000.0))
+    told = run_consistency.between(model, (0, 1), found, fitted(5.0, 10_000.0))
     assert bool(told) == differs
     assert ("a is 2.0" in told) == differs
 

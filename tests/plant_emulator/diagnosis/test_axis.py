@@ -11,18 +11,18 @@ import pytest
 
 from plant_emulator.diagnosis.diagnose import Diagnose
 from plant_emulator.diagnosis.execution.pool import Here
-from plant_emulator.diagnosis.fitting.contest import Point, linearised, null_fit
-from plant_emulator.diagnosis.fitting.explain import Explanation
+from plant_emulator.diagnosis.fitting.explanation import Explanation
+from plant_emulator.diagnosis.fitting.joint_fit import Point, linearised, null_fit
 from plant_emulator.diagnosis.fitting.looks import glance, look
+from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
 from plant_emulator.diagnosis.fitting.signature import signature
-from plant_emulator.diagnosis.fitting.tangents import Tangents
 from plant_emulator.diagnosis.machines.axis import AxisModel, AxisRecipe
 from plant_emulator.diagnosis.machines.axis_effects import EFFECTS
 from plant_emulator.diagnosis.machines.axis_signals import AxisLog, prepared
-from plant_emulator.diagnosis.prediction.bands import power
+from plant_emulator.diagnosis.prediction.frequency_bands import power
 from plant_emulator.diagnosis.prediction.held_out import NOMINAL, HeldOut, Plan
 from plant_emulator.errors import LogError
-from plant_emulator.workflows.diagnosis_session import plan_of
+from plant_emulator.workflows.diagnosis import plan_of
 
 spec = importlib.util.spec_from_file_location(
     "axis_truth", Path(__file__).with_name("axis_truth.py")

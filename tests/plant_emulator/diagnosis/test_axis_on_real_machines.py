@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.fitting.contest import Point, linearised, null_fit
+from plant_emulator.diagnosis.fitting.joint_fit import Point, linearised, null_fit
 from plant_emulator.diagnosis.fitting.looks import glance, look
+from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
 from plant_emulator.diagnosis.fitting.signature import signature
-from plant_emulator.diagnosis.fitting.tangents import Tangents
 from plant_emulator.diagnosis.machines.axis import AxisModel
-from plant_emulator.diagnosis.prediction.bands import BANDS, power
-from plant_emulator.estimation.estimation import estimate
-from plant_emulator.workflows import axis_log
+from plant_emulator.diagnosis.prediction.frequency_bands import BANDS, power
+from plant_emulator.estimation.least_squares import estimate
+from plant_emulator.workflows import axis_reader
 
 ROOT = Path(__file__).parents[3]
 DATA = ROOT / os.environ.get("REAL_DATA", "../shared/data")
@@ -64,7 +64,7 @@ def relative_error(model: AxisModel, run: int, point: Point) -> float:
 @pytest.fixture(scope="module")
 def emps() -> AxisModel:
     files = [EMPS / "DATA_EMPS.mat", EMPS / "DATA_EMPS_PULSES.mat"]
-    return AxisModel([axis_log.read(file) for file in files], fitted=(FIRST,))
+    return AxisModel([axis_reader.read(file) for file in files], fitted=(FIRST,))
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +75,7 @@ def emps_contest(emps: AxisModel) -> Contest:
 @pytest.fixture(scope="module")
 def hsm150() -> AxisModel:
     files = [file for n in "123" for file in sorted(HSM150.glob(f"idf_*_{n}.mat"))]
-    return AxisModel([axis_log.read(file) for file in files], fitted=tuple(range(8)))
+    return AxisModel([axis_reader.read(file) for file in files], fitted=tuple(range(8)))
 
 
 @pytest.fixture(scope="module")
@@ -165,7 +165,7 @@ def test_pulses_are_in_the_command_already(emps: AxisModel, emps_contest: Contes
     from scipy.io import loadmat
 
     found = loadmat(EMPS / "DATA_EMPS_PULSES.mat")
-    log = axis_log.read(EMPS / "DATA_EMPS_PULSES.mat")
+    log = axis_reader.read(EMPS / "DATA_EMPS_PULSES.mat")
     assert log.force == pytest.approx((found["vir"] * found["gtau"]).ravel())
 
 

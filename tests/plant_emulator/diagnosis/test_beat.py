@@ -7,14 +7,14 @@ from math import pi
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.fitting.contest import fit, linearised, null_fit
+from plant_emulator.diagnosis.fitting.joint_fit import fit, linearised, null_fit
 from plant_emulator.diagnosis.fitting.looks import look
+from plant_emulator.diagnosis.fitting.nuisance_space import Tangents, gain_turned
 from plant_emulator.diagnosis.fitting.signature import signature
-from plant_emulator.diagnosis.fitting.tangents import Tangents, gain_turned
-from plant_emulator.diagnosis.model import Candidate
-from plant_emulator.diagnosis.prediction.shrink import Fold, refitted
-from plant_emulator.estimation.estimates import Array, Unknown
-from plant_emulator.estimation.scans import scanned
+from plant_emulator.diagnosis.machine import Candidate
+from plant_emulator.diagnosis.prediction.gap import Fold, refitted
+from plant_emulator.estimation.robust_scan import scanned
+from plant_emulator.estimation.unknowns import Array, Unknown
 from tests.plant_emulator.diagnosis.test_contest import TIME, Line, explained, linear, noisy
 
 # One that the samples of a run of 2 s tell from others 0.5 Hz off, anywhere within 5.2 Hz.

@@ -2,7 +2,7 @@
 
 import pytest
 
-from plant_emulator.diagnosis.calibration.calibration import FEWEST, Case, confidence
+from plant_emulator.diagnosis.calibration.confidence import FEWEST, Case, confidence
 
 
 def cases(kind: str, *rights: bool) -> list[Case]:

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.execution.pool import Here
-from plant_emulator.diagnosis.fitting.chance import Weighted, unrest
-from plant_emulator.diagnosis.fitting.contest import fit, null_fit
+from plant_emulator.diagnosis.fitting.joint_fit import fit, null_fit
+from plant_emulator.diagnosis.fitting.random_effects import Weighted, unrest
 from plant_emulator.diagnosis.fitting.steps import Task, show
-from plant_emulator.diagnosis.selection.inquiry import Inquiry
-from plant_emulator.estimation.estimates import Array
+from plant_emulator.diagnosis.selection.procedure import Inquiry
+from plant_emulator.estimation.unknowns import Array
 from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, effect, linear, noisy
 
 # How much a shake of the size 1 moves each sample (standard deviation): nothing in the first half.

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.execution.pool import Here
-from plant_emulator.diagnosis.fitting.contest import Point, fit, linearised, null_fit
 from plant_emulator.diagnosis.fitting.elsewhere import (
     from_nominal,
     in_place,
@@ -17,22 +16,23 @@ from plant_emulator.diagnosis.fitting.elsewhere import (
     smoothed,
     vacated,
 )
-from plant_emulator.diagnosis.fitting.explain import Contender, Explanation, adequate, excess
+from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation, adequate, excess
+from plant_emulator.diagnosis.fitting.joint_fit import Point, fit, linearised, null_fit
 from plant_emulator.diagnosis.fitting.looks import glance, glance_far, look
+from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
 from plant_emulator.diagnosis.fitting.signature import signature
-from plant_emulator.diagnosis.fitting.tangents import Tangents
-from plant_emulator.diagnosis.model import Candidate, Run
+from plant_emulator.diagnosis.machine import Candidate, Run
 from plant_emulator.diagnosis.report.answer import undetectable
 from plant_emulator.diagnosis.selection import rounds as engine
 from plant_emulator.diagnosis.selection.contenders import best_of
 from plant_emulator.diagnosis.selection.drifts import Drifts
-from plant_emulator.diagnosis.selection.place import subsystem
 from plant_emulator.diagnosis.selection.restarts import Restarts
 from plant_emulator.diagnosis.selection.rules import noise_only
 from plant_emulator.diagnosis.selection.stepwise import Contest
+from plant_emulator.diagnosis.selection.subsystem import subsystem
 from plant_emulator.diagnosis.selection.verdict import decide
-from plant_emulator.estimation.estimates import Array, Unknown
-from plant_emulator.recordings.fed_noise import Loud
+from plant_emulator.estimation.unknowns import Array, Unknown
+from plant_emulator.recordings.input_noise import Loud
 
 TIME = np.linspace(-1.0, 1.0, 2000)
 

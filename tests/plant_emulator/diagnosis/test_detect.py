@@ -10,7 +10,12 @@ from click.testing import CliRunner, Result
 
 from plant_emulator import effects
 from plant_emulator.cli import main
-from plant_emulator.diagnosis.design.detect import Detectability, as_answer, reached, smallest
+from plant_emulator.diagnosis.design.detectability import (
+    Detectability,
+    as_answer,
+    reached,
+    smallest,
+)
 from plant_emulator.diagnosis.machines.bench import candidate
 
 

@@ -9,11 +9,11 @@ import pytest
 
 from plant_emulator.diagnosis.diagnose import Diagnose, Diagnosis
 from plant_emulator.diagnosis.execution.pool import Here
-from plant_emulator.diagnosis.fitting.contest import Point, fit
+from plant_emulator.diagnosis.fitting.joint_fit import Point, fit
+from plant_emulator.diagnosis.prediction.gap import Fold, predict
 from plant_emulator.diagnosis.prediction.held_out import HeldOut, Plan
-from plant_emulator.diagnosis.prediction.shrink import Fold, predict
-from plant_emulator.estimation import estimation
-from plant_emulator.estimation.estimates import Array
+from plant_emulator.estimation import least_squares
+from plant_emulator.estimation.unknowns import Array
 from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, noisy
 
 EACH_IN_TURN = Plan(fitted=(0, 1, 2), folds=(((1, 2), (0,)), ((0, 2), (1,)), ((0, 1), (2,))))
@@ -139,7 +139,7 @@ def fold_of_a_line() -> tuple[Line, Fold]:
 def test_fit_that_runs_out_of_steps_is_taken_up_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """Three steps lead near the least squares, and not to the knowledge that these are reached."""
     model, fold = fold_of_a_line()
-    monkeypatch.setattr(estimation, "MAX_ITERATIONS", 3)
+    monkeypatch.setattr(least_squares, "MAX_ITERATIONS", 3)
     assert not fit(model, (), (0,), fold.start.values, [{}]).converged
     found = predict(model, fold)
     assert found.converged
@@ -148,7 +148,7 @@ def test_fit_that_runs_out_of_steps_is_taken_up_again(monkeypatch: pytest.Monkey
 
 def test_prediction_by_a_fit_that_does_not_end_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     model, fold = fold_of_a_line()
-    monkeypatch.setattr(estimation, "MAX_ITERATIONS", 1)
+    monkeypatch.setattr(least_squares, "MAX_ITERATIONS", 1)
     found = {(): [predict(model, fold)], ("kink",): [predict(model, fold)]}
     folds = (((0,), (1,)),)
     held_out = HeldOut(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from plant_emulator.diagnosis.localisation.driven_drum import compiled, drum_speed
+from plant_emulator.diagnosis.localisation.drum_simulation import compiled, drum_speed
 
 # Thesis, Table 3.1: half gap, damping, drum's inertia; stiffness by eq. 3.32 and 3.33.
 ALPHA, K, C, J = 0.15073, 1349265.04, 120320.0, 312.69

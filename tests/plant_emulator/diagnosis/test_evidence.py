@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from plant_emulator.diagnosis.localisation.evidence import Linear, log_evidence, unrest
+from plant_emulator.diagnosis.localisation.ard_evidence import Linear, log_evidence, unrest
 
 RANDOM = np.random.default_rng(3)
 NUISANCE, LAW = RANDOM.standard_normal((40, 2)), RANDOM.standard_normal((40, 3))

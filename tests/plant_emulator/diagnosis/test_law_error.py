@@ -2,7 +2,7 @@
 
 import pytest
 
-from plant_emulator.diagnosis.calibration.law_error import Sized, law_errors
+from plant_emulator.diagnosis.calibration.model_form_error import Sized, law_errors
 
 
 def sized(true: float, estimated: float, standard_error: float, name: str = "lag") -> Sized:

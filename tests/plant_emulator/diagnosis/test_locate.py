@@ -6,12 +6,12 @@ from dataclasses import replace
 import pytest
 
 from plant_emulator import parameter_sets
-from plant_emulator.diagnosis.fitting.contest import null_fit
+from plant_emulator.diagnosis.fitting.joint_fit import null_fit
 from plant_emulator.diagnosis.localisation.locate import WORTH, Location, among, locate
 from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
-from plant_emulator.simulation.sensors import noisy
+from plant_emulator.simulation.sensor_noise import noisy
 from plant_emulator.simulation.simulate import run_of, simulate, values_of
 from plant_emulator.solver.kernel import kernel
 

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 from plant_emulator import parameter_sets
-from plant_emulator.diagnosis.design.advice import Advice
+from plant_emulator.diagnosis.design.next_experiment import Advice
 from plant_emulator.diagnosis.execution.pool import Here
-from plant_emulator.diagnosis.fitting.contest import Point, fit, null_fit
-from plant_emulator.diagnosis.fitting.explain import Contender, Explanation
+from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation
+from plant_emulator.diagnosis.fitting.joint_fit import Point, fit, null_fit
+from plant_emulator.diagnosis.machine import Candidate, Run
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
-from plant_emulator.diagnosis.model import Candidate, Run
 from plant_emulator.diagnosis.selection.verdict import Verdict
-from plant_emulator.estimation.estimates import Array, Unknown
-from plant_emulator.estimation.search import GAP_POSITION
-from plant_emulator.recordings.fed_noise import Loud
+from plant_emulator.estimation.start_search import GAP_POSITION
+from plant_emulator.estimation.unknowns import Array, Unknown
+from plant_emulator.recordings.input_noise import Loud
 from plant_emulator.recordings.recording import recording
-from plant_emulator.simulation.sensors import noisy
-from plant_emulator.workflows.session import simulated
+from plant_emulator.simulation.sensor_noise import noisy
+from plant_emulator.workflows.simulation import simulated
 
 N = 400
 SLOW = np.linspace(0.0, 1.0, N)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.localisation.phases import PHASES, field_weakened, phases
+from plant_emulator.diagnosis.localisation.operating_phases import PHASES, field_weakened, phases
 
 TIME = np.arange(0.0, 20.0, 0.01)
 # 1 s rest, up to 200 rad/s within 4 s, 5 s there, down within 4 s, rest.

@@ -8,11 +8,11 @@ import pytest
 from scipy.sparse import csr_array
 
 from plant_emulator.diagnosis.execution.pool import Here
-from plant_emulator.diagnosis.fitting.contest import Point, null_fit
-from plant_emulator.diagnosis.fitting.quieted import Quieted, quieted
-from plant_emulator.diagnosis.selection.inquiry import Inquiry
-from plant_emulator.estimation.estimates import Array
-from plant_emulator.recordings.fed_noise import Loud
+from plant_emulator.diagnosis.fitting.input_noise_model import Quieted, quieted
+from plant_emulator.diagnosis.fitting.joint_fit import Point, null_fit
+from plant_emulator.diagnosis.selection.procedure import Inquiry
+from plant_emulator.estimation.unknowns import Array
+from plant_emulator.recordings.input_noise import Loud
 from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, noisy
 
 # What the fed input's noise adds to every sample by its one standard deviation.

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.localisation.relations import (
+from plant_emulator.diagnosis.localisation.parity_covariance import relations
+from plant_emulator.diagnosis.localisation.parity_relations import (
     DRIVE,
     GEAR,
     MOTOR,
@@ -14,7 +15,6 @@ from plant_emulator.diagnosis.localisation.relations import (
     smoothed_speed,
     values,
 )
-from plant_emulator.diagnosis.localisation.whiten import relations
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import Recording, recording
 from plant_emulator.signals.log import Log

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.report.details import Step, Trace
-from plant_emulator.diagnosis.report.report import MOST_RUNS, html
-from plant_emulator.diagnosis.report.report_pictures import waterfall
-from plant_emulator.diagnosis.report.report_style import STYLE
-from plant_emulator.diagnosis.report.report_traces import path
+from plant_emulator.diagnosis.report.html import MOST_RUNS, html
+from plant_emulator.diagnosis.report.html_pictures import waterfall
+from plant_emulator.diagnosis.report.html_style import STYLE
+from plant_emulator.diagnosis.report.html_traces import path
 from tests.plant_emulator.diagnosis import answers
 
 HOSTILE = "<script>alert(1)</script>\"'&amp;]]>--><svg onload=x>\x1b[31m\x00\ud800\u202e"

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.localisation.phases import CRUISE, phases
+from plant_emulator.diagnosis.localisation.operating_phases import CRUISE, phases
 from plant_emulator.diagnosis.localisation.residual_map import Cell, residual_map
 from plant_emulator.recordings.recording import Recording, recording
 from plant_emulator.signals.log import Log

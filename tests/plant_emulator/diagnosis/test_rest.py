@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.fitting.contest import Point, fit
-from plant_emulator.diagnosis.fitting.terms import in_terms
+from plant_emulator.diagnosis.fitting.derived_quantities import in_terms
+from plant_emulator.diagnosis.fitting.joint_fit import Point, fit
 from plant_emulator.diagnosis.machines.axis import AxisModel
-from plant_emulator.diagnosis.prediction.rest import lies, rest_of, shrinks
+from plant_emulator.diagnosis.prediction.remainder import lies, rest_of, shrinks
 from plant_emulator.diagnosis.report.details import Trace
 from tests.plant_emulator.diagnosis import axis_truth
 from tests.plant_emulator.diagnosis.axis_truth import Array

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from plant_emulator.diagnosis.model import Run
-from plant_emulator.diagnosis.prediction.shrink import (
+from plant_emulator.diagnosis.machine import Run
+from plant_emulator.diagnosis.prediction.gap import (
     Prediction,
     block_lengths,
     closed_fraction,
@@ -13,7 +13,7 @@ from plant_emulator.diagnosis.prediction.shrink import (
     gap,
     interval,
 )
-from plant_emulator.estimation.estimates import Array
+from plant_emulator.estimation.unknowns import Array
 
 
 def prediction(*channels: Array) -> Prediction:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.contest import null_fit
+from plant_emulator.diagnosis.fitting.joint_fit import null_fit
 from plant_emulator.diagnosis.selection.verdict import Verdict, decide, shifts
 from tests.plant_emulator.diagnosis.test_contest import TIME, Line, explained, linear, noisy
 

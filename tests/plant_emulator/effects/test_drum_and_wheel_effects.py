@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from plant_emulator.model.parameters import ParameterSet
-from plant_emulator.simulation.bench import Bench
 from plant_emulator.simulation.programs import TravelProgram
+from plant_emulator.simulation.running_bench import Bench
 from plant_emulator.simulation.simulate import values_of
-from plant_emulator.simulation.travel import travel
+from plant_emulator.simulation.travel_program import travel
 from tests import reference_plant as thesis
 from tests.plant_emulator.runs import DRUM, Piecewise, linear, simulate, with_truck
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import Array, Log
-from plant_emulator.simulation.bench import Bench
+from plant_emulator.simulation.running_bench import Bench
 from tests.plant_emulator.model.test_plant import energy
 from tests.plant_emulator.runs import GEAR, Piecewise, linear, simulate
 

@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from plant_emulator.model import friction, plant
+from plant_emulator.model import gear as gear_equation
+from plant_emulator.model import implicit_stage
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.model.stage import STAGE, STATES
-from plant_emulator.simulation.bench import Bench
+from plant_emulator.simulation.running_bench import Bench
 from plant_emulator.solver.kernel import Kernel
 from tests import reference_plant as thesis
 from tests.plant_emulator.model.test_plant import TABLE, energy, size
@@ -176,7 +177,7 @@ def test_stage_balances_friction_by_direction_speed_and_load(
     asymmetry: float, rise: float, load: float,
 ) -> None:  # fmt: skip
     with pytest.MonkeyPatch.context() as patch:
-        for module in (plant, friction):
+        for module in (implicit_stage, gear_equation):
             patch.setattr(
                 module, "gear_direction_factor", lambda s, p: 1.0 + asymmetry * s.gear_direction
             )
@@ -192,7 +193,7 @@ def test_stage_balances_friction_by_direction_speed_and_load(
         vars(s).update(zip(STATES, base, strict=True))
         s.gear_speed = gear + estimate
         s.delayed_reference = motor
-        plant.solve_stage(base, a, s, TABLE)
+        implicit_stage.solve_stage(base, a, s, TABLE)
     assert s.unsettled == 0.0
     omega, closing = s.gear_speed, s.gear_speed - s.drum_speed
     T_mg = thesis.k_mg * (twist + a * (s.motor_speed - 62.6 * omega))

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.model.stage import FIRST_MEMORY
 from plant_emulator.signals.log import Log
-from plant_emulator.simulation.bench import Bench
-from plant_emulator.solver.trial import memory_names
+from plant_emulator.simulation.running_bench import Bench
+from plant_emulator.solver.effect_check import memory_names
 from tests.plant_emulator.model.test_plant import energy
 from tests.plant_emulator.runs import BACKLASH, GEAR, Piecewise, linear, simulate
 

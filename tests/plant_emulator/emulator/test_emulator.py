@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from plant_emulator import logs
-from plant_emulator.emulator.control import Control as Channel
+from plant_emulator.emulator.control_channel import Control as Channel
 from plant_emulator.emulator.emulator import Emulator, Options, build, words_of
 from plant_emulator.emulator.plc.faults import FaultError
 from plant_emulator.emulator.plc.plc import Plc
-from plant_emulator.emulator.plc.plc_surroundings import CLOSED
+from plant_emulator.emulator.plc.surroundings import CLOSED
 from plant_emulator.emulator.server import PlcServer
 from plant_emulator.emulator.serving import unsettled_text
 from register_maps import load

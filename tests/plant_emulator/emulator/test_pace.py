@@ -2,8 +2,8 @@
 
 import pytest
 
-from plant_emulator.emulator import pace
-from plant_emulator.emulator.pace import Pace
+from plant_emulator.emulator import scan_timer
+from plant_emulator.emulator.scan_timer import Pace
 
 
 class Clock:
@@ -22,7 +22,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch):
     virtual = Clock()
-    monkeypatch.setattr(pace, "time", virtual)
+    monkeypatch.setattr(scan_timer, "time", virtual)
     return virtual
 
 

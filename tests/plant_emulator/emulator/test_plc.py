@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from plant_emulator.emulator.plc.plc import Plc
-from plant_emulator.emulator.plc.plc_state import TRANSITIONS, Event
-from plant_emulator.emulator.plc.plc_surroundings import CLOSED, Switches, Truck
+from plant_emulator.emulator.plc.state import TRANSITIONS, Event
+from plant_emulator.emulator.plc.surroundings import CLOSED, Switches, Truck
 from register_maps import load
 from register_maps.codec import decode_measurement, encode_measurement, encode_setpoint
 from register_maps.signals import (

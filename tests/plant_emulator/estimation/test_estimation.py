@@ -13,8 +13,8 @@ from plant_emulator.estimation.covariance import (
     sandwich,
     structure,
 )
-from plant_emulator.estimation.estimates import Unknown
-from plant_emulator.estimation.estimation import at, estimate
+from plant_emulator.estimation.least_squares import at, estimate
+from plant_emulator.estimation.unknowns import Unknown
 
 
 def number(name: str, start: float, **more: object) -> Unknown:

@@ -11,16 +11,16 @@ import pytest
 from plant_emulator.errors import IdentificationError
 from plant_emulator.estimation.equation_error import start_values
 from plant_emulator.estimation.free_parameters import free_parameters
-from plant_emulator.identification.experiments import experiments
+from plant_emulator.identification.experiment_design import experiments
 from plant_emulator.identification.identify import Identification, identify
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.preflight import preflight
 from plant_emulator.recordings.recording import Recording, recording
 from plant_emulator.signals.log import COMPARED, Log
+from plant_emulator.simulation.fit_metrics import validate
 from plant_emulator.simulation.programs import PROGRAMS
-from plant_emulator.simulation.sensors import SENSORS, noisy
+from plant_emulator.simulation.sensor_noise import SENSORS, noisy
 from plant_emulator.simulation.simulate import fit_start, run_of, simulate, values_of
-from plant_emulator.simulation.validate import validate
 
 Reader = Callable[[str], Log]
 FREE = (

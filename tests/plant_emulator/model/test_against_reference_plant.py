@@ -5,8 +5,8 @@ import pytest
 
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import Log
+from plant_emulator.simulation.fit_metrics import validate
 from plant_emulator.simulation.simulate import run_of, simulate
-from plant_emulator.simulation.validate import validate
 from tests import reference_plant
 
 RUNS = {

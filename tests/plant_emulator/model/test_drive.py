@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from plant_emulator.model import drive, laws, plant
+from plant_emulator.model import drive, implicit_stage, laws
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.model.stage import STAGE
 
@@ -20,7 +20,7 @@ def stage(p: SimpleNamespace, reference: float, motor_speed: float) -> SimpleNam
     """A stage with its laws evaluated."""
     s = SimpleNamespace(**dict.fromkeys(STAGE, 0.0))
     s.delayed_reference, s.motor_speed = reference, motor_speed
-    plant.evaluate_laws(s, p)
+    implicit_stage.evaluate_laws(s, p)
     return s
 
 

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from plant_emulator.model import contact, plant, stage
+from plant_emulator.model import drum as drum_equation
+from plant_emulator.model import implicit_stage, stage
 from plant_emulator.model.parameters import ParameterSet
-from plant_emulator.simulation.bench import Bench
+from plant_emulator.simulation.running_bench import Bench
 from tests import reference_plant as thesis
 from tests.plant_emulator.runs import (
     BACKLASH,
@@ -36,20 +37,20 @@ BREAKAWAY = 35.989 / 62.6  # torque at the motor side that the gear withstands a
     [(0.0, 0.0), (0.1, 0.0), (-0.15, 0.0), (0.15, 0.0), (0.25, 0.1), (-0.25, -0.1)],
 )
 def test_dead_zone_by_hand(y: float, expected: float) -> None:
-    assert contact.dead_zone(y, 0.15) == pytest.approx(expected)
+    assert drum_equation.dead_zone(y, 0.15) == pytest.approx(expected)
 
 
 @given(y=st.floats(-10.0, 10.0), step=st.floats(0.0, 1.0), half_gap=st.floats(0.0, 1.0))
 def test_dead_zone_is_odd_and_rises_by_no_more_than_its_argument(
     y: float, step: float, half_gap: float
 ) -> None:
-    assert contact.dead_zone(-y, half_gap) == -contact.dead_zone(y, half_gap)
-    rise = contact.dead_zone(y + step, half_gap) - contact.dead_zone(y, half_gap)
+    assert drum_equation.dead_zone(-y, half_gap) == -drum_equation.dead_zone(y, half_gap)
+    rise = drum_equation.dead_zone(y + step, half_gap) - drum_equation.dead_zone(y, half_gap)
     assert -1e-12 <= rise <= step + 1e-12
 
 
 def test_friction_takes_up_to_its_level_and_leaves_the_rest() -> None:
-    assert [contact.slipping(torque, 2.0) for torque in (5.0, 2.0, -1.0, -2.0, -5.0)] == [
+    assert [drum_equation.slipping(torque, 2.0) for torque in (5.0, 2.0, -1.0, -2.0, -5.0)] == [
         3.0, 0.0, 0.0, 0.0, -3.0,
     ]  # fmt: skip
 
@@ -87,7 +88,7 @@ def test_stage_solves_the_equations_of_the_thesis(
     vars(s).update(zip(stage.STATES, base, strict=True))
     s.gear_speed = gear + estimate
     s.delayed_reference, s.wheel_torque = motor + error, wheel_torque
-    plant.solve_stage(base, a, s, TABLE)
+    implicit_stage.solve_stage(base, a, s, TABLE)
     found = [getattr(s, name) for name in stage.STATES]
 
     omega_g = found[GEAR]

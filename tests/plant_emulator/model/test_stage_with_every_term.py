@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from plant_emulator.model import drive, plant, stage
+from plant_emulator.model import drive, implicit_stage, stage
 from tests import reference_plant as thesis
 from tests.plant_emulator.model.test_plant import TABLE, size
 
@@ -27,7 +27,7 @@ def every_term_present() -> Iterator[None]:
     """Each neglected law gives the value in p of its own name, as the law of an effect would."""
     with pytest.MonkeyPatch.context() as patch:
         for name in TERMS:
-            for module in (plant, drive):
+            for module in (implicit_stage, drive):
                 if hasattr(module, name):
                     patch.setattr(module, name, lambda s, p, name=name: getattr(p, name))
         yield
@@ -73,7 +73,7 @@ def test_stage_balances_every_torque(
     s = SimpleNamespace(**dict.fromkeys(stage.STAGE, 0.0))
     vars(s).update(zip(stage.STATES, base, strict=True))
     s.delayed_reference, s.wheel_torque = motor, wheel_torque
-    plant.solve_stage(base, a, s, p)
+    implicit_stage.solve_stage(base, a, s, p)
 
     omega_m, omega_g, omega_d = s.motor_speed, s.gear_speed, s.drum_speed
     closing = omega_g - omega_d

@@ -9,7 +9,7 @@ import pytest
 from plant_emulator import parameter_sets
 from plant_emulator.errors import ParameterError
 from plant_emulator.model.parameters import ParameterSet
-from plant_emulator.parameter_sets import known_set
+from plant_emulator.parameter_sets import with_effects
 
 OWN = '''"""A factor on the torque that the gear loses."""
 
@@ -39,7 +39,7 @@ def test_an_effect_that_nobody_knows_is_told_with_its_file(
 ) -> None:
     path = saved(nominal, tmp_path, stiff_oil={"factor": 0.1})
     with pytest.raises(ParameterError, match=r"bench\.toml: effects\.stiff_oil: unknown; .*--effe"):
-        known_set.load(path)
+        with_effects.load(path)
 
 
 def test_an_effect_of_ones_own_is_known_with_its_file(
@@ -48,7 +48,7 @@ def test_an_effect_of_ones_own_is_known_with_its_file(
     own = tmp_path / "stiff_oil.py"
     own.write_text(OWN, encoding="utf-8")
     path = saved(nominal, tmp_path, stiff_oil={"factor": 0.1}, drum_imbalance={"moment": 3.0})
-    assert known_set.load(path, [str(own)]).effects["stiff_oil"] == {"factor": 0.1}
+    assert with_effects.load(path, [str(own)]).effects["stiff_oil"] == {"factor": 0.1}
 
 
 def test_a_misspelt_parameter_of_an_effect_is_told_with_those_known(
@@ -56,7 +56,7 @@ def test_a_misspelt_parameter_of_an_effect_is_told_with_those_known(
 ) -> None:
     path = saved(nominal, tmp_path, torque_sensor_lag={"time_constants": 0.1})
     with pytest.raises(ParameterError, match=r"torque_sensor_lag\.time_constants: unknown; known:"):
-        known_set.load(path)
+        with_effects.load(path)
 
 
 def test_an_error_that_is_infinite_is_left_out_of_the_file(

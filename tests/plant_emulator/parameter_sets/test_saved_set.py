@@ -10,14 +10,14 @@ import pytest
 
 from plant_emulator import effects
 from plant_emulator.diagnosis.diagnose import Diagnosis
-from plant_emulator.diagnosis.fitting.contest import Point, null_fit
+from plant_emulator.diagnosis.fitting.joint_fit import Point, null_fit
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
-from plant_emulator.simulation.sensors import SENSORS, noisy
-from plant_emulator.workflows.diagnosis_session import parameter_set
-from plant_emulator.workflows.session import followed, simulated
+from plant_emulator.simulation.sensor_noise import SENSORS, noisy
+from plant_emulator.workflows.diagnosis import parameter_set
+from plant_emulator.workflows.simulation import followed, simulated
 
 BenchLog = Callable[[str], Log]
 

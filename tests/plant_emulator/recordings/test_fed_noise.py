@@ -10,12 +10,12 @@ from scipy.sparse import csr_array
 from plant_emulator.errors import UnsettledError
 from plant_emulator.identification.identify import identify
 from plant_emulator.model.parameters import ParameterSet
-from plant_emulator.recordings.fed_noise import Loud, loud
+from plant_emulator.recordings.input_noise import Loud, loud
 from plant_emulator.recordings.recording import Recording, recording
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation.programs import TravelProgram, program
-from plant_emulator.simulation.sensors import SENSORS, noisy
-from plant_emulator.simulation.travel import travel
+from plant_emulator.simulation.sensor_noise import SENSORS, noisy
+from plant_emulator.simulation.travel_program import travel
 
 GAP = 0.3
 

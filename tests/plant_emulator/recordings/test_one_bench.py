@@ -11,10 +11,10 @@ from plant_emulator import effects
 from plant_emulator.cli import main
 from plant_emulator.errors import LogError
 from plant_emulator.model.parameters import ParameterSet
-from plant_emulator.recordings.one_bench import DIFFERENT, PICTURE, one_bench, scale_of
+from plant_emulator.recordings.same_bench import DIFFERENT, PICTURE, one_bench, scale_of
 from plant_emulator.signals.log import Log
-from plant_emulator.simulation.sensors import noisy
-from plant_emulator.workflows.session import simulated
+from plant_emulator.simulation.sensor_noise import noisy
+from plant_emulator.workflows.simulation import simulated
 
 DATA = Path(__file__).parents[2] / "data" / "bench_practice"
 BENCHES = {

@@ -6,13 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.design.detect import as_answer, detectability
-from plant_emulator.diagnosis.fitting.contest import null_fit
-from plant_emulator.diagnosis.fitting.explain import STRUCTURED
-from plant_emulator.diagnosis.localisation.drift import slopes
-from plant_emulator.diagnosis.localisation.laws import inside
+from plant_emulator.diagnosis.design.detectability import as_answer, detectability
+from plant_emulator.diagnosis.fitting.explanation import STRUCTURED
+from plant_emulator.diagnosis.fitting.joint_fit import null_fit
+from plant_emulator.diagnosis.localisation.block_basis import inside
 from plant_emulator.diagnosis.localisation.locate import WORTH, locate
-from plant_emulator.diagnosis.localisation.relations import (
+from plant_emulator.diagnosis.localisation.parameter_sensitivities import slopes
+from plant_emulator.diagnosis.localisation.parity_covariance import relations
+from plant_emulator.diagnosis.localisation.parity_relations import (
     ARMATURE,
     DRIVE,
     GEAR,
@@ -20,16 +21,15 @@ from plant_emulator.diagnosis.localisation.relations import (
     measured,
     values,
 )
-from plant_emulator.diagnosis.localisation.whiten import relations
 from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.preflight import preflight
 from plant_emulator.recordings.recording import OFFSET, Recording, recording
 from plant_emulator.signals.log import COMPARED, VOLTAGE, Log, compared, without_voltage
-from plant_emulator.simulation.sensors import SENSORS, noisy
+from plant_emulator.simulation.sensor_noise import SENSORS, noisy
 from plant_emulator.simulation.simulate import run_of, simulate, values_of
 from plant_emulator.solver.kernel import kernel
-from plant_emulator.workflows.admission import alike
+from plant_emulator.workflows.loading import alike
 
 Reader = Callable[[str], Log]
 HEATING = "armature_resistance_heating"

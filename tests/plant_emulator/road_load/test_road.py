@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant_emulator.road_load.road import RoadParameters, Truck, velocity
-from plant_emulator.road_load.road_kernel import compiled, foreseen
-from plant_emulator.road_load.road_whiten import whitener
+from plant_emulator.road_load.kernel import compiled, foreseen
+from plant_emulator.road_load.random_walk_filter import whitener
+from plant_emulator.road_load.truck_model import RoadParameters, Truck, velocity
 
 # Round numbers: xi / (r_w m) = 10 / (0.2 * 1000) = 0.05 m/s^2 per N m; g C_rr = 0.0981 m/s^2.
 TRUCK = Truck(mass=1000.0, ratio=10.0, wheel_radius=0.2, drum_radius=0.5)

@@ -9,11 +9,11 @@ import os
 import numpy as np
 import pytest
 
-from plant_emulator.road_load.road import Truck
-from plant_emulator.road_load.road_answer import RoadAnswer, answer
-from plant_emulator.road_load.road_fit import fit
-from plant_emulator.road_load.road_run import prepared
-from plant_emulator.road_load.road_signal import signal
+from plant_emulator.road_load.answer import RoadAnswer, answer
+from plant_emulator.road_load.fit import fit
+from plant_emulator.road_load.run import prepared
+from plant_emulator.road_load.signal import signal
+from plant_emulator.road_load.truck_model import Truck
 from tests.plant_emulator.road_load.road_truth import Truth, drawn, logged
 
 NAMES = {

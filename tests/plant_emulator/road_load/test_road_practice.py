@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from plant_emulator.road_load.road import Truck
-from plant_emulator.road_load.road_answer import RoadAnswer, answer
-from plant_emulator.road_load.road_fit import RoadFit, descended, filter_of, fit
-from plant_emulator.road_load.road_prior import prior_of, starts
-from plant_emulator.road_load.road_run import prepared
-from plant_emulator.road_load.road_signal import signal
+from plant_emulator.road_load.answer import RoadAnswer, answer
+from plant_emulator.road_load.fit import RoadFit, descended, filter_of, fit
+from plant_emulator.road_load.prior import prior_of, starts
+from plant_emulator.road_load.run import prepared
+from plant_emulator.road_load.signal import signal
+from plant_emulator.road_load.truck_model import Truck
 from plant_emulator.workflows import road_log
 
 DATA = Path(__file__).parents[2] / "data" / "road_practice"

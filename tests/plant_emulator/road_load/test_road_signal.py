@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from plant_emulator.errors import LogError
-from plant_emulator.road_load.road_clock import clock_ahead
-from plant_emulator.road_load.road_signal import Signal, low_pass, noise, resting, signal
+from plant_emulator.road_load.clock_offset import clock_ahead
+from plant_emulator.road_load.signal import Signal, low_pass, noise, resting, signal
 
 TIME = np.arange(5000) * 0.002
 DRAW = np.random.default_rng(3)

@@ -7,7 +7,7 @@ import pytest
 
 from plant_emulator.errors import EmulatorError, ParameterError, UnsettledError
 from plant_emulator.model.parameters import ParameterSet
-from plant_emulator.simulation.bench import Bench
+from plant_emulator.simulation.running_bench import Bench
 from plant_emulator.solver.kernel import Kernel
 from tests.plant_emulator.runs import linear, simulate
 

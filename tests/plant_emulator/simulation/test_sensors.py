@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from plant_emulator.signals.log import Log
-from plant_emulator.simulation.sensors import SENSORS, noisy
+from plant_emulator.simulation.sensor_noise import SENSORS, noisy
 
 # signal -> noise rms, quantisation step (README of the data, one more digit)
 LEVELS = {

@@ -7,8 +7,8 @@ import pytest
 
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import COMPARED, Log
+from plant_emulator.simulation.fit_metrics import validate
 from plant_emulator.simulation.simulate import fit_start, run_of, simulate, values_of, whitened
-from plant_emulator.simulation.validate import validate
 from tests.plant_emulator.runs import linear, with_truck
 
 ReadLog = Callable[[str], Log]

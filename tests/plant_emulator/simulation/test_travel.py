@@ -7,10 +7,10 @@ import pytest
 
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import COMPARED, Log
+from plant_emulator.simulation.fit_metrics import fit, validate
 from plant_emulator.simulation.programs import TravelProgram, program
-from plant_emulator.simulation.travel import ThesisReference, travel
+from plant_emulator.simulation.travel_program import ThesisReference, travel
 from plant_emulator.simulation.truck import Forklift, PiDriver
-from plant_emulator.simulation.validate import fit, validate
 
 ReadLog = Callable[[str], Log]
 

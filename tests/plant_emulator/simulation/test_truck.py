@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from plant_emulator.signals.log import Log
+from plant_emulator.simulation.fit_metrics import fit
 from plant_emulator.simulation.programs import sample_times
 from plant_emulator.simulation.truck import (
     Cycle,
@@ -19,7 +20,6 @@ from plant_emulator.simulation.truck import (
     road_speed,
     road_step,
 )
-from plant_emulator.simulation.validate import fit
 
 ReadLog = Callable[[str], Log]
 TOP_SPEED = 14 / 3.6

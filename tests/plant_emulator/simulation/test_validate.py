@@ -7,7 +7,7 @@ import pytest
 
 from plant_emulator.errors import LogError
 from plant_emulator.signals.log import Log
-from plant_emulator.simulation.validate import fit, validate, zero_phase
+from plant_emulator.simulation.fit_metrics import fit, validate, zero_phase
 
 MEASURED = np.array([0.0, 2.0, 4.0, 2.0])
 SIMULATED = np.array([0.0, 1.0, 4.0, 4.0])

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from plant_emulator.emulator.plc.plc_surroundings import Backlash
-from plant_emulator.simulation.bench import BenchSamples
+from plant_emulator.emulator.plc.surroundings import Backlash
+from plant_emulator.simulation.running_bench import BenchSamples
 
 RATIO = 62.6
 STEP = 1e-3

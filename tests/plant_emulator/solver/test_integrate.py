@@ -9,10 +9,10 @@ import pytest
 from plant_emulator.errors import UnsettledError
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import COMPARED, Log
+from plant_emulator.simulation.fit_metrics import validate
 from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram
 from plant_emulator.simulation.simulate import run_of
 from plant_emulator.simulation.simulate import simulate as simulate_run
-from plant_emulator.simulation.validate import validate
 from plant_emulator.solver.kernel import Kernel
 from tests.plant_emulator.runs import BACKLASH, CURRENT, DRUM, MOTOR, Piecewise, linear, simulate
 

@@ -5,8 +5,8 @@ import pytest
 
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import COMPARED, Log
+from plant_emulator.simulation.fit_metrics import validate
 from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram
-from plant_emulator.simulation.validate import validate
 from tests.plant_emulator.runs import linear, simulate, with_truck
 
 CHANNELS = (*COMPARED, "armature_voltage", "shell_temperature")

@@ -9,8 +9,8 @@ import pytest
 from scipy.io import savemat
 
 from plant_emulator.errors import DiagnosisError, LogError
-from plant_emulator.workflows import axis_log
-from plant_emulator.workflows.admission import unlabelled
+from plant_emulator.workflows import axis_reader
+from plant_emulator.workflows.loading import unlabelled
 
 TIME = np.arange(5) * 1e-3
 LINEAR = "time_s,position_m,force_N,label\n0,0.1,5,1\n0.001,0.2,-6.5,1\n0.002,0.3,7,1\n"
@@ -45,7 +45,7 @@ def motor(folder: Path, **changed: Any) -> Path:
 
 
 def test_a_linear_axis_is_read_from_csv(tmp_path: Path) -> None:
-    log = axis_log.read(written(tmp_path, LINEAR))
+    log = axis_reader.read(written(tmp_path, LINEAR))
     assert not log.rotary
     assert log.time.tolist() == [0.0, 0.001, 0.002]
     assert log.position.tolist() == [0.1, 0.2, 0.3]
@@ -57,14 +57,14 @@ def test_a_linear_axis_is_read_from_csv(tmp_path: Path) -> None:
 def test_a_rotary_axis_is_read_from_compressed_csv(tmp_path: Path) -> None:
     path = tmp_path / "run.csv.gz"
     path.write_bytes(gzip.compress(ROTARY.encode()))
-    log = axis_log.read(path)
+    log = axis_reader.read(path)
     assert log.rotary
     assert log.position.tolist() == [0.1, 0.2, 0.3]
     assert log.force.tolist() == [5.0, -6.5, 7.0]
 
 
 def test_the_force_of_a_screw_is_its_gain_times_its_command(tmp_path: Path) -> None:
-    log = axis_log.read(screw(tmp_path))
+    log = axis_reader.read(screw(tmp_path))
     assert not log.rotary
     assert log.position == pytest.approx(2.0 * TIME)
     # 35 N/V times 1 V at the start; the pulses are in the command already
@@ -73,7 +73,7 @@ def test_the_force_of_a_screw_is_its_gain_times_its_command(tmp_path: Path) -> N
 
 
 def test_the_torque_of_a_motor_is_its_constant_times_its_current(tmp_path: Path) -> None:
-    log = axis_log.read(motor(tmp_path))
+    log = axis_reader.read(motor(tmp_path))
     assert log.rotary
     assert log.position == pytest.approx(3.0 * TIME)
     assert log.force == pytest.approx(0.0458 * (2.0 + TIME))
@@ -92,7 +92,7 @@ def test_the_torque_of_a_motor_is_its_constant_times_its_current(tmp_path: Path)
 def test_a_csv_that_is_none_is_refused_with_its_place(tmp_path: Path, text: str, told: str) -> None:
     path = written(tmp_path, text)
     with pytest.raises(LogError) as caught:
-        axis_log.read(path)
+        axis_reader.read(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert told in str(caught.value)
 
@@ -113,33 +113,33 @@ def test_a_screw_with_bad_variables_is_refused(
 ) -> None:
     path = screw(tmp_path, **changed)
     with pytest.raises(LogError) as caught:
-        axis_log.read(path)
+        axis_reader.read(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert told in str(caught.value)
 
 
 def test_a_motor_without_its_seven_columns_is_refused(tmp_path: Path) -> None:
     with pytest.raises(LogError, match=r"data has shape \(5, 3\); 7 columns"):
-        axis_log.read(motor(tmp_path, data=np.zeros((5, 3))))
+        axis_reader.read(motor(tmp_path, data=np.zeros((5, 3))))
 
 
 def test_other_variables_are_told(tmp_path: Path) -> None:
     path = tmp_path / "other.mat"
     savemat(path, {"speed": TIME, "torque": TIME})
     with pytest.raises(LogError, match=r"other\.mat: variables speed, torque; known: t, qm"):
-        axis_log.read(path)
+        axis_reader.read(path)
 
 
 def test_a_damaged_matlab_file_is_told(tmp_path: Path) -> None:
     path = screw(tmp_path)
     path.write_bytes(path.read_bytes()[:200])
     with pytest.raises(LogError, match=r"screw\.mat: no readable MATLAB file"):
-        axis_log.read(path)
+        axis_reader.read(path)
 
 
 def test_a_file_that_is_not_there_is_told(tmp_path: Path) -> None:
     with pytest.raises(LogError, match=r"nothing\.csv: no such file"):
-        axis_log.read(tmp_path / "nothing.csv")
+        axis_reader.read(tmp_path / "nothing.csv")
 
 
 def test_a_variable_that_looks_like_the_answer_is_refused(tmp_path: Path) -> None:
@@ -147,4 +147,4 @@ def test_a_variable_that_looks_like_the_answer_is_refused(tmp_path: Path) -> Non
     time = np.arange(100.0) * 1e-3
     savemat(path, {"t": time, "qm": time, "vir": time, "gtau": 2.0, "true_effect": "friction"})
     with pytest.raises(DiagnosisError, match=r"run\.mat: variable true_effect looks like"):
-        unlabelled(axis_log.read(path))
+        unlabelled(axis_reader.read(path))

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from plant_emulator.cli import main
 from plant_emulator.diagnosis.execution import pool
 from plant_emulator.diagnosis.fitting import steps
-from plant_emulator.diagnosis.model import Model
+from plant_emulator.diagnosis.machine import Model
 from plant_emulator.errors import EmulatorError, InputError
 from plant_emulator.workflows.workers import Cluster, Processes
 from tests.plant_emulator.diagnosis.test_contest import TIME, Line, noisy

@@ -1,0 +1,52 @@
+"""Steady speeds one after the other, in the place of a regulator (pure).
+
+It has the form of a regulator (gateway.regulators), so that supervisor, limits, command block and
+recording are those of any run. It knows no truck and looks at no torque; the PLC is in mode SPEED,
+in which nobody drives. After the last speed it asks for standstill, and goes on asking for it.
+"""
+
+from dataclasses import dataclass, replace
+from math import copysign
+
+from gateway.configuration.sweep_speeds import Sweep as Params
+from gateway.regulators.window import Demand, Window
+
+__all__ = ["Params", "State", "follow", "seed", "update"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class State:
+    """number : of the speed that is gone to or held; held : for so long [s]
+    motor_speed : that was last asked for [rad/s]
+    """
+
+    number: int
+    held: float
+    motor_speed: float
+
+
+def seed(params: Params, motor_speed: float, drum_speed: float) -> State:  # noqa: ARG001 - all regulators have these arguments
+    """The sweep before its first speed."""
+    return State(number=0, held=0.0, motor_speed=max(motor_speed, 0.0))
+
+
+def update(params: Params, state: State, window: Window) -> tuple[State, Demand]:
+    """Where the sweep is one sample later."""
+    over = state.number >= len(params.speeds)
+    target = 0.0 if over else params.speeds[state.number]
+    step = params.rate * window.duration
+    way = target - state.motor_speed
+    if abs(way) > step:
+        rate = copysign(params.rate, way)
+        speed = state.motor_speed + rate * window.duration
+        return replace(state, motor_speed=speed), Demand(speed=speed, rate=rate)
+    held = state.held + window.duration
+    after = State(number=state.number, held=held, motor_speed=target)
+    if held >= params.hold and not over:
+        after = State(number=state.number + 1, held=0.0, motor_speed=target)
+    return after, Demand(speed=target)
+
+
+def follow(params: Params, state: State, demand: float, setpoint: float) -> State:  # noqa: ARG001 - all regulators have these arguments
+    """The sweep goes on from what the limits passed."""
+    return replace(state, motor_speed=setpoint)

@@ -1,0 +1,239 @@
+"""Plays the operator at the emulated PLC: waits for ARMED, sets remote, clears it after the cycle.
+
+In real time the gateway is the daemon (`gateway run`, a process of its own), and all that is known
+of it is what it appends to its recording. Fast, the same loop runs here over the same kind of
+socket, against an emulator that scans on request, so that no clock is waited for.
+"""
+
+import math
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Protocol
+
+import numpy as np
+
+import register_maps
+from gateway.configuration.config import Config
+from gateway.cycle.record import Layout
+from gateway.cycle.supervisor import State
+from gateway.demo.view import Moment, Screen
+from gateway.errors import GatewayError
+from gateway.link.plc import TcpLink
+from gateway.recordings import recording
+from gateway.recordings.header import header
+from gateway.recordings.recording import SUFFIX, encode_header
+from gateway.runtime.loop import Loop
+
+SCAN: Final = 0.01
+"""[s] Scan of the emulated PLC."""
+LOOK_EVERY: Final = 0.1
+CHANGE_WITHIN: Final = 30.0
+"""[s] For each state that is waited for, beside the cycle itself."""
+
+
+class Emulator(Protocol):
+    """The switches of the emulated bench."""
+
+    def set_remote(self, *, on: bool) -> None:
+        """Turn the operator's switch."""
+
+    def step(self, scans: int) -> None:
+        """Scan so many times."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Session:
+    """One run to operate: configuration and its file, bench, screen, duration of the cycle [s]."""
+
+    config: Config
+    file: Path
+    emulator: Emulator
+    screen: Screen
+    duration: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Operated:
+    """What a gateway left behind: its recording and its exit code."""
+
+    recording: Path
+    exit_code: int
+
+
+def operate_in_real_time(session: Session) -> Operated:
+    """The daemon through one cycle."""
+    folder, words = session.file.parent, session.file.with_suffix(".txt")
+    before = set(folder.glob(f"*{SUFFIX}"))
+    with (
+        words.open("w", encoding="utf-8") as said,
+        subprocess.Popen(
+            [sys.executable, "-m", "gateway", "run", "-c", str(session.file)],
+            stdout=said,
+            stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL,
+        ) as daemon,
+    ):
+        try:
+            wait_for("a recording", lambda: bool(set(folder.glob(f"*{SUFFIX}")) - before), daemon)
+            (path,) = set(folder.glob(f"*{SUFFIX}")) - before
+            _operate(session, _Follower(path, session), daemon)
+        except GatewayError as error:
+            raise GatewayError(f"{error}; the daemon's words: {words}") from error
+        finally:
+            daemon.send_signal(signal.SIGTERM)
+    return Operated(recording=path, exit_code=daemon.returncode)
+
+
+def _operate(session: Session, look: "_Follower", daemon: "subprocess.Popen[bytes]") -> None:
+    wait_for("ARMED", lambda: look.state() is State.ARMED, daemon)
+    session.emulator.set_remote(on=True)
+    wait_for("RUN", lambda: look.state() is State.RUN, daemon)
+    over = CHANGE_WITHIN + session.duration
+    wait_for(
+        "the end of the cycle",
+        lambda: look.state() is not State.RUN or look.time > session.duration,
+        daemon,
+        over,
+    )
+    session.emulator.set_remote(on=False)
+    wait_for("SAFE", lambda: look.state() is State.SAFE, daemon)
+
+
+def wait_for(
+    what: str,
+    holds: Callable[[], bool],
+    daemon: "subprocess.Popen[bytes]",
+    within: float = CHANGE_WITHIN,
+) -> None:
+    """Look until it holds; raises GatewayError when that takes too long or the daemon ends."""
+    deadline = time.monotonic() + within
+    while not holds():
+        if daemon.poll() is not None:
+            raise GatewayError(f"the daemon ended before {what}, exit code {daemon.returncode}")
+        if time.monotonic() > deadline:
+            raise GatewayError(f"the gateway did not come to {what} within {within:g} s")
+        time.sleep(LOOK_EVERY)
+
+
+class _Follower:
+    """Reads what the daemon appends to its recording, and shows the newest tick."""
+
+    def __init__(self, path: Path, session: Session) -> None:
+        self._path, self._session = path, session
+        self._began = math.inf
+        self.time = -1.0
+
+    def state(self) -> State | None:
+        """State of the newest tick; None: there is none yet."""
+        records = recording.read(self._path).records
+        if not len(records):
+            return None
+        newest, state = records[-1], State(int(records[-1]["state"]))
+        if state is State.RUN:
+            self._began = min(self._began, float(newest["now"]))
+        self.time = max(-1.0, float(newest["now"]) - self._began)
+        self._session.screen.show(moment(newest, self.time, self._session.config))
+        return state
+
+
+def moment(tick: np.void, cycle_time: float, config: Config) -> Moment:
+    """A record as the screen shows it."""
+    drum_speed = float(tick["measured_drum_speed"])
+    return Moment(
+        time=cycle_time,
+        state=State(int(tick["state"])).name,
+        setpoint=float(tick["setpoint_speed_setpoint"]),
+        motor_speed=float(tick["measured_motor_speed"]),
+        drum_speed=drum_speed,
+        rim_speed=drum_speed * config.bench.drum_radius,
+        shaft_torque=float(tick["measured_shaft_torque"]),
+        latency=float(tick["latency"]),
+        missed=int(tick["missed"]),
+    )
+
+
+class _ScanClock:
+    """Time of an emulator that scans on request: sleeping is scanning."""
+
+    def __init__(self, emulator: Emulator) -> None:
+        self._emulator, self._scans = emulator, 0
+
+    def now(self) -> float:
+        """Time of the last scan [s]."""
+        return self._scans * SCAN
+
+    def sleep_until(self, deadline: float) -> None:
+        """Let the emulator scan until it is that late [s]."""
+        scans = round(deadline / SCAN) - self._scans
+        if scans > 0:
+            self._emulator.step(scans)
+            self._scans += scans
+
+
+class _FileSink:
+    """Takes the records of a loop that nothing hurries; shows some of them."""
+
+    dropped, failed = 0, False
+
+    def __init__(self, path: Path, head: dict[str, Any], session: Session, layout: Layout) -> None:
+        self._file = path.open("wb")
+        self._file.write(encode_header(head))
+        self._dtype, self._session = np.dtype(layout.formats), session
+        self.state, self.began, self.now = State.OFF, math.inf, 0.0
+        self._shown = -1.0
+
+    def push(self, record: bytes) -> None:
+        """Append one record."""
+        self._file.write(record)
+        tick = np.frombuffer(record, dtype=self._dtype)[0]
+        self.state, self.now = State(int(tick["state"])), float(tick["now"])
+        if self.state is State.RUN:
+            self.began = min(self.began, self.now)
+        if self.now - self._shown >= LOOK_EVERY:
+            self._shown = self.now
+            self._session.screen.show(moment(tick, self.time, self._session.config))
+
+    @property
+    def time(self) -> float:
+        """Time since RUN began [s]; -1 before."""
+        return max(-1.0, self.now - self.began)
+
+    def close(self) -> None:
+        """Everything is in the file."""
+        self._file.close()
+
+
+def operate_fast(session: Session) -> Operated:
+    """The same loop through one cycle as fast as the machine allows."""
+    config = session.config
+    register_map = register_maps.load(config.plc.map)
+    clock, layout = _ScanClock(session.emulator), Layout.of(register_map)
+    head = header(config, register_map, started=0.0, shadow=False, real_time="not asked for")
+    path = session.file.with_suffix(SUFFIX)
+    sink = _FileSink(path, head, session, layout)
+    link = TcpLink(config.plc.host, config.plc.port, config.plc.unit, 1.0)
+    loop = Loop(config=config, register_map=register_map, link=link, sink=sink, clock=clock)
+    remote = False
+
+    def stop_requested() -> bool:
+        nonlocal remote
+        wanted = sink.state is State.ARMED or (
+            sink.state is State.RUN and sink.time <= session.duration
+        )
+        if wanted is not remote:
+            session.emulator.set_remote(on=wanted)
+            remote = wanted
+        if sink.state is not State.RUN and sink.time < 0.0 and sink.now > CHANGE_WITHIN:
+            raise GatewayError(f"the gateway did not come to RUN within {CHANGE_WITHIN:g} s")
+        return sink.state is State.SAFE
+
+    try:
+        loop.run(stop_requested)
+    finally:
+        sink.close()
+    return Operated(recording=path, exit_code=0)

@@ -1,0 +1,67 @@
+"""A sweep of steady speeds as a run of the daemon: its configuration, and its end (pure)."""
+
+from collections.abc import Sequence
+from typing import Final
+
+from gateway.configuration import sweep_speeds
+from gateway.configuration.config import Config, from_document
+from gateway.configuration.sweep_speeds import HOLD_S, RATE_RPM_S, RPM, Sweep
+from gateway.cycle.cycle import Output
+from gateway.cycle.supervisor import State
+from gateway.errors import ConfigError
+from gateway.losses.fit import FEWEST, SPREAD, different
+
+ENDED: Final = (State.RAMPDOWN, State.SAFE)
+BEGUN: Final = 0.5
+"""Of the first speed: what was asked for before is where the bench happened to stand."""
+
+
+def swept_config(config: Config, speeds: Sequence[float] | None, hold: float | None) -> Config:
+    """The same with a sweep; speeds in rpm, hold in s, None: as usual."""
+    highest = config.limits.speed_max / RPM
+    usual = [one for one in sweep_speeds.DEFAULT if one <= highest * (1.0 + 1e-9)]
+    asked = usual if speeds is None else list(speeds)
+    table = {
+        "speeds_rpm": asked,
+        "hold_s": HOLD_S if hold is None else hold,
+        "rate_rpm_s": RATE_RPM_S,
+    }
+    swept = from_document({**config.document, "sweep": table})
+    _refuse(asked, highest)
+    return swept
+
+
+def _refuse(speeds: Sequence[float], highest: float) -> None:
+    """Refuse what the law cannot be fitted to, before anything turns."""
+    ordered = sorted(speeds)
+    if different(speeds) < FEWEST or ordered[-1] < SPREAD * ordered[0]:
+        raise ConfigError(
+            "speeds that do not determine the friction",
+            place="--speeds",
+            value=ordered,
+            expected=f"at least {FEWEST}, the fastest at least {SPREAD:g} times the slowest",
+        )
+    if ordered[-1] > highest * (1.0 + 1e-9):
+        raise ConfigError(
+            "faster than the limit",
+            place="--speeds",
+            value=ordered[-1],
+            expected=f"at most limits.speed_max_rpm = {highest:.0f}",
+        )
+
+
+class Progress:
+    """Told of every tick's output, whether the run is over. `done`: the sweep was completed."""
+
+    def __init__(self, sweep: Sweep) -> None:
+        self._first = BEGUN * sweep.speeds[0]
+        self._begun = self.done = False
+
+    def __call__(self, output: Output) -> bool:
+        """Whether the sweep has come to standstill again, or the run has ended otherwise."""
+        if output.state in ENDED:
+            return True
+        if output.state is State.RUN and output.demand is not None:
+            self._begun = self._begun or output.demand > self._first
+            self.done = self._begun and output.demand == 0.0
+        return self.done

@@ -1,0 +1,121 @@
+"""Runs in files, as the analysis of losses takes them: CSV logs and the gateway's recordings."""
+
+import hashlib
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from gateway.configuration.config import Config
+from gateway.errors import ConfigError
+from gateway.losses.sections import Array, LossesError, Trace
+from gateway.recordings import log, recording
+from gateway.recordings.export import elapsed, fresh
+from gateway.recordings.header import config_of, map_of
+from gateway.recordings.log import LogError
+from register_maps.register_map import RegisterMap
+from register_maps.signals import Status
+
+TRUCK: Final = 1.0
+"""[N m] of the truck's wheel, over which there is a truck that drives or brakes."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """A run in a file.
+
+    date : of the recording, or of the log's last change; sha256 : of the file
+    config : that the run was recorded under, None: a log does not tell
+    """
+
+    path: Path
+    date: datetime
+    sha256: str
+    trace: Trace
+    config: Config | None = None
+
+
+def read(path: Path) -> Source:
+    """The run in a log or a recording; refused where a truck drives the drum."""
+    try:
+        is_recording = recording.is_recording(path)
+        changed = datetime.fromtimestamp(path.stat().st_mtime, UTC)
+    except OSError as error:
+        raise ConfigError(
+            error.strerror or "cannot be read", file=path, expected="a log or a recording"
+        ) from error
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    if not is_recording:
+        return Source(path=path, date=changed, sha256=digest, trace=_of_log(log.read(path)))
+    found = recording.read(path)
+    return Source(
+        path=path,
+        date=datetime.fromisoformat(found.header["date"]),
+        sha256=digest,
+        trace=_of_recording(found, map_of(found.header)),
+        config=config_of(found.header),
+    )
+
+
+def _of_log(found: log.Log) -> Trace:
+    columns = found.columns
+    wheel = columns.get("wheel_torque")
+    if wheel is not None and float(np.abs(wheel).max()) > TRUCK:
+        raise LogError(
+            "a truck stands on the drum",
+            file=found.path,
+            place="column wheel_torque_Nm",
+            value=float(wheel[np.argmax(np.abs(wheel))]),
+            expected="a run without a truck: what it pushes is no loss of the bench",
+        )
+    return Trace(
+        name=found.path.name,
+        time=found.time,
+        motor_speed=columns["motor_speed"],
+        drum_speed=columns["drum_speed"],
+        shaft_torque=columns["shaft_torque"],
+        shell_temperature=columns.get("shell_temperature"),
+    )
+
+
+def _of_recording(found: recording.Recording, register_map: RegisterMap) -> Trace:
+    rows = found.records[fresh(found)]
+    if len(rows) < 2:
+        raise LossesError(f"{found.path}: holds no samples of the PLC; expected a run")
+    if np.any(rows["measured_status"].astype(int) & Status.ROAD_LOAD):
+        raise LossesError(
+            f"{found.path}: was made in road load: a truck is on the drum, and what it pushes is "
+            "no loss of the bench; expected a sweep of steady speeds (gateway losses -c CONFIG)"
+        )
+    time = elapsed(rows["measured_plc_time"], register_map.modulus("plc_time"))
+    return Trace(
+        name=found.path.name,
+        time=time,
+        motor_speed=rows["measured_motor_speed"],
+        drum_speed=rows["measured_drum_speed"],
+        shaft_torque=_mean_torque(rows, time, register_map.modulus("shaft_torque_integral")),
+        shell_temperature=_shell(rows),
+    )
+
+
+def _mean_torque(rows: Any, time: Array, modulus: float | None) -> Array:
+    """Mean of the torque up to each sample [N m]: out of its integral, where the PLC has one."""
+    sampled: Array = rows["measured_shaft_torque"]
+    integral = rows["measured_shaft_torque_integral"]
+    if not np.isfinite(integral).all():
+        return sampled
+    change = np.diff(integral)
+    if modulus is not None:
+        change = np.mod(change + 0.5 * modulus, modulus) - 0.5 * modulus
+    mean: Array = np.concatenate((sampled[:1], change / np.diff(time)))
+    return mean
+
+
+def _shell(rows: Any) -> Array | None:
+    """Mean of the thermocouples that work [K]; None: there is none all the time."""
+    both = [rows[f"measured_shell_temperature_{number}"] for number in (1, 2)]
+    working = [one for one in both if np.isfinite(one).all()]
+    mean: Array | None = np.mean(working, axis=0) if working else None
+    return mean

@@ -1,0 +1,52 @@
+"""Effects in the terms that the field knows them by, with standard errors (pure)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from plant_emulator.diagnosis.fitting.joint_fit import linearised
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from plant_emulator.diagnosis.fitting.joint_fit import Point
+    from plant_emulator.diagnosis.machine import Model, Term
+    from plant_emulator.estimation.unknowns import Estimate
+
+# Half step of a central difference on the scale of the estimation.
+STEP = 1e-4
+
+
+def in_terms(model: Model, found: Point, runs: Sequence[int]) -> dict[str, list[dict[str, Any]]]:
+    """By effect of a fit: its terms, in the form of the answer's parameters.
+
+    The variance of a term t is g' C g, C the covariance of the fit and g the slope of t by it
+    (propagation of errors: JCGM 100:2008, eq. 13).
+    """
+    named = {name: model.candidates[name].terms for name in found.effects}
+    if not any(named.values()):
+        return {}
+    where = linearised(model, found, runs)
+    return {name: [_parameter(term, where) for term in terms] for name, terms in named.items()}
+
+
+def _parameter(term: Term, where: Estimate) -> dict[str, Any]:
+    shared = [k for k, u in enumerate(where.unknowns) if u.run is None]
+    slope = np.zeros(len(where.z))
+    for k in shared:
+        step = STEP * np.eye(len(where.z))[k]
+        slope[k] = (_at(term, where, step) - _at(term, where, -step)) / (2.0 * STEP)
+    on = np.flatnonzero(slope)  # an unknown that the term is not of may have an infinite variance
+    return {
+        "name": term.name,
+        "value": _at(term, where, np.zeros(len(where.z))),
+        "standard_error": float(np.sqrt(slope[on] @ where.covariance[np.ix_(on, on)] @ slope[on])),
+        "unit": term.unit,
+    }
+
+
+def _at(term: Term, where: Estimate, step: np.ndarray[Any, np.dtype[np.float64]]) -> float:
+    pairs = zip(where.unknowns, where.z + step, strict=True)
+    return term.of({u.name: u.value(float(z)) for u, z in pairs if u.run is None})

@@ -1,0 +1,146 @@
+"""Drive programs that a bench has not shown yet, as runs that can be judged before they are driven.
+
+They are simulated without noise at a fit to the logs, and judged by the noise of those logs. A
+program was driven where a log has its reference; a log with a truck stands for both travel
+programs, whose references depend on the bench. A start with a cold gear is a run of its own.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.errors import UnsettledError
+from plant_emulator.estimation.start_search import GAP_POSITION
+from plant_emulator.identification.experiment_design import noise_levels
+from plant_emulator.recordings.preflight import LEAST_MOTION, NAMES
+from plant_emulator.recordings.recording import Recording
+from plant_emulator.signals.log import VOLTAGE, Log, compared
+from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram, TravelProgram, in_words
+from plant_emulator.simulation.simulate import run_of, simulate
+from plant_emulator.simulation.travel_program import travel
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from plant_emulator.model.parameters import ParameterSet
+    from plant_emulator.simulation.programs import Program
+
+    Values = Mapping[str, float]
+
+# A log shows a program if its reference is off by less [rad/s rms], over this share of it.
+SAME_REFERENCE, SHOWN = 5.0, 0.9
+# Shell of a gear that stood over night, and from where on one is no longer cold [K].
+COLD_SHELL, NO_LONGER_COLD = 293.15, 298.15
+
+
+def shows(log: Log, program: Program) -> bool:
+    """Whether the log is a run of this program."""
+    if not isinstance(program, SpeedProgram):
+        return "wheel_torque" in log
+    if "wheel_torque" in log:
+        return False
+    time, reference = program.reference()
+    off = log["speed_reference"] - np.interp(log.time - log.time[0], time, reference)
+    long_enough = np.ptp(log.time) >= SHOWN * program.duration
+    return bool(long_enough and np.sqrt(np.mean(off**2)) < SAME_REFERENCE)
+
+
+def undriven(logs: Sequence[Log]) -> list[Program]:
+    """Programs that no log shows, those without a truck first."""
+    rest = [p for p in PROGRAMS.values() if not any(shows(log, p) for log in logs)]
+    return sorted(rest, key=lambda p: not isinstance(p, SpeedProgram))
+
+
+def cold(logs: Sequence[Log]) -> bool:
+    """Whether some log shows a gear that started cold."""
+    name = "shell_temperature"
+    return any(name in log and log[name][0] < NO_LONGER_COLD for log in logs)
+
+
+def planned(
+    recordings: Sequence[Recording], parameters: ParameterSet, warm: Values, from_cold: Values
+) -> Iterator[Recording]:
+    """Runs not driven yet, the least effort first: warm, from a cold start, with a truck.
+
+    parameters : at the fit, for what a truck's reference follows from
+    warm, from_cold : all values of the simulation, with states as the last log or a cold start has
+    """
+    logs = [r.log for r in recordings]
+    rest = undriven(logs)
+    levels = noise_levels(recordings)
+    shell = _last_shell(logs)
+    for speeds in (p for p in rest if isinstance(p, SpeedProgram)):
+        yield from _recorded(in_words(speeds), _inputs(speeds), warm, levels, shell)
+    if not cold(logs):
+        speeds = max(
+            (p for p in PROGRAMS.values() if isinstance(p, SpeedProgram)), key=lambda p: p.duration
+        )
+        words = f"{speeds.name} from a cold start"
+        yield from _recorded(words, _inputs(speeds), from_cold, levels, COLD_SHELL)
+    for cycle in (p for p in rest if isinstance(p, TravelProgram)):
+        with suppress(UnsettledError):
+            inputs = travel(cycle, parameters)
+            yield from _recorded(in_words(cycle), inputs, warm, levels, shell)
+
+
+def _last_shell(logs: Sequence[Log]) -> float | None:
+    known = [log["shell_temperature"] for log in logs if "shell_temperature" in log]
+    return float(known[-1][0]) if known else None
+
+
+def _inputs(program: SpeedProgram) -> Log:
+    time, reference = program.reference()
+    return Log(time, {"speed_reference": reference}, program.name)
+
+
+def _recorded(
+    words: str, inputs: Log, values: Values, levels: Mapping[str, float], shell: float | None
+) -> Iterator[Recording]:
+    """The run as these values predict it; none where they cannot be driven through it."""
+    run = run_of(inputs)
+    with suppress(UnsettledError):
+        rest = dict(values)
+        log = simulate(run, rest, gap_position=rest.pop(GAP_POSITION))
+        signals = {**log.signals, "speed_reference": inputs["speed_reference"]}
+        if shell is not None:
+            signals["shell_temperature"] = np.full(len(log.time), shell)
+        channels = tuple(levels)
+        yield Recording(
+            Log(log.time, signals, words),
+            run,
+            channels,
+            np.array([levels[name] for name in channels]),
+            np.ones((len(channels), len(log.time)), bool),
+        )
+
+
+def lacks(logs: Sequence[Log], base_speed: float) -> dict[str, tuple[str, ...]]:
+    """By subsystem: what would tell more of it and is in none of these logs.
+
+    base_speed : above which the field is weakened [rad/s]
+    """
+    fastest = max(float(log["motor_speed"].max()) for log in logs)
+    backwards = min(float(log["speed_reference"].min()) for log in logs) < -LEAST_MOTION
+    missing = (
+        (not any(VOLTAGE in compared(log) for log in logs), NAMES[VOLTAGE], ("drive", "motor")),
+        (
+            fastest < base_speed,
+            f"a run above {base_speed:.0f} rad/s, where the field is weakened",
+            ("drive", "motor"),
+        ),
+        (not cold(logs), "a cold start", ("gear",)),
+        (not backwards, "a run in the other direction", ("gear",)),
+        (
+            not any("wheel_torque" in log for log in logs),
+            "a run with a truck on the drum",
+            ("gear", "drum", "wheel_contact"),
+        ),
+    )
+    found: dict[str, tuple[str, ...]] = {}
+    for absent, words, subsystems in missing:
+        for subsystem in subsystems if absent else ():
+            found[subsystem] = (*found.get(subsystem, ()), words)
+    return found

@@ -1,0 +1,71 @@
+"""Where the gap lies, as the answer tells it: the verdict's own place, or the gap's."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from plant_emulator.diagnosis.fitting.explanation import Explanation
+    from plant_emulator.diagnosis.fitting.steps import Task
+    from plant_emulator.diagnosis.machine import Candidate, Model
+    from plant_emulator.diagnosis.selection.verdict import Verdict
+
+
+def evidence_shares(
+    explained: Explanation, candidates: Mapping[str, Candidate]
+) -> dict[str, float]:
+    """Share of each subsystem, by the best fall of the cost that one of its effects brings."""
+    best: dict[str, float] = {}
+    for contender in explained.contenders:
+        if contender.point is not None:
+            place = candidates[contender.effect].subsystem
+            fall = max(0.0, explained.null.cost - contender.point.cost)
+            best[place] = max(best.get(place, 0.0), fall)
+    total = sum(best.values())
+    return {place: fall / total for place, fall in best.items()} if total > 0.0 else {}
+
+
+def subsystem(
+    verdict: Verdict,
+    candidates: Mapping[str, Candidate],
+    shares: Mapping[str, float],
+) -> str | None:
+    """The place of the effect with the largest share there, of the most surprising parameter, or of
+    the gap.
+    """
+    if verdict.kind == "none":
+        return None
+    if verdict.kind == "parameter":
+        return verdict.shifts[0].subsystem
+    if verdict.kind == "effect":
+        places = [candidates[name].subsystem for name in verdict.effects]
+        return max(places, key=lambda place: shares.get(place, 0.0))
+    return max(shares, key=shares.__getitem__, default=None)
+
+
+def site(model: Model, task: Task) -> Mapping[str, Any] | None:
+    """Step of a diagnosis: the block that the gap of a fit lies in."""
+    return model.located(task.base, task.runs)
+
+
+def location(
+    place: str | None, shares: Mapping[str, float], located: Mapping[str, Any] | None
+) -> dict[str, Any]:
+    """The part `location` of the answer.
+
+    place : the verdict's; None: there is no gap
+    located : what the machine's blocks say; None: the shares are those of the evidence
+    """
+    if located is None:
+        by_share = sorted(shares.items(), key=lambda pair: -pair[1])
+        blocks: Any = [{"name": name, "share": share} for name, share in by_share]
+        located = {"channel": None, "phase": None, "subsystems": blocks, "map": []}
+    return {
+        "subsystem": place,
+        "channel": None if place is None else located["channel"],
+        "phase": None if place is None else located["phase"],
+        "subsystems": located["subsystems"],
+        "map": located["map"],
+    }

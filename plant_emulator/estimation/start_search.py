@@ -1,0 +1,90 @@
+"""One-dimensional scans by simulation: from first guesses to the valley that the optimum lies in.
+
+In cruise the drum floats in the gap, and a tiny torque decides where in it the deceleration finds
+it: the cost of a fit has many valleys in the gap, the damping and the start position. A scan, with
+a loss that forgives spikes at the wrong time, chooses the valley; least squares then finds its
+bottom.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.estimation.robust_scan import cauchy_loss
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from plant_emulator.recordings.recording import Recording
+    from plant_emulator.signals.log import Array
+
+    Progress = Callable[[str, float], None]
+
+
+GAP_POSITION = "gap_position"
+# A scan: name, factor either way, values. Coarse over what a first guess may be off, then fine.
+SCANS: tuple[tuple[str, float, int], ...] = (
+    (GAP_POSITION, 1.0, 9),
+    ("dead_time", 2.5, 27),
+    ("backlash_half_gap", 2.2, 31),
+    (GAP_POSITION, 1.0, 21),
+    ("drum_shaft_damping", 3.0, 13),
+    ("dead_time", 1.1, 11),
+    ("backlash_half_gap", 1.15, 21),
+    (GAP_POSITION, 1.0, 41),
+)
+FINE_SCANS = SCANS[-3:]
+SCAN_TOLERANCE = 1e-4
+
+
+class Search:
+    """The way from a parameter set to start values in the right valley.
+
+    values : parameters [SI], scanned where free; gaps : start in the gap of every run, -1 to 1
+    progress : called with a stage's name and how far it has come, 0 to 1
+    """
+
+    def __init__(
+        self,
+        recordings: Sequence[Recording],
+        values: Mapping[str, float],
+        free: Sequence[str],
+        progress: Progress | None = None,
+    ) -> None:
+        self.recordings, self.free, self.progress = recordings, free, progress
+        self.values = dict(values)
+        self.gaps = [0.0] * len(recordings)
+        self.simulations = 0
+
+    def loss(self, run: int, values: Mapping[str, float], gap: float) -> float:
+        """Cauchy's loss of a run."""
+        self.simulations += 1
+        return cauchy_loss(self.recordings[run].residual(values, gap, SCAN_TOLERANCE))
+
+    def total(self, values: Mapping[str, float]) -> float:
+        """Loss of all runs at the starts in the gap found so far."""
+        return sum(self.loss(k, values, gap) for k, gap in enumerate(self.gaps))
+
+    def scan(self, scans: Sequence[tuple[str, float, int]] = SCANS) -> None:
+        """Go through the scans in order, each from the best of the one before."""
+        for done, (name, factor, count) in enumerate(scans):
+            if self.progress is not None:
+                self.progress("start values", done / len(scans))
+            if name == GAP_POSITION:
+                self.scan_gaps(count)
+            elif name in self.free:
+                self._scan(name, np.geomspace(1.0 / factor, factor, count))
+
+    def _scan(self, name: str, factors: Array) -> None:
+        candidates = [{**self.values, name: self.values[name] * f} for f in factors]
+        losses = [self.total(candidate) for candidate in candidates]
+        self.values = candidates[int(np.argmin(losses))]
+
+    def scan_gaps(self, count: int) -> None:
+        """Choose the start in the gap of every run among so many positions."""
+        for k, gap in enumerate(self.gaps):
+            positions = [gap, *np.linspace(-1.0, 1.0, count)]
+            losses = [self.loss(k, self.values, float(g)) for g in positions]
+            self.gaps[k] = float(positions[int(np.argmin(losses))])

@@ -1,0 +1,213 @@
+"""What a fit of road logs says: values with standard errors, what they cannot tell, doubts (pure).
+
+Mass and load-cell gain enter only as gain times mass. C_rr needs neither; the forces F0 and F1 are
+as good as the mass is, which is taken as exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from plant_emulator.road_load.covariance import covariance_of, residual_variance
+from plant_emulator.road_load.fit import LOWER, UPPER
+from plant_emulator.road_load.prior import NAMES, OFFSET, vector
+from plant_emulator.simulation.fit_metrics import Fit
+from plant_emulator.simulation.fit_metrics import fit as measures
+
+if TYPE_CHECKING:
+    from plant_emulator.road_load.fit import RoadFit
+    from plant_emulator.signals.log import Array
+
+NORMAL_95 = 1.959964
+COLLINEAR = 0.95
+CONTRADICTION = 4.0
+"""Standard deviations from what was known of the gain, from which mass or gearing must be wrong."""
+EXPLAINED = 98.0
+"""Val1 of the velocity [percent] below which the model is not what happened."""
+EXCELLENT, NOISE = 99.8, 3.5
+"""Val1 [percent] below which the residual has to be noise, and the long-run variance of the white
+residual from which it is none."""
+MASS = (
+    "mass from torque_gain: only their product is seen; the given mass is taken as exact, f0 and "
+    "f1 are proportional to it"
+)
+UNITS = {
+    "crr": "1",
+    "crr_v": "s",
+    "efficiency": "1",
+    "f0_newton": "N",
+    "f1_newton_per_m_s": "N s/m",
+    "torque_gain": "1",
+    "torque_offset_Nm": "N m",
+    "velocity_clock_ahead_s": "s",
+    "clock_ppm": "ppm",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """A value, its standard error, and its 95 % interval."""
+
+    value: float
+    standard_error: float
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Bounds between which the truth lies in 95 of 100 cases."""
+        half = NORMAL_95 * self.standard_error
+        return self.value - half, self.value + half
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoadAnswer:
+    """Estimates by the names of the answer file, fit of the velocity, limits and doubts.
+
+    problems : why the numbers must not be used; empty where they may
+    """
+
+    estimates: dict[str, Estimate]
+    velocity: Fit
+    not_separable: tuple[str, ...]
+    problems: tuple[str, ...]
+    starts: tuple[int, int]
+
+    @property
+    def converged(self) -> bool:
+        """Whether the numbers may be used."""
+        return not self.problems
+
+    def as_json(self) -> dict[str, Any]:
+        """The machine-readable answer."""
+        values = {
+            name: {
+                "value": estimate.value,
+                "standard_error": estimate.standard_error,
+                "interval_95": list(estimate.interval),
+                "unit": UNITS[name],
+            }
+            for name, estimate in self.estimates.items()
+        }
+        return {
+            "schema": "truck/1",
+            **values,
+            "velocity": {"val1": self.velocity.val1, "val2": self.velocity.val2},
+            "not_separable": list(self.not_separable),
+            "starts": {"reached": self.starts[0], "tried": self.starts[1]},
+            "problems": list(self.problems),
+            "converged": self.converged,
+        }
+
+
+def answer(fit: RoadFit) -> RoadAnswer:
+    """What the fit says."""
+    covariance = covariance_of(fit)
+    errors = dict(zip((NAMES[i] for i in fit.free), np.sqrt(np.diag(covariance)), strict=True))
+    quality = velocity_fit(fit)
+    estimates = estimates_of(fit, errors)
+    return RoadAnswer(
+        estimates=estimates,
+        velocity=quality,
+        not_separable=not_separable(fit, covariance, estimates),
+        problems=tuple(problems(fit, quality)),
+        starts=fit.reached,
+    )
+
+
+def velocity_fit(fit: RoadFit) -> Fit:
+    """Val1 and Val2 of the velocity, over every measured sample that both logs cover."""
+    run = fit.run
+    covered = (run.velocity.time >= run.time[0]) & (run.velocity.time <= run.time[-1])
+    covered &= run.velocity.known
+    simulated = run.compared(fit.values, run.velocity.time[covered])
+    return measures(run.velocity.values[covered], simulated, run.velocity.source)
+
+
+def estimates_of(fit: RoadFit, errors: dict[str, Any]) -> dict[str, Estimate]:
+    """The estimates by the names and in the units of the answer.
+
+    F0 = m g C_rr    F1 = m g C_rr,v / r_d
+    """
+    truck, values = fit.run.truck, fit.values
+
+    def scaled(name: str, factor: float = 1.0) -> Estimate:
+        return Estimate(
+            value=factor * float(getattr(values, name)), standard_error=factor * float(errors[name])
+        )
+
+    return {
+        "crr": scaled("crr"),
+        "crr_v": scaled("crr_v"),
+        "efficiency": scaled("efficiency"),
+        "f0_newton": scaled("crr", truck.weight),
+        "f1_newton_per_m_s": scaled("crr_v", truck.weight / truck.drum_radius),
+        "velocity_clock_ahead_s": scaled("clock_ahead"),
+        "clock_ppm": scaled("clock_skew", 1e6),
+        "torque_offset_Nm": scaled("torque_offset"),
+        "torque_gain": scaled("torque_gain"),
+    }
+
+
+def not_separable(
+    fit: RoadFit, covariance: Array, estimates: dict[str, Estimate]
+) -> tuple[str, ...]:
+    """What these logs cannot tell apart, one sentence each."""
+    found = [MASS]
+    low, high = estimates["crr_v"].interval
+    if low <= 0.0 <= high:
+        found.append(f"crr_v from 0: its 95 % interval is {low:.2g} .. {high:.2g} s")
+    gain = NAMES.index("torque_gain")
+    share = np.sqrt(covariance[gain, gain]) / fit.prior.deviation[gain]
+    if share > 0.5:
+        found.append(
+            "efficiency from torque_gain: driving and braking are both needed; the gain is what "
+            "was known of it beforehand"
+        )
+    deviations = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(deviations, deviations)
+    for i, j in combinations(range(len(fit.free)), 2):
+        if abs(correlation[i, j]) > COLLINEAR:
+            names = f"{NAMES[fit.free[i]]} from {NAMES[fit.free[j]]}"
+            found.append(f"{names}: correlation {correlation[i, j]:.3f}")
+    return tuple(found)
+
+
+# Zero of the load cell that differs so much between standstills [N m] is 2 % of the road load.
+ZERO_MOVED = 0.1
+
+
+def problems(fit: RoadFit, quality: Fit) -> list[str]:
+    """Reasons why the numbers must not be used."""
+    found = [] if fit.settled else ["the search ended before it settled"]
+    values = vector(fit.values)
+    for index in fit.free:
+        edge = 1e-6 * (UPPER[index] - LOWER[index])
+        if not LOWER[index] + edge < values[index] < UPPER[index] - edge:
+            found.append(f"{NAMES[index]} ended at its bound {values[index]:g}")
+    if quality.val1 < EXPLAINED:
+        found.append(
+            f"the truck's velocity is not explained: Val1 {quality.val1:.1f} %, at least "
+            f"{EXPLAINED:g} expected; level road, no foot brake, both logs of one run?"
+        )
+    elif quality.val1 < EXCELLENT and (variance := residual_variance(fit)) > NOISE:
+        found.append(
+            f"the residual is no noise, its long-run variance is {variance:.1f} times what noise "
+            "leaves: level road, no foot brake, both logs of one run?"
+        )
+    drift = float(fit.prior.deviation[NAMES.index("torque_offset")])
+    if ZERO_MOVED < drift < OFFSET:
+        found.append(
+            f"the load cell's zero moves from standstill to standstill, by {drift:.2f} N m "
+            "(standard deviation): cut the log where it moved"
+        )
+    gain = NAMES.index("torque_gain")
+    distance = abs(values[gain] - 1.0) / fit.prior.deviation[gain]
+    if distance > CONTRADICTION:
+        found.append(
+            f"the load cell's gain would be {values[gain]:.3f}, {distance:.1f} standard deviations "
+            "from 1: is the mass, the gear ratio or the wheel radius another one?"
+        )
+    return found

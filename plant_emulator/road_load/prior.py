@@ -1,0 +1,144 @@
+"""What is known of a truck before its road logs are fitted, and where the fits begin (pure).
+
+Known are the gain of the load cell within its calibration, its offset as the standing truck shows
+it, and that the rates of two clocks differ by some 100 ppm. The starts are the plain values of the
+thesis, a regression of the acceleration on the torque, which needs no simulation, and four points
+around it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant_emulator.road_load.signal import low_pass
+from plant_emulator.road_load.truck_model import GRAVITY, RoadParameters
+
+if TYPE_CHECKING:
+    from plant_emulator.road_load.run import RoadRun
+    from plant_emulator.signals.log import Array
+
+Indices = NDArray[np.int64]
+
+NAMES = tuple(RoadParameters.__dataclass_fields__)
+CLOCK_SKEW = 100e-6
+"""Standard deviation of what two free-running clocks differ by [1]."""
+CRR_V = 1e-3
+"""Standard deviation of C_rr,v beforehand [s]: at 14 km/h as large as half of C_rr."""
+OFFSET = 1.0
+"""[N m] by which a load cell may be off where no standstill shows it."""
+LEAST_STANDSTILL = 0.3
+"""[s] of sure standstill without which the offset of the load cell is not seen."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prior:
+    """What is known beforehand, shape (parameters,): means, deviations (infinite: nothing)."""
+
+    mean: Array
+    deviation: Array
+
+    @property
+    def rows(self) -> Indices:
+        """The parameters about which something is known: their indices."""
+        return np.flatnonzero(np.isfinite(self.deviation)).astype(np.int64)
+
+    def residual(self, values: Array) -> Array:
+        """Distance from the means in deviations, one row for each that is known."""
+        found: Array = ((self.mean - values) / self.deviation)[self.rows]
+        return found
+
+
+def vector(values: RoadParameters) -> Array:
+    """Values in the order of NAMES."""
+    return np.array(astuple(values), dtype=np.float64)
+
+
+def parameters(values: Array) -> RoadParameters:
+    """The record of values in the order of NAMES."""
+    return RoadParameters(**dict(zip(NAMES, values.tolist(), strict=True)))
+
+
+def prior_of(run: RoadRun, gain_deviation: float) -> Prior:
+    """What is known without a fit."""
+    mean, deviation = np.zeros(len(NAMES)), np.full(len(NAMES), np.inf)
+    known = {
+        "torque_gain": (1.0, gain_deviation),
+        "clock_skew": (0.0, CLOCK_SKEW),
+        "crr_v": (0.0, CRR_V),
+        "torque_offset": standstill_offset(run),
+    }
+    for name, (value, spread) in known.items():
+        mean[NAMES.index(name)], deviation[NAMES.index(name)] = value, spread
+    return Prior(mean=mean, deviation=deviation)
+
+
+def standstill_offset(run: RoadRun) -> tuple[float, float]:
+    """Torque that the load cell shows while the truck stands, and its standard error [N m].
+
+    From the noise, or from how far the standstills differ among each other where that is more: a
+    load cell drifts.
+    """
+    edges = np.flatnonzero(np.diff(np.r_[False, run.held, False].astype(np.int8)))
+    rests = [run.torque.values[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    count = np.array([len(rest) for rest in rests])
+    if count.sum() * run.torque.period < LEAST_STANDSTILL:
+        return 0.0, OFFSET
+    shown = np.concatenate(rests)
+    means = np.array([rest.mean() for rest in rests])
+    mean = float(shown.mean())
+    error = max(float(shown.std()), 1e-4) / float(np.sqrt(len(shown)))
+    if len(rests) > 1:
+        among = np.sum(count * (means - mean) ** 2) / ((len(rests) - 1) * count.sum())
+        error = max(error, float(np.sqrt(among)))
+    return mean, error
+
+
+def starts(run: RoadRun, prior: Prior) -> list[RoadParameters]:
+    """Where the fits begin."""
+    near = regression(run, prior)
+    plain = replace(near, crr=0.0117, crr_v=0.0, efficiency=0.9, torque_gain=1.0)
+    around = [(0.6, 0.93, 0.02), (1.5, 1.05, -0.02), (0.8, 1.05, 0.05), (1.25, 0.93, -0.05)]
+    moved = [
+        replace(
+            near,
+            crr=near.crr * crr,
+            efficiency=min(near.efficiency * efficiency, 0.99),
+            clock_ahead=near.clock_ahead + shift,
+        )
+        for crr, efficiency, shift in around
+    ]
+    return [near, replace(plain, clock_ahead=0.0), *moved]
+
+
+def regression(run: RoadRun, prior: Prior) -> RoadParameters:
+    """A start without simulation: acceleration on driving torque, braking torque and direction.
+
+    dv/dt = xi eta / (r_w m gain) T+ + xi / (eta r_w m gain) T- - g C_rr sgn v
+    """
+    truck, offset = run.truck, float(prior.mean[NAMES.index("torque_offset")])
+    period = float(np.median(np.diff(run.time)))
+    speed = low_pass(run.measured, period, 4.0)
+    shown = low_pass(run.torque.values, run.torque.period, 4.0) - offset
+    torque = np.interp(run.time + run.ahead, run.torque.time, shown)
+    used = run.known & (np.abs(speed) > 0.3)
+    sign = np.sign(speed)
+    drives = torque * sign > 0.0
+    columns = np.stack([np.where(drives, torque, 0.0), np.where(drives, 0.0, torque), -sign], 1)
+    found = np.linalg.lstsq(columns[used], np.gradient(speed, period)[used])[0]
+    lossless = truck.ratio / (truck.wheel_radius * truck.mass)
+    driving, braking = (float(value) / lossless for value in found[:2])
+    sound = 0.2 < driving < 2.0 and driving < braking < 4.0
+    return RoadParameters(
+        crr=float(np.clip(found[2] / GRAVITY, 1e-3, 0.1)),
+        crr_v=0.0,
+        efficiency=float(np.clip(np.sqrt(driving / braking), 0.5, 0.99)) if sound else 0.9,
+        torque_gain=float(np.clip(1.0 / np.sqrt(driving * braking), 0.8, 1.25)) if sound else 1.0,
+        torque_offset=offset,
+        clock_ahead=run.ahead,
+        clock_skew=0.0,
+        initial_velocity=float(speed[0]) if run.moving_start else 0.0,
+    )

@@ -1,0 +1,34 @@
+"""An identified truck as the `[truck]` table of the gateway's configuration (pure)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from plant_emulator.road_load.answer import RoadAnswer
+    from plant_emulator.road_load.truck_model import Truck
+
+
+def table(answer: RoadAnswer, truck: Truck, origin: Sequence[str]) -> str:
+    """The text of a TOML file; `origin` are lines about where it comes from, as comments.
+
+    The road load stands as F0 and F1, which need no drum. What the gateway does not take is told
+    in comments, and stays with the table when that is pasted.
+    """
+    lines = [*origin, "Standard errors at the end of a line; mass and radius as given.", ""]
+    for name in ("crr", "crr_v", "efficiency", "torque_gain", "torque_offset_Nm"):
+        estimate = answer.estimates[name]
+        lines.append(f"{name} = {estimate.value:.6g} +- {estimate.standard_error:.2g}")
+    lines += [f"Not separable: {text}" for text in answer.not_separable]
+    f0, f1 = answer.estimates["f0_newton"], answer.estimates["f1_newton_per_m_s"]
+    keys = [
+        "[truck]",
+        f"mass_kg = {truck.mass!r}  # with its load",
+        "load_kg = 0.0",
+        f"wheel_radius_m = {truck.wheel_radius!r}",
+        f"f0_N = {f0.value:.6g}  # +- {f0.standard_error:.2g}",
+        f"f1_N_per_m_s = {f1.value:.6g}  # +- {f1.standard_error:.2g}",
+    ]
+    return "\n".join([f"# {line}".rstrip() for line in lines] + keys) + "\n"

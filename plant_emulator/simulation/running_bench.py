@@ -1,0 +1,152 @@
+"""The running bench: the model advanced in fixed steps, a few at a time, for the emulator."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, isfinite
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.errors import EmulatorError, UnsettledError
+from plant_emulator.simulation.simulate import values_of
+from plant_emulator.solver.kernel import Kernel, kernel_for, vector
+from plant_emulator.solver.stepper import CHANNELS
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.model.parameters import ParameterSet
+    from plant_emulator.signals.log import Array
+
+STEP = 1e-3
+# How much longer than nominal effects may make the dead time [s]; the bench remembers that much.
+LONGER_DEAD_TIME = 0.5
+(
+    MOTOR_SPEED,
+    DRUM_SPEED,
+    ARMATURE_CURRENT,
+    SHAFT_TORQUE,
+    ARMATURE_VOLTAGE,
+    SHELL_TEMPERATURE,
+    WHEEL_TORQUE,
+) = range(len(CHANNELS))
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchSamples:
+    """What the sensors showed at the end of every step, shape (steps,) each, and where it stands.
+
+    wheel_torque : torque of the truck at its wheel incl. the brake's reaction, mean [N m]
+    shell_temperature [K]; motor_angle, drum_angle: since the start [rad]
+    """
+
+    motor_speed: Array
+    drum_speed: Array
+    armature_current: Array
+    armature_voltage: Array
+    shaft_torque: Array
+    wheel_torque: float
+    shell_temperature: float
+    motor_angle: float
+    drum_angle: float
+
+
+class Bench:
+    """Drive, motor, gear and drum at rest, waiting for references.
+
+    effects : effect -> parameter -> value [SI]; gap_position: see `simulate`; step [s]
+    truck : whether one stands on the drum
+    """
+
+    def __init__(
+        self,
+        parameters: ParameterSet,
+        effects: Mapping[str, Mapping[str, float]] | None = None,
+        *,
+        gap_position: float = 0.0,
+        truck: bool = False,
+        step: float = STEP,
+        kernel: Kernel | None = None,
+    ) -> None:
+        values: Mapping[str, float] = values_of(parameters, effects)
+        self._kernel, values = (kernel, values) if kernel is not None else kernel_for(values)
+        self._p = self._kernel.parameter_record(values)
+        self._stage = self._kernel.stage_record()
+        self._stage.truck = float(truck)
+        self._x = self._kernel.state(self._p, gap_position * self._p.backlash_half_gap)
+        self._work = self._kernel.work()
+        self._longest_dead_time = self._p.dead_time + LONGER_DEAD_TIME
+        # The last step's first stage looks less than one step further back.
+        self._history = vector([0.0] * (ceil(self._longest_dead_time / step) + 3))
+        self._newest = 0
+        self._step = step
+        self._motor_angle = 0.0
+        self._drum_angle = 0.0
+        self._truck = (0.0, 0.0)
+        self._own_current_limit = self._p.armature_current_limit
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        return float(self._stage.time)
+
+    @property
+    def unsettled(self) -> int:
+        """Implicit stages so far whose equations were not solved: what follows is not the model."""
+        return int(self._stage.unsettled)
+
+    def advance(
+        self, references: Sequence[float], *, wheel_torque: float = 0.0, brake_torque: float = 0.0
+    ) -> BenchSamples:
+        """Advance by one step for each reference and return what the sensors showed.
+
+        references : what the PLC asks of the drive at the end of each step, before its dead time,
+            linear between them [rad/s]
+        wheel_torque : the truck's drive at its own wheel [N m]
+        brake_torque : its brake, >= 0, holds a standing drum up to that torque [N m at the wheel]
+        """
+        self._load(wheel_torque, brake_torque)
+        out = np.zeros((len(references), len(CHANNELS)))
+        self._newest = self._kernel.advance(
+            vector([float(r) for r in references]),
+            self._history,
+            self._newest,
+            self._step,
+            self._x,
+            self._work,
+            self._stage,
+            self._p,
+            out,
+        )
+        if self._newest < 0:
+            raise EmulatorError(
+                f"bench at {self.time:g} s: the drive's dead time, with its effects, lies outside "
+                f"of 0 to {self._longest_dead_time:.4g} s, which the running bench remembers"
+            )
+        sums = out.sum(axis=0).tolist()
+        if not isfinite(sum(sums)):
+            raise UnsettledError(f"bench at {self.time:g} s: its state is not finite any more")
+        self._motor_angle += sums[MOTOR_SPEED] * self._step
+        self._drum_angle += sums[DRUM_SPEED] * self._step
+        return BenchSamples(
+            motor_speed=out[:, MOTOR_SPEED],
+            drum_speed=out[:, DRUM_SPEED],
+            armature_current=out[:, ARMATURE_CURRENT],
+            armature_voltage=out[:, ARMATURE_VOLTAGE],
+            shaft_torque=out[:, SHAFT_TORQUE],
+            wheel_torque=sums[WHEEL_TORQUE] / len(out),
+            shell_temperature=float(out[-1, SHELL_TEMPERATURE]),
+            motor_angle=self._motor_angle,
+            drum_angle=self._drum_angle,
+        )
+
+    def limit_current(self, limit: float) -> None:
+        """Let the drive ask for no more armature current than that, nor than its own limit [A]."""
+        self._p.armature_current_limit = min(limit, self._own_current_limit)
+
+    def _load(self, wheel_torque: float, brake_torque: float) -> None:
+        """Set the truck's torques; writing a record costs more than a step of the bench."""
+        if (wheel_torque, brake_torque) != self._truck:
+            self._stage.wheel_torque, self._stage.brake_torque = wheel_torque, brake_torque
+            self._truck = (wheel_torque, brake_torque)

@@ -1,0 +1,80 @@
+"""Finds the faults of a user's own effect, and says where in his file they are."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, cast
+
+from plant_emulator import effects
+from plant_emulator.errors import ParameterError, place_in
+from plant_emulator.model import stage
+from plant_emulator.model.parameters import UNITS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+    from plant_emulator.effects import Effect
+    from plant_emulator.model.records import Record
+
+# Size of the implicit stage that a memory is tried with [s].
+SHORT = 1e-3
+
+
+class Stage(SimpleNamespace):
+    """A plain stage record; the name is what an error shows."""
+
+
+class Parameters(SimpleNamespace):
+    """A plain parameter record."""
+
+
+def memory_names(known: Mapping[str, Effect]) -> list[str]:
+    """Names of all memories in the stage record, in the order of the state vector."""
+    return [f"{effect.name}_{memory}" for effect in known.values() for memory in effect.memories]
+
+
+def try_out(known: Mapping[str, Effect]) -> None:
+    """Call the functions of each effect that is not shipped once, at rest, at its plausible size.
+
+    Uncompiled, since the compiler says of a misspelt name only that it is missing, not where. A
+    division by zero is no fault here: compiled it gives infinity, and the simulation refuses what
+    is not finite.
+    """
+    for name in known.keys() - effects.names():
+        _try_one(known[name], known)
+
+
+def _try_one(effect: Effect, known: Mapping[str, Effect]) -> None:
+    for function, arguments in _calls(effect, known):
+        try:
+            float(function(*arguments))
+        except ArithmeticError:
+            continue
+        except Exception as error:
+            raise_in_effects(error, known)
+            line = function.__code__.co_firstlineno
+            raise ParameterError(
+                f"{effect.file}:{line}: {function.__name__} gives no number: {error}"
+            ) from error
+
+
+def _calls(
+    effect: Effect, known: Mapping[str, Effect]
+) -> Iterator[tuple[Callable[..., Any], tuple[Any, ...]]]:
+    own = {f"{effect.name}_{key}": value for key, value in effect.plausible().items()}
+    p = cast("Record", Parameters(**dict.fromkeys(UNITS, 1.0) | effects.neutral(known) | own))
+    s = cast("Record", Stage(**dict.fromkeys((*stage.STAGE, *memory_names(known)), 0.0)))
+    for law in effect.laws.values():
+        yield law, (0.0, s, p)
+    for memory in effect.memories.values():
+        yield memory.start, (p,)
+        value = () if memory.follows is None else (0.0,)
+        base = () if memory.beside is None else (0.0,)
+        yield memory.advance, (0.0, SHORT, *value, *base, s, p)
+
+
+def raise_in_effects(error: Exception, known: Mapping[str, Effect]) -> None:
+    """Raise ParameterError, if the fault lies in the file of an effect."""
+    place = place_in((effect.file for effect in known.values()), error)
+    if place is not None:
+        raise ParameterError(place) from error
