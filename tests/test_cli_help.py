@@ -49,7 +49,7 @@ def test_every_command_has_help_and_a_line_in_the_list(package: str, name: str) 
 
 @pytest.mark.parametrize("package", FOLDERS)
 def test_version_is_told(package: str) -> None:
-    assert "0.1.0" in CliRunner().invoke(FOLDERS[package], ["--version"]).stdout
+    assert "0.2.0" in CliRunner().invoke(FOLDERS[package], ["--version"]).stdout
 
 
 @pytest.mark.parametrize("package", FOLDERS)

@@ -39,7 +39,8 @@ MANY = 1000
 DIAGNOSIS_BUDGET = 60.0
 FIRST_RESULT = """
 import sys
-from plant_emulator import parameter_sets, programs
+from plant_emulator import parameter_sets
+from plant_emulator.simulation import programs
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation.simulate import run_of, simulate
 time, reference = programs.PROGRAMS[sys.argv[1]].reference()

@@ -251,7 +251,7 @@ DETAILS = Details(
     settings={
         "command": "plant-emulator diagnose program1.csv.gz program2.csv.gz "
         "--hold-out program3.csv.gz --report answer.html",
-        "version": "0.1.0",
+        "version": "0.2.0",
         "program1.csv.gz": "sha256:" + "9f86d081884c7d65" * 4,
         "threshold of the evidence": "25.0",
     },

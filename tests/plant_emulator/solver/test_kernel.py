@@ -35,7 +35,8 @@ INPUTS = linear((0.1, 0.0), (1.0, 220.0), (1.4, 220.0), (2.2, 0.0), duration=3.0
 
 UNCOMPILED = """
 import json
-from plant_emulator import compiler, parameter_sets
+from plant_emulator import parameter_sets
+from plant_emulator.solver import compiler
 from plant_emulator.simulation.running_bench import Bench
 from plant_emulator.signals.log import COMPARED
 from tests.plant_emulator.solver.test_kernel import INPUTS, simulate
