@@ -2,11 +2,12 @@
 
 import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from gateway.configuration.config import Config, changed, from_document
+from gateway import regulators
+from gateway.configuration.config import Config, Place, changed, from_document
 from gateway.configuration.keys import check_text
 from gateway.errors import ConfigError
 from gateway.friction import friction_of_file
@@ -20,7 +21,8 @@ def load(path: str | Path) -> Config:
     def place(section: str, key: str) -> str:
         return _place(file, text, section, key)
 
-    return from_document(_with_friction(_toml(file, text), file.parent, place), place=place)
+    document = _with_friction(_toml(file, text), file.parent, place)
+    return _checked(from_document(document, place=place), place)
 
 
 def with_values(config: Config, values: Mapping[str, str]) -> Config:
@@ -29,7 +31,8 @@ def with_values(config: Config, values: Mapping[str, str]) -> Config:
         document = changed(config.document, values)
     except (ValueError, RecursionError) as error:
         raise ConfigError(_why(error), place="--set", expected="KEY=VALUE as in TOML") from error
-    return from_document(_with_friction(document, Path(), "{}.{}".format))
+    place = "{}.{}".format
+    return _checked(from_document(_with_friction(document, Path(), place)), place)
 
 
 def load_friction(path: str | Path) -> dict[str, Any]:
@@ -37,9 +40,15 @@ def load_friction(path: str | Path) -> dict[str, Any]:
     return friction_of_file(_toml(Path(path), _text(Path(path))), path)
 
 
-def _with_friction(
-    document: dict[str, Any], directory: Path, place: Callable[[str, str], str]
-) -> dict[str, Any]:
+def _checked(config: Config, place: Place) -> Config:
+    """Refuse a regulator that does not exist; otherwise return the configuration."""
+    name = config.regulator.name
+    if name not in regulators.names():
+        raise regulators.unknown(name, place("regulator", "name"))
+    return config
+
+
+def _with_friction(document: dict[str, Any], directory: Path, place: Place) -> dict[str, Any]:
     regulator = document.get("regulator")
     if not isinstance(regulator, Mapping) or not isinstance(regulator.get("friction"), str):
         return document

@@ -2,8 +2,7 @@
 
 A `Config` keeps its `document`, the whole of what was configured in the units of the file with all
 defaults written out, so that a recording can carry it and `from_document` makes the same again.
-What the sections hold stands in `config_sections.py`, files are read in `config_file.py`; this
-module does not touch any.
+The sections stand in `sections.py`; `gateway/config_file.py` reads files. This module touches none.
 """
 
 import hashlib
@@ -13,7 +12,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, get_type_hints
 
-from gateway import regulators
 from gateway.configuration.keys import checked, keys
 from gateway.configuration.sections import (
     RPM,
@@ -106,7 +104,6 @@ def from_document(document: Mapping[str, Any], *, place: Place = _set_place) -> 
     for name, section in SECTIONS.items():
         sections[name] = _section(name, section, written[name], place)
     _form_of_road_load(document, place)
-    _known_regulator(sections["regulator"], place)
     return Config(**sections, document=written)
 
 
@@ -137,17 +134,6 @@ def _form_of_road_load(document: Mapping[str, Any], place: Place) -> None:
             place=place("truck", given[0]),
             value=truck[given[0]],
             expected="f0_N beside it",
-        )
-
-
-def _known_regulator(section: RegulatorConfig, place: Place) -> None:
-    """A regulator is one of the files there are; a name from elsewhere would be a path."""
-    if section.name not in regulators.names():
-        raise ConfigError(
-            "unknown regulator",
-            place=place("regulator", "name"),
-            value=section.name,
-            expected=" or ".join(regulators.names()),
         )
 
 

@@ -8,12 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from math import pi
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from gateway.errors import ConfigError
-
-if TYPE_CHECKING:
-    from gateway.configuration.config import Config
 
 RPM: Final = 2.0 * pi / 60.0
 RANGES: Final = {"hold_s": (3.0, 3600.0), "rate_rpm_s": (10.0, 3000.0)}
@@ -33,12 +30,6 @@ class Sweep:
     speeds: tuple[float, ...]
     hold: float
     rate: float
-
-    @classmethod
-    def of(cls, config: "Config") -> "Sweep":
-        """The sweep of a configuration that has one."""
-        assert config.sweep is not None
-        return config.sweep
 
     @property
     def duration(self) -> float:

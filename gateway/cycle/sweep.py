@@ -8,10 +8,19 @@ in which nobody drives. After the last speed it asks for standstill, and goes on
 from dataclasses import dataclass, replace
 from math import copysign
 
-from gateway.configuration.sweep_speeds import Sweep as Params
+from gateway.configuration.config import Config
+from gateway.configuration.sweep_speeds import Sweep
 from gateway.regulators.window import Demand, Window
 
-__all__ = ["Params", "State", "follow", "seed", "update"]
+
+class Params(Sweep):
+    """The configured sweep as the parameters of a regulator."""
+
+    @classmethod
+    def of(cls, config: Config) -> "Params":
+        """Parameters out of a configuration that has a sweep."""
+        assert config.sweep is not None
+        return cls(**vars(config.sweep))
 
 
 @dataclass(frozen=True, kw_only=True)

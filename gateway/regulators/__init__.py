@@ -47,11 +47,14 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(found.name for found in iter_modules(__path__) if found.name != "window"))
 
 
+def unknown(name: str, place: str) -> ConfigError:
+    """Return the error for a name that no regulator has; `place` says where the name stands."""
+    return ConfigError("unknown regulator", place=place, value=name, expected=" or ".join(names()))
+
+
 @lru_cache
 def load(name: str) -> Regulator:
     """The regulator of that name; the folder is looked through once, not at every tick."""
     if name not in names():
-        raise ConfigError(
-            "unknown regulator", place="regulator.name", value=name, expected=" or ".join(names())
-        )
+        raise unknown(name, "regulator.name")
     return cast("Regulator", import_module(f"{__name__}.{name}"))
