@@ -10,8 +10,8 @@ from plant_emulator.diagnosis.design.next_experiment import Advice
 from plant_emulator.diagnosis.execution.pool import model_of
 from plant_emulator.diagnosis.execution.progress import Told
 from plant_emulator.diagnosis.fitting.derived_quantities import in_terms
-from plant_emulator.diagnosis.fitting.explanation import NOISE_LEFT, THRESHOLD
-from plant_emulator.diagnosis.fitting.steps import Task
+from plant_emulator.diagnosis.fitting.evidence import NOISE_LEFT, THRESHOLD
+from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.prediction import gap
 from plant_emulator.diagnosis.prediction.held_out import NOMINAL, HeldOut
 from plant_emulator.diagnosis.prediction.remainder import rest_of
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.calibration.confidence import Case
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
     from plant_emulator.diagnosis.execution.progress import Progress
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.prediction.gap import Gap, Prediction
     from plant_emulator.diagnosis.prediction.held_out import Plan
@@ -44,7 +44,7 @@ class Diagnosis:
 
     answer: dict[str, Any]
     details: Details
-    final: Point
+    final: FitResult
     fixed: Mapping[str, Mapping[str, float]]
 
 

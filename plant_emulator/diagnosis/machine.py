@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.estimation.unknowns import Array, Residual, Unknown
     from plant_emulator.recordings.input_noise import Loud
 
@@ -118,7 +118,7 @@ class Model(Protocol):
         Measured minus simulated over the noise, shape (channels, samples); 0: does not count.
         """
 
-    def loud(self, run: int, where: Point, state: Mapping[str, float]) -> Loud | None:
+    def loud(self, run: int, where: FitResult, state: Mapping[str, float]) -> Loud | None:
         """What the noise of the run's fed inputs does to it at a fit; see `fed_noise`."""
 
     def nominal(self, runs: Sequence[int]) -> Mapping[str, float]:
@@ -132,14 +132,14 @@ class Model(Protocol):
     ) -> dict[str, float]:
         """States of a run near the best at these values of everything else."""
 
-    def located(self, where: Point, runs: Sequence[int]) -> Mapping[str, Any] | None:
+    def located(self, where: FitResult, runs: Sequence[int]) -> Mapping[str, Any] | None:
         """Where the gap of a fit without effects lies, without any hypothesis of its cause.
 
         In the form of the answer's `location`, and the residual map along all axes as `maps`; None:
         this machine has no blocks to tell apart.
         """
 
-    def with_planned(self, where: Point, runs: Sequence[int]) -> Model:
+    def with_planned(self, where: FitResult, runs: Sequence[int]) -> Model:
         """The machine with runs that it has not shown yet behind its own, the least effort first.
 
         As the fit of these runs predicts them, without noise, judged by its own runs' noise; their

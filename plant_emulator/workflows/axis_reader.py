@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from plant_emulator.diagnosis.machines.axis_signals import AxisLog
 from plant_emulator.errors import LogError
+from plant_emulator.signals.axis_log import AxisLog
 from register_maps.csv_log import GZIP, TIME, CsvLogError, parse
 from register_maps.signals import LOG_COLUMNS, LogColumn
 

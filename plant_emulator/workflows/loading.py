@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from plant_emulator.diagnosis.machines.axis_signals import AxisLog
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
+    from plant_emulator.signals.axis_log import AxisLog
     from plant_emulator.signals.log import Array, Log
     from plant_emulator.simulation.simulate import Hold
 

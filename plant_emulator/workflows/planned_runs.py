@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.joint_fit import Point, null_fit
+from plant_emulator.diagnosis.fit_result import FitResult
+from plant_emulator.diagnosis.fitting.joint_fit import null_fit
 from plant_emulator.diagnosis.machines.bench import BenchModel, BenchRecipe
 from plant_emulator.errors import ParameterError
 from plant_emulator.estimation.start_search import GAP_POSITION
@@ -41,7 +42,7 @@ def planned_run(
 
 def prepared(
     names: Sequence[str], parameters: ParameterSet, hold: str | None = None
-) -> tuple[BenchModel, Point, tuple[str, ...]]:
+) -> tuple[BenchModel, FitResult, tuple[str, ...]]:
     """A model of these logs and programs, the fit at which they are judged, and what was noted.
 
     Logs are fitted; programs are simulated at what the logs say, or at the set as given.
@@ -63,7 +64,7 @@ def prepared(
     channels = max((r.channels for r in recordings), key=len, default=COMPARED)
     recordings += [planned_run(name, parameters, channels) for name in planned]
     model = BenchRecipe(tuple(recordings), parameters).build()
-    point = Point(
+    point = FitResult(
         effects=(),
         values={u.name: values[u.name] for u in model.parameters},
         states=(*states, *({GAP_POSITION: 0.0} for _ in planned)),

@@ -16,14 +16,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.explanation import DETECTABLE, MARGIN
-from plant_emulator.diagnosis.fitting.joint_fit import Point, linearised
+from plant_emulator.diagnosis.fitting.evidence import DETECTABLE, MARGIN
+from plant_emulator.diagnosis.fitting.joint_fit import linearised
 from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
 from plant_emulator.diagnosis.fitting.signature import SIZES, bounded, signature
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.signature import Signature
     from plant_emulator.diagnosis.machine import Candidate, Model
 
@@ -47,7 +48,7 @@ class Detectability:
     alike: tuple[str, ...]
 
 
-def detectability(model: Model, where: Point, runs: Sequence[int]) -> list[Detectability]:
+def detectability(model: Model, where: FitResult, runs: Sequence[int]) -> list[Detectability]:
     """For every effect of the library, at a fit without effects."""
     tangents = Tangents(linearised(model, where, runs))
     found = {

@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.explanation import DETECTABLE
-from plant_emulator.diagnosis.fitting.joint_fit import Point, fit, linearised
+from plant_emulator.diagnosis.fitting.evidence import DETECTABLE
+from plant_emulator.diagnosis.fitting.joint_fit import fit, linearised
 from plant_emulator.diagnosis.fitting.looks import FEW_WITH_STATES
 from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
 from plant_emulator.diagnosis.fitting.signature import bounded, signs
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from plant_emulator.diagnosis.execution.pool import Recipe
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model
 
 
@@ -41,7 +42,7 @@ class PlannedRecipe:
     """
 
     recipe: Recipe
-    where: Point
+    where: FitResult
     runs: tuple[int, ...]
 
     def build(self) -> Model:
@@ -61,7 +62,7 @@ class Asked:
     where : a fit to `runs`: of a rival, or without effects; names : of the effects asked about
     """
 
-    where: Point
+    where: FitResult
     runs: tuple[int, ...]
     planned: int
     names: tuple[str, ...] = ()
@@ -71,14 +72,14 @@ class Asked:
 class Exchange:
     """An accepted effect exchanged for another one, the rest as accepted, on these runs."""
 
-    final: Point
+    final: FitResult
     name: str
     other: str
-    alone: Point | None
+    alone: FitResult | None
     runs: tuple[int, ...]
 
 
-def rival(model: Model, asked: Exchange) -> Point:
+def rival(model: Model, asked: Exchange) -> FitResult:
     """Step: the fit with one effect in the place of another.
 
     That of the contest where the other effect is the only one.
@@ -118,14 +119,14 @@ def informs(model: Model, asked: Asked) -> float:
     return float(np.linalg.slogdet(found.information + precision).logabsdet)
 
 
-def _as_foretold(asked: Asked) -> tuple[Point, tuple[int, ...]]:
+def _as_foretold(asked: Asked) -> tuple[FitResult, tuple[int, ...]]:
     """The fit and its runs with the planned one, which starts as the last one did."""
     where = asked.where
     return replace(where, states=(*where.states, where.states[-1])), (*asked.runs, asked.planned)
 
 
 def _signature_norm(
-    model: Model, name: str, where: Point, runs: Sequence[int], tangents: Tangents
+    model: Model, name: str, where: FitResult, runs: Sequence[int], tangents: Tangents
 ) -> float:
     """Norm of the part of an effect's signature that drift cannot imitate, the larger sign."""
     candidate = model.candidates[name]

@@ -20,15 +20,15 @@ from plant_emulator.diagnosis.design.experiment_value import (
     seen,
 )
 from plant_emulator.diagnosis.execution.pool import model_of
-from plant_emulator.diagnosis.fitting.explanation import DETECTABLE
+from plant_emulator.diagnosis.fitting.evidence import DETECTABLE
 from plant_emulator.diagnosis.wording import listed, spoken
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.explanation import Explanation
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.selection.verdict import Verdict
 
@@ -102,7 +102,7 @@ class Advice:
             return undecided(pairs, needs, tried=bool(tried))
         return separated(source, pairs, norms)
 
-    def _showing(self, null: Point, hidden: Sequence[str]) -> str | None:
+    def _showing(self, null: FitResult, hidden: Sequence[str]) -> str | None:
         """The run that shows most of the effects that these logs could not."""
         if not hidden:
             return None
@@ -138,7 +138,7 @@ class Advice:
         advised = "; ".join(part for part in parts if part)
         return f"To narrow it down in the {spoken(place)}: {advised}." if advised else None
 
-    def _steadying(self, null: Point) -> str:
+    def _steadying(self, null: FitResult) -> str:
         """The run that determines best what drifts."""
         sharpness: dict[str, float] = {}
         for source, planned, recipe in self._planned(null):
@@ -148,16 +148,16 @@ class Advice:
         what = f"drive {best}" if best else "add another run, with other speeds and rates"
         return f"To steady the fit: {what}."
 
-    def _planned(self, where: Point) -> list[tuple[str, int, Recipe]]:
+    def _planned(self, where: FitResult) -> list[tuple[str, int, Recipe]]:
         """Runs that were not driven: what to do, number, and the machine that has them."""
         recipe = PlannedRecipe(self._recipe, where, self._runs)
         runs = model_of(recipe).runs
         return [(runs[k].source, k, recipe) for k in range(len(self._model.runs), len(runs))]
 
-    def _asked(self, where: Point, planned: int, names: Sequence[str] = ()) -> Asked:
+    def _asked(self, where: FitResult, planned: int, names: Sequence[str] = ()) -> Asked:
         return Asked(where=where, runs=self._runs, planned=planned, names=tuple(names))
 
-    def _seen(self, null: Point, names: Sequence[str]) -> list[tuple[str, dict[str, float]]]:
+    def _seen(self, null: FitResult, names: Sequence[str]) -> list[tuple[str, dict[str, float]]]:
         """Every planned run with the norms of these effects' signatures."""
         planned = self._planned(null)
         if not planned or not names:

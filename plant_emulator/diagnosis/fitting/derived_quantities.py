@@ -11,7 +11,7 @@ from plant_emulator.diagnosis.fitting.joint_fit import linearised
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model, Term
     from plant_emulator.estimation.unknowns import Estimate
 
@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 STEP = 1e-4
 
 
-def in_terms(model: Model, found: Point, runs: Sequence[int]) -> dict[str, list[dict[str, Any]]]:
+def in_terms(
+    model: Model, found: FitResult, runs: Sequence[int]
+) -> dict[str, list[dict[str, Any]]]:
     """By effect of a fit: its terms, in the form of the answer's parameters.
 
     The variance of a term t is g' C g, C the covariance of the fit and g the slope of t by it

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.joint_fit import Point, fit, linearised, template
+from plant_emulator.diagnosis.fitting.joint_fit import fit, linearised, template
 from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
 from plant_emulator.diagnosis.fitting.signature import signs, sized
 from plant_emulator.diagnosis.fitting.valleys import best_states, loss_of, whole
@@ -18,6 +18,7 @@ from plant_emulator.estimation.robust_scan import cauchy_loss
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model
 
 # Steps from some way off, how far off that is [standard errors], and at most [scales].
@@ -37,8 +38,8 @@ FAR_SIZES = (0.25, 0.4, 0.6, 0.8, 1.0, 1.4, 2.0)
 
 
 def shaken(
-    model: Model, effects: Sequence[str], runs: Sequence[int], start: Point, number: int
-) -> Point:
+    model: Model, effects: Sequence[str], runs: Sequence[int], start: FitResult, number: int
+) -> FitResult:
     """A few steps of a joint fit from some way off where it has come to, each number another way.
 
     As far as SHAKE times the noise may have moved it, no further than what is known beforehand. One
@@ -61,7 +62,9 @@ def shaken(
     return fit(model, effects, runs, moved, states, FEW_SHAKEN)
 
 
-def smoothed(model: Model, effects: Sequence[str], runs: Sequence[int], start: Point) -> Point:
+def smoothed(
+    model: Model, effects: Sequence[str], runs: Sequence[int], start: FitResult
+) -> FitResult:
     """A few steps of a joint fit from where another has come to, with slopes over wide differences
     first, then over smaller ones.
 
@@ -77,7 +80,9 @@ def smoothed(model: Model, effects: Sequence[str], runs: Sequence[int], start: P
     return best
 
 
-def sifted(model: Model, effects: Sequence[str], runs: Sequence[int], start: Point) -> Point:
+def sifted(
+    model: Model, effects: Sequence[str], runs: Sequence[int], start: FitResult
+) -> FitResult:
     """A few steps of a joint fit from where another has come to, each unknown moved to the best of
     some values while the others stay, two times over.
 
@@ -97,8 +102,8 @@ def sifted(model: Model, effects: Sequence[str], runs: Sequence[int], start: Poi
 
 
 def in_place(
-    model: Model, effect: str, found: Point, runs: Sequence[int], tangents: Tangents
-) -> tuple[float, Point]:
+    model: Model, effect: str, found: FitResult, runs: Sequence[int], tangents: Tangents
+) -> tuple[float, FitResult]:
     """A start with an effect in the place of a fit's last, at the size that fits best there, the
     drift as it is or moved to make up for the difference; and the loss there.
 
@@ -121,7 +126,7 @@ def in_place(
     return loss, replace(found, effects=effects, values=values, states=tuple(states))
 
 
-def vacated(model: Model, found: Point) -> Point:
+def vacated(model: Model, found: FitResult) -> FitResult:
     """Where a fit has come to, less its last effect."""
     last = model.candidates[found.effects[-1]]
     gone = {u.name for u in (*last.sizes, *last.shapes)}
@@ -129,7 +134,7 @@ def vacated(model: Model, found: Point) -> Point:
     return replace(found, effects=found.effects[:-1], values=values)
 
 
-def from_nominal(model: Model, effect: str, base: Point, runs: Sequence[int]) -> Point:
+def from_nominal(model: Model, effect: str, base: FitResult, runs: Sequence[int]) -> FitResult:
     """Joint fit of one more effect, a few steps a run: the drift from its nominal values, the
     effect from the size that fits them best.
     """
@@ -157,7 +162,7 @@ def run_by_run(
     runs: Sequence[int],
     values: Mapping[str, float],
     few: int,
-) -> Point:
+) -> FitResult:
     """Joint fit from values far off: the runs come in one by one, the nearest first, a few steps
     after each. A run with much contact, whose cost has many valleys, comes in when the others have
     brought the values near.

@@ -10,13 +10,14 @@ import hashlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
-from plant_emulator.diagnosis.fitting.steps import Task, refit, start
+from plant_emulator.diagnosis.fitting.steps import refit, start
+from plant_emulator.diagnosis.fitting.task import Task
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.estimation.unknowns import Array, Residual
     from plant_emulator.recordings.input_noise import Loud
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 def quieted(
     pool: Pool, recipe: Recipe, model: Model, runs: tuple[int, ...]
-) -> tuple[Recipe, Point | None]:
+) -> tuple[Recipe, FitResult | None]:
     """The recipe of a model whose residuals have white noise also where inputs are fed.
 
     The recipe itself where these runs feed none, or none that counts; and the fit without effects
@@ -60,7 +61,7 @@ class _Quieted:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._model, name)
 
-    def with_planned(self, where: Point, runs: Sequence[int]) -> Model:
+    def with_planned(self, where: FitResult, runs: Sequence[int]) -> Model:
         """See `Model`; the planned runs come behind its own, whose noise stays as it is."""
         return cast("Model", _Quieted(self._model.with_planned(where, runs), self._louds))
 

@@ -26,11 +26,12 @@ processes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.estimation.covariance import correlation_time, structure
 from plant_emulator.estimation.least_squares import DIFFERENCE_NORM, at, estimate
 
@@ -57,47 +58,6 @@ ASTRAY = 1.5
 SHY = 2.0
 # A fit that is to be improved by starting again has to fall by more than this [chi squared].
 WORTH = 1.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Point:
-    """Where a joint fit has come to.
-
-    values : parameters, sizes and shapes by name; states : of every run of the fit, by name
-    cost : sum of squares with the priors, and what the looks cost; squares : of the residuals
-        alone; samples : counted
-    share : of the samples that are independent, from the residual's autocorrelation time
-    errors : standard errors by name of `values`
-    structure : of the residuals, beyond white noise, see `covariance.structure`
-    looks : of the cost, what the choice of the states has gained by chance, see `looks_of`
-    sizes : the largest size of every effect, in plausible sizes
-    unsure : effects with values of each run and no certain size; those can be anything that differs
-        from run to run
-    """
-
-    effects: tuple[str, ...]
-    values: Mapping[str, float]
-    states: tuple[Mapping[str, float], ...]
-    cost: float
-    squares: float
-    samples: int
-    share: float
-    errors: Mapping[str, float]
-    converged: bool
-    structure: float = 0.0
-    looks: float = 0.0
-    sizes: Mapping[str, float] = field(default_factory=dict)
-    unsure: tuple[str, ...] = ()
-
-    @property
-    def key(self) -> tuple[object, ...]:
-        """The same for the same fit only."""
-        return (self.effects, self.cost, *self.values.values())
-
-    @property
-    def chi_squared(self) -> float:
-        """Mean square of the whitened residual; 1: only the noise is left."""
-        return self.squares / self.samples
 
 
 def template(
@@ -141,7 +101,7 @@ def fit(
     *,
     shy: bool = False,
     difference: float = DIFFERENCE_NORM,
-) -> Point:
+) -> FitResult:
     """Joint fit of drift, states and these effects, from these values.
 
     near : see `estimate`'s `follow`; a first look only
@@ -174,7 +134,7 @@ def _largest(candidate: Candidate, values: Mapping[str, float]) -> float:
     return max(map(abs, sizes), default=0.0)
 
 
-def _sure(candidate: Candidate, found: Point) -> bool:
+def _sure(candidate: Candidate, found: FitResult) -> bool:
     """Whether a size of an effect is not neutral by chance, and not as large as it may be; without
     values of each run none has to be told.
     """
@@ -191,24 +151,24 @@ def again(
     model: Model,
     effects: Sequence[str],
     runs: Sequence[int],
-    start: Point,
+    start: FitResult,
     iterations: int | None = None,
-) -> Point:
+) -> FitResult:
     """Joint fit with these effects from where another fit has come to."""
     return fit(model, effects, runs, start.values, start.states, iterations)
 
 
-def linearised(model: Model, where: Point, runs: Sequence[int]) -> Estimate:
+def linearised(model: Model, where: FitResult, runs: Sequence[int]) -> Estimate:
     """Residuals and Jacobians of a fit that has ended."""
     unknowns = started(template(model, where.effects, runs), where.values, where.states)
     return at(unknowns, [model.residual(k, where.effects) for k in runs])
 
 
-def point(effects: Sequence[str], found: Estimate, runs: int) -> Point:
+def point(effects: Sequence[str], found: Estimate, runs: int) -> FitResult:
     """An estimate as plain data."""
     errors = zip(found.unknowns, found.z, found.standard_errors, strict=True)
     looks = sum(looks_of(found, k) for k in range(runs))
-    return Point(
+    return FitResult(
         effects=tuple(effects),
         values=found.parameters(),
         states=tuple(found.states(k) for k in range(runs)),
@@ -249,7 +209,7 @@ def independent_share(found: Estimate) -> float:
     return float(weight.sum() / (weight * times).sum())
 
 
-def null_fit(model: Model, runs: Sequence[int]) -> Point:
+def null_fit(model: Model, runs: Sequence[int]) -> FitResult:
     """The fit without effects, from the model's own search; where that leaves much, from the
     nominal parameters as well.
     """

@@ -9,14 +9,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fitting.elsewhere import smoothed
-from plant_emulator.diagnosis.fitting.explanation import excess
-from plant_emulator.diagnosis.fitting.joint_fit import WORTH, Point, fit
+from plant_emulator.diagnosis.fitting.evidence import excess
+from plant_emulator.diagnosis.fitting.joint_fit import WORTH, fit
 from plant_emulator.diagnosis.fitting.signature import FAR, signs, sized
 from plant_emulator.diagnosis.fitting.valleys import best_sizes, best_states
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.signature import Signature
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.estimation.unknowns import Estimate
@@ -34,8 +35,8 @@ PATIENT = 25
 
 
 def glance(
-    model: Model, found: Signature, base: Point, runs: Sequence[int], near: Estimate
-) -> Point:
+    model: Model, found: Signature, base: FitResult, runs: Sequence[int], near: Estimate
+) -> FitResult:
     """A first look at the joint fit of one more effect, from its signature's start, or, where that
     stops on its way back, from the drift as it is.
 
@@ -53,8 +54,8 @@ def glance(
 
 
 def glance_far(
-    model: Model, found: Signature, base: Point, runs: Sequence[int], near: Estimate
-) -> Point | None:
+    model: Model, found: Signature, base: FitResult, runs: Sequence[int], near: Estimate
+) -> FitResult | None:
     """The same from a larger size; None where the signature has none.
 
     On with wide slopes where it stops on the way, for the way back from where the drift has gone to
@@ -68,12 +69,12 @@ def glance_far(
     return smoothed(model, effects, runs, start) if stopped else start
 
 
-def _on_the_way(base: Point) -> float:
+def _on_the_way(base: FitResult) -> float:
     """Cost from which on a fit with one more effect has stopped on its way to where it is none."""
     return base.cost + WORTH + ON_THE_WAY * excess(base)
 
 
-def patient(model: Model, found: Signature, base: Point, runs: Sequence[int]) -> Point:
+def patient(model: Model, found: Signature, base: FitResult, runs: Sequence[int]) -> FitResult:
     """The joint fit of one more effect from a size on either side, the drift as it is, and with
     steps enough to come through where drift follows the effect along a curve.
     """
@@ -91,7 +92,7 @@ def patient(model: Model, found: Signature, base: Point, runs: Sequence[int]) ->
     return min(tries, key=lambda p: p.cost)
 
 
-def look(model: Model, effects: Sequence[str], runs: Sequence[int], start: Point) -> Point:
+def look(model: Model, effects: Sequence[str], runs: Sequence[int], start: FitResult) -> FitResult:
     """A few steps of a joint fit, from where another fit has come to; what the last effect has of
     many valleys is looked for anew.
     """

@@ -21,7 +21,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.explanation import THRESHOLD
+from plant_emulator.diagnosis.fit_result import Unrest
+from plant_emulator.diagnosis.fitting.evidence import THRESHOLD
 from plant_emulator.diagnosis.fitting.joint_fit import again
 from plant_emulator.estimation.covariance import structure
 
@@ -29,8 +30,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.execution.pool import Recipe
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
-    from plant_emulator.diagnosis.fitting.steps import Task
+    from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.fitting.task import Task
     from plant_emulator.diagnosis.machine import Candidate, Model
     from plant_emulator.estimation.unknowns import Array, Residual, Unknown
 
@@ -47,34 +48,6 @@ LEFT_STRUCTURED = 0.01
 # Of little evidence the share is larger, up to 0.036, for courses leave 400 to 900 of structure in
 # three runs whatever their size, since scans and samples beat; coarse references left 60 000.
 LITTLE_STRUCTURED, BEAT = 0.04, 350.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Unrest:
-    """An effect of chance course on top of a fit.
-
-    size, error : a with its standard error, in the unit of `name`
-    shape : constants that only shape the effect, by name
-    evidence : twice the rise of the log-likelihood
-    weights : 1 / sqrt(1 + a^2 v) of every run, shape (channels, samples)
-    even : whether what is left is as small as it says at every level
-    random : whether what is left is random
-    """
-
-    effect: str
-    name: str
-    size: float
-    error: float
-    shape: Mapping[str, float]
-    evidence: float
-    weights: tuple[Array, ...]
-    even: bool
-    random: bool
-
-    @property
-    def holds(self) -> bool:
-        """Whether the residual is what the effect leaves."""
-        return self.even and self.random
 
 
 def unrest(model: Model, task: Task) -> Unrest:
@@ -201,7 +174,7 @@ class _Weighted:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._model, name)
 
-    def with_planned(self, where: Point, runs: Sequence[int]) -> Model:
+    def with_planned(self, where: FitResult, runs: Sequence[int]) -> Model:
         """See `Model`; the planned runs come behind its own, without unrest."""
         return cast("Model", _Weighted(self._model.with_planned(where, runs), self._weights))
 

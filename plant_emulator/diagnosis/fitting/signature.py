@@ -19,7 +19,7 @@ from plant_emulator.estimation.robust_scan import combinations
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
     from plant_emulator.diagnosis.machine import Candidate, Model
     from plant_emulator.estimation.unknowns import Array, Estimate, Unknown
@@ -68,7 +68,7 @@ class Signature:
 
 
 def signature(
-    model: Model, name: str, where: Point, runs: Sequence[int], tangents: Tangents
+    model: Model, name: str, where: FitResult, runs: Sequence[int], tangents: Tangents
 ) -> Signature | None:
     """The signature of an effect at a fit that lacks it; None: it changes nothing there."""
     own = _own_states(model, name, where, runs, tangents)
@@ -114,7 +114,7 @@ def _concentrated(rest: Array) -> bool:
 
 
 def _own_states(
-    model: Model, name: str, where: Point, runs: Sequence[int], tangents: Tangents
+    model: Model, name: str, where: FitResult, runs: Sequence[int], tangents: Tangents
 ) -> list[dict[str, float]]:
     """An effect's states of every run: those whose small signature explains most of that run.
 
@@ -145,7 +145,7 @@ def _own_states(
 
 
 def _size_to_find_states(
-    model: Model, candidate: Candidate, where: Point, runs: Sequence[int]
+    model: Model, candidate: Candidate, where: FitResult, runs: Sequence[int]
 ) -> dict[str, float]:
     """An effect at a small size to find its states by; of several sizes only that one which goes
     with them, for what the others do hides which states are right.
@@ -216,7 +216,7 @@ def _alone(tried: Callable[..., _Trial], candidate: Candidate) -> list[_Trial]:
 def _trial(
     model: Model,
     name: str,
-    where: Point,
+    where: FitResult,
     runs: Sequence[int],
     tangents: Tangents,
     own: Sequence[Mapping[str, float]],
@@ -244,7 +244,7 @@ def _trial(
 def _residual(
     model: Model,
     candidate: Candidate,
-    where: Point,
+    where: FitResult,
     runs: Sequence[int],
     own: Sequence[Mapping[str, float]],
     sizes: Mapping[str, float],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fitting.elsewhere import (
@@ -13,46 +13,24 @@ from plant_emulator.diagnosis.fitting.elsewhere import (
     smoothed,
     vacated,
 )
-from plant_emulator.diagnosis.fitting.joint_fit import (
-    ADVANCED,
-    Point,
-    again,
-    linearised,
-    null_fit,
-    point,
-)
+from plant_emulator.diagnosis.fitting.joint_fit import ADVANCED, again, linearised, null_fit, point
 from plant_emulator.diagnosis.fitting.looks import glance, glance_far, look, patient
 from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
 from plant_emulator.diagnosis.fitting.signature import signature
+from plant_emulator.diagnosis.fitting.task import Task
 
 if TYPE_CHECKING:
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.signature import Signature
     from plant_emulator.diagnosis.machine import Model
 
 
-@dataclass(frozen=True, kw_only=True)
-class Task:
-    """One step: an effect, or none, on top of a fit, on these runs.
-
-    signature : where a joint fit starts from, if it has been computed
-    number : of several starts
-    known : runs that `base` is a fit of, where it is not one of all
-    """
-
-    base: Point
-    runs: tuple[int, ...]
-    effect: str = ""
-    signature: Signature | None = None
-    number: int = 0
-    known: tuple[int, ...] = ()
-
-
-def start(model: Model, runs: tuple[int, ...]) -> Point:
+def start(model: Model, runs: tuple[int, ...]) -> FitResult:
     """The fit without effects."""
     return null_fit(model, runs)
 
 
-def spread(model: Model, task: Task) -> Point:
+def spread(model: Model, task: Task) -> FitResult:
     """A fit of some runs as it is on all, their states looked for."""
     base, known = task.base, dict(zip(task.known, task.base.states, strict=True))
     states = tuple(
@@ -70,60 +48,60 @@ def show(model: Model, task: Task) -> Signature | None:
     return signature(model, task.effect, task.base, task.runs, _tangents(model, task))
 
 
-def contend(model: Model, task: Task) -> Point:
+def contend(model: Model, task: Task) -> FitResult:
     """A first look at the joint fit of an effect from its signature."""
     assert task.signature is not None
     near = _tangents(model, task).found
     return glance(model, task.signature, task.base, task.runs, near)
 
 
-def contend_far(model: Model, task: Task) -> Point | None:
+def contend_far(model: Model, task: Task) -> FitResult | None:
     """The same from a larger size."""
     assert task.signature is not None
     near = _tangents(model, task).found
     return glance_far(model, task.signature, task.base, task.runs, near)
 
 
-def plod(model: Model, task: Task) -> Point:
+def plod(model: Model, task: Task) -> FitResult:
     """The same with more steps, from a size on either side."""
     assert task.signature is not None
     return patient(model, task.signature, task.base, task.runs)
 
 
-def follow(model: Model, task: Task) -> Point:
+def follow(model: Model, task: Task) -> FitResult:
     """A few steps more of `task.base`'s fit."""
     return look(model, task.base.effects, task.runs, task.base)
 
 
-def shake(model: Model, task: Task) -> Point:
+def shake(model: Model, task: Task) -> FitResult:
     """The fit of `task.base` from some way off, or, number 0, with wide slopes."""
     if task.number == 0:
         return smoothed(model, task.base.effects, task.runs, task.base)
     return shaken(model, task.base.effects, task.runs, task.base, task.number)
 
 
-def sift(model: Model, task: Task) -> Point:
+def sift(model: Model, task: Task) -> FitResult:
     """The fit of `task.base` from the best values of each of its unknowns."""
     return sifted(model, task.base.effects, task.runs, task.base)
 
 
-def swap(model: Model, task: Task) -> tuple[float, Point]:
+def swap(model: Model, task: Task) -> tuple[float, FitResult]:
     """The start of `task.effect` in the place of the last of `task.base`, and its loss."""
     place = Task(base=vacated(model, task.base), runs=task.runs)
     return in_place(model, task.effect, task.base, task.runs, _tangents(model, place))
 
 
-def once_more(model: Model, task: Task) -> Point:
+def once_more(model: Model, task: Task) -> FitResult:
     """The joint fit of an effect from the nominal parameters."""
     return from_nominal(model, task.effect, task.base, task.runs)
 
 
-def advance(model: Model, task: Task) -> Point:
+def advance(model: Model, task: Task) -> FitResult:
     """Some steps of the fit of `task.base` from its values."""
     return again(model, task.base.effects, task.runs, task.base, ADVANCED)
 
 
-def refit(model: Model, task: Task) -> Point:
+def refit(model: Model, task: Task) -> FitResult:
     """The fit of `task.base` with the effects named there, from its values."""
     return again(model, task.base.effects, task.runs, task.base)
 

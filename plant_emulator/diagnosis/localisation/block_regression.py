@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.estimation.unknowns import Array, Estimate
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
@@ -58,7 +58,7 @@ class Site:
     """The blocks of a bench with the measured signals at their borders."""
 
     def __init__(
-        self, recordings: Sequence[Recording], parameters: ParameterSet, null: Point
+        self, recordings: Sequence[Recording], parameters: ParameterSet, null: FitResult
     ) -> None:
         self.recordings, self.parameters, self.null = recordings, parameters, null
         self.fitted = {**parameters.values(), **null.values}

@@ -33,7 +33,7 @@ from plant_emulator.estimation.start_search import GAP_POSITION
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.estimation.unknowns import Array
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
@@ -77,7 +77,7 @@ class Location:
         }
 
 
-def locate(recordings: Sequence[Recording], parameters: ParameterSet, null: Point) -> Location:
+def locate(recordings: Sequence[Recording], parameters: ParameterSet, null: FitResult) -> Location:
     """Where the gap of these runs lies.
 
     null : the converged fit of all that drifts, without effects

@@ -30,10 +30,11 @@ from plant_emulator.estimation.unknowns import Unknown
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machines.axis_effects import AxisEffect
-    from plant_emulator.diagnosis.machines.axis_signals import AxisLog, Motion
+    from plant_emulator.diagnosis.machines.axis_signals import Motion
     from plant_emulator.estimation.unknowns import Array, Residual
+    from plant_emulator.signals.axis_log import AxisLog
 
 LEVEL = "friction_level"
 LEVEL_STD = 0.1
@@ -109,7 +110,7 @@ class AxisModel:
 
         return residual
 
-    def loud(self, run: int, where: Point, state: Mapping[str, float]) -> None:  # noqa: ARG002 - `Model`'s signature
+    def loud(self, run: int, where: FitResult, state: Mapping[str, float]) -> None:  # noqa: ARG002 - `Model`'s signature
         """See `Model`: the motion is fed, but smoothed."""
         return
 
@@ -130,11 +131,11 @@ class AxisModel:
         """See `Model`."""
         return self._level()
 
-    def located(self, where: Point, runs: Sequence[int]) -> None:  # noqa: ARG002 - `Model`'s signature
+    def located(self, where: FitResult, runs: Sequence[int]) -> None:  # noqa: ARG002 - `Model`'s signature
         """See `Model`: one channel has no blocks to tell apart."""
         return
 
-    def with_planned(self, where: Point, runs: Sequence[int]) -> AxisModel:  # noqa: ARG002 - `Model`'s signature
+    def with_planned(self, where: FitResult, runs: Sequence[int]) -> AxisModel:  # noqa: ARG002 - `Model`'s signature
         """See `Model`: an axis has no drive programs."""
         return self
 

@@ -13,14 +13,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.prediction.frequency_bands import power
 from plant_emulator.errors import LogError
+from plant_emulator.signals.frequency_bands import power
 from plant_emulator.signals.noise import noise
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from plant_emulator.estimation.unknowns import Array
+    from plant_emulator.signals.axis_log import AxisLog
 
 ORDER = 4
 TOPS = (2.0, 5.0, 10.0, 20.0, 40.0)
@@ -37,21 +38,6 @@ FEWEST, FEWEST_LEFT = 100, 20
 """Samples of a run, and those that remain of it in the band, below which nothing is fitted."""
 REST, REST_SPEED = 0.1, 0.002
 """[s] from which an axis rests, and the share of its highest speed below which it does."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class AxisLog:
-    """A run of an axis, SI, shape (n,) each: linear [s, m, N] or rotary [s, rad, N m].
-
-    other : columns of the file that were not used
-    """
-
-    time: Array
-    position: Array
-    force: Array
-    rotary: bool
-    source: str
-    other: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

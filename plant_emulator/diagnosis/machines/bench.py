@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.effects import Effect
     from plant_emulator.estimation.unknowns import Array, Residual
     from plant_emulator.model.parameters import ParameterSet
@@ -187,7 +187,7 @@ class BenchModel:
 
         return residual
 
-    def loud(self, run: int, where: Point, state: Mapping[str, float]) -> Loud | None:
+    def loud(self, run: int, where: FitResult, state: Mapping[str, float]) -> Loud | None:
         """See `Model`."""
         values = {**self._fixed(run, where.effects), **where.values, **state}
         return loud(self._recordings[run], values, values.pop(GAP_POSITION))
@@ -224,13 +224,13 @@ class BenchModel:
             found = scanned(lambda trial: residual({**values, **trial}), found, states)
         return found
 
-    def located(self, where: Point, runs: Sequence[int]) -> Mapping[str, Any] | None:
+    def located(self, where: FitResult, runs: Sequence[int]) -> Mapping[str, Any] | None:
         """See `Model`."""
         if self._given:
             return None
         return locate([self._recordings[k] for k in runs], self._set, where).as_answer()
 
-    def with_planned(self, where: Point, runs: Sequence[int]) -> BenchModel:
+    def with_planned(self, where: FitResult, runs: Sequence[int]) -> BenchModel:
         """See `Model`: drive programs that no log shows, starting as the last run did."""
         warm = {**self._fixed(runs[-1], where.effects), **where.values, **where.states[-1]}
         fitted = self._set.with_values({name: where.values[name] for name in self._free})

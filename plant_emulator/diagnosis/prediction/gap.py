@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.joint_fit import Point, fit, linearised
+from plant_emulator.diagnosis.fitting.joint_fit import fit, linearised
 from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
 from plant_emulator.diagnosis.prediction import block_bootstrap
 from plant_emulator.estimation.least_squares import estimate
@@ -21,6 +21,7 @@ from plant_emulator.estimation.least_squares import estimate
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model, Run
     from plant_emulator.estimation.unknowns import Array
 
@@ -41,7 +42,7 @@ class Fold:
 
     fitted: tuple[int, ...]
     predicted: tuple[int, ...]
-    start: Point
+    start: FitResult
     refitted: bool = True
     as_fitted: bool = False
 
@@ -68,7 +69,7 @@ def predict(model: Model, fold: Fold) -> Prediction:
     )
 
 
-def refitted(model: Model, fold: Fold) -> Point:
+def refitted(model: Model, fold: Fold) -> FitResult:
     """The fold's model fitted on its runs, taken up again where it ran out of steps.
 
     What these runs tell nothing of, as a pause that none of them has, would end anywhere.
@@ -98,7 +99,7 @@ def _shown(model: Model, fold: Fold, name: str) -> float:
 
 
 def _predicted(
-    model: Model, point: Point, run: int, known: Mapping[str, float] | None
+    model: Model, point: FitResult, run: int, known: Mapping[str, float] | None
 ) -> tuple[Array, bool]:
     """Residual of a run with all parameters kept, its own states fitted unless known; converged."""
     effects = point.effects

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.explanation import DETECTABLE, THRESHOLD
+from plant_emulator.diagnosis.fitting.evidence import DETECTABLE, THRESHOLD
 from plant_emulator.diagnosis.prediction import gap
 from plant_emulator.diagnosis.prediction.gap import Fold
 
@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.prediction.gap import Prediction
 
@@ -82,7 +82,7 @@ class HeldOut:
 
         ("nominal",) : the parameter set as given, or the fold's own where none is.
         """
-        points: dict[tuple[str, ...], Point] = {(): explained.null}
+        points: dict[tuple[str, ...], FitResult] = {(): explained.null}
         for count in range(1, len(followed) + 1):
             some = followed[:count]
             points[some] = replace(explained.final, effects=some)
@@ -118,7 +118,12 @@ class HeldOut:
         return tuple(notes)
 
     def _fold(
-        self, point: Point, fitted: tuple[int, ...], predicted: tuple[int, ...], *, refitted: bool
+        self,
+        point: FitResult,
+        fitted: tuple[int, ...],
+        predicted: tuple[int, ...],
+        *,
+        refitted: bool,
     ) -> Fold:
         """A fold that begins where the fit to all runs has ended."""
         states = tuple(point.states[self.plan.fitted.index(run)] for run in fitted)

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.prediction.frequency_bands import BANDS, power
+from plant_emulator.signals.frequency_bands import BANDS, power
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model
-    from plant_emulator.diagnosis.report.details import Trace
+    from plant_emulator.diagnosis.prediction.trace import Trace
     from plant_emulator.estimation.unknowns import Array
 
 FAST = 10.0
@@ -52,7 +52,7 @@ class Rest:
         return BANDS[int(np.argmax(excess))]
 
 
-def rest_of(model: Model, found: Point, fitted: Sequence[int], traces: Sequence[Trace]) -> Rest:
+def rest_of(model: Model, found: FitResult, fitted: Sequence[int], traces: Sequence[Trace]) -> Rest:
     """The rest of the first channel after a fit, on the held-out runs behind the traces."""
     first = traces[0]
     same = [t for t in traces if t.channel == first.channel]
@@ -77,7 +77,7 @@ def _relative(traces: Sequence[Trace], predicted: Sequence[Array]) -> float:
     return float(np.linalg.norm(error[counts]) / np.linalg.norm(measured[counts]))
 
 
-def _residual(model: Model, found: Point, k: int, run: int) -> tuple[Array, Array]:
+def _residual(model: Model, found: FitResult, k: int, run: int) -> tuple[Array, Array]:
     """Residual of the first channel of a fitted run [unit], and its time [s]."""
     there = model.runs[run]
     whitened = model.residual(run, found.effects)({**found.values, **found.states[k]})

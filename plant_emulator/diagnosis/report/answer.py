@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from plant_emulator.diagnosis.calibration.model_form_error import scale
-from plant_emulator.diagnosis.fitting.explanation import DETECTABLE, THRESHOLD
+from plant_emulator.diagnosis.fitting.evidence import DETECTABLE, THRESHOLD
 from plant_emulator.diagnosis.prediction.gap import combined
-from plant_emulator.diagnosis.report.details import Step, Trace
+from plant_emulator.diagnosis.prediction.trace import Trace
+from plant_emulator.diagnosis.report.details import Step
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
     from plant_emulator.diagnosis.machine import Candidate, Run
     from plant_emulator.diagnosis.prediction.gap import Gap, Prediction
     from plant_emulator.estimation.unknowns import Array
@@ -58,7 +59,7 @@ def ranked(explained: Explanation) -> list[Contender]:
     return [*order[:shown], *accepted]
 
 
-def with_chance(explained: Explanation) -> Point:
+def with_chance(explained: Explanation) -> FitResult:
     """The final fit with the sizes and shapes of effects whose course is chance."""
     values: dict[str, float] = {}
     for one in explained.chance:

@@ -9,26 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.prediction.remainder import Rest
-    from plant_emulator.estimation.unknowns import Array
-
-
-@dataclass(frozen=True, kw_only=True)
-class Trace:
-    """A channel of a held-out run, measured and predicted, shape (n,) each [unit].
-
-    recalibrated : the same equations, parameters re-estimated; explained : with the effects named
-        NaN where a sample does not count
-    noise : standard deviation of the sensor's noise
-    """
-
-    source: str
-    channel: str
-    unit: str
-    time: Array
-    measured: Array
-    recalibrated: Array
-    explained: Array
-    noise: float
+    from plant_emulator.diagnosis.prediction.trace import Trace
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.prediction.remainder import Rest
-    from plant_emulator.diagnosis.report.details import Details, Trace
+    from plant_emulator.diagnosis.prediction.trace import Trace
+    from plant_emulator.diagnosis.report.details import Details
 
 # Runs drawn: those with the largest gaps; the others are named.
 MOST_RUNS = 8

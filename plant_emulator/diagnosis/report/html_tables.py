@@ -25,7 +25,7 @@ from plant_emulator.diagnosis.wording import (
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from plant_emulator.diagnosis.report.details import Trace
+    from plant_emulator.diagnosis.prediction.trace import Trace
 
 # From which multiple of the noise a cell of the map takes which tint.
 HEAT = ((10.0, "heat4"), (5.0, "heat3"), (2.0, "heat2"), (1.2, "heat1"))

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from plant_emulator.diagnosis.report.details import Trace
+    from plant_emulator.diagnosis.prediction.trace import Trace
     from plant_emulator.estimation.unknowns import Array
 
     Axis = Callable[[Array], Array]

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.explanation import MARGIN, NOISE_LEFT, weighed
+from plant_emulator.diagnosis.fitting.evidence import MARGIN, NOISE_LEFT, weighed
 from plant_emulator.diagnosis.selection.contenders import beside, best_of, costs_of, points_of
 from plant_emulator.diagnosis.selection.rules import FAINT, MOST_EFFECTS, noise_only
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.explanation import Contender
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
     from plant_emulator.diagnosis.selection.rounds import Rounds
 
 
@@ -26,13 +26,13 @@ class Backward:
     """
 
     rounds: Rounds
-    counts: Callable[[Point, Point, Point], bool]
+    counts: Callable[[FitResult, FitResult, FitResult], bool]
     # Fits without one of their effects, by the fit: none is made twice.
-    _refits: dict[object, Point] = field(default_factory=dict)
+    _refits: dict[object, FitResult] = field(default_factory=dict)
 
     def stand(
-        self, final: Point, last: Sequence[Contender]
-    ) -> tuple[Point, dict[str, dict[str, float]]]:
+        self, final: FitResult, last: Sequence[Contender]
+    ) -> tuple[FitResult, dict[str, dict[str, float]]]:
         """Let every effect but the last stand the contest again; take the best in its place.
 
         Where another takes an effect's place, the rest have new company, and stand once more.
@@ -52,7 +52,7 @@ class Backward:
                 rivals[waiting[0]] = costs_of(found)
         return final, rivals
 
-    def missed(self, final: Point, null: Point) -> tuple[Point, dict[str, float]]:
+    def missed(self, final: FitResult, null: FitResult) -> tuple[FitResult, dict[str, float]]:
         """Without an effect that another has made needless; and the cost without each of several
         that are all needed, by name.
 
@@ -63,7 +63,7 @@ class Backward:
             return found, without
         return self._needed(self.rounds.restarts.followed(found, to_noise=False), null)
 
-    def _needed(self, final: Point, null: Point) -> tuple[Point, dict[str, float]]:
+    def _needed(self, final: FitResult, null: FitResult) -> tuple[FitResult, dict[str, float]]:
         """The same of a fit as it is."""
         costs: dict[str, float] = {}
         if len(final.effects) < 2:
@@ -77,7 +77,7 @@ class Backward:
             costs[name] = without.cost
         return final, costs
 
-    def _without(self, final: Point, name: str) -> Point:
+    def _without(self, final: FitResult, name: str) -> FitResult:
         """A fit without one of its effects, fitted again."""
         rest = tuple(e for e in final.effects if e != name)
         if (final.key, name) not in self._refits:
@@ -85,12 +85,12 @@ class Backward:
             self._refits[final.key, name] = found
         return self._refits[final.key, name]
 
-    def _alone(self, point: Point, null: Point) -> Point:
+    def _alone(self, point: FitResult, null: FitResult) -> FitResult:
         """The fit with one effect, or that from the nominal parameters, where that is better."""
         found = self.rounds.nominal.fitted(null, [beside(point, null)])
         return min([point, *points_of(found)], key=lambda p: p.cost)
 
-    def _faint(self, final: Point, null: Point, without: Mapping[str, float]) -> bool:
+    def _faint(self, final: FitResult, null: FitResult, without: Mapping[str, float]) -> bool:
         """Whether one of two effects explains no more than what a fit may gain by leaving a hollow
         of its valley.
         """

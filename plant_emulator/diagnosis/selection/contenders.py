@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.explanation import NOISE_LEFT, Contender, excess
+from plant_emulator.diagnosis.fitting.evidence import NOISE_LEFT, excess
+from plant_emulator.diagnosis.fitting.explanation import Contender
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.signature import Signature
 
 # What keeps an effect in a round: the fall of its cost [fall of the best one], more of it beside
@@ -23,12 +24,12 @@ def explained(contenders: Sequence[Contender]) -> bool:
     return any(point.chi_squared <= NOISE_LEFT for point in points_of(contenders))
 
 
-def closed(contenders: Sequence[Contender], base: Point, share: float) -> bool:
+def closed(contenders: Sequence[Contender], base: FitResult, share: float) -> bool:
     """Whether an effect closes so much of what a fit leaves beyond the noise."""
     return any(excess(point) <= (1.0 - share) * excess(base) for point in points_of(contenders))
 
 
-def contender_of(name: str, shown: Signature | None, point: Point | None) -> Contender:
+def contender_of(name: str, shown: Signature | None, point: FitResult | None) -> Contender:
     """An effect after its first look."""
     if shown is None:
         return Contender(effect=name, norm=0.0, raw=0.0, imitated_by="", point=None)
@@ -37,7 +38,7 @@ def contender_of(name: str, shown: Signature | None, point: Point | None) -> Con
     )
 
 
-def beside(point: Point, base: Point) -> Contender:
+def beside(point: FitResult, base: FitResult) -> Contender:
     """The effect that a fit has beside those of another."""
     (name,) = set(point.effects) - set(base.effects)
     return Contender(effect=name, norm=0.0, raw=0.0, imitated_by="", point=point)
@@ -49,7 +50,7 @@ def better_of(first: Sequence[Contender], second: Sequence[Contender]) -> list[C
     return [min(c, others.get(c.effect, c), key=cost_of) for c in first]
 
 
-def best_few(contenders: Sequence[Contender], base: Point, most: int) -> list[Contender]:
+def best_few(contenders: Sequence[Contender], base: FitResult, most: int) -> list[Contender]:
     """Those whose cost is least, without those that fall far behind the best."""
     order = sorted(with_point(contenders), key=cost_of)
     if not order:
@@ -75,12 +76,12 @@ def with_point(contenders: Sequence[Contender]) -> list[Contender]:
     return [c for c in contenders if c.point is not None]
 
 
-def points_of(contenders: Sequence[Contender]) -> Iterator[Point]:
+def points_of(contenders: Sequence[Contender]) -> Iterator[FitResult]:
     """The fits of those that show."""
     return (c.point for c in contenders if c.point is not None)
 
 
-def best_of(contenders: Sequence[Contender]) -> Point | None:
+def best_of(contenders: Sequence[Contender]) -> FitResult | None:
     """The fit whose cost is least; None where no effect shows.
 
     Beside another one that has to have a size: what else differs from run to run is left of a law

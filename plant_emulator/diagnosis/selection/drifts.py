@@ -5,15 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.explanation import excess
-from plant_emulator.diagnosis.fitting.steps import Task, spread, start
+from plant_emulator.diagnosis.fitting.evidence import excess
+from plant_emulator.diagnosis.fitting.steps import spread, start
+from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.selection.rules import noise_only
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
+    from plant_emulator.diagnosis.fit_result import FitResult
 
 # Mean square that a fit to a few runs leaves where its drift is one to start from on all.
 LITTLE = 2.0
@@ -30,12 +31,12 @@ class Drifts:
     recipe: Recipe
     runs: tuple[int, ...]
 
-    def of_all(self) -> Point:
+    def of_all(self) -> FitResult:
         """The fit to all runs."""
         (null,) = self.pool.map(start, self.recipe, [self.runs])
         return null
 
-    def of_some(self, null: Point) -> tuple[list[Point], bool]:
+    def of_some(self, null: FitResult) -> tuple[list[FitResult], bool]:
         """Drift of some runs as it is on all, to start from; and whether these need no effect.
 
         Runs that need none show drift that no effect has led astray, and the others show the effect
@@ -57,12 +58,12 @@ class Drifts:
             return [], False
         return self._spread({(run,): point for run, point in alone.items()}), False
 
-    def _spread(self, points: Mapping[tuple[int, ...], Point]) -> list[Point]:
+    def _spread(self, points: Mapping[tuple[int, ...], FitResult]) -> list[FitResult]:
         """Fits to some runs as they are on all, by these runs."""
         tasks = [Task(base=point, runs=self.runs, known=runs) for runs, point in points.items()]
         return list(self.pool.map(spread, self.recipe, tasks))
 
 
-def _little(point: Point) -> bool:
+def _little(point: FitResult) -> bool:
     """Whether a fit leaves little enough to have its drift from."""
     return point.chi_squared <= LITTLE

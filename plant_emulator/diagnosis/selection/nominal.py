@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.explanation import excess
-from plant_emulator.diagnosis.fitting.steps import Task, once_more, refit
+from plant_emulator.diagnosis.fitting.evidence import excess
+from plant_emulator.diagnosis.fitting.steps import once_more, refit
+from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.fitting.valleys import WIDEST
 from plant_emulator.diagnosis.selection.contenders import better_of, with_point
 
@@ -14,8 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.explanation import Contender
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
     from plant_emulator.diagnosis.selection.restarts import Restarts
 
 # Best after a few steps that are fitted to convergence.
@@ -34,14 +35,14 @@ class FromNominal:
     restarts: Restarts
     runs: tuple[int, ...]
     # By the effects before and the last one: the points after a few steps, and at their end.
-    _far: dict[tuple[object, str], Point] = field(default_factory=dict)
-    _near: dict[tuple[object, str], Point] = field(default_factory=dict)
+    _far: dict[tuple[object, str], FitResult] = field(default_factory=dict)
+    _near: dict[tuple[object, str], FitResult] = field(default_factory=dict)
 
-    def ended_at(self, point: Point) -> bool:
+    def ended_at(self, point: FitResult) -> bool:
         """Whether a fit from the nominal parameters has ended there."""
         return point.key in {p.key for p in self._near.values()}
 
-    def fitted(self, base: Point, contenders: Sequence[Contender]) -> list[Contender]:
+    def fitted(self, base: FitResult, contenders: Sequence[Contender]) -> list[Contender]:
         """The best of some effects fitted from the nominal parameters, from where a few steps come
         to and then from the best values of each unknown.
 
@@ -61,13 +62,13 @@ class FromNominal:
         self._near.update(zip(new, ended, strict=True))
         return [replace(chosen[key], point=self._near[key]) for key in best]
 
-    def surveyed(self, contenders: Sequence[Contender], base: Point) -> list[Contender]:
+    def surveyed(self, contenders: Sequence[Contender], base: FitResult) -> list[Contender]:
         """All that could close the gap, from the nominal parameters where that is better."""
         able = [c for c in contenders if could_close(c.raw, base)]
         return better_of(contenders, self.fitted(base, able))
 
 
-def could_close(raw: float, base: Point) -> bool:
+def could_close(raw: float, base: FitResult) -> bool:
     """Whether an effect, drift or not, changes as much as a fit leaves beyond the noise.
 
     raw : norm of what it changes at its plausible size

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.explanation import NOISE_LEFT, THRESHOLD, excess
+from plant_emulator.diagnosis.fitting.evidence import NOISE_LEFT, THRESHOLD, excess
 from plant_emulator.diagnosis.fitting.input_noise_model import quieted
 from plant_emulator.diagnosis.fitting.random_effects import Weighted, unrest
-from plant_emulator.diagnosis.fitting.steps import Task, refit, start
+from plant_emulator.diagnosis.fitting.steps import refit, start
+from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.selection import run_consistency, verdict
 from plant_emulator.diagnosis.selection.stepwise import Contest
 
@@ -18,9 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
+    from plant_emulator.diagnosis.fit_result import FitResult, Unrest
     from plant_emulator.diagnosis.fitting.explanation import Explanation
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
-    from plant_emulator.diagnosis.fitting.random_effects import Unrest
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.selection.verdict import Verdict
 
@@ -40,7 +40,7 @@ class Inquiry:
     recipe: Recipe
     model: Model
     runs: tuple[int, ...]
-    null: Point | None = None
+    null: FitResult | None = None
 
     def with_quiet_inputs(self) -> Inquiry:
         """The same with the noise of fed inputs as part of the noise."""
@@ -64,7 +64,9 @@ class Inquiry:
             found = self._between(explained, found)
         return explained, found, recipe
 
-    def _contest(self, recipe: Recipe, null: Point | None, by_chance: float = 0.0) -> Explanation:
+    def _contest(
+        self, recipe: Recipe, null: FitResult | None, by_chance: float = 0.0
+    ) -> Explanation:
         contest = Contest(
             self.pool,
             recipe,
@@ -78,7 +80,7 @@ class Inquiry:
         )
         return contest.explain()
 
-    def _restless(self, null: Point) -> tuple[Explanation, Recipe] | None:
+    def _restless(self, null: FitResult) -> tuple[Explanation, Recipe] | None:
         """The contest with an effect of chance course, where the fit without effects leaves much,
         but next to nothing that is not random: a contest of others would be in vain.
         """
@@ -86,7 +88,7 @@ class Inquiry:
             return None
         return self._by_chance(null, null)
 
-    def _by_chance(self, base: Point, null: Point) -> tuple[Explanation, Recipe] | None:
+    def _by_chance(self, base: FitResult, null: FitResult) -> tuple[Explanation, Recipe] | None:
         """The contest with the unrest of the effect of chance course that explains most on top of
         a fit, and the recipe with it; None where there is none.
 
@@ -104,7 +106,7 @@ class Inquiry:
         last = self._unrest(again.final, [first.effect])
         return (replace(again, chance=tuple(last)), recipe) if last else None
 
-    def _unrest(self, base: Point, names: Iterable[str]) -> list[Unrest]:
+    def _unrest(self, base: FitResult, names: Iterable[str]) -> list[Unrest]:
         """What holds of effects of chance course on top of a fit."""
         tasks = [
             Task(base=base, runs=self.runs, effect=name)

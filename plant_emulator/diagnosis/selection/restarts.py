@@ -5,16 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.explanation import excess
+from plant_emulator.diagnosis.fitting.evidence import excess
 from plant_emulator.diagnosis.fitting.joint_fit import ASTRAY, WORTH
-from plant_emulator.diagnosis.fitting.steps import Task, advance, follow, refit, shake, sift, swap
+from plant_emulator.diagnosis.fitting.steps import advance, follow, refit, shake, sift, swap
+from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.selection.rules import noise_only
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
+    from plant_emulator.diagnosis.fit_result import FitResult
 
 # Times that a fit that ran out of steps is taken up again.
 PATIENCE = 3
@@ -37,12 +38,12 @@ class Restarts:
     recipe: Recipe
     runs: tuple[int, ...]
 
-    def refitted(self, point: Point) -> Point:
+    def refitted(self, point: FitResult) -> FitResult:
         """A fit to convergence from where another has come to."""
         (found,) = self.pool.map(refit, self.recipe, [Task(base=point, runs=self.runs)])
         return found
 
-    def settled(self, final: Point) -> Point:
+    def settled(self, final: FitResult) -> FitResult:
         """The fit taken up again where it ran out of steps."""
         for _ in range(PATIENCE):
             if final.converged:
@@ -50,7 +51,7 @@ class Restarts:
             final = self.refitted(final)
         return final
 
-    def sifted(self, points: Sequence[Point]) -> list[Point]:
+    def sifted(self, points: Sequence[FitResult]) -> list[FitResult]:
         """Fits; of those that leave much the better of itself and that from the best values of
         each of its unknowns.
         """
@@ -59,20 +60,20 @@ class Restarts:
         found = dict(zip(far, self.pool.map(sift, self.recipe, tasks), strict=True))
         return self._ended(points, found)
 
-    def shaken(self, points: Sequence[Point]) -> list[Point]:
+    def shaken(self, points: Sequence[FitResult]) -> list[FitResult]:
         """Fits, each the best of itself, that with wide slopes and those from some way off."""
         off = self._off(points, range(SHAKES))
         best = [min(found, key=lambda p: p.cost) for found in off]
         return self._ended(points, dict(enumerate(best)))
 
-    def _off(self, points: Sequence[Point], numbers: Sequence[int]) -> list[list[Point]]:
+    def _off(self, points: Sequence[FitResult], numbers: Sequence[int]) -> list[list[FitResult]]:
         """Of every fit those from some way off, each number another way; 0: with wide slopes."""
         tasks = [Task(base=point, runs=self.runs, number=k) for point in points for k in numbers]
         found = list(self.pool.map(shake, self.recipe, tasks))
         each = len(numbers)
         return [found[each * k : each * (k + 1)] for k in range(len(points))]
 
-    def swapped(self, point: Point, names: Sequence[str]) -> Point:
+    def swapped(self, point: FitResult, names: Sequence[str]) -> FitResult:
         """The fit with the likeliest of these effects in the place of the last, from that fit.
 
         Drift that has followed the wrong effect goes a long way back, through many valleys.
@@ -89,7 +90,7 @@ class Restarts:
             best = min(best, again, key=lambda p: p.cost)
         return best
 
-    def followed(self, point: Point, *, to_noise: bool = True) -> Point:
+    def followed(self, point: FitResult, *, to_noise: bool = True) -> FitResult:
         """The fit followed down a long valley, in whose rough bottom fits stop on the way.
 
         From where it has come to and where a start from some way off has, further the same way, as
@@ -112,14 +113,16 @@ class Restarts:
             point, failed = moved, failed + 1
         return point
 
-    def lowest(self, point: Point, starts: Sequence[Point]) -> Point:
+    def lowest(self, point: FitResult, starts: Sequence[FitResult]) -> FitResult:
         """A fit, or the best of some steps from these starts, where that is better, to the end."""
         tasks = [Task(base=start, runs=self.runs) for start in starts]
         found = list(self.pool.map(advance, self.recipe, tasks))
         best = min([point, *found], key=lambda p: p.cost)
         return self._ended([point], {0: best})[0]
 
-    def _ended(self, points: Sequence[Point], found: Mapping[int, Point]) -> list[Point]:
+    def _ended(
+        self, points: Sequence[FitResult], found: Mapping[int, FitResult]
+    ) -> list[FitResult]:
         """Fits, or what was found in their place where that is better, to convergence."""
         lower = {k: new for k, new in found.items() if new.cost < points[k].cost - WORTH}
         tasks = [Task(base=new, runs=self.runs) for new in lower.values()]
@@ -127,7 +130,7 @@ class Restarts:
         return [ended.get(k, point) for k, point in enumerate(points)]
 
 
-def further(first: Point, second: Point, stride: float) -> Point:
+def further(first: FitResult, second: FitResult, stride: float) -> FitResult:
     """A start that goes on from one fit through another, by so many times their difference."""
 
     def beyond(before: Mapping[str, float], after: Mapping[str, float]) -> dict[str, float]:

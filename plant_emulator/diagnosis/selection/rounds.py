@@ -11,17 +11,10 @@ from dataclasses import replace
 from math import inf
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.explanation import NOISE_LEFT, THRESHOLD
+from plant_emulator.diagnosis.fitting.evidence import NOISE_LEFT, THRESHOLD
 from plant_emulator.diagnosis.fitting.joint_fit import ASTRAY, WORTH
-from plant_emulator.diagnosis.fitting.steps import (
-    Task,
-    contend,
-    contend_far,
-    follow,
-    plod,
-    refit,
-    show,
-)
+from plant_emulator.diagnosis.fitting.steps import contend, contend_far, follow, plod, refit, show
+from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.selection.contenders import (
     beside,
     best_few,
@@ -43,8 +36,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.explanation import Contender
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
     from plant_emulator.diagnosis.fitting.signature import Signature
     from plant_emulator.diagnosis.machine import Model
 
@@ -89,7 +82,7 @@ class Rounds:
             pool=pool, recipe=recipe, restarts=self.restarts, runs=self._runs
         )
 
-    def from_clear(self, base: Point, null: Point) -> list[Contender]:
+    def from_clear(self, base: FitResult, null: FitResult) -> list[Contender]:
         """All effects on top of the drift of some runs, the best of them fitted.
 
         null : the fit without effects to all runs
@@ -98,11 +91,11 @@ class Rounds:
 
     def contend(
         self,
-        base: Point,
+        base: FitResult,
         *,
         thorough: bool,
         hasty: bool = False,
-        known: Point | None = None,
+        known: FitResult | None = None,
     ) -> list[Contender]:
         """All effects on top of a fit: a first look at each, the best of them fitted.
 
@@ -134,7 +127,7 @@ class Rounds:
             contenders = self.nominal.surveyed(contenders, base)
         return contenders
 
-    def deepened(self, contenders: Sequence[Contender], base: Point) -> list[Contender]:
+    def deepened(self, contenders: Sequence[Contender], base: FitResult) -> list[Contender]:
         """The best of a round started again from elsewhere, where none leaves little and the fit
         that they are on top of may be astray.
         """
@@ -149,7 +142,7 @@ class Rounds:
         self,
         contenders: Sequence[Contender],
         signatures: Sequence[Signature],
-        base: Point,
+        base: FitResult,
     ) -> list[Contender]:
         """Effects whose signature promises nothing, but may be wrong, fitted all the same."""
         wrong = {one.effect: one for one in signatures if one.concentrated}
@@ -159,7 +152,7 @@ class Rounds:
         return better_of(contenders, [replace(c, point=points.get(c.effect)) for c in contenders])
 
     def _looked(
-        self, base: Point, but: Sequence[str] = ()
+        self, base: FitResult, but: Sequence[str] = ()
     ) -> tuple[dict[str, Signature | None], list[Contender]]:
         """The signatures of all other effects on top of a fit, and these after a first look."""
         names = [name for name in self._names if name not in {*base.effects, *but}]
@@ -180,7 +173,7 @@ class Rounds:
         self,
         contenders: Sequence[Contender],
         shown: Mapping[str, Signature | None],
-        base: Point,
+        base: FitResult,
     ) -> list[Contender]:
         """Effects that could close the gap fitted from a larger size, where that is better."""
         large = [
@@ -197,7 +190,7 @@ class Rounds:
         ]
         return better_of(contenders, self._taken_further(again, base))
 
-    def _sighted(self, contenders: Sequence[Contender], base: Point) -> list[Contender]:
+    def _sighted(self, contenders: Sequence[Contender], base: FitResult) -> list[Contender]:
         """The best effect on top of noise fitted to convergence, where it is worth that."""
         found = list(contenders)
         for step in (follow, refit):
@@ -209,7 +202,7 @@ class Rounds:
     def _taken_further(
         self,
         contenders: Sequence[Contender],
-        base: Point,
+        base: FitResult,
         *,
         done: Sequence[Contender] = (),
         hasty: bool = False,
@@ -223,13 +216,13 @@ class Rounds:
             return found
         return self._fitted(found, base, POLISHED, refit, done)
 
-    def located(self, null: Point) -> frozenset[str]:
+    def located(self, null: FitResult) -> frozenset[str]:
         """The subsystems that the gap of a fit without effects lies in, by themselves."""
         (found,) = self._pool.map(site, self._recipe, [Task(base=null, runs=self._runs)])
         shares = [] if found is None else found["subsystems"]
         return frozenset(one["name"] for one in shares if one["share"] >= PLACED)
 
-    def restarted(self, base: Point, contenders: Sequence[Contender]) -> Point:
+    def restarted(self, base: FitResult, contenders: Sequence[Contender]) -> FitResult:
         """The best fit with the base's effects from the drift of the best contenders: a few steps
         from each, and on from where these lead lower.
         """
@@ -238,7 +231,7 @@ class Rounds:
         starts = [replace(p, effects=base.effects) for p in ranked if base.cost - p.cost > WORTH]
         return self.restarts.lowest(base, starts)
 
-    def in_place(self, contenders: Sequence[Contender], best: Point) -> list[Contender]:
+    def in_place(self, contenders: Sequence[Contender], best: FitResult) -> list[Contender]:
         """A round's effects, the likeliest in the best one's place fitted from there.
 
         Where a round's fits stop in valleys, an effect's near twin may have been left behind.
@@ -250,7 +243,9 @@ class Rounds:
         again = [replace(c, point=found) for c in contenders if c.effect == found.effects[-1]]
         return better_of(contenders, again)
 
-    def _moved(self, contenders: Sequence[Contender], base: Point, most: int) -> list[Contender]:
+    def _moved(
+        self, contenders: Sequence[Contender], base: FitResult, most: int
+    ) -> list[Contender]:
         """The best of a round started again from the nominal parameters and from some way off."""
         best = best_few(contenders, base, most)
         before = closed(contenders, base, MOST)
@@ -271,9 +266,9 @@ class Rounds:
     def _fitted(
         self,
         contenders: Sequence[Contender],
-        base: Point,
+        base: FitResult,
         most: int,
-        step: Callable[[Model, Task], Point],
+        step: Callable[[Model, Task], FitResult],
         done: Sequence[Contender] = (),
     ) -> list[Contender]:
         """The best of a round taken a step further, but for those that are done."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.explanation import (
+from plant_emulator.diagnosis.fitting.evidence import (
     LEFT,
     NOISE_LEFT,
     STRUCTURED,
@@ -14,7 +14,7 @@ from plant_emulator.diagnosis.fitting.explanation import (
 )
 
 if TYPE_CHECKING:
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
+    from plant_emulator.diagnosis.fit_result import FitResult
 
 # More effects than that at once explain anything.
 MOST_EFFECTS = 2
@@ -49,7 +49,7 @@ LITTLE = 0.04
 PART = 0.2
 
 
-def enough(final: Point, null: Point, reaches_noise: bool) -> bool:
+def enough(final: FitResult, null: FitResult, reaches_noise: bool) -> bool:
     """Whether to look for no further effect: there is little left for it, or far too much."""
     if not final.effects:
         return False
@@ -60,9 +60,9 @@ def enough(final: Point, null: Point, reaches_noise: bool) -> bool:
 
 
 def counts(
-    best: Point,
-    base: Point,
-    null: Point,
+    best: FitResult,
+    base: FitResult,
+    null: FitResult,
     reaches_noise: bool,
     *,
     by_chance: float = 0.0,
@@ -101,11 +101,11 @@ def counts(
     return evidence > THRESHOLD and orderly and most
 
 
-def _ordered(point: Point) -> float:
+def _ordered(point: FitResult) -> float:
     """Structure beyond what noise may have [chi squared]."""
     return max(0.0, point.structure - STRUCTURED)
 
 
-def noise_only(point: Point) -> bool:
+def noise_only(point: FitResult) -> bool:
     """Whether a fit leaves as little as the noise, and as random."""
     return point.chi_squared <= NOISE_LEFT and point.structure <= STRUCTURED

@@ -9,15 +9,15 @@ from __future__ import annotations
 from itertools import combinations
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.explanation import LEFT
+from plant_emulator.diagnosis.fitting.evidence import LEFT
 from plant_emulator.diagnosis.fitting.joint_fit import null_fit
 from plant_emulator.diagnosis.wording import size
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
-    from plant_emulator.diagnosis.fitting.steps import Task
+    from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.fitting.task import Task
     from plant_emulator.diagnosis.machine import Model
 
 # Standard errors from which on a parameter differs between two runs.
@@ -28,12 +28,14 @@ AGREES = 1.1
 CHANGES = "friction"
 
 
-def alone(model: Model, task: Task) -> Point:
+def alone(model: Model, task: Task) -> FitResult:
     """Step of a diagnosis: the fit without effects of these runs only."""
     return null_fit(model, task.runs)
 
 
-def between(model: Model, runs: Sequence[int], found: Sequence[Point], together: Point) -> str:
+def between(
+    model: Model, runs: Sequence[int], found: Sequence[FitResult], together: FitResult
+) -> str:
     """What differs most between two of the runs, each fitted alone; empty: nothing is known to.
 
     together : the best fit of all of them
@@ -55,25 +57,25 @@ def between(model: Model, runs: Sequence[int], found: Sequence[Point], together:
     )
 
 
-def _agree(model: Model, found: Sequence[Point], together: Point) -> bool:
+def _agree(model: Model, found: Sequence[FitResult], together: FitResult) -> bool:
     """Whether each run alone agrees with the equations, in so far as the model can tell."""
     if model.reaches_noise:
         return all(point.chi_squared <= AGREES for point in found)
     return sum(point.squares for point in found) <= LEFT * together.squares
 
 
-def _apart(name: str, a: Point, b: Point) -> float:
+def _apart(name: str, a: FitResult, b: FitResult) -> float:
     """Difference of a parameter of two fits in its standard errors, wider by what they leave."""
     error = float((_variance(name, a) + _variance(name, b)) ** 0.5)
     return abs(a.values[name] - b.values[name]) / error if error > 0.0 else 0.0
 
 
-def _variance(name: str, point: Point) -> float:
+def _variance(name: str, point: FitResult) -> float:
     """Square of a standard error, by the residual and its autocorrelation."""
     return point.errors[name] ** 2 * max(1.0, point.chi_squared) / point.share
 
 
-def _told(model: Model, name: str, run: int, found: Point) -> str:
+def _told(model: Model, name: str, run: int, found: FitResult) -> str:
     """A parameter of a run, whose file is named with its folder."""
     value = size(
         {

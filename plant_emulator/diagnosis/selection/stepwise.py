@@ -16,7 +16,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.explanation import NOISE_LEFT, THRESHOLD, Explanation, excess
+from plant_emulator.diagnosis.fitting.evidence import NOISE_LEFT, THRESHOLD, excess
+from plant_emulator.diagnosis.fitting.explanation import Explanation
 from plant_emulator.diagnosis.selection.backward import Backward
 from plant_emulator.diagnosis.selection.contenders import (
     best_of,
@@ -34,8 +35,8 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.explanation import Contender
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
 
 # Share of the gap that a better fit without effects closes when it has moved to another valley.
 MOVED = 0.5
@@ -61,7 +62,7 @@ class Contest:
         *,
         reaches_noise: bool = True,
         by_chance: float = 0.0,
-        null: Point | None = None,
+        null: FitResult | None = None,
         exact: Collection[str] = (),
         subsystems: Mapping[str, str] | None = None,
     ) -> None:
@@ -84,8 +85,8 @@ class Contest:
         return found
 
     def _deepened(
-        self, null: Point, contenders: Sequence[Contender]
-    ) -> tuple[Point, list[Contender]]:
+        self, null: FitResult, contenders: Sequence[Contender]
+    ) -> tuple[FitResult, list[Contender]]:
         """A first round in earnest: the effects of the place that the gap lies in from the nominal
         parameters; and also from the fit to all runs, where that has not been done.
         """
@@ -97,7 +98,7 @@ class Contest:
             return self._confirmed(null, better_of(found, contenders))
         return self._confirmed(null, self._rounds.deepened(contenders, null))
 
-    def _stepped(self, null: Point, contenders: Sequence[Contender]) -> Explanation:
+    def _stepped(self, null: FitResult, contenders: Sequence[Contender]) -> Explanation:
         """Forward and backward steps from the fit without effects and the first round on it."""
         null = self._rounds.restarts.settled(null)
         final = null
@@ -133,7 +134,7 @@ class Contest:
             without=_least(without, costs_of(contenders)),
         )
 
-    def _first(self, null: Point) -> tuple[Point, list[Contender]]:
+    def _first(self, null: FitResult) -> tuple[FitResult, list[Contender]]:
         """All effects on the fit without any, and that fit, started again from the best of them."""
         null, contenders, self._from_clear_only = self._from_clear(null)
         if not self._from_clear_only:
@@ -142,8 +143,8 @@ class Contest:
         return self._confirmed(null, contenders)
 
     def _confirmed(
-        self, null: Point, contenders: Sequence[Contender]
-    ) -> tuple[Point, list[Contender]]:
+        self, null: FitResult, contenders: Sequence[Contender]
+    ) -> tuple[FitResult, list[Contender]]:
         """A first round, and the fit without effects, started again from the best of it.
 
         All are tried again when the fit without effects has moved to another valley and they leave
@@ -163,7 +164,7 @@ class Contest:
             better = self._rounds.restarted(better, contenders)
         return better, list(contenders)
 
-    def _from_clear(self, null: Point) -> tuple[Point, list[Contender], bool]:
+    def _from_clear(self, null: FitResult) -> tuple[FitResult, list[Contender], bool]:
         """The fit without effects, and all effects, from the drift of the runs that need none; and
         whether one explains half of what the others show. No effects where there are no such runs.
         """
@@ -178,19 +179,19 @@ class Contest:
         half = explained(contenders) or closed(contenders, base, MUCH)
         return null, contenders, half and null.cost - least_cost(contenders) > THRESHOLD
 
-    def _from_all(self, null: Point) -> tuple[Point, list[Contender]]:
+    def _from_all(self, null: FitResult) -> tuple[FitResult, list[Contender]]:
         """The same from the fit without effects to all runs, started again where it leaves much."""
         if null.chi_squared > NOISE_LEFT:
             (null,) = self._rounds.restarts.shaken([null])
         return null, self._searched(null)
 
-    def _searched(self, null: Point) -> list[Contender]:
+    def _searched(self, null: FitResult) -> list[Contender]:
         """A first round; the best of it started again where none closes much, or in earnest."""
         found = self._rounds.contend(null, thorough=True)
         shallow = closed(found, null, MUCH) and not self._deep
         return found if shallow else self._rounds.deepened(found, null)
 
-    def _further(self, base: Point) -> tuple[Point, list[Contender]]:
+    def _further(self, base: FitResult) -> tuple[FitResult, list[Contender]]:
         """A fit with effects started again from the best others on top of it, and all of these."""
         if base.key not in self._on_top:
             hasty = not self._deep
@@ -203,7 +204,7 @@ class Contest:
             return base, found
         return self._rounds.restarted(base, found), found
 
-    def _counts(self, best: Point, base: Point, null: Point) -> bool:
+    def _counts(self, best: FitResult, base: FitResult, null: FitResult) -> bool:
         """Whether one more effect earns its place."""
         return counts(
             best,
@@ -215,7 +216,7 @@ class Contest:
         )
 
 
-def _settles(found: Sequence[Contender], base: Point) -> bool:
+def _settles(found: Sequence[Contender], base: FitResult) -> bool:
     """Whether a second effect explains so much that nothing is likely to be astray."""
     return explained(found) or closed(found, base, MOST)
 
@@ -237,7 +238,7 @@ def _least(without: Mapping[str, float], alone: Mapping[str, float]) -> dict[str
     }
 
 
-def _unconverged(null: Point, final: Point) -> str:
+def _unconverged(null: FitResult, final: FitResult) -> str:
     """Why a contest cannot be trusted; empty where it can."""
     if not final.converged:
         return "the last fit did not converge"

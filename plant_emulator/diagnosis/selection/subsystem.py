@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from plant_emulator.diagnosis.fitting.explanation import Explanation
-    from plant_emulator.diagnosis.fitting.steps import Task
+    from plant_emulator.diagnosis.fitting.task import Task
     from plant_emulator.diagnosis.machine import Candidate, Model
     from plant_emulator.diagnosis.selection.verdict import Verdict
 

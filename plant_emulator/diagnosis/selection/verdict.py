@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
-from plant_emulator.diagnosis.fitting.explanation import STRUCTURED, adequate, evident
+from plant_emulator.diagnosis.fitting.evidence import STRUCTURED, adequate, evident
 from plant_emulator.diagnosis.prediction.remainder import lies, shrinks
 from plant_emulator.diagnosis.wording import number, percent
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.explanation import Explanation
-    from plant_emulator.diagnosis.fitting.joint_fit import Point
     from plant_emulator.diagnosis.machine import Candidate, Model
     from plant_emulator.diagnosis.prediction.remainder import Rest
 
@@ -55,7 +55,7 @@ class Verdict:
     reason: str
 
 
-def shifts(model: Model, found: Point) -> tuple[Shift, ...]:
+def shifts(model: Model, found: FitResult) -> tuple[Shift, ...]:
     """Parameters more than SHIFTED standard errors from nominal: those that chance does not explain
     first, of these the most surprising.
     """

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from plant_emulator.diagnosis.report.details import Details, Step, Trace
+from plant_emulator.diagnosis.prediction.trace import Trace
+from plant_emulator.diagnosis.report.details import Details, Step
 
 CHANNELS = {"motor_speed": "rad/s", "drum_speed": "rad/s", "armature_current": "A",
             "shaft_torque": "N m"}  # fmt: skip

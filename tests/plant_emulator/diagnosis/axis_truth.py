@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from plant_emulator.diagnosis.machines.axis_signals import AxisLog
+from plant_emulator.signals.axis_log import AxisLog
 
 Array = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation
-from plant_emulator.diagnosis.fitting.joint_fit import Point
 from plant_emulator.diagnosis.machine import Run
 from plant_emulator.diagnosis.prediction.gap import Prediction, gap
 from plant_emulator.diagnosis.report.answer import noise_floor, ranged, rank, ranked, traces
@@ -14,7 +14,7 @@ from plant_emulator.diagnosis.report.html_traces import path, rms
 from plant_emulator.estimation.unknowns import Array
 from tests.plant_emulator.diagnosis.test_contest import effect
 
-POINT = Point(
+POINT = FitResult(
     effects=(),
     values={},
     states=({},),

@@ -5,7 +5,8 @@ from collections.abc import Callable
 
 import pytest
 
-from plant_emulator.diagnosis.fitting.joint_fit import Point, null_fit
+from plant_emulator.diagnosis.fit_result import FitResult
+from plant_emulator.diagnosis.fitting.joint_fit import null_fit
 from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.diagnosis.selection import run_consistency
 from plant_emulator.model.parameters import ParameterSet
@@ -31,9 +32,9 @@ class Outlined(Line):
     reaches_noise = False
 
 
-def fitted(a: float, squares: float) -> Point:
+def fitted(a: float, squares: float) -> FitResult:
     """A line at this level, known to 0.1 in white noise."""
-    return Point(
+    return FitResult(
         effects=(),
         values={"a": a, "b": 0.0},
         states=({},),

@@ -11,17 +11,19 @@ import pytest
 
 from plant_emulator.diagnosis.diagnose import Diagnose
 from plant_emulator.diagnosis.execution.pool import Here
+from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.explanation import Explanation
-from plant_emulator.diagnosis.fitting.joint_fit import Point, linearised, null_fit
+from plant_emulator.diagnosis.fitting.joint_fit import linearised, null_fit
 from plant_emulator.diagnosis.fitting.looks import glance, look
 from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
 from plant_emulator.diagnosis.fitting.signature import signature
 from plant_emulator.diagnosis.machines.axis import AxisModel, AxisRecipe
 from plant_emulator.diagnosis.machines.axis_effects import EFFECTS
-from plant_emulator.diagnosis.machines.axis_signals import AxisLog, prepared
-from plant_emulator.diagnosis.prediction.frequency_bands import power
+from plant_emulator.diagnosis.machines.axis_signals import prepared
 from plant_emulator.diagnosis.prediction.held_out import NOMINAL, HeldOut, Plan
 from plant_emulator.errors import LogError
+from plant_emulator.signals.axis_log import AxisLog
+from plant_emulator.signals.frequency_bands import power
 from plant_emulator.workflows.diagnosis import plan_of
 
 spec = importlib.util.spec_from_file_location(
@@ -40,7 +42,7 @@ PLANTED: dict[str, tuple[Callable[..., np.ndarray], str, float]] = {
 }
 
 
-def contest(model: AxisModel, runs: tuple[int, ...]) -> tuple[Point, dict[str, Point]]:
+def contest(model: AxisModel, runs: tuple[int, ...]) -> tuple[FitResult, dict[str, FitResult]]:
     """The fit without effects, and the joint fit of every effect that shows at all."""
     null = null_fit(model, runs)
     tangents = Tangents(linearised(model, null, runs))

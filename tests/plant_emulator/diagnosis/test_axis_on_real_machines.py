@@ -12,13 +12,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.fitting.joint_fit import Point, linearised, null_fit
+from plant_emulator.diagnosis.fit_result import FitResult
+from plant_emulator.diagnosis.fitting.joint_fit import linearised, null_fit
 from plant_emulator.diagnosis.fitting.looks import glance, look
 from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
 from plant_emulator.diagnosis.fitting.signature import signature
 from plant_emulator.diagnosis.machines.axis import AxisModel
-from plant_emulator.diagnosis.prediction.frequency_bands import BANDS, power
 from plant_emulator.estimation.least_squares import estimate
+from plant_emulator.signals.frequency_bands import BANDS, power
 from plant_emulator.workflows import axis_reader
 
 ROOT = Path(__file__).parents[3]
@@ -31,10 +32,10 @@ COUNTS = 25.0
 needs_emps = pytest.mark.skipif(not EMPS.is_dir(), reason=f"{EMPS}: no data; set REAL_DATA")
 needs_hsm150 = pytest.mark.skipif(not HSM150.is_dir(), reason=f"{HSM150}: no data; set REAL_DATA")
 
-Contest = tuple[Point, dict[str, Point]]
+Contest = tuple[FitResult, dict[str, FitResult]]
 
 
-def contest(model: AxisModel, runs: tuple[int, ...], base: Point | None = None) -> Contest:
+def contest(model: AxisModel, runs: tuple[int, ...], base: FitResult | None = None) -> Contest:
     """A fit, and the joint fits of every further effect that shows at all."""
     base = base or null_fit(model, runs)
     tangents = Tangents(linearised(model, base, runs))
@@ -49,13 +50,13 @@ def contest(model: AxisModel, runs: tuple[int, ...], base: Point | None = None) 
     }
 
 
-def evidence(base: Point, found: dict[str, Point], share: float) -> dict[str, float]:
+def evidence(base: FitResult, found: dict[str, FitResult], share: float) -> dict[str, float]:
     """Fall of the cost in units of what the best model leaves, in independent samples."""
     left = max(1.0, min(point.chi_squared for point in (base, *found.values())))
     return {name: (base.cost - point.cost) / left * share for name, point in found.items()}
 
 
-def relative_error(model: AxisModel, run: int, point: Point) -> float:
+def relative_error(model: AxisModel, run: int, point: FitResult) -> float:
     """norm(e) / norm(y) in percent."""
     residual = model.residual(run, point.effects)(point.values) * model.runs[run].noise[0]
     return 100.0 * float(np.linalg.norm(residual) / np.linalg.norm(model.runs[run].measured))
@@ -182,7 +183,7 @@ def test_repeats_of_hsm150_differ_by_friction_and_leave_nothing_but_noise(
         assert float(np.mean(held_out(hsm150, run, null) ** 2)) < 1.2
 
 
-def held_out(model: AxisModel, run: int, point: Point) -> np.ndarray:
+def held_out(model: AxisModel, run: int, point: FitResult) -> np.ndarray:
     """Whitened residual of a run, all parameters kept, its own friction level fitted."""
     residual = model.residual(run, point.effects)
     own = [replace(unknown, run=0) for unknown in model.states]

@@ -9,7 +9,8 @@ import pytest
 from plant_emulator.diagnosis.execution.pool import Here
 from plant_emulator.diagnosis.fitting.joint_fit import fit, null_fit
 from plant_emulator.diagnosis.fitting.random_effects import Weighted, unrest
-from plant_emulator.diagnosis.fitting.steps import Task, show
+from plant_emulator.diagnosis.fitting.steps import show
+from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.selection.procedure import Inquiry
 from plant_emulator.estimation.unknowns import Array
 from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, effect, linear, noisy

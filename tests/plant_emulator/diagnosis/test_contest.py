@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.execution.pool import Here
+from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.elsewhere import (
     from_nominal,
     in_place,
@@ -16,8 +17,9 @@ from plant_emulator.diagnosis.fitting.elsewhere import (
     smoothed,
     vacated,
 )
-from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation, adequate, excess
-from plant_emulator.diagnosis.fitting.joint_fit import Point, fit, linearised, null_fit
+from plant_emulator.diagnosis.fitting.evidence import adequate, excess
+from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation
+from plant_emulator.diagnosis.fitting.joint_fit import fit, linearised, null_fit
 from plant_emulator.diagnosis.fitting.looks import glance, glance_far, look
 from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
 from plant_emulator.diagnosis.fitting.signature import signature
@@ -100,7 +102,7 @@ class Line:
 
         return residual
 
-    def loud(self, run: int, where: Point, state: Mapping[str, float]) -> Loud | None:
+    def loud(self, run: int, where: FitResult, state: Mapping[str, float]) -> Loud | None:
         """See `Model`: nothing is fed."""
         return None
 
@@ -118,7 +120,7 @@ class Line:
         """See `Model`."""
         return {}
 
-    def located(self, where: Point, runs: Sequence[int]) -> None:
+    def located(self, where: FitResult, runs: Sequence[int]) -> None:
         """See `Model`."""
 
 
@@ -296,7 +298,7 @@ def partly(*sizes: float) -> Partly:
     return Partly([noisy(y, seed) for seed, y in enumerate(waves)])
 
 
-def drifts(model: Line) -> tuple[list[Point], bool]:
+def drifts(model: Line) -> tuple[list[FitResult], bool]:
     """What the fit without effects starts from."""
     found = Drifts(pool=Here(), recipe=Given(model), runs=tuple(range(len(model.runs))))
     return found.of_some(found.of_all())
@@ -419,7 +421,7 @@ def test_far_from_the_cause_all_start_from_the_nominal_parameters() -> None:
 class Placed(Line):
     """The gap is known to lie where the kink belongs."""
 
-    def located(self, where: Point, runs: Sequence[int]) -> Mapping[str, Any]:  # type: ignore[override]
+    def located(self, where: FitResult, runs: Sequence[int]) -> Mapping[str, Any]:  # type: ignore[override]
         """See `Model`."""
         return {"subsystems": [{"name": "here", "share": 0.8}, {"name": "there", "share": 0.2}]}
 
@@ -519,7 +521,7 @@ def test_what_no_effect_explains_stays_unexplained() -> None:
 
 
 def test_excess_is_what_the_noise_does_not_explain() -> None:
-    point = Point(
+    point = FitResult(
         effects=(),
         values={},
         states=(),

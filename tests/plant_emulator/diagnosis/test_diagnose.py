@@ -9,7 +9,8 @@ import pytest
 
 from plant_emulator.diagnosis.diagnose import Diagnose, Diagnosis
 from plant_emulator.diagnosis.execution.pool import Here
-from plant_emulator.diagnosis.fitting.joint_fit import Point, fit
+from plant_emulator.diagnosis.fit_result import FitResult
+from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.prediction.gap import Fold, predict
 from plant_emulator.diagnosis.prediction.held_out import HeldOut, Plan
 from plant_emulator.estimation import least_squares
@@ -30,7 +31,7 @@ class OnlyInTheFirst(Line):
 class Unplanned(Line):
     """Knows no further run that would tell more."""
 
-    def with_planned(self, where: Point, runs: Sequence[int]) -> Line:
+    def with_planned(self, where: FitResult, runs: Sequence[int]) -> Line:
         """See `Model`."""
         return self
 

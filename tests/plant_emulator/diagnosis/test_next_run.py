@@ -10,8 +10,9 @@ import pytest
 from plant_emulator import parameter_sets
 from plant_emulator.diagnosis.design.next_experiment import Advice
 from plant_emulator.diagnosis.execution.pool import Here
+from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation
-from plant_emulator.diagnosis.fitting.joint_fit import Point, fit, null_fit
+from plant_emulator.diagnosis.fitting.joint_fit import fit, null_fit
 from plant_emulator.diagnosis.machine import Candidate, Run
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
 from plant_emulator.diagnosis.selection.verdict import Verdict
@@ -96,7 +97,7 @@ class Slope:
         x, y = self.speeds[run], self.measured[run]
         return lambda v: ((y - self.foretold(x, effects, v)) / 0.01)[None, :]
 
-    def loud(self, run: int, where: Point, state: Mapping[str, float]) -> Loud | None:
+    def loud(self, run: int, where: FitResult, state: Mapping[str, float]) -> Loud | None:
         return None
 
     def nominal(self, runs: Sequence[int]) -> dict[str, float]:
@@ -108,10 +109,10 @@ class Slope:
     def start_states(self, run: int, effects: Sequence[str], values: Any) -> dict[str, float]:
         return {}
 
-    def located(self, where: Point, runs: Sequence[int]) -> None:
+    def located(self, where: FitResult, runs: Sequence[int]) -> None:
         """See `Model`."""
 
-    def with_planned(self, where: Point, runs: Sequence[int]) -> "Slope":
+    def with_planned(self, where: FitResult, runs: Sequence[int]) -> "Slope":
         more = [self.foretold(x, where.effects, where.values) for x in self.plans.values()]
         return Slope(
             [*self.speeds, *self.plans.values()],
@@ -268,7 +269,7 @@ def test_bench_names_the_program_that_has_what_an_effect_needs():
     ]
     recipe = BenchRecipe(tuple(recording(log) for log in logs), given)
     model = recipe.build()
-    null = Point(
+    null = FitResult(
         effects=(),
         values={u.name: u.prior for u in model.parameters},
         states=({GAP_POSITION: 0.0},) * 3,

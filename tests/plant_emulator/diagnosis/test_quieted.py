@@ -8,8 +8,9 @@ import pytest
 from scipy.sparse import csr_array
 
 from plant_emulator.diagnosis.execution.pool import Here
+from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.input_noise_model import Quieted, quieted
-from plant_emulator.diagnosis.fitting.joint_fit import Point, null_fit
+from plant_emulator.diagnosis.fitting.joint_fit import null_fit
 from plant_emulator.diagnosis.selection.procedure import Inquiry
 from plant_emulator.estimation.unknowns import Array
 from plant_emulator.recordings.input_noise import Loud
@@ -27,7 +28,7 @@ class Fed(Line):
         super().__init__(measured)
         self.runs = [replace(run, fed=True) for run in self.runs]
 
-    def loud(self, run: int, where: Point, state: Mapping[str, float]) -> Loud:
+    def loud(self, run: int, where: FitResult, state: Mapping[str, float]) -> Loud:
         """See `Model`."""
         return Loud(directions=csr_array(FED[None] / NORM), deviations=np.array([NORM]))
 

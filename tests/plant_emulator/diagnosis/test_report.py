@@ -9,7 +9,8 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.report.details import Step, Trace
+from plant_emulator.diagnosis.prediction.trace import Trace
+from plant_emulator.diagnosis.report.details import Step
 from plant_emulator.diagnosis.report.html import MOST_RUNS, html
 from plant_emulator.diagnosis.report.html_pictures import waterfall
 from plant_emulator.diagnosis.report.html_style import STYLE

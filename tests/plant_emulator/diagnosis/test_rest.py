@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.derived_quantities import in_terms
-from plant_emulator.diagnosis.fitting.joint_fit import Point, fit
+from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.machines.axis import AxisModel
 from plant_emulator.diagnosis.prediction.remainder import lies, rest_of, shrinks
-from plant_emulator.diagnosis.report.details import Trace
+from plant_emulator.diagnosis.prediction.trace import Trace
 from tests.plant_emulator.diagnosis import axis_truth
 from tests.plant_emulator.diagnosis.axis_truth import Array
 
@@ -24,7 +25,7 @@ def axis() -> AxisModel:
 
 
 @pytest.fixture(scope="module")
-def nominal(axis: AxisModel) -> Point:
+def nominal(axis: AxisModel) -> FitResult:
     return fit(axis, (), (0,), axis.search((0,))[0], [{}])
 
 
@@ -47,7 +48,7 @@ def wave(size: float, frequency: float) -> Array:
 
 
 def test_relative_error_of_sines_is_the_ratio_of_their_sizes(
-    axis: AxisModel, nominal: Point
+    axis: AxisModel, nominal: FitResult
 ) -> None:
     rest = rest_of(axis, nominal, (0,), [trace(wave(6.0, 1.0), wave(5.0, 27.0))])
     assert (rest.before, rest.after) == pytest.approx((0.06, 0.05), rel=1e-6)
@@ -55,7 +56,7 @@ def test_relative_error_of_sines_is_the_ratio_of_their_sizes(
 
 
 def test_relative_error_leaves_out_the_samples_that_do_not_count(
-    axis: AxisModel, nominal: Point
+    axis: AxisModel, nominal: FitResult
 ) -> None:
     """At rest for a third of the run, held by a force of ten times the motion's."""
     whole = trace(wave(6.0, 1.0), wave(5.0, 27.0))
@@ -76,7 +77,7 @@ def test_relative_error_leaves_out_the_samples_that_do_not_count(
     [(27.0, "20 to 35 Hz: elasticity, or unknown"), (1.1, "0.2 to 2 Hz: unknown")],
 )
 def test_rest_lies_in_the_band_of_its_frequency(
-    axis: AxisModel, nominal: Point, frequency: float, told: str
+    axis: AxisModel, nominal: FitResult, frequency: float, told: str
 ) -> None:
     rest = rest_of(axis, nominal, (0,), [trace(wave(6.0, 1.0), wave(5.0, frequency))])
     assert lies(rest).endswith(told)
@@ -85,17 +86,19 @@ def test_rest_lies_in_the_band_of_its_frequency(
 
 
 def test_what_fitted_runs_leave_too_is_not_where_the_rest_lies(
-    axis: AxisModel, nominal: Point
+    axis: AxisModel, nominal: FitResult
 ) -> None:
     # Without Coulomb friction the fitted run leaves 25 N that turn with the motion: 625 N^2.
-    off = Point(**{**vars(nominal), "values": {**nominal.values, "coulomb_friction": 0.0}})
+    off = FitResult(**{**vars(nominal), "values": {**nominal.values, "coulomb_friction": 0.0}})
     rest = rest_of(axis, off, (0,), [trace(wave(9.0, 1.0), wave(25.0, 1.0) + wave(20.0, 15.0))])
     assert rest.fitted is not None
     assert rest.fitted[0] > rest.held_out[0] > rest.held_out[3]
     assert rest.band == (10.0, 20.0)
 
 
-def test_runs_held_out_in_turn_are_compared_with_nothing(axis: AxisModel, nominal: Point) -> None:
+def test_runs_held_out_in_turn_are_compared_with_nothing(
+    axis: AxisModel, nominal: FitResult
+) -> None:
     rest = rest_of(axis, nominal, (0,), [trace(wave(6.0, 1.0), wave(5.0, 27.0), source="axis 1")])
     assert rest.fitted is None
 
@@ -116,5 +119,5 @@ def test_coefficients_by_direction_are_those_of_a_fit_of_both() -> None:
         assert 0.3 * rough < error < 1.5 * rough
 
 
-def test_effect_without_terms_of_its_own_has_none(axis: AxisModel, nominal: Point) -> None:
+def test_effect_without_terms_of_its_own_has_none(axis: AxisModel, nominal: FitResult) -> None:
     assert in_terms(axis, nominal, (0,)) == {}

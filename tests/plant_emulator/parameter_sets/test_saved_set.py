@@ -10,7 +10,8 @@ import pytest
 
 from plant_emulator import effects
 from plant_emulator.diagnosis.diagnose import Diagnosis
-from plant_emulator.diagnosis.fitting.joint_fit import Point, null_fit
+from plant_emulator.diagnosis.fit_result import FitResult
+from plant_emulator.diagnosis.fitting.joint_fit import null_fit
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import recording
@@ -26,7 +27,7 @@ def diagnosis(name: str, **states: tuple[float, ...]) -> Diagnosis:
     """A diagnosis that names an effect, with these values of its states by run."""
     plausible = effects.load(name).plausible()
     runs = zip(*states.values(), strict=True)
-    final = Point(
+    final = FitResult(
         effects=(name,), values={},
         states=tuple({f"{name}_{k}": v for k, v in zip(states, run, strict=True)} for run in runs),
         cost=0.0, squares=0.0, samples=1, share=1.0, errors={}, converged=True,

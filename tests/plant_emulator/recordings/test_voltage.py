@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.design.detectability import as_answer, detectability
-from plant_emulator.diagnosis.fitting.explanation import STRUCTURED
+from plant_emulator.diagnosis.fitting.evidence import STRUCTURED
 from plant_emulator.diagnosis.fitting.joint_fit import null_fit
 from plant_emulator.diagnosis.localisation.block_basis import inside
 from plant_emulator.diagnosis.localisation.locate import WORTH, locate

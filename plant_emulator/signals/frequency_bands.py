@@ -14,7 +14,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from plant_emulator.estimation.unknowns import Array
+    from plant_emulator.signals.log import Array
 
 BANDS = ((0.2, 2.0), (2.0, 5.0), (5.0, 10.0), (10.0, 20.0), (20.0, 35.0), (35.0, 45.0))
 """[Hz]"""
