@@ -28,6 +28,7 @@ from plant_emulator.diagnosis.report import answer
 from plant_emulator.diagnosis.selection.procedure import Inquiry
 from plant_emulator.recordings.recording import recording
 from plant_emulator.solver.kernel import kernel, know
+from plant_emulator.workflows.workers import end_with_parent
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -86,7 +87,7 @@ def main(seed: int, cases: int, workers: int, only: tuple[str, ...]) -> None:
     """Print a table of true and estimated sizes under other laws."""
     table = csv.DictWriter(sys.stdout, COLUMNS, extrasaction="ignore", lineterminator="\n")
     table.writeheader()
-    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+    with ProcessPoolExecutor(workers, get_context("spawn"), end_with_parent) as pool:
         for found in pool.map(partial(sizes, seed, only), range(cases)):
             table.writerows(found)
             sys.stdout.flush()

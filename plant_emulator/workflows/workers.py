@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from concurrent.futures import BrokenExecutor, CancelledError, ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import partial
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
+from threading import Thread
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from threadpoolctl import threadpool_limits
@@ -37,12 +39,28 @@ def _lost(errors: tuple[type[Exception], ...], advice: str) -> Iterator[None]:
         raise EmulatorError(f"{advice} ({type(error).__name__}: {error})") from error
 
 
+def end_with_parent() -> None:
+    """Let this worker process end as soon as its parent has ended, however that ended.
+
+    A killed parent closes no queue, so that a worker would compute or wait for ever.
+    """
+    Thread(target=_exit_after_parent, name="end with parent", daemon=True).start()
+
+
+def _exit_after_parent() -> None:
+    if (parent := parent_process()) is not None:
+        parent.join()
+    os._exit(1)  # sys.exit would end this thread only
+
+
 class Processes:
-    """On so many processes of this machine."""
+    """Runs steps on several processes of this machine."""
 
     def __init__(self, workers: int) -> None:
         # spawned, not forked: a fork copies the locks of threads that it does not copy
-        self._executor = ProcessPoolExecutor(workers, get_context("spawn"))
+        self._executor = ProcessPoolExecutor(
+            workers, get_context("spawn"), initializer=end_with_parent
+        )
         self._told = partial(
             _lost,
             (BrokenExecutor,),

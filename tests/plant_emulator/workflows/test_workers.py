@@ -1,7 +1,11 @@
-"""Steps on processes: the answers in their order, and one line where a process is lost."""
+"""Steps on processes: the answers in their order, one line where a process is lost, none left."""
 
 import os
+import signal
+import subprocess
+import sys
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -60,6 +64,46 @@ def test_lost_process_is_told_in_one_line() -> None:
     assert one.value.exit_code == 1
 
 
+ROOT = Path(__file__).parents[3]
+# Prints the number of the process of every worker, which then waits for work or computes for ever.
+PARENT = f"""
+from plant_emulator.workflows.workers import Processes
+from {__name__} import Number, {{work}}
+list(Processes(2).map({{work}}, Number(1), [1, 2]))
+input()
+"""
+
+
+def waits(_model: Any, _item: int) -> None:
+    os.write(1, b"%d\n" % os.getpid())
+
+
+def computes(model: Any, item: int) -> None:
+    waits(model, item)
+    while True:
+        pass
+
+
+@pytest.mark.parametrize(
+    ("work", "number"), [("computes", signal.SIGKILL), ("waits", signal.SIGTERM)]
+)
+def test_killed_parent_leaves_no_worker(work: str, number: signal.Signals) -> None:
+    """Every worker holds the parent's standard output: it ends when the last process has ended."""
+    command = [sys.executable, "-c", PARENT.format(work=work)]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen(command, cwd=ROOT, text=True, **pipes) as parent:
+        assert parent.stdout is not None
+        workers = {int(parent.stdout.readline()) for _ in range(2)}
+        parent.send_signal(number)
+        try:
+            parent.communicate(timeout=10.0)
+        except subprocess.TimeoutExpired:
+            for worker in workers:
+                os.kill(worker, signal.SIGKILL)
+            raise
+    assert parent.returncode == -number
+
+
 class Cleared(dict[Any, Any]):
     """What another thread of the worker clears as soon as something stands there."""
 
@@ -79,11 +123,15 @@ def test_model_is_returned_though_another_thread_lets_it_go(
 def test_tangents_are_returned_though_another_thread_lets_them_go(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(steps, "_last", Cleared())
     line = Line([noisy(2.0 + 3.0 * TIME + np.abs(TIME), 1)], ["kink"])
-    base = steps.start(line, (0,))
-    shown = steps.show(line, steps.Task(base=base, runs=(0,), effect="kink"))
+    task = steps.Task(base=steps.start(line, (0,)), runs=(0,), effect="kink")
+    undisturbed = steps.show(line, task)
+    monkeypatch.setattr(steps, "_last", Cleared())
+    shown = steps.show(line, task)
     assert shown is not None
+    assert undisturbed is not None
+    assert shown.start == undisturbed.start
+    assert shown.norm == undisturbed.norm > 10.0
 
 
 @pytest.mark.parametrize("address", ["nonsense", "foo://host:1", "tcp://127.0.0.1:x", "tcp://"])
