@@ -1,4 +1,4 @@
-"""What can go wrong. The command line shows any error that carries `exit_code` as one line."""
+"""The errors of the emulator. The command line prints an error with an `exit_code` as one line."""
 
 import re
 import traceback
@@ -6,51 +6,51 @@ from collections.abc import Iterable
 
 
 class EmulatorError(Exception):
-    """The thing asked for failed."""
+    """A request failed."""
 
     exit_code = 1
 
 
 class InputError(EmulatorError):
-    """Bad input. The message says where it stands, what was found, and what would be right."""
+    """Bad input. The message names the place, the value found and the value expected."""
 
     exit_code = 2
 
 
 class ParameterError(InputError):
-    """A parameter, parameter set, program or effect that does not exist or holds no such value."""
+    """A parameter, parameter set, program or effect does not exist, or has a bad value."""
 
 
 class LogError(InputError):
-    """A log file that cannot be read; the message names line and column."""
+    """A log file cannot be read. The message names line and column."""
 
 
 class UnsettledError(EmulatorError):
-    """A simulation whose equations were not solved at every step: its numbers mean nothing."""
+    """The solver did not converge in every step, so the simulation must not be used."""
 
 
 class IdentificationError(InputError):
-    """Logs that cannot be fitted as asked, or a parameter that cannot be free."""
-
-
-def place_in(files: Iterable[str], error: Exception) -> str | None:
-    """What went wrong in one of these files, as `file:line: what`; None: it is none of theirs.
-
-    The place is the innermost line of these files that the error passed through. A compiler's
-    error has no such trace; it tells the places in its text, also innermost first.
-    """
-    known = set(files)
-    if isinstance(error, SyntaxError) and error.filename in known:
-        return f"{error.filename}:{error.lineno}: {error.msg}"
-    frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename in known]
-    if frames:
-        return f"{frames[-1].filename}:{frames[-1].lineno}: {type(error).__name__}: {error}"
-    for file, line in re.findall(r" at (\S.*?) \((\d+)\)", str(error)):
-        if file in known:
-            said = (text for text in str(error).splitlines() if not text.startswith("Failed in"))
-            return f"{file}:{line}: {next(filter(None, said))}"
-    return None
+    """Logs cannot be fitted as asked, or a parameter cannot be free."""
 
 
 class DiagnosisError(InputError):
-    """Logs that cannot be diagnosed as asked."""
+    """Logs cannot be diagnosed as asked."""
+
+
+def place_in(files: Iterable[str], error: Exception) -> str | None:
+    """Message `file:line: text` if one of these files caused the error, else None.
+
+    The line is the innermost one of these files in the error's trace. An error of the compiler has
+    no such trace. Its text lists the lines instead, innermost first.
+    """
+    wanted = set(files)
+    if isinstance(error, SyntaxError) and error.filename in wanted:
+        return f"{error.filename}:{error.lineno}: {error.msg}"
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename in wanted]
+    if frames:
+        return f"{frames[-1].filename}:{frames[-1].lineno}: {type(error).__name__}: {error}"
+    for file, line in re.findall(r" at (\S.*?) \((\d+)\)", str(error)):
+        if file in wanted:
+            texts = (text for text in str(error).splitlines() if not text.startswith("Failed in"))
+            return f"{file}:{line}: {next(filter(None, texts))}"
+    return None

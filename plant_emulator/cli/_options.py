@@ -1,4 +1,4 @@
-"""Options that several commands share."""
+"""Options that several commands share, and the output of a JSON answer."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ effect = click.option(
     "effect_texts",
     multiple=True,
     metavar="NAME[:PARAM=VALUE,...]",
-    help="An effect that the nominal bench lacks; without PARAM in its plausible size.",
+    help="Add an effect to the nominal bench; a PARAM left out has its plausible size.",
 )
 reference = click.option(
     "--reference",
     type=click.Choice(["linear", "staircase"]),
-    help="What holds between samples of the reference; default staircase with a truck.",
+    help="Course of the reference between its samples; default: staircase with a truck.",
 )
 start = click.option(
     "--start",
     type=click.Choice(["fit", "middle"]),
     default="fit",
     show_default=True,
-    help="Fit to each log its start in the backlash gap, and that of the set's effects.",
+    help="fit: each log's backlash gap position and the initial states of the set's effects.",
 )
 table = click.option("--table", type=OutputFile(), help="Write a CSV file for a spreadsheet.")
 plot = click.option(
-    "--plot", type=OutputFile(endings=PICTURES), help="Draw measured, simulated and residual (PNG)."
+    "--plot", type=OutputFile(endings=PICTURES), help="Plot measured, simulated and residual (PNG)."
 )
 json_file = click.option(
     "--json",
@@ -50,18 +50,18 @@ json_file = click.option(
 
 
 def write_json(answer: Any, target: str) -> None:
-    """Write an answer to a file, or to standard output for `-`; null where it has no number."""
-    text = json.dumps(_finite(answer), indent=2, allow_nan=False)
+    """Write an answer to a file, or to standard output for `-`."""
+    text = json.dumps(_with_null(answer), indent=2, allow_nan=False)
     if target == "-":
         click.echo(text)
     else:
         Path(target).write_text(text + "\n", encoding="utf-8")
 
 
-def _finite(answer: Any) -> Any:
-    """The same with null for infinite and undefined numbers, which JSON has none of (RFC 8259)."""
+def _with_null(answer: Any) -> Any:
+    """The answer with null for infinities and NaN, because JSON has neither (RFC 8259)."""
     if isinstance(answer, dict):
-        return {key: _finite(value) for key, value in answer.items()}
+        return {key: _with_null(value) for key, value in answer.items()}
     if isinstance(answer, list | tuple):
-        return [_finite(value) for value in answer]
+        return [_with_null(value) for value in answer]
     return None if isinstance(answer, float) and not isfinite(answer) else answer

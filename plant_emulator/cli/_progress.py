@@ -1,4 +1,4 @@
-"""A progress bar on standard error where that is a terminal; silence otherwise."""
+"""A progress bar on standard error. Without a terminal there is none."""
 
 from __future__ import annotations
 
@@ -11,21 +11,24 @@ if TYPE_CHECKING:
 
     from rich.progress import Progress
 
-    Tell = Callable[[str, float], None]
+    Report = Callable[[str, float], None]
 
 
 @contextmanager
-def progress() -> Iterator[Tell | None]:
-    """A function to be called with a step's name and how far it has come, 0 to 1; or None."""
+def progress() -> Iterator[Report | None]:
+    """Show a progress bar; yield the function that moves it, or None without a terminal.
+
+    The function takes a step's name and the share of the step that is done, 0 to 1.
+    """
     if not sys.stderr.isatty():
         yield None
         return
-    with bars() as drawn:
-        yield teller(drawn)
+    with new_bar() as bar:
+        yield reporter(bar)
 
 
-def bars() -> Progress:
-    """Step, done share, what it needs yet, and the time since the begin."""
+def new_bar() -> Progress:
+    """A bar with the step's name, its share done, its time left and the time since the start."""
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -46,22 +49,22 @@ def bars() -> Progress:
     )
 
 
-def teller(drawn: Progress) -> Tell:
-    """What moves the bar; where a share falls, a new step has begun.
+def reporter(bar: Progress) -> Report:
+    """The function that moves the bar. A share that falls begins a new step.
 
-    The remaining time is that of the step: how many steps are to come depends on what they find.
+    The time left is that of the step, because the number of later steps is not known yet.
     """
-    begun = drawn.get_time()
-    task = drawn.add_task("", total=1.0, before="")
+    begin = bar.get_time()
+    task = bar.add_task("", total=1.0, before="")
     last = 0.0
 
-    def tell(step: str, done: float) -> None:
+    def report(step: str, done: float) -> None:
         nonlocal last
-        minutes, seconds = divmod(int(drawn.get_time() - begun), 60)
+        minutes, seconds = divmod(int(bar.get_time() - begin), 60)
         before = f"{minutes}:{seconds:02d} so far"
         if done < last:
-            drawn.reset(task)
-        drawn.update(task, completed=done, description=step, before=before)
+            bar.reset(task)
+        bar.update(task, completed=done, description=step, before=before)
         last = done
 
-    return tell
+    return report

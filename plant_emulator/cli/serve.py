@@ -7,7 +7,7 @@ import click
 
 from plant_emulator.cli._types import Command, Number, OutputFile
 
-MASS_HELP = "Mass of the truck on the drum [kg], or none. Its driver sets off in road-load."
+MASS_HELP = "Mass of the truck on the drum [kg], or none. The driver sets off in road-load."
 
 
 class Mass(click.ParamType[float | None]):
@@ -21,7 +21,7 @@ class Mass(click.ParamType[float | None]):
         param: click.Parameter | None,
         ctx: click.Context | None,
     ) -> float | None:
-        """Mass [kg], None for `none`."""
+        """Mass [kg]; None for `none`."""
         if value is None or value == "none":
             return None
         try:
@@ -29,7 +29,7 @@ class Mass(click.ParamType[float | None]):
         except ValueError:
             mass = 0.0
         if not 100.0 <= mass <= 100_000.0:
-            self.fail(f"{value!r} is no mass; 100 to 100000 (kg), or none", param, ctx)
+            self.fail(f"{value!r} is not a mass; 100 to 100000 (kg), or none", param, ctx)
         return mass
 
 
@@ -57,7 +57,7 @@ Examples:
     default=1.0,
     show_default=True,
     type=Number(0.01, 1000.0),
-    help="Emulated seconds in one second.",
+    help="Emulated seconds per second.",
 )
 @click.option("--parameters", default="thesis_table_3_1", show_default=True, metavar="SET")
 @click.option("--effect", multiple=True, metavar="NAME[:PARAM=VALUE,...]", help="May be repeated.")
@@ -68,12 +68,12 @@ Examples:
     default="pi",
     show_default=True,
     type=click.Choice(["none", "pi"]),
-    help="pi holds the speed of the cycle, none replays the torque of the cycle.",
+    help="pi controls the speed of the drive cycle; none replays the torque of the cycle.",
 )
-@click.option("--remote/--local", default=False, help="Operator's switch at the start.")
-@click.option("--remote-after", type=Number(0.0), metavar="S", help="Switch to remote then.")
-@click.option("--log", type=OutputFile(path_type=Path), help="Log written at the end.")
-@click.option("--duration", type=Number(0.0), metavar="S", help="Emulated time to stop at.")
+@click.option("--remote/--local", default=False, help="Remote switch at the start.")
+@click.option("--remote-after", type=Number(0.0), metavar="S", help="PLC time to turn remote on.")
+@click.option("--log", type=OutputFile(path_type=Path), help="Log to write at the end.")
+@click.option("--duration", type=Number(0.0), metavar="S", help="PLC time to stop at.")
 @click.option("--control", is_flag=True, hidden=True, help="JSON requests on standard input.")
 @click.option("--stepped", is_flag=True, hidden=True, help="Scan only on request.")
 def command(
@@ -95,8 +95,8 @@ def command(
 ) -> None:
     """Emulate the bench and its PLC behind a Modbus TCP server.
 
-    The first line printed says where it listens. It ends on Ctrl-C or SIGTERM and then says how
-    well it kept real time.
+    The first line of the output says where the server listens. Ctrl-C or SIGTERM ends the
+    emulator, which then reports how well it kept real time.
     """
     from plant_emulator.emulator.emulator import Options
     from plant_emulator.emulator.serving import serve
@@ -117,5 +117,5 @@ def command(
         duration=duration,
         keeps_log=control,
     )
-    last_words = asyncio.run(serve(options, click.echo, control=control))
-    click.echo(last_words, err=True)
+    timing = asyncio.run(serve(options, click.echo, control=control))
+    click.echo(timing, err=True)

@@ -1,1 +1,1 @@
-"""The running emulator: clock, Modbus server, process, and the emulated PLC in `plc`."""
+"""The running emulator: clock, Modbus server and process. The emulated PLC is in `plc`."""

@@ -1,16 +1,16 @@
-"""The control channel: a JSON object a line, request and answer, for who started the emulator.
+"""The control channel: requests and answers, one JSON object per line.
 
-    {"do": "remote", "on": true}             the operator's switch
-    {"do": "interlock", "open": ["GUARD"]}   exactly these are open (names of Interlock)
-    {"do": "faults", "names": ["nan@2.5"]}   exactly these faults, from now or from a PLC time on
-    {"do": "step", "scans": 10}              scan so many times (an emulator that is only stepped)
-    {"do": "status"}                         PLC time, state, alarms, last refusal, speeds, pace,
-                                             stages of the bench that did not settle
-    {"do": "log"}                            what was logged so far, SI, one list a signal
-    {"do": "stop"}                           end, as SIGTERM does
+    {"do": "remote", "on": true}             turn the operator's remote switch
+    {"do": "interlock", "open": ["GUARD"]}   open these members of Interlock, close the others
+    {"do": "faults", "names": ["nan@2.5"]}   replace all faults; @ gives the PLC time they begin
+    {"do": "step", "scans": 10}              run so many scans (only without a scan timer)
+    {"do": "status"}                         PLC time, state, alarms, last refusal, speeds, timing,
+                                             bench steps that did not converge
+    {"do": "log"}                            the log so far: SI units, one list per signal
+    {"do": "stop"}                           end the emulator, like SIGTERM
 
-An answer is {"ok": ...} or {"error": "what is wrong"}. Here is what a request does; where the lines
-come from, and where the answers go, is `serving.py`.
+An answer is {"ok": ...} or {"error": "what is wrong"}. This module carries requests out.
+`serving.py` reads the requests and writes the answers.
 """
 
 import json
@@ -24,22 +24,28 @@ from typing import Any
 from plant_emulator.emulator.emulator import Emulator
 from plant_emulator.emulator.plc import faults
 from plant_emulator.emulator.plc.surroundings import CLOSED
-from plant_emulator.emulator.scan_timer import Pace
+from plant_emulator.emulator.scan_timer import ScanTimer
 from plant_emulator.errors import EmulatorError
 from register_maps.signals import Interlock
 
 
 class RequestError(EmulatorError):
-    """A request on the control channel that means nothing."""
+    """A request on the control channel is unknown or cannot be carried out now."""
 
     exit_code = 2
 
 
-class Control:
-    """Carries requests out on an emulator; `stop` is called for the request to end."""
+class ControlChannel:
+    """Carries out requests on an emulator.
 
-    def __init__(self, emulator: Emulator, pace: Pace | None, stop: Callable[[], None]) -> None:
-        self.emulator, self.pace, self.stop = emulator, pace, stop
+    timer : None for an emulator that scans only on request
+    stop : called when a request asks for the end
+    """
+
+    def __init__(
+        self, emulator: Emulator, timer: ScanTimer | None, stop: Callable[[], None]
+    ) -> None:
+        self.emulator, self.timer, self.stop = emulator, timer, stop
         self._requests: dict[str, Callable[[dict[str, Any]], Any]] = {
             "remote": self._remote,
             "interlock": self._interlock,
@@ -51,7 +57,7 @@ class Control:
         }
 
     def answer(self, line: str) -> str:
-        """Answer to one line, without its line end."""
+        """Carry out one request line; return the answer line, without its line end."""
         try:
             return json.dumps({"ok": self._do(json.loads(line))})
         except (EmulatorError, ValueError, KeyError, TypeError) as error:
@@ -75,7 +81,7 @@ class Control:
         self.emulator.faults = tuple(faults.parse(text) for text in request["names"])
 
     def _step(self, request: dict[str, Any]) -> None:
-        if self.pace is not None:
+        if self.timer is not None:
             raise RequestError("this emulator runs in real time; only a stepped one can be stepped")
         for _ in range(request["scans"]):
             self.emulator.scan()
@@ -94,7 +100,7 @@ class Control:
             "motor_speed": float(plc.samples.motor_speed[-1]),
             "drum_speed": float(plc.samples.drum_speed[-1]),
             "unsettled": plc.bench.unsettled,
-            "pace": asdict(self.pace.report()) if self.pace else None,
+            "pace": asdict(self.timer.report()) if self.timer else None,
         }
 
     def _log(self, request: dict[str, Any]) -> dict[str, list[float]]:  # noqa: ARG002 - all requests have one signature

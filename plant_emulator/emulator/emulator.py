@@ -1,7 +1,7 @@
-"""The bench, its PLC and the faults put together: everything of the emulator but the clock.
+"""The emulator without its clock: bench, PLC, faults and Modbus server.
 
-`build` makes one from what the command line says. `Emulator.scan` is one scan; whoever calls it
-sets the pace (`pace.py` in real time, the control channel step by step).
+`build` makes an emulator from the options of the command line. `Emulator.scan` runs one scan. The
+caller decides when: `scan_timer.py` in real time, `control_channel.py` on request.
 """
 
 import time
@@ -41,10 +41,14 @@ LOGGED = (
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """What is emulated, as the command line names it.
+    """Options of an emulator, named like those of the command line.
 
-    truck_mass [kg], None: nobody on the drum; speed: emulated seconds a second, None: only stepped
-    remote_after, duration : PLC time [s]
+    map : name of the register map
+    speed : emulated seconds per second; None: the emulator scans only on request
+    truck_mass : mass of the truck on the drum [kg]; None: no truck
+    remote_after : PLC time at which the remote switch turns on [s]
+    log : file that the log is written to at the end
+    duration : PLC time at which the emulator stops [s]
     """
 
     host: str = "127.0.0.1"
@@ -66,10 +70,10 @@ class Options:
 class Emulator:
     """A PLC with its server. `switches` and `faults` may be replaced at any moment.
 
-    changed : called with the names of the active faults whenever they change
+    on_faults_changed : called with the names of the active faults when these change
     """
 
-    changed: Callable[[frozenset[str]], None] | None = None
+    on_faults_changed: Callable[[frozenset[str]], None] | None = None
 
     def __init__(self, plc: Plc, server: PlcServer, *, keeps_log: bool = False) -> None:
         self.plc, self.server = plc, server
@@ -82,20 +86,21 @@ class Emulator:
         self._rows: list[tuple[float, ...]] | None = [] if keeps_log else None
 
     def scan(self) -> None:
-        """One scan of the PLC, and what it shows from then on."""
+        """Run one scan of the PLC and publish its measurement."""
         begin = time.perf_counter()
         if self.remote_after is not None and self.plc.time >= self.remote_after:
             self.remote_after = None
             self.switches = replace(self.switches, remote=True)
         measurement = self.plc.scan(self.server.command, self.switches, self._scan_time_max)
-        self._show(measurement)
+        self._publish(measurement)
         if self._rows is not None:
             self._rows.append(self._row(measurement))
         self._scan_time_max = max(self._scan_time_max, time.perf_counter() - begin)
 
-    def _show(self, measurement: Measurement) -> None:
+    def _publish(self, measurement: Measurement) -> None:
+        """Put the measurement into the server's image, after the active faults changed it."""
         register_map = self.server.register_map
-        fresh = words_of(register_map, measurement)
+        fresh = encode(register_map, measurement)
         names = faults.active(self.faults, self.plc.time)
         shown = self.server.image
         self.server.image = (
@@ -104,14 +109,14 @@ class Emulator:
         self._previous = fresh
         if names != self._active:
             self._active = names
-            if self.changed is not None:
-                self.changed(names)
+            if self.on_faults_changed is not None:
+                self.on_faults_changed(names)
 
     def _row(self, measurement: Measurement) -> tuple[float, ...]:
-        """One line of the log.
+        """One row of the log, in the order of LOGGED.
 
-        The reference of a log with a truck is a staircase: the mean of what acts until the next
-        line. Without one it is linear: the value at this moment.
+        With a truck the reference is a staircase: its mean over the next scan. Without a truck the
+        reference is linear between the rows: its value at this time.
         """
         plc = self.plc
         reference = sum(plc.path) / STEPS if plc.truck else plc.reference
@@ -128,7 +133,7 @@ class Emulator:
         )
 
     def log(self) -> Log:
-        """What was logged so far: one sample a scan."""
+        """The log so far, one sample per scan."""
         rows = np.array(self._rows or np.zeros((0, len(LOGGED))))
         signals = {name: rows[:, k] for k, name in enumerate(LOGGED)}
         if self.plc.truck is None:
@@ -136,30 +141,30 @@ class Emulator:
         return Log(signals.pop("time"), signals, "emulator")
 
     def write_log(self, path: Path) -> None:
-        """Write it to a file, in the format of the file's name."""
+        """Write the log to a file, in the format that the file's name tells."""
         logs.write(self.log(), path)
 
 
-def words_of(register_map: RegisterMap, measurement: Measurement) -> tuple[int, ...]:
-    """Words of the measurement block, also where a value does not fit its register.
+def encode(register_map: RegisterMap, measurement: Measurement) -> tuple[int, ...]:
+    """Words of the measurement block, even if a value exceeds its register.
 
-    A scan that never ends is no behaviour of a PLC: what its register cannot hold is shown as not
-    available, since an end of the range would be taken for a measurement. Where the map has no
-    such mark the register stays at its end, as the PLC's own conversion does.
+    A PLC does not stop because a value is too large. The value is then shown as not available,
+    because the end of the range would look like a measurement. A register without such a mark stays
+    at the end of its range, like the PLC's own conversion.
     """
     try:
         return encode_measurement(register_map, measurement)
     except CodecError:
         fitting: dict[str, Any] = {
-            register.signal: _shown(register, value)
+            register.signal: _fit(register, value)
             for register in register_map.registers
             if isinstance(value := getattr(measurement, register.signal, None), float)
         }
         return encode_measurement(register_map, replace(measurement, **fitting))
 
 
-def _shown(register: Register, value: float) -> float | None:
-    """The value as far as the register can hold it; None: not available."""
+def _fit(register: Register, value: float) -> float | None:
+    """The value if the register can hold it, else None (not available) or the end of its range."""
     raw = (register.si_unit.from_si(value) - register.offset) / register.scale
     if register.wraps or register.raw.low - 0.5 < raw < register.raw.high + 0.5:
         return value
@@ -170,12 +175,15 @@ def _shown(register: Register, value: float) -> float | None:
 
 
 def build(options: Options) -> Emulator:
-    """An emulator at rest; raises on anything in the options that does not exist."""
+    """Build an emulator at rest.
+
+    Raises MapError, FaultError or ParameterError if the options name something that does not exist.
+    """
     register_map = load(options.map)
     active_faults = tuple(faults.parse(text) for text in options.faults)
     parameters = with_effects.load(options.parameters)
     chosen = effects.parse(options.effects)
-    # The first call compiles: better here than in the first scan.
+    # The first call compiles the bench, which must not delay the first scan.
     Bench(parameters, chosen).advance([0.0] * STEPS)
     plc = Plc(
         Bench(parameters, chosen, truck=options.truck_mass is not None),

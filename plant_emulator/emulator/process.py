@@ -1,11 +1,11 @@
-"""An emulator in a process of its own, for whoever needs a PLC to talk to: demo and system tests.
+"""Starts an emulator in its own process. The demo and the system tests use it as their PLC.
 
     with EmulatorProcess(truck_mass=3640.0, driver="none") as emulator:
         ...connect to emulator.port...
         emulator.set_remote(on=True)
 
-It is started as `plant-emulator serve --control` in a session of its own, so that a Ctrl-C in the
-terminal reaches the gateway first; it ends when its standard input does, so it is never left over.
+The process runs `plant-emulator serve --control` in its own session: a Ctrl-C in the terminal then
+reaches the gateway first. The process ends with its standard input, so it cannot outlive its owner.
 """
 
 import json
@@ -24,7 +24,7 @@ import numpy as np
 from plant_emulator.errors import EmulatorError
 from plant_emulator.signals.log import Log
 
-# The first start on a machine compiles the bench.
+# [s] The first start on a machine compiles the bench, which takes minutes at worst.
 START_TIMEOUT = 180.0
 ANSWER_TIMEOUT = 60.0
 STOP_TIMEOUT = 10.0
@@ -48,9 +48,10 @@ class ProcessError(EmulatorError):
 
 
 class EmulatorProcess:
-    """A running emulator; `options` are the fields of `emulator.Options`, port 0 by default.
+    """An emulator in its own process, as a context manager.
 
-    speed=None: it scans only when `step` asks for it.
+    options : fields of `emulator.Options`; the default port is 0 (any free one)
+    With speed=None the emulator scans only when `step` is called.
     """
 
     def __init__(self, **options: Any) -> None:
@@ -75,11 +76,11 @@ class EmulatorProcess:
 
     @property
     def pid(self) -> int:
-        """Process id, for whoever wants to stop it the hard way."""
+        """Process id."""
         return self._running().pid
 
     def start(self) -> None:
-        """Start it and return when it listens."""
+        """Start the process and wait until its server listens."""
         path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
         self._process = subprocess.Popen(
             [sys.executable, "-m", "plant_emulator", "serve", "--control", *self.arguments],
@@ -90,15 +91,15 @@ class EmulatorProcess:
             start_new_session=True,
         )
         try:
-            words = self._line(START_TIMEOUT).rpartition(" ")[2]
+            address = self._read_line(START_TIMEOUT).rpartition(" ")[2]
         except BaseException:
             self.stop()
             raise
-        self.host, _, port = words.rpartition(":")
+        self.host, _, port = address.rpartition(":")
         self.port = int(port)
 
     def stop(self) -> int:
-        """End it and return its exit code; afterwards `report` says how it kept real time."""
+        """End the process and return its exit code. `report` then holds its timing report."""
         if self._process is None:
             return 0
         process, self._process = self._process, None
@@ -111,43 +112,43 @@ class EmulatorProcess:
             process.kill()
             code = process.wait()
         process.stdout.close()
-        self.report = self._said()
+        self.report = self._read_errors()
         self._errors.close()
         return code
 
     def set_remote(self, *, on: bool) -> None:
-        """Turn the operator's switch."""
+        """Turn the operator's remote switch."""
         self.ask(do="remote", on=on)
 
     def set_faults(self, *names: str) -> None:
-        """Misbehave in exactly these ways, `NAME` or `NAME@SECONDS` of PLC time; none: be good."""
+        """Replace all faults: each is `NAME` or `NAME@SECONDS` of PLC time."""
         self.ask(do="faults", names=list(names))
 
     def open_interlocks(self, *names: str) -> None:
-        """Open exactly these members of `Interlock`, close the others."""
+        """Open these members of `Interlock` and close the others."""
         self.ask(do="interlock", open=list(names))
 
     def step(self, scans: int) -> None:
-        """Scan so many times; for an emulator with speed=None."""
+        """Run so many scans; only for an emulator with speed=None."""
         self.ask(do="step", scans=scans)
 
     def status(self) -> dict[str, Any]:
-        """PLC time, state, alarms, speeds, pace: see `control.py`."""
+        """PLC time, state, alarms, speeds and timing; see `control_channel.py`."""
         answer: dict[str, Any] = self.ask(do="status")
         return answer
 
     def log(self) -> Log:
-        """What was logged so far. Ask after a run: the answer takes longer than a scan."""
+        """The log so far. Call it after a run, because the answer takes longer than a scan."""
         signals = {name: np.array(values) for name, values in self.ask(do="log").items()}
         return Log(signals.pop("time"), signals, "emulator")
 
     def ask(self, **request: Any) -> Any:
-        """Answer to one request on the control channel."""
+        """Send one request on the control channel; return its answer or raise ProcessError."""
         stdin = self._running().stdin
         assert stdin is not None
         stdin.write(json.dumps(request).encode() + b"\n")
         stdin.flush()
-        answer = json.loads(self._line(ANSWER_TIMEOUT))
+        answer = json.loads(self._read_line(ANSWER_TIMEOUT))
         if "error" in answer:
             raise ProcessError(answer["error"])
         return answer["ok"]
@@ -157,8 +158,8 @@ class EmulatorProcess:
             raise ProcessError("the emulator is not running; use it in a with block")
         return self._process
 
-    def _line(self, timeout: float) -> str:
-        """Next line of its standard output."""
+    def _read_line(self, timeout: float) -> str:
+        """Next line of the process's standard output."""
         stdout = self._running().stdout
         assert stdout is not None
         deadline = time.monotonic() + timeout
@@ -169,18 +170,19 @@ class EmulatorProcess:
                     raise ProcessError(f"the emulator said nothing for {timeout:g} s")
                 data = os.read(stdout.fileno(), 1 << 16)
                 if not data:
-                    raise ProcessError(f"the emulator ended: {self._said()}")
+                    raise ProcessError(f"the emulator ended: {self._read_errors()}")
                 self._buffer += data
         line, _, self._buffer = self._buffer.partition(b"\n")
         return line.decode()
 
-    def _said(self) -> str:
+    def _read_errors(self) -> str:
+        """Standard error of the process so far."""
         self._errors.seek(0)
         return self._errors.read().decode(errors="replace").strip()
 
 
 def _arguments(options: dict[str, Any]) -> list[str]:
-    """Command line for these fields of `emulator.Options`."""
+    """Command-line arguments for these fields of `emulator.Options`."""
     known = {*FLAGS, *REPEATED, "truck_mass", "remote"}
     if unknown := options.keys() - known:
         raise ProcessError(f"unknown options {sorted(unknown)}; known: {sorted(known)}")

@@ -1,7 +1,7 @@
-"""Real time for the scan: a thread that calls it at absolute deadlines, and measures how well.
+"""Runs the scan in real time: a thread calls it at absolute deadlines and measures the lateness.
 
-A scan that comes late is followed by the next at its own deadline, so nothing drifts. Whoever lags
-more than `GIVE_UP` (the machine slept) starts a new time base, and the lost time is counted.
+A late scan does not move the deadlines of later scans, so delays do not add up. A scan that is
+more than `GIVE_UP` late (the machine slept) starts a new time base. The lost time is counted.
 """
 
 import threading
@@ -11,16 +11,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from statistics import quantiles
 
-GIVE_UP = 0.25
-# Scans that the percentiles are taken over: the last 100 s in real time.
+GIVE_UP = 0.25  # [s]
+# The percentiles are taken over so many scans: the last 100 s in real time.
 REMEMBERED = 10_000
 
 
 @dataclass(frozen=True, kw_only=True)
-class PaceReport:
-    """How real time was held; times in seconds of the wall clock.
+class TimingReport:
+    """Figures of how well real time was kept; times in seconds of the wall clock.
 
-    real_time_factor : emulated time over the time that it should have been
+    real_time_factor : elapsed emulated time over the time that should have elapsed
+    lateness : begin of a scan minus its deadline
+    lost : total lateness that new time bases gave up
     """
 
     scans: int
@@ -33,7 +35,7 @@ class PaceReport:
     lost: float
 
     def __str__(self) -> str:
-        """Say it in one line."""
+        """The figures in one line."""
         return (
             f"{self.scans} scans, real-time factor {self.real_time_factor:.4f}, "
             f"lateness p50 {1e3 * self.lateness_p50:.2f} p99 {1e3 * self.lateness_p99:.2f} "
@@ -42,14 +44,14 @@ class PaceReport:
         )
 
 
-class Pace:
-    """Calls `scan` every `period` seconds until `stop`; an error of `scan` goes to `failed`."""
+class ScanTimer:
+    """Calls `scan` every `period` seconds until `stop`. An error of `scan` goes to `on_error`."""
 
     def __init__(
-        self, scan: Callable[[], None], period: float, failed: Callable[[Exception], None]
+        self, scan: Callable[[], None], period: float, on_error: Callable[[Exception], None]
     ) -> None:
         self.period = period
-        self._scan, self._failed = scan, failed
+        self._scan, self._on_error = scan, on_error
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="scan", daemon=True)
         self._late: deque[float] = deque(maxlen=REMEMBERED)
@@ -57,22 +59,22 @@ class Pace:
         self._late_max = self._busy = self._busy_max = self._lost = self._elapsed = 0.0
 
     def start(self) -> None:
-        """Begin with the first period."""
+        """Start the thread; the first scan comes after one period."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Return after the last scan."""
+        """End the thread and wait for its last scan."""
         self._stopping.set()
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join()
 
     def _run(self) -> None:
         try:
-            self._keep_pace()
+            self._scan_at_deadlines()
         except Exception as error:  # noqa: BLE001 - the loop's thread must learn of any of them
-            self._failed(error)
+            self._on_error(error)
 
-    def _keep_pace(self) -> None:
+    def _scan_at_deadlines(self) -> None:
         start = deadline = time.perf_counter()
         while not self._stopping.is_set():
             deadline += self.period
@@ -86,7 +88,7 @@ class Pace:
             self._elapsed = begin - start
 
     def _wait(self, deadline: float) -> float:
-        """Sleep until the deadline; the time at which that ended."""
+        """Sleep until the deadline; return the time at which the sleep ended."""
         while (now := time.perf_counter()) < deadline:
             time.sleep(deadline - now)
         return now
@@ -98,13 +100,13 @@ class Pace:
         self._busy += busy
         self._busy_max = max(self._busy_max, busy)
 
-    def report(self) -> PaceReport:
-        """Figures so far."""
+    def report(self) -> TimingReport:
+        """The figures so far."""
         late = [*self._late] or [0.0]
         cuts = quantiles([*late, late[-1]], n=100)
         scans = max(self._scans, 1)
         elapsed = max(self._elapsed, self.period)
-        return PaceReport(
+        return TimingReport(
             scans=self._scans,
             real_time_factor=self._scans * self.period / elapsed,
             lateness_p50=cuts[49],

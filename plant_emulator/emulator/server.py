@@ -1,11 +1,11 @@
-"""The Modbus TCP server in front of the PLC: the only place that knows pymodbus' server.
+"""The Modbus TCP server of the PLC. No other module of the emulator imports pymodbus.
 
-Reads are answered from an image that is replaced as a whole once a scan, so no reply is ever torn.
-Functions 3, 4, 6, 16 and 23 are served; a write that touches anything but the command block is
-answered by exception 2. Every unit id is answered (libmodbus clients ask for 255 by default).
+Reads are answered from an image that each scan replaces as a whole, so no reply is torn. The server
+supports functions 3, 4, 6, 16 and 23. A write outside the command block gets exception 2. The
+server answers every unit id, because libmodbus clients use 255 by default.
 
-pymodbus answers one request a segment and gives wrong error frames for a bad quantity or an unknown
-function; tests/plant_emulator/emulator/test_server.py pins these deviations.
+pymodbus answers one request per segment. It also gives wrong error frames for a bad quantity or an
+unknown function. tests/plant_emulator/emulator/test_server.py pins these deviations.
 """
 
 import asyncio
@@ -29,13 +29,13 @@ UNIT, ANY_UNIT = 1, 0
 
 
 class PortError(EmulatorError):
-    """The port cannot be listened on."""
+    """The server cannot listen on its port."""
 
     exit_code = 2
 
 
 def refusal(error: OSError | UnicodeError, host: str, port: int) -> str:
-    """Why nobody can listen there, and which of the two options to change."""
+    """Why the server cannot listen there, and which option to change."""
     code = getattr(error, "errno", None)
     if code in (errno.EADDRINUSE, errno.EACCES):
         why, right = os.strerror(code), "another --port (0 = any free one)"
@@ -46,11 +46,12 @@ def refusal(error: OSError | UnicodeError, host: str, port: int) -> str:
 
 
 class PlcServer:
-    """A register map's two blocks on a port.
+    """Serves the two blocks of a register map on a port.
 
-    `image` (shown) and `command` (written by clients, None until then) are tuples that are
-    replaced, never changed: another thread may replace the image at any moment.
-    `start`, `stop` and `misbehave` belong to the loop's thread.
+    image : words of the measurement block, as clients read them
+    command : words of the command block, as clients wrote them; None before the first write
+    Both are tuples that are replaced as a whole, because another thread may replace the image at
+    any moment. Call `start`, `stop` and `apply_faults` in the loop's thread.
     """
 
     def __init__(self, register_map: RegisterMap, host: str, port: int) -> None:
@@ -62,7 +63,7 @@ class PlcServer:
         self._changing = asyncio.Lock()
 
     def blocks(self) -> tuple[tuple[Block, tuple[int, ...]], ...]:
-        """What can be read: each block and its words."""
+        """The readable blocks with their words."""
         command = self.register_map.command
         return (
             (self.register_map.measurement, self.image),
@@ -70,7 +71,7 @@ class PlcServer:
         )
 
     async def start(self) -> None:
-        """Listen; afterwards `port` is the real one."""
+        """Start to listen and set `port` to the real port. Raises PortError."""
         listener = _Listener(self)
         await listener.serve_forever(background=True)
         self._listener = listener
@@ -82,8 +83,8 @@ class PlcServer:
             await self._listener.shutdown()  # type: ignore[no-untyped-call]  # pymodbus declares none here
             self._listener = None
 
-    async def misbehave(self, names: frozenset[str]) -> None:
-        """Switch to exactly these faults."""
+    async def apply_faults(self, names: frozenset[str]) -> None:
+        """Replace the active faults; open or close the port accordingly."""
         self.faults = names
         async with self._changing:
             if faults.refuses(names):
@@ -94,7 +95,10 @@ class PlcServer:
     def request(
         self, function: int, address: int, count: int, values: list[int] | None
     ) -> ExcCodes | None:
-        """Carry out a request, values = None for a read; the exception code if it may not be."""
+        """Carry out a request; return the exception code if it is refused.
+
+        values : words to write; None for a read
+        """
         if faults.refuses_requests(self.faults):
             return ExcCodes.DEVICE_FAILURE
         if function not in SERVED:
@@ -112,14 +116,14 @@ class PlcServer:
 
 
 class _Handler(ServerRequestHandler):
-    """One connection. What leaves it passes the faults first."""
+    """One connection. Every reply passes the active faults."""
 
     def __init__(self, listener: ModbusTcpServer, plc: PlcServer) -> None:
         super().__init__(listener, None, None, None)  # type: ignore[no-untyped-call]  # pymodbus declares none here
         self.plc = plc
 
     def send(self, data: bytes, addr: tuple[Any, ...] | None = None) -> None:
-        """Send the reply, or what the faults make of it."""
+        """Send the reply after the active faults changed it."""
         if not self.plc.faults:
             super().send(data, addr)
             return
@@ -137,15 +141,15 @@ class _Handler(ServerRequestHandler):
 
 
 class _Listener(ModbusTcpServer):
-    """pymodbus' server over the device, with our handler for each connection."""
+    """The server of pymodbus with our handler for each connection."""
 
     def __init__(self, plc: PlcServer) -> None:
         super().__init__(_devices(plc), address=(plc.host, plc.port))
         self.plc = plc
-        self._listen, self.call_create = self.call_create, self._listens
+        self._listen, self.call_create = self.call_create, self._listen_or_raise
 
-    async def _listens(self) -> Any:
-        """Listen; what stops it becomes ours, since pymodbus prints an OSError and drops it."""
+    async def _listen_or_raise(self) -> Any:
+        """Listen or raise PortError, because pymodbus prints an OSError and drops it."""
         try:
             return await self._listen()
         except (OSError, UnicodeError) as error:
@@ -153,17 +157,17 @@ class _Listener(ModbusTcpServer):
 
     @property
     def bound_port(self) -> int:
-        """Port that the system gave us."""
+        """Port on which the server listens."""
         listening: Any = self.transport
         return int(listening.sockets[0].getsockname()[1])
 
     def callback_new_connection(self) -> _Handler:
-        """Make the handler of one connection."""
+        """Make the handler of a new connection."""
         return _Handler(self, self.plc)
 
 
 def _devices(plc: PlcServer) -> list[SimDevice]:
-    """The same registers for our unit and for any other."""
+    """Two pymodbus devices with the PLC's registers: one for our unit, one for any other."""
 
     async def action(
         function: int,

@@ -1,7 +1,7 @@
-"""Runs an emulator until it is told to stop: loop, signals, pace, control channel, last words.
+"""Runs an emulator until a signal, a request or its duration ends it.
 
-Scans run in a thread of their own (`pace.py`), requests are answered in the loop. Both touch only
-references to tuples, which Python exchanges as a whole.
+The scan timer runs the scans in its own thread. The asyncio loop answers requests. The two threads
+share only references to tuples, which Python replaces atomically.
 """
 
 import asyncio
@@ -13,70 +13,70 @@ import sys
 from collections.abc import Callable
 
 from plant_emulator import logs
-from plant_emulator.emulator.control_channel import Control
+from plant_emulator.emulator.control_channel import ControlChannel
 from plant_emulator.emulator.emulator import Emulator, Options, build
 from plant_emulator.emulator.plc.plc import SCAN
-from plant_emulator.emulator.scan_timer import Pace
+from plant_emulator.emulator.scan_timer import ScanTimer
 
-LIVE_EVERY = 1.0
+LIVE_EVERY = 1.0  # [s] between two lines on the terminal
 PRIORITY = 20
 
 
 class _Run:
-    """One run of an emulator, all in the loop's thread unless it says otherwise."""
+    """One run of an emulator. Its methods run in the loop's thread unless they say otherwise."""
 
     def __init__(self, options: Options, emulator: Emulator) -> None:
         self.options, self.emulator = options, emulator
         self.loop = asyncio.get_running_loop()
         self.stopping = asyncio.Event()
         self.failure: Exception | None = None
-        self.faults: frozenset[str] = frozenset()
         self.tasks: set[asyncio.Task[None]] = set()
-        self.pace: Pace | None = None
+        self.timer: ScanTimer | None = None
         if options.speed is not None:
-            self.pace = Pace(self.scan, SCAN / options.speed, self.failed)
-        emulator.changed = self.faults_changed
+            self.timer = ScanTimer(self.scan, SCAN / options.speed, self.fail)
+        emulator.on_faults_changed = self.on_faults_changed
 
     def scan(self) -> None:
-        """One scan; in the pace's thread."""
+        """Run one scan, in the timer's thread."""
         self.emulator.scan()
         duration = self.options.duration
         if duration is not None and self.emulator.plc.time >= duration:
             self.loop.call_soon_threadsafe(self.stopping.set)
 
-    def failed(self, error: Exception) -> None:
-        """Stop because a scan raised; in the pace's thread."""
+    def fail(self, error: Exception) -> None:
+        """Stop because of an error, in any thread."""
         self.failure = error
         self.loop.call_soon_threadsafe(self.stopping.set)
 
-    def faults_changed(self, names: frozenset[str]) -> None:
-        """Take the port's faults over; in the thread that scans."""
+    def on_faults_changed(self, names: frozenset[str]) -> None:
+        """Pass the new faults to the server, in the thread that scans."""
         self.loop.call_soon_threadsafe(self.start_task, names)
 
     def start_task(self, names: frozenset[str]) -> None:
-        """Switch the server's faults."""
-        task = self.loop.create_task(self.emulator.server.misbehave(names))
+        """Apply the faults to the server."""
+        task = self.loop.create_task(self.emulator.server.apply_faults(names))
         self.tasks.add(task)
-        task.add_done_callback(self.task_done)
+        task.add_done_callback(self.end_task)
 
-    def task_done(self, task: asyncio.Task[None]) -> None:
-        """Forget it, unless the port could not be had again."""
+    def end_task(self, task: asyncio.Task[None]) -> None:
+        """Drop a finished task; stop if the server could not listen again."""
         self.tasks.discard(task)
         if not task.cancelled() and isinstance(error := task.exception(), Exception):
-            self.failed(error)
+            self.fail(error)
 
 
 async def serve(options: Options, announce: Callable[[str], None], *, control: bool) -> str:
-    """Emulate until SIGINT, SIGTERM, the duration or a request; how real time was held, in words.
+    """Run the emulator until SIGINT, SIGTERM, its duration or a request; return a timing report.
 
-    announce : prints a line at once; the first one says where the server listens
-    control : requests come in on standard input, and its end is the end of the run
+    announce : prints a line at once; the first line says where the server listens
+    control : read requests from standard input, and stop at its end
+    Raises PortError if the server cannot listen, and any error of a scan.
     """
     emulator = build(options)
     run = _Run(options, emulator)
     for number in (signal.SIGINT, signal.SIGTERM):
         run.loop.add_signal_handler(number, run.stopping.set)
-    # One scan before anybody can look: there is no image without one.
+    # A client must not see the server before the first scan has made an image.
     emulator.scan()
     if options.log is not None:
         logs.rehearse(emulator.log(), options.log)
@@ -88,28 +88,28 @@ async def serve(options: Options, announce: Callable[[str], None], *, control: b
     try:
         await _until_stopped(run, announce, control=control)
     finally:
-        if run.pace is not None:
-            run.pace.stop()
+        if run.timer is not None:
+            run.timer.stop()
         await emulator.server.stop()
         gc.unfreeze()
     if options.log is not None:
         emulator.write_log(options.log)
     if run.failure is not None:
         raise run.failure
-    said = f"{run.pace.report()}, {policy}" if run.pace else f"{emulator.plc.scans} scans"
-    return said + unsettled_text(emulator)
+    timing = f"{run.timer.report()}, {policy}" if run.timer else f"{emulator.plc.scans} scans"
+    return timing + unsettled_text(emulator)
 
 
 def unsettled_text(emulator: Emulator) -> str:
-    """What is wrong with the bench itself, in words; nothing as a rule."""
+    """Warning that the bench's equations were not solved; empty if they were."""
     stages = emulator.plc.bench.unsettled
     return f", {stages} IMPLICIT STAGES OF THE BENCH DID NOT SETTLE" if stages else ""
 
 
 def _ask_for_real_time(speed: float | None) -> str:
-    """Scheduling as a PLC has it, below the gateway's own; what we got, in a word.
+    """Ask for real-time scheduling below the gateway's priority; return the policy's name.
 
-    Not for an emulator that is faster than time: it could take all that a processor has.
+    An emulator faster than real time does not ask, because it could use a whole processor.
     """
     if speed is not None and speed <= 1.0:
         with contextlib.suppress(OSError):
@@ -121,11 +121,12 @@ def _ask_for_real_time(speed: float | None) -> str:
 async def _until_stopped(run: _Run, announce: Callable[[str], None], *, control: bool) -> None:
     others = []
     if control:
-        others.append(_answer(Control(run.emulator, run.pace, run.stopping.set), run, announce))
-    if run.pace is not None:
-        run.pace.start()
+        channel = ControlChannel(run.emulator, run.timer, run.stopping.set)
+        others.append(_answer(channel, run, announce))
+    if run.timer is not None:
+        run.timer.start()
         if sys.stderr.isatty():
-            others.append(_show(run.pace, run.emulator))
+            others.append(_show(run.timer, run.emulator))
     tasks = [asyncio.create_task(other) for other in others]
     await run.stopping.wait()
     for task in tasks:
@@ -133,24 +134,24 @@ async def _until_stopped(run: _Run, announce: Callable[[str], None], *, control:
     await asyncio.gather(*tasks, return_exceptions=True)
 
 
-async def _answer(control: Control, run: _Run, announce: Callable[[str], None]) -> None:
-    """Answer requests; their end means that nobody is there to stop us any more."""
+async def _answer(channel: ControlChannel, run: _Run, announce: Callable[[str], None]) -> None:
+    """Answer requests until standard input ends, then stop the run."""
     reader = asyncio.StreamReader()
     protocol = asyncio.StreamReaderProtocol(reader)
     transport, _ = await run.loop.connect_read_pipe(lambda: protocol, sys.stdin)
     with contextlib.closing(transport):
         while line := await reader.readline():
-            announce(control.answer(line.decode()))
+            announce(channel.answer(line.decode()))
     run.stopping.set()
 
 
-async def _show(pace: Pace, emulator: Emulator) -> None:
-    """One line on the terminal, renewed each second."""
+async def _show(timer: ScanTimer, emulator: Emulator) -> None:
+    """Show one status line on the terminal and renew it each second."""
     while True:
         await asyncio.sleep(LIVE_EVERY)
         plc = emulator.plc
         line = (
-            f"t {plc.time:8.1f} s  {plc.state.name:<9}{unsettled_text(emulator)}  {pace.report()}"
+            f"t {plc.time:8.1f} s  {plc.state.name:<9}{unsettled_text(emulator)}  {timer.report()}"
         )
         sys.stderr.write(f"\r\x1b[K{line[:150]}")
         sys.stderr.flush()

@@ -1,4 +1,4 @@
-"""The emulator as a process: its first line, its switches from outside, its end."""
+"""The emulator as a process: its first line, its control from outside and its end."""
 
 import signal
 import subprocess
@@ -21,7 +21,7 @@ def started(*arguments: str) -> subprocess.Popen[str]:
 
 
 def wait_for(state: str, emulator: EmulatorProcess, limit: float = 10.0) -> None:
-    """Return when the PLC is in that state."""
+    """Wait until the PLC is in that state."""
     end = time.monotonic() + limit
     while emulator.status()["state"] != state:
         assert time.monotonic() < end, f"never {state}"

@@ -1,1 +1,1 @@
-"""The emulated PLC without input or output: scan, commands, state word, ramp, watchdog, faults."""
+"""The emulated PLC: scan, commands, states, ramp, watchdog and faults, without clock or socket."""

@@ -1,8 +1,8 @@
-"""The PLC's inbox: a command block is accepted whole, or refused whole with the reason.
+"""The PLC's inbox: it accepts a command block as a whole, or refuses it as a whole with the reason.
 
-The map version must match, the watchdog is 50 to 1000 ms (0 does not switch it off), the armature
-current at most 72 A. The speed asked for is clamped later, not refused here. A refused block
-changes nothing: the last accepted command stays in force.
+The map version must match. The watchdog time must be 50 to 1000 ms, so 0 does not switch it off.
+The current limit must be at most 72 A. The speed setpoint is clamped later, not refused here. A
+refused block changes nothing: the last accepted command stays in force.
 """
 
 from collections.abc import Sequence
@@ -14,24 +14,28 @@ from register_maps.codec import CodecError, decode_setpoint
 from register_maps.register_map import RegisterMap
 from register_maps.signals import Control, Mode, Setpoint
 
-CURRENT_MAX = 72.0
-WATCHDOG_MIN, WATCHDOG_MAX, WATCHDOG_DEFAULT = 0.05, 1.0, 0.2
-# 10 s from standstill to full speed, for a map without a slew register.
+CURRENT_MAX = 72.0  # [A]
+WATCHDOG_MIN, WATCHDOG_MAX, WATCHDOG_DEFAULT = 0.05, 1.0, 0.2  # [s]
+# [rad/s^2] A map without a slew register gets 10 s from standstill to full speed.
 SLEW_DEFAULT = 50.0
 MODES = (Mode.READY, Mode.SPEED, Mode.ROAD_LOAD)
-# A speed-controlled drive cannot let go of its shaft, so these two are refused, not ignored.
+# A speed-controlled drive cannot release its shaft, so these two are refused, not ignored.
 UNSUPPORTED = Control.ZERO_TORQUE | Control.COAST
-# Seconds, amperes: a float32 of 0.05 is not 0.05, nor is 5 times 0.01.
+# [s], [A] Neither the float32 of 0.05 nor 5 times 0.01 is exactly 0.05.
 ROUNDING = 1e-6
 
 
 class RefusedError(EmulatorError):
-    """The PLC does not take this command block."""
+    """The PLC refuses this command block; the message is the reason."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
-    """An acceptable command: every value there, SI."""
+    """An accepted command in SI units, with every value present.
+
+    speed [rad/s], rate (slope of the speed) [rad/s^2], slew (limit of the slope) [rad/s^2] : motor
+    current_limit [A]; watchdog [s]
+    """
 
     sequence: int
     heartbeat: int
@@ -45,7 +49,7 @@ class Command:
     map_version: int
 
 
-# What is in force before the gateway has said anything.
+# The command in force before the gateway's first write.
 NO_COMMAND = Command(
     sequence=0,
     heartbeat=0,
@@ -61,25 +65,25 @@ NO_COMMAND = Command(
 
 
 def sequence_of(register_map: RegisterMap, words: Sequence[int]) -> int:
-    """Command sequence number of a block, read without judging the rest of it."""
+    """Command sequence number of a block. The rest of the block is not checked."""
     register = register_map.register("command_sequence")
     assert register is not None, "a map without a command sequence is refused when it is loaded"
     return words[register.address - register_map.command.start]
 
 
 def judge(register_map: RegisterMap, words: Sequence[int]) -> Command:
-    """Command of an acceptable block; raises RefusedError."""
+    """Decode and check a block. Raises RefusedError with the first violated rule."""
     try:
-        command = _completed(decode_setpoint(register_map, words), register_map.version)
+        command = _fill_defaults(decode_setpoint(register_map, words), register_map.version)
     except CodecError as error:
         raise RefusedError(str(error)) from error
-    for complaint in _complaints(command, register_map.version):
-        raise RefusedError(complaint)
+    for violation in _violations(command, register_map.version):
+        raise RefusedError(violation)
     return command
 
 
-def _completed(setpoint: Setpoint, version: int) -> Command:
-    """The command with a default for each register that the map has not."""
+def _fill_defaults(setpoint: Setpoint, version: int) -> Command:
+    """The command with a default for each register that the map lacks."""
     return Command(
         sequence=setpoint.command_sequence,
         heartbeat=setpoint.gateway_heartbeat,
@@ -98,7 +102,7 @@ def _or(value: float | None, default: float) -> float:
     return default if value is None else value
 
 
-def _complaints(command: Command, version: int) -> list[str]:
+def _violations(command: Command, version: int) -> list[str]:
     rules = [
         (command.map_version == version, f"map version {command.map_version}, not {version}"),
         (command.slew > 0.0, f"ramp limit {command.slew:g} rad/s^2, must be more than 0"),
@@ -113,14 +117,14 @@ def _complaints(command: Command, version: int) -> list[str]:
         (command.mode in MODES, f"mode {command.mode.name} is not offered by this PLC"),
         (not command.control & UNSUPPORTED, f"{command.control!r} is not offered by this PLC"),
     ]
-    return [complaint for holds, complaint in rules if not holds]
+    return [violation for holds, violation in rules if not holds]
 
 
 class Inbox:
-    """The command in force, its age, and whether the gateway's heartbeat still moves.
+    """Holds the command in force, its age and the time of the gateway's last heartbeat.
 
-    edges : control bits that rose with the command read in this scan
-    refusal : why a command was refused last
+    edges : control bits that rose with the command of this scan
+    refusal : reason of the last refusal
     """
 
     def __init__(self, register_map: RegisterMap) -> None:
@@ -132,9 +136,10 @@ class Inbox:
         self._accepted_at = self._fed_at = -inf
 
     def read(self, words: Sequence[int] | None, now: float) -> bool:
-        """Take the block if its sequence number is new, a repeat means nothing; False: refused.
+        """Read the block; return False if it is refused. A repeated sequence number is ignored.
 
-        words : the block as it now stands, None until it is first written; now: PLC time [s]
+        words : the block now; None before the first write
+        now : PLC time [s]
         """
         self.edges = Control(0)
         if words is None or sequence_of(self._register_map, words) == self._sequence:
@@ -153,9 +158,9 @@ class Inbox:
         return True
 
     def age(self, now: float) -> float:
-        """Time since a command was last accepted [s]."""
+        """Time since the last accepted command [s]."""
         return now - self._accepted_at
 
     def watchdog_ok(self, now: float) -> bool:
-        """Whether the gateway's heartbeat moved within the time that it set itself."""
+        """Whether the heartbeat changed within the gateway's own watchdog time."""
         return now - self._fed_at <= self.command.watchdog + ROUNDING

@@ -1,13 +1,13 @@
-"""The PLC's fast task: sees the shaft torque every millisecond, hands mean and integral on."""
+"""The PLC's fast task: samples the shaft torque every millisecond for its mean and integral."""
 
 from numpy import float64
 from numpy.typing import NDArray
 
 
 class FastTask:
-    """Torque [N m] now, its mean over the last scan, its integral since the start [N m s].
+    """Torque now [N m], its mean over the last scan [N m], its integral since the start [N m s].
 
-    Integrated by trapezoids, so that the window is exactly that of the speeds at both of its ends.
+    The trapezoidal rule makes the window of the mean end exactly at the speed samples.
     """
 
     def __init__(self, step: float) -> None:
@@ -15,7 +15,7 @@ class FastTask:
         self.torque = self.mean = self.integral = 0.0
 
     def take(self, torque: NDArray[float64]) -> None:
-        """Take the samples of one scan, one a step."""
+        """Take the torque samples of one scan [N m], shape (steps,)."""
         before, self.torque = self.torque, float(torque[-1])
         self.mean = (float(torque.sum()) + (before - self.torque) / 2) / len(torque)
         self.integral += self.mean * len(torque) * self._step

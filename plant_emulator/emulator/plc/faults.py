@@ -1,8 +1,8 @@
-"""Ways in which a PLC or the network before it misbehaves, each switchable by name.
+"""Faults of a PLC or its network. Each fault is switched on by its name.
 
-Three places can lie, and each has one function here: the image that the PLC's program publishes
-(`image`), the bytes of a reply on the wire (`reply`), and the listening port (`refuses`). This file
-moves no byte itself: words in, words out; frame in, timed chunks out.
+A fault acts in one of three places, and each place has one function: the image that the PLC
+publishes (`image`), the bytes of a reply (`reply`), and the listening port (`refuses`). The
+functions do no input or output: `image` returns words, `reply` returns timed chunks of bytes.
 """
 
 from collections.abc import Iterable
@@ -26,9 +26,9 @@ NAMES = (
     "refuse_connection",
 )
 
-# Longer than any sensible time-out of a 100 Hz client, shorter than a person's patience.
+# [s] Longer than any sensible time-out of a 100 Hz client.
 LATENESS = 0.15
-# All ones is a NaN in every word and byte order.
+# All bits set are a NaN in every word and byte order.
 NOT_A_NUMBER = (0xFFFF, 0xFFFF)
 NOT_AVAILABLE = -0x8000
 HEADER = 7
@@ -40,14 +40,14 @@ OTHER_FUNCTION = {3: 4, 4: 3, 6: 5, 16: 15, 23: 3}
 
 
 class FaultError(EmulatorError):
-    """A fault was asked for that does not exist."""
+    """A requested fault does not exist, or its start is no time."""
 
     exit_code = 2
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fault:
-    """A misbehaviour and the PLC time [s] at which it begins."""
+    """A fault's name and the PLC time at which it begins [s]."""
 
     name: str
     start: float = 0.0
@@ -55,14 +55,14 @@ class Fault:
 
 @dataclass(frozen=True, kw_only=True)
 class Chunk:
-    """What the wire does `delay` seconds after the reply is ready: bytes, or None = it closes."""
+    """Bytes that are sent `delay` seconds after the reply is ready; None: the connection closes."""
 
     delay: float = 0.0
     data: bytes | None
 
 
 def parse(text: str) -> Fault:
-    """Fault from `NAME` or `NAME@SECONDS`."""
+    """Parse `NAME` or `NAME@SECONDS`. Raises FaultError."""
     name, _, start = text.partition("@")
     if name not in NAMES:
         raise FaultError(f"--fault {text}: unknown fault {name!r}; one of {', '.join(NAMES)}")
@@ -82,27 +82,27 @@ def _seconds(text: str, start: str) -> float:
 
 
 def active(faults: Iterable[Fault], now: float) -> frozenset[str]:
-    """Names of the faults that have begun; now: PLC time [s]."""
+    """Names of the faults that have begun at PLC time `now` [s]."""
     return frozenset(fault.name for fault in faults if fault.start <= now)
 
 
 def refuses(names: frozenset[str]) -> bool:
-    """Whether the port is closed to everybody."""
+    """Whether the port is closed."""
     return "refuse_connection" in names
 
 
 def refuses_requests(names: frozenset[str]) -> bool:
-    """Whether a request is answered by an exception, and therefore must have no effect."""
+    """Whether every request gets an exception reply, and therefore has no effect."""
     return any(name in names for name in EXCEPTION_FAULTS)
 
 
 def image(
     names: frozenset[str], register_map: RegisterMap, fresh: Words, previous: Words, shown: Words
 ) -> Words:
-    """Words that the PLC shows instead of `fresh`.
+    """Words that the PLC publishes instead of `fresh`.
 
-    previous : the true image of the scan before
-    shown : what was shown in the scan before; a frozen part stays as it is there
+    previous : true image of the previous scan
+    shown : published image of the previous scan, in which a frozen part stays
     """
     if "frozen_image" in names:
         return shown
@@ -130,7 +130,7 @@ def _distort(
 
 
 def _without_value(register: Register) -> tuple[int, ...]:
-    """Words that say "no number", empty where the type cannot say it."""
+    """Words that mean "no number" in this register; empty if its type has no such value."""
     if register.type == "float32":
         return NOT_A_NUMBER
     if register.type == "int16":
@@ -140,20 +140,23 @@ def _without_value(register: Register) -> tuple[int, ...]:
 
 
 def reply(names: frozenset[str], frame: bytes) -> tuple[Chunk, ...]:
-    """What becomes of a reply, `frame` = MBAP header (7 bytes), function code, data."""
+    """Chunks that are sent instead of a reply.
+
+    frame : MBAP header (7 bytes), function code, data
+    """
     delay = LATENESS if "late_reply" in names else 0.0
-    frame = _altered(names, frame)
+    frame = _alter(names, frame)
     if "drop_mid_reply" in names:
         return Chunk(delay=delay, data=frame[: len(frame) // 2]), Chunk(delay=delay, data=None)
     return (Chunk(delay=delay, data=frame),)
 
 
-def _altered(names: frozenset[str], frame: bytes) -> bytes:
+def _alter(names: frozenset[str], frame: bytes) -> bytes:
     for code, name in enumerate(EXCEPTION_FAULTS, start=1):
         if name in names:
-            return _framed(frame, bytes([frame[HEADER] | 0x80, code]))
+            return _replace_pdu(frame, bytes([frame[HEADER] | 0x80, code]))
     if "wrong_count" in names:
-        frame = _one_register_less(frame)
+        frame = _drop_register(frame)
     if "wrong_function" in names:
         other = OTHER_FUNCTION.get(frame[HEADER], frame[HEADER])
         frame = frame[:HEADER] + bytes([other]) + frame[HEADER + 1 :]
@@ -163,18 +166,18 @@ def _altered(names: frozenset[str], frame: bytes) -> bytes:
     return frame
 
 
-def _one_register_less(frame: bytes) -> bytes:
-    """A reply to a read loses its last register, a reply to a write confirms one fewer."""
+def _drop_register(frame: bytes) -> bytes:
+    """Take the last register from a read reply; lower the count of a write reply by one."""
     function = frame[HEADER]
     if function in READ_FUNCTIONS or function == READ_WRITE_FUNCTION:
         count = frame[HEADER + 1]
-        return _framed(frame, bytes([function, count - 2]) + frame[HEADER + 2 : -2])
+        return _replace_pdu(frame, bytes([function, count - 2]) + frame[HEADER + 2 : -2])
     if function == WRITE_FUNCTION:
         count = int.from_bytes(frame[-2:], "big")
         return frame[:-2] + (count - 1).to_bytes(2, "big")
     return frame
 
 
-def _framed(frame: bytes, pdu: bytes) -> bytes:
-    """The same transaction and unit around another protocol data unit."""
+def _replace_pdu(frame: bytes, pdu: bytes) -> bytes:
+    """The frame with another protocol data unit; transaction and unit stay."""
     return frame[:4] + (len(pdu) + 1).to_bytes(2, "big") + frame[6:7] + pdu

@@ -1,13 +1,13 @@
-"""The emulated PLC: one `scan` every 10 ms around a bench, no clock and no socket.
+"""The emulated PLC: one `scan` every 10 ms around a bench. It has no clock and no socket.
 
-A scan first lets the bench run to the present under the reference that the scan before decided,
-then reads the command, decides its state and the reference of the next 10 ms, and shows a
-measurement. So a command acts from the scan that first sees it, and nothing shown is ahead of time.
+A scan has four steps. It simulates the bench up to now, under the reference of the previous scan.
+It reads the command. It decides the state and the reference of the next 10 ms. It returns a
+measurement. A command therefore acts in the scan that first reads it.
 
-The watchdog is fed by accepted commands whose heartbeat moved. Once it has bitten, the drum is
-ramped down and only a new edge of CTRL.enable (0 -> 1) starts again, as after any other stop.
-An alarm stays until it is acknowledged: by CTRL.fault_reset (edge) or by the operator's moving the
-remote switch.
+An accepted command with a changed heartbeat feeds the watchdog. When the watchdog expires, the PLC
+ramps the drum down. Then only a rising edge of CTRL.enable starts the bench, like after any stop.
+An alarm stays until a rising edge of CTRL.fault_reset, or until the operator moves the remote
+switch.
 """
 
 from collections.abc import Sequence
@@ -26,19 +26,19 @@ SCAN = 0.01
 STEPS = 10
 STEP = SCAN / STEPS
 
-STANDSTILL = 1.0  # motor, 0.016 rad/s at the drum
-# 5 % over what the reference may reach: the drive overshoots a ramp by less than 1 %.
+STANDSTILL = 1.0  # motor speed [rad/s], 0.016 rad/s at the drum
+# 5 % above the largest reference, because the drive overshoots a ramp by less than 1 %.
 OVERSPEED = 1.05 * reference.SPEED_MAX
-# Nominal friction belongs to a shell of about 32 degC; below 30 degC the gear counts as cold.
-WARM_SHELL = 303.15
+# [K] The gear counts as cold below 30 degC; its nominal friction belongs to about 32 degC.
+COLD_BELOW = 303.15
 PULSES_PER_REVOLUTION = 4096
 DRIVEN = (Mode.SPEED, Mode.ROAD_LOAD)
 
 
 class Plc:
-    """The PLC's program and its memory; `scan` is all that it does.
+    """The PLC's program and its state. `scan` runs it once.
 
-    samples : what the bench did in the last scan
+    samples : the bench's signals in the last scan
     """
 
     samples: BenchSamples
@@ -65,23 +65,23 @@ class Plc:
         self._at_limit = False
         self._current_limit = self.inbox.command.current_limit
         field = register_map.register("field_current")
-        # The bench has no field circuit; where the map cannot say so, an unused input shows zero.
+        # The bench has no field circuit. A map without a "not available" mark shows zero.
         self._field_current = None if field is None or field.not_available is not None else 0.0
         self._age_max = _largest(register_map, "command_age")
         self._scan_time_max = _largest(register_map, "scan_time_max")
 
     @property
     def time(self) -> float:
-        """PLC time [s]: that of the sample last shown."""
+        """PLC time: the time of the last measurement [s]."""
         return self.scans * SCAN
 
     def scan(
         self, words: Sequence[int] | None, switches: Switches, scan_time_max: float = 0.0
     ) -> Measurement:
-        """Measurement after one scan.
+        """Run one scan and return its measurement.
 
-        words : the command block as it now stands, None until it is first written
-        scan_time_max : longest scan so far [s], measured outside
+        words : the command block now; None before the first write
+        scan_time_max : longest scan so far [s], measured by the caller
         """
         self._advance()
         self.scans += 1
@@ -104,7 +104,7 @@ class Plc:
         self.fast_task.take(self.samples.shaft_torque)
 
     def _decide(self, acknowledged: bool) -> None:
-        """Go to the next state, if anything asks for one."""
+        """Go to the next state if an event asks for one."""
         if self.samples.motor_speed[-1] > OVERSPEED:
             self.alarm |= Alarm.OVERSPEED
         for event in self._events(acknowledged):
@@ -143,7 +143,7 @@ class Plc:
         self.state = state
 
     def _plan(self) -> None:
-        """Decide the reference of the next scan, and hand the drive its current limit."""
+        """Plan the reference of the next scan and set the drive's current limit."""
         if self.inbox.command.current_limit != self._current_limit:
             self._current_limit = self.inbox.command.current_limit
             self.bench.limit_current(self._current_limit)
@@ -152,7 +152,7 @@ class Plc:
         self.path = reference.trajectory(self.reference, target, STEP, STEPS)
         current = abs(float(self.samples.armature_current[-1]))
         self._at_limit = (
-            reference.limited(self.path, target, STEP)
+            reference.is_limited(self.path, target, STEP)
             or current > 0.999 * self.inbox.command.current_limit
         )
 
@@ -178,7 +178,7 @@ class Plc:
             Status.ROAD_LOAD: self.state is PlcState.ROAD_LOAD,
             Status.AT_LIMIT: self._at_limit,
             Status.GAP: abs(twist) < self.backlash.half_gap,
-            Status.WARM: temperature > WARM_SHELL,
+            Status.WARM: temperature > COLD_BELOW,
             Status.WATCHDOG_OK: self.inbox.watchdog_ok(self.time),
             Status.EMERGENCY_STOP_OK: Interlock.EMERGENCY_STOP in self.switches.interlock,
             Status.FAULT: self.state is PlcState.FAULT,
@@ -217,12 +217,12 @@ class Plc:
 
 
 def _pulses(angle: float) -> int:
-    """Pulses of an encoder after turning by that angle [rad]; the codec wraps them."""
+    """Encoder pulses after a turn by `angle` [rad]; the codec wraps them."""
     return floor(angle * PULSES_PER_REVOLUTION / (2 * pi))
 
 
 def _largest(register_map: RegisterMap, signal: str) -> float:
-    """Largest SI value that the map can show: what runs longer stays there."""
+    """Largest SI value that the signal's register can show; infinite without a register."""
     register = register_map.register(signal)
     if register is None:
         return inf

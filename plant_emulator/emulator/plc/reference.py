@@ -1,8 +1,8 @@
 """The speed reference that the PLC gives the drive within one scan.
 
-Between two commands the PLC goes on along the slope that came with the last one, but only for
-`HOLD`: a gateway that died must not drag the drum away before its watchdog bites. What is asked is
-clamped to the bench's speed range and followed no faster than the slew limit.
+Between two commands the reference follows the slope of the last command, but only for `HOLD`.
+Otherwise a dead gateway could accelerate the drum until the watchdog expires. The reference is
+clamped to the bench's speed range, and its slope to the slew limit.
 """
 
 from dataclasses import dataclass
@@ -11,13 +11,16 @@ from math import pi
 RPM = 2 * pi / 60
 # Thesis: 4830 rpm is 105 % of the rated 4600 rpm; the bench does not run backwards.
 SPEED_MAX = 4830 * RPM
-# Ten polls at 100 Hz, one at the slowest period that makes sense.
+# [s] Ten polls at 100 Hz, or one poll at the slowest sensible period.
 HOLD = 0.1
 
 
 @dataclass(frozen=True, kw_only=True)
 class Target:
-    """What the reference goes to: speed + slope x age [rad/s], no faster than slew [rad/s^2]."""
+    """Target of the reference: speed + slope x age [rad/s], approached no faster than slew.
+
+    slope, slew [rad/s^2]; age of the command [s]
+    """
 
     speed: float
     slope: float
@@ -25,7 +28,7 @@ class Target:
     age: float
 
     def at(self, ahead: float) -> float:
-        """Speed asked for `ahead` seconds from now, inside the bench's range [rad/s]."""
+        """Target speed in `ahead` seconds, clamped to the bench's range [rad/s]."""
         asked = self.speed + self.slope * min(self.age + ahead, HOLD)
         return min(max(asked, 0.0), SPEED_MAX)
 
@@ -39,7 +42,7 @@ def ramp_down(slew: float) -> Target:
 
 
 def trajectory(reference: float, target: Target, step: float, count: int) -> list[float]:
-    """References [rad/s] at the ends of the next `count` sub-steps of `step` seconds each."""
+    """References at the ends of the next `count` sub-steps of `step` seconds [rad/s]."""
     most = target.slew * step
     path = []
     for number in range(1, count + 1):
@@ -49,7 +52,7 @@ def trajectory(reference: float, target: Target, step: float, count: int) -> lis
     return path
 
 
-def limited(path: list[float], target: Target, step: float) -> bool:
-    """Whether a limit keeps the end of the path from where the command wants it."""
+def is_limited(path: list[float], target: Target, step: float) -> bool:
+    """Whether a limit keeps the end of the path away from the command's target."""
     wanted = target.speed + target.slope * min(target.age + len(path) * step, HOLD)
     return abs(path[-1] - wanted) > 1e-9 * SPEED_MAX

@@ -1,4 +1,4 @@
-"""The PLC's states: what may happen, and where it leads. What is not listed leads nowhere."""
+"""The PLC's state machine as a table. Any pair of state and event outside it changes nothing."""
 
 from enum import Enum
 
@@ -6,7 +6,7 @@ from register_maps.signals import PlcState
 
 
 class Event(Enum):
-    """What may change the state, the weightiest first: only the first that applies acts."""
+    """Events that may change the state, by falling priority: only the first one acts."""
 
     TRIPPED = "interlock open or overspeed"
     RESET = "fault reset, or remote switch moved, after the cause is gone"

@@ -1,4 +1,4 @@
-"""What surrounds the PLC's program: the bench, the truck on it, the people at its switches."""
+"""The surroundings of the PLC's program: the bench, the truck on it and the operator's switches."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,38 +10,45 @@ from plant_emulator.simulation.running_bench import BenchSamples
 from register_maps.signals import Interlock, PlcState
 
 CLOSED = reduce(or_, Interlock)
-PARKING_SPEED = 0.05
-PARKING_TORQUE = 300.0
+PARKING_SPEED = 0.05  # [rad/s] of the drum
+PARKING_TORQUE = 300.0  # [N m] at the wheel
 
 
 class Bench(Protocol):
-    """Anything that runs under speed references [rad/s], one for each sub-step of 1 ms."""
+    """A bench that can be simulated in steps of 1 ms."""
 
     @property
     def unsettled(self) -> int:
-        """Steps so far whose equations were not solved."""
+        """Number of steps so far whose equations were not solved."""
 
     def advance(
         self, references: Sequence[float], *, wheel_torque: float = 0.0, brake_torque: float = 0.0
     ) -> BenchSamples:
-        """Run one sub-step an entry; torques [N m] at the truck's wheel."""
+        """Simulate one step per reference.
+
+        references : of the motor speed, one per step of 1 ms [rad/s]
+        wheel_torque, brake_torque : at the truck's wheel [N m]
+        """
 
     def limit_current(self, limit: float) -> None:
-        """Let the drive ask for no more than that armature current [A]."""
+        """Set the largest armature current that the drive may ask for [A]."""
 
 
 class Driver(Protocol):
-    """Whoever drives the truck on the drum."""
+    """The driver of the truck on the drum."""
 
     def torques(self, time: float, speed: float) -> tuple[float, float]:
-        """Drive and brake torque at the wheel [N m]; time since he set off, tread speed [m/s]."""
+        """Drive and brake torque at the wheel [N m].
+
+        time : since the driver set off [s]; speed : of the tread [m/s]
+        """
 
 
 class Truck:
-    """A truck on the drum: a new driver sets off whenever the bench goes into road-load.
+    """A truck on the drum. A new driver sets off when the bench enters road-load.
 
-    When the bench is neither in road-load nor in speed mode nobody drives, and the truck is parked
-    as soon as the drum stands: without that the frictionless drum would float through its gap.
+    Outside road-load and speed mode the truck has no driver and parks when the drum stands.
+    Otherwise the frictionless drum would float through its backlash.
     """
 
     def __init__(self, new_driver: Callable[[], Driver], drum_radius: float) -> None:
@@ -51,13 +58,13 @@ class Truck:
         self._parks = True
 
     def follow(self, state: PlcState, time: float) -> None:
-        """Do what goes with the PLC's new state; time: now [s]."""
+        """Follow the PLC's new state at PLC time `time` [s]."""
         self._driver = self._new_driver() if state is PlcState.ROAD_LOAD else None
         self._since = time
         self._parks = state not in (PlcState.ROAD_LOAD, PlcState.SPEED)
 
     def torques(self, time: float, drum_speed: float) -> tuple[float, float]:
-        """Drive and brake torque at its wheel [N m]."""
+        """Drive and brake torque at the truck's wheel [N m], at PLC time `time` [s]."""
         if self._driver is not None:
             return self._driver.torques(time - self._since, self._drum_radius * drum_speed)
         stands = self._parks and abs(drum_speed) < PARKING_SPEED
@@ -66,7 +73,7 @@ class Truck:
 
 @dataclass(frozen=True, kw_only=True)
 class Switches:
-    """What people do at the bench: the operator's remote switch, and the interlock chain."""
+    """The operator's remote switch and the interlock chain."""
 
     remote: bool = False
     interlock: Interlock = CLOSED
@@ -74,9 +81,10 @@ class Switches:
 
 @dataclass(frozen=True, kw_only=True)
 class Backlash:
-    """The gap between gear and drum as the PLC knows it.
+    """The backlash between gear and drum, for the PLC's gap bit.
 
-    ratio : of the gear; half_gap, start : at the gear output, start 0 = middle of the gap [rad]
+    ratio : gear ratio [1]; half_gap : half of the backlash width at the gear output [rad]
+    start : backlash gap position at the start, 0 in the middle [rad]
     """
 
     ratio: float
@@ -84,5 +92,5 @@ class Backlash:
     start: float = 0.0
 
     def twist(self, motor_angle: float, drum_angle: float) -> float:
-        """Angle of the gear output before the drum, from the middle of the gap [rad]."""
+        """Angle of the gear output minus that of the drum, from the middle of the gap [rad]."""
         return self.start + motor_angle / self.ratio - drum_angle

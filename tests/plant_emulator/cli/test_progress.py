@@ -1,14 +1,14 @@
-"""What is told of the time that a step needs yet, by a clock of the test's own."""
+"""The progress bar's remaining time, with a virtual clock."""
 
 from rich.progress import Progress
 
-from plant_emulator.cli._progress import teller
+from plant_emulator.cli._progress import reporter
 from plant_emulator.diagnosis.execution.pool import Here
 from plant_emulator.diagnosis.execution.progress import Told
 
 
 class Clock:
-    """A clock that goes on when it is told to."""
+    """A virtual clock that the test moves."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -18,18 +18,18 @@ class Clock:
 
 
 def test_a_second_step_has_a_remaining_time_of_its_own() -> None:
-    """A step of 3 s, then a quarter of the next in 2 s: 6 s are left of it."""
+    """After a step of 3 s, a quarter of the next step takes 2 s, so 6 s of it are left."""
     clock = Clock()
-    drawn = Progress(get_time=clock, disable=True)
-    tell = teller(drawn)
+    bar = Progress(get_time=clock, disable=True)
+    report = reporter(bar)
     for done in (0.0, 1 / 3, 2 / 3, 1.0):
-        tell("first fits", done)
+        report("first fits", done)
         clock.now += 1.0
-    tell("held-out runs", 0.0)
+    report("held-out runs", 0.0)
     for done in (0.125, 0.25):
         clock.now += 1.0
-        tell("held-out runs", done)
-    (task,) = drawn.tasks
+        report("held-out runs", done)
+    (task,) = bar.tasks
     assert task.description == "held-out runs"
     assert task.time_remaining == 6
     assert task.fields["before"] == "0:06 so far"

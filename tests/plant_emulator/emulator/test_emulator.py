@@ -1,4 +1,4 @@
-"""The emulator put together: the real bench under the PLC, stepped without a clock."""
+"""The whole emulator without its clock: the simulated bench under the PLC, scan by scan."""
 
 import json
 import struct
@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from plant_emulator import logs
-from plant_emulator.emulator.control_channel import Control as Channel
-from plant_emulator.emulator.emulator import Emulator, Options, build, words_of
+from plant_emulator.emulator.control_channel import ControlChannel
+from plant_emulator.emulator.emulator import Emulator, Options, build, encode
 from plant_emulator.emulator.plc.faults import FaultError
 from plant_emulator.emulator.plc.plc import Plc
 from plant_emulator.emulator.plc.surroundings import CLOSED
@@ -30,7 +30,7 @@ def shown(emulator: Emulator) -> Measurement:
 
 
 def drive(emulator: Emulator, scans: int, speed: float = 0.0, *, enable: bool = True) -> None:
-    """Ask for a speed [rad/s] before each of so many scans."""
+    """Run so many scans; command the motor speed `speed` [rad/s] before each."""
     for _ in range(scans):
         number = emulator.plc.scans
         setpoint = Setpoint(
@@ -50,7 +50,7 @@ def drive(emulator: Emulator, scans: int, speed: float = 0.0, *, enable: bool = 
 
 @pytest.fixture
 def emulator() -> Emulator:
-    """Nobody on the drum, remote."""
+    """An emulator without a truck, with the remote switch on."""
     return build(Options(truck_mass=None, remote=True, keeps_log=True))
 
 
@@ -72,7 +72,7 @@ def test_steady_speed_shows_the_friction_of_the_thesis(emulator):
     drive(emulator, 1200, 4025 * RPM)
     measurement = shown(emulator)
     assert measurement.motor_speed == pytest.approx(4025 * RPM, rel=1e-3)
-    # the drum has no friction and floats slowly through its gap
+    # The drum has no friction and floats slowly through its backlash.
     assert measurement.drum_speed == pytest.approx(4025 * RPM / 62.6, abs=0.05)
     assert measurement.shaft_torque_mean == pytest.approx(-13.4, abs=0.1)
     assert measurement.armature_current == pytest.approx(15.7, abs=0.2)
@@ -84,7 +84,7 @@ def test_integral_of_the_torque_is_the_sum_of_the_means(emulator):
     for _ in range(50):
         drive(emulator, 1, 500 * RPM)
         means.append(shown(emulator).shaft_torque_mean)
-    # each mean is rounded to 0.01 Nm
+    # Each mean is rounded to 0.01 N m.
     integral = shown(emulator).shaft_torque_integral
     assert integral == pytest.approx(sum(means) * 0.01, abs=50 * 0.005 * 0.01)
     assert integral < -1.0
@@ -106,7 +106,7 @@ def test_truck_drives_only_in_road_load():
     emulator.scan()
     drive(emulator, 400, enable=False)
     assert not emulator.log()["wheel_torque"].any()
-    # the driver starts after 2 s
+    # The driver starts after 2 s.
     drive(emulator, 300)
     assert emulator.log()["wheel_torque"][-1] > 100.0
 
@@ -122,7 +122,7 @@ def test_log_has_one_line_a_scan_and_can_be_read_again(emulator, tmp_path):
 
 
 def test_reference_without_a_truck_is_logged_as_it_stands_at_its_time(emulator):
-    # 1000 rpm/s from the second scan on: at that moment still 0, 10 ms later 10 rpm
+    # The slope is 1000 rpm/s from the second scan on: 0 at its time, 10 rpm 10 ms later.
     emulator.scan()
     drive(emulator, 3, 300 * RPM)
     assert np.allclose(emulator.log()["speed_reference"] / RPM, [0.0, 0.0, 10.0, 20.0])
@@ -132,7 +132,7 @@ def test_reference_with_a_truck_is_logged_as_a_staircase():
     emulator = build(Options(truck_mass=3640.0, remote=True, keeps_log=True))
     emulator.scan()
     drive(emulator, 3, 300 * RPM)
-    # mean over the next 10 ms of a ramp in ten steps: 5.5, 15.5, 25.5
+    # Mean over the next 10 ms of a ramp in ten steps: 5.5, 15.5, 25.5 rpm.
     assert np.allclose(emulator.log()["speed_reference"] / RPM, [0.0, 5.5, 15.5, 25.5])
 
 
@@ -157,7 +157,7 @@ def test_fault_begins_at_its_time():
 def test_frozen_image_stays_until_the_fault_ends():
     emulator = build(Options(truck_mass=None))
     emulator.scan()
-    channel = Channel(emulator, None, lambda: None)
+    channel = ControlChannel(emulator, None, lambda: None)
     channel.answer('{"do": "faults", "names": ["frozen_image"]}')
     channel.answer('{"do": "step", "scans": 5}')
     assert shown(emulator).sequence_start == 1
@@ -201,13 +201,13 @@ def test_what_does_not_exist_is_refused(options, error):
 )
 def test_bad_request_is_answered_and_changes_nothing(emulator, line, what):
     before = emulator.switches
-    answer = json.loads(Channel(emulator, None, lambda: None).answer(line))
+    answer = json.loads(ControlChannel(emulator, None, lambda: None).answer(line))
     assert what in answer["error"]
     assert emulator.switches == before
 
 
 def test_interlocks_open_and_close_on_request(emulator):
-    channel = Channel(emulator, None, lambda: None)
+    channel = ControlChannel(emulator, None, lambda: None)
     channel.answer('{"do": "interlock", "open": ["GUARD", "FAN"]}')
     channel.answer('{"do": "step", "scans": 2}')
     # GUARD is bit 1, FAN bit 2 of the six
@@ -215,12 +215,12 @@ def test_interlocks_open_and_close_on_request(emulator):
     assert json.loads(channel.answer('{"do": "status"}'))["ok"]["state"] == "FAULT"
 
 
-# --- what does not fit, and what is not solved --------------------------------------------------
+# --- values that exceed their register, and steps that did not converge -------------------------
 
 
 @pytest.fixture(params=["bench_int16", "bench_float32"])
 def spiking(request):
-    """An emulator of a bench without physics, and that bench; `push` is added to its speed."""
+    """An emulator of a bench without physics, and the bench. Its `push` is added to its speed."""
     bench = LinearBench()
     plc = Plc(bench, load(request.param), backlash=BACKLASH)
     made = Emulator(plc, PlcServer(plc.register_map, "127.0.0.1", 0))
@@ -239,7 +239,7 @@ def raw(emulator: Emulator, signal: str) -> bytes:
 
 @pytest.mark.parametrize("push", [1e6, -1e6])
 def test_spike_that_its_register_cannot_hold_is_shown_as_not_available(spiking, push):
-    """int16: 0x8000. A float32 holds it: the reader judges."""
+    """An int16 shows 0x8000. A float32 holds the value, so its reader must judge it."""
     emulator, bench = spiking
     bench.push = push
     emulator.scan()
@@ -276,7 +276,7 @@ def test_register_without_a_mark_stays_at_its_end():
         sequence_start=1, plc_heartbeat=1, plc_time=0.0, status=Status(0), sequence_end=1,
         motor_speed=1e6, drum_speed=-1e6, shaft_torque=0.0, **OPTIONAL,
     )  # fmt: skip
-    words = words_of(unmarked, measurement)
+    words = encode(unmarked, measurement)
     drum = unmarked.register("drum_speed")
     assert drum is not None
     assert words[speed.address] == 0x7FFF
@@ -294,7 +294,7 @@ OPTIONAL = {
 
 def test_status_tells_stages_of_the_bench_that_did_not_settle(spiking):
     emulator, bench = spiking
-    channel = Channel(emulator, None, lambda: None)
+    channel = ControlChannel(emulator, None, lambda: None)
     assert json.loads(channel.answer('{"do": "status"}'))["ok"]["unsettled"] == 0
     assert unsettled_text(emulator) == ""
     bench.unsettled = 3

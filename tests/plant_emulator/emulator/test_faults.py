@@ -1,4 +1,4 @@
-"""Each way to misbehave, on images and on frames written out field by field."""
+"""Each fault, on images and on frames that are written out field by field."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from register_maps import load
 
 INT16 = load("bench_int16")
 FLOAT32 = load("bench_float32")
-# What users may type.
+# The names that a user may type.
 KNOWN = [
     "frozen_heartbeat",
     "frozen_image",

@@ -1,4 +1,4 @@
-"""The emulated PLC around a bench whose motor is where its reference is."""
+"""The emulated PLC around a bench whose motor follows its reference exactly."""
 
 import itertools
 from dataclasses import dataclass, field, replace
@@ -28,7 +28,7 @@ from tests.plant_emulator.solver.linear_bench import BACKLASH, LinearBench
 RPM = 2 * pi / 60
 INT16 = load("bench_int16")
 FLOAT32 = load("bench_float32")
-# Where the int16 block has its registers in the map: CMD_SEQ is word 0.
+# Words of the int16 command block in the map; CMD_SEQ is word 0.
 HB, CTRL, MODE, SPEED_REF, SPEED_RATE, RAMP, CURRENT, WATCHDOG, VERSION = range(1, 10)
 
 
@@ -61,23 +61,23 @@ class Desk:
         self.words = encode_setpoint(self.plc.register_map, self.setpoint)
 
     def write_raw(self, place: int, word: int) -> None:
-        """Send the next command with one word put over it."""
+        """Send the next command with one word replaced."""
         self.write()
         assert self.words is not None
         words = list(self.words)
         words[place] = word
-        # The checksum is optional; 0 says that there is none.
+        # The checksum is optional; 0 means that there is none.
         words[10:12] = [0, 0]
         self.words = tuple(words)
 
     def scan(self, count: int = 1) -> Measurement:
-        """Let the PLC scan; what it shows at the end."""
+        """Run so many scans; return the last measurement."""
         for _ in range(count):
             shown = self.plc.scan(self.words, self.switches)
         return shown
 
     def beat(self, scans: int, **changes: object) -> Measurement:
-        """Scan so often, with a new command before each scan."""
+        """Run so many scans with a new command before each; return the last measurement."""
         for _ in range(scans):
             self.write(**changes)
             shown = self.scan()
@@ -91,7 +91,7 @@ def desk(register_map=INT16, **surroundings) -> Desk:
 
 @pytest.fixture
 def running() -> Desk:
-    """In road-load, standing."""
+    """A PLC in road-load, at standstill."""
     made = desk()
     made.scan(2)
     made.beat(1, control=Control.ENABLE)
@@ -154,7 +154,7 @@ def test_enable_edge_in_local_is_lost():
 
 
 def test_reference_goes_to_the_setpoint_no_faster_than_the_slew_limit(running):
-    # 1000 rpm/s for 20 ms are 20 rpm
+    # 1000 rpm/s for 20 ms are 20 rpm.
     shown = running.beat(2, speed_setpoint=300 * RPM)
     assert shown.speed_reference == pytest.approx(20 * RPM)
     assert Status.AT_LIMIT in shown.status
@@ -175,7 +175,7 @@ def test_reference_is_clamped_to_0_to_4830_rpm(running, asked, given):
 
 def test_setpoint_goes_on_along_its_slope_between_two_writes(running):
     running.write(speed_setpoint=100 * RPM, speed_rate=500 * RPM, ramp_limit=60000 * RPM)
-    # after the scan that reads it, the reference of the next 10 ms: 100 + 500 * 0.01
+    # The scan that reads the command plans the next 10 ms: 100 + 500 * 0.01.
     assert running.scan().speed_reference == pytest.approx(105 * RPM)
     assert running.scan(3).speed_reference == pytest.approx(120 * RPM)
     path = running.plc.bench.references[-10:]
@@ -192,14 +192,14 @@ def test_slope_ends_after_100_ms_so_that_a_dead_gateway_cannot_ramp_away(running
 
 def test_watchdog_ramps_down_at_the_ramp_limit_and_then_is_ready(running):
     running.beat(100, speed_setpoint=500 * RPM)
-    # written at scan 0; 200 ms later the heartbeat is 200 ms old and still good
+    # The command came at scan 0. 200 ms later the heartbeat is 200 ms old and still valid.
     assert running.scan(20).plc_state is PlcState.ROAD_LOAD
     shown = running.scan()
     assert shown.plc_state is PlcState.RAMP_DOWN
     assert Alarm.COMMUNICATION in shown.alarm
     assert Status.WATCHDOG_OK not in shown.status
     assert Status.ENABLED not in shown.status
-    # 500 rpm at 1000 rpm/s are 0.5 s: of 50 scans the first was the one above
+    # 500 rpm at 1000 rpm/s take 0.5 s, or 50 scans; the scan above was the first of them.
     assert running.scan(48).plc_state is PlcState.RAMP_DOWN
     assert running.scan(2).plc_state is PlcState.READY
 
@@ -293,7 +293,7 @@ def test_current_limit_of_an_accepted_command_reaches_the_drive(running):
 
 @pytest.mark.parametrize("words", [(0x7FC0, 0), (0x7F80, 0), (0xFF80, 0), (0, 1)])
 def test_float_that_is_no_number_is_refused_at_every_place(words):
-    # NaN, both infinities, the smallest subnormal; at the floats of the command block
+    # NaN, both infinities and the smallest subnormal, at the floats of the command block.
     for address in (196, 198, 200, 202):
         made = desk(FLOAT32)
         made.scan(2)
@@ -387,13 +387,13 @@ def test_alarm_stays_until_the_operator_moves_the_remote_switch(running):
 
 
 def test_mean_torque_is_over_exactly_the_window_of_the_speeds():
-    # torque rises by 1 N m a millisecond from 0: over scan k its mean is 10 k - 5
+    # The torque rises from 0 by 1 N m per millisecond: its mean over scan k is 10 k - 5.
     made = desk()
     assert made.scan().shaft_torque_mean == pytest.approx(5.0)
     shown = made.scan()
     assert shown.shaft_torque == 20.0
     assert shown.shaft_torque_mean == pytest.approx(15.0)
-    # integral of 1000 t from 0 to 20 ms
+    # Integral of 1000 t from 0 to 20 ms.
     assert shown.shaft_torque_integral == pytest.approx(0.2)
 
 
@@ -411,7 +411,7 @@ def test_gap_bit_is_set_between_the_flanks(running):
 
 
 class Diary:
-    """A driver who writes down when he was asked, at which speed."""
+    """A driver that records the times and speeds of all calls."""
 
     def __init__(self) -> None:
         self.asked: list[tuple[float, float]] = []
@@ -457,7 +457,7 @@ def test_driver_is_told_the_speed_of_the_tread():
     made = desk(truck=Truck(lambda: diary, drum_radius=0.645))
     made.scan(2)
     made.beat(100, control=Control.ENABLE, speed_setpoint=376.0, ramp_limit=6000.0)
-    # 376 rad/s is 6.0064 rad/s at the drum, 3.8741 m/s; one digit of the map is 0.2 rpm
+    # 376 rad/s are 6.0064 rad/s at the drum, or 3.8741 m/s; one digit of the map is 0.2 rpm.
     assert diary.asked[-1][1] == pytest.approx(3.8741, abs=3e-4)
 
 
@@ -494,7 +494,7 @@ def test_no_command_gets_the_reference_out_of_range_or_over_its_slew_limit(block
     made.scan(2)
     made.beat(1, control=Control.ENABLE, speed_setpoint=start * 0.2 * RPM)
     for number, block in enumerate(blocks, start=2):
-        # sound in what would be refused at once, anything in the rest
+        # These words are valid, because a bad one is refused at once; the others are arbitrary.
         block[0], block[VERSION], block[10:12] = number, 1, [0, 0]
         made.words = tuple(block)
         before = made.plc.path[-1]

@@ -1,4 +1,4 @@
-"""The Modbus server, byte by byte: frames as the Modbus specification writes them."""
+"""The Modbus server, byte by byte, against frames of the Modbus specification."""
 
 import asyncio
 import contextlib
@@ -16,7 +16,7 @@ IMAGE = tuple(range(1000, 1032))
 
 
 class Served:
-    """A server in a loop of its own."""
+    """A server with its own event loop and thread."""
 
     def __init__(self) -> None:
         self.loop = asyncio.new_event_loop()
@@ -36,14 +36,14 @@ class Served:
         self.thread.join()
         self.loop.close()
 
-    def misbehave(self, *names: str) -> None:
-        self.do(self.plc.misbehave(frozenset(names)))
+    def apply_faults(self, *names: str) -> None:
+        self.do(self.plc.apply_faults(frozenset(names)))
 
     def connect(self) -> socket.socket:
         return socket.create_connection(("127.0.0.1", self.plc.port), timeout=10)
 
     def ask(self, pdu: str, unit: int = 1) -> str:
-        """Reply to a request, both without their MBAP headers."""
+        """Send a request and return its reply, both without their MBAP headers."""
         with self.connect() as wire:
             wire.sendall(adu(pdu, unit))
             header = received(wire, 7)
@@ -64,8 +64,8 @@ def received(wire: socket.socket, count: int) -> bytes:
     return data
 
 
-def rest(wire: socket.socket) -> bytes:
-    """Everything that still comes after we said that we are done."""
+def remaining(wire: socket.socket) -> bytes:
+    """All bytes that arrive after we closed our side."""
     wire.shutdown(socket.SHUT_WR)
     return received(wire, 1000)
 
@@ -191,38 +191,38 @@ def test_refused_connection_cuts_the_old_ones_and_comes_back_on_the_same_port(se
     with served.connect() as wire:
         wire.sendall(adu("03 0000 0001"))
         received(wire, 11)
-        served.misbehave("refuse_connection")
+        served.apply_faults("refuse_connection")
         with contextlib.suppress(ConnectionResetError):
             assert wire.recv(1) == b""
     with pytest.raises(ConnectionRefusedError):
         served.connect()
-    served.misbehave()
+    served.apply_faults()
     assert served.plc.port == port
     assert served.ask("03 0000 0001") == "03 02 03 E8"
 
 
 def test_excepted_write_has_no_effect(served):
-    served.misbehave("exception_6")
+    served.apply_faults("exception_6")
     assert served.ask("06 0041 0001") == "86 06"
     assert served.plc.command is None
 
 
 def test_drop_mid_reply_ends_the_connection_after_a_part(served):
-    served.misbehave("drop_mid_reply")
+    served.apply_faults("drop_mid_reply")
     with served.connect() as wire:
         wire.sendall(adu("03 0000 0002"))
         assert received(wire, 100) == adu("03 04 03E8 03E9")[:6]
 
 
 def test_late_reply_comes_whole_and_the_connection_lives(served):
-    served.misbehave("late_reply")
+    served.apply_faults("late_reply")
     assert served.ask("03 0000 0001") == "03 02 03 E8"
-    served.misbehave()
+    served.apply_faults()
     assert served.ask("03 0000 0001") == "03 02 03 E8"
 
 
 def test_wrong_transaction_is_on_the_wire(served):
-    served.misbehave("wrong_transaction")
+    served.apply_faults("wrong_transaction")
     with served.connect() as wire:
         wire.sendall(adu("03 0000 0001"))
         assert received(wire, 11)[:2] == b"\x12\x35"
@@ -231,7 +231,7 @@ def test_wrong_transaction_is_on_the_wire(served):
 def test_faults_may_change_faster_than_the_port_can(served):
     async def flicker() -> None:
         changes = [frozenset({"refuse_connection"}), frozenset()] * 10
-        await asyncio.gather(*(served.plc.misbehave(names) for names in changes))
+        await asyncio.gather(*(served.plc.apply_faults(names) for names in changes))
 
     served.do(flicker())
     assert served.ask("03 0000 0001") == "03 02 03 E8"
@@ -243,19 +243,19 @@ def test_server_outlives_any_bytes(served):
         with served.connect() as wire:
             wire.sendall(chance.randbytes(length))
             with contextlib.suppress(ConnectionError):
-                rest(wire)
+                remaining(wire)
     assert served.ask("03 0000 0001") == "03 02 03 E8"
     assert served.plc.command is None
 
 
-# What pymodbus does otherwise than the specification says: an upgrade that changes it shows here.
+# Deviations of pymodbus from the specification. An upgrade that changes one shows here.
 
 
 def test_known_deviation_three_requests_in_one_segment_get_one_reply(served):
     with served.connect() as wire:
         wire.sendall(3 * adu("03 0000 0001"))
         assert received(wire, 11) == adu("03 02 03E8")
-        assert rest(wire) == b""
+        assert remaining(wire) == b""
 
 
 def test_known_deviation_126_registers_are_refused_under_function_80(served):
@@ -271,4 +271,4 @@ def test_known_deviation_unknown_function_is_refused_under_function_80(served):
 def test_known_deviation_foreign_protocol_id_is_not_answered(served):
     with served.connect() as wire:
         wire.sendall(b"\x12\x34\0\1" + adu("03 0000 0001")[4:])
-        assert rest(wire) == b""
+        assert remaining(wire) == b""

@@ -1,13 +1,13 @@
-"""Keeping real time, with a clock that only moves when somebody sleeps or works."""
+"""The scan timer, with a virtual clock that moves only by sleep and by work."""
 
 import pytest
 
 from plant_emulator.emulator import scan_timer
-from plant_emulator.emulator.scan_timer import Pace
+from plant_emulator.emulator.scan_timer import ScanTimer
 
 
 class Clock:
-    """A virtual clock; sleeping oversleeps by `late` seconds."""
+    """A virtual clock. Each sleep takes `late` seconds longer than asked."""
 
     def __init__(self, late: float = 0.0) -> None:
         self.now, self.late = 100.0, late
@@ -27,7 +27,7 @@ def clock(monkeypatch):
 
 
 def paced(clock, work, scans):
-    """Pace over so many scans that take `work(number)` seconds each, and when they began."""
+    """Run `scans` scans that take `work(number)` seconds each; return the report and the begins."""
     begins = []
 
     def scan() -> None:
@@ -37,7 +37,7 @@ def paced(clock, work, scans):
             made.stop()
 
     errors = []
-    made = Pace(scan, 0.01, errors.append)
+    made = ScanTimer(scan, 0.01, errors.append)
     made._run()
     assert not errors
     return made.report(), begins
@@ -79,7 +79,7 @@ def test_error_of_a_scan_is_handed_over(clock):
     def scan() -> None:
         raise ValueError("bench broken")
 
-    Pace(scan, 0.01, errors.append)._run()
+    ScanTimer(scan, 0.01, errors.append)._run()
     assert [str(error) for error in errors] == ["bench broken"]
 
 
