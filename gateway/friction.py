@@ -14,8 +14,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from gateway.errors import ConfigError
-
-CELSIUS = 273.15
+from register_maps.units import ZERO_CELSIUS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +68,7 @@ def friction_torque(omega: float, friction: Friction, temperature: float | None 
     torque = math.copysign(f_gc + f_g * abs(omega) ** delta_g, omega)
     if temperature is None or friction.temperature_coefficient == 0.0:
         return torque
-    above = temperature - CELSIUS - friction.reference_temperature_celsius
+    above = temperature - ZERO_CELSIUS - friction.reference_temperature_celsius
     return torque * math.exp(-friction.temperature_coefficient * above)
 
 

@@ -6,6 +6,12 @@ Nothing else in this house knows of rpm or degC except the borders that show the
 
 import math
 from dataclasses import dataclass
+from typing import Final
+
+RPM: Final = 2.0 * math.pi / 60.0
+"""One revolution per minute [rad/s]."""
+ZERO_CELSIUS: Final = 273.15
+"""Zero degrees Celsius [K]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,8 +31,6 @@ class Unit:
         return (value - self.shift) / self.factor
 
 
-_PER_REVOLUTION = 2.0 * math.pi / 60.0
-
 UNITS = {
     "1": Unit(si="1"),
     "count": Unit(si="1"),
@@ -37,9 +41,9 @@ UNITS = {
     "m/s": Unit(si="m/s"),
     "rad": Unit(si="rad"),
     "rad/s": Unit(si="rad/s"),
-    "rpm": Unit(si="rad/s", factor=_PER_REVOLUTION),
+    "rpm": Unit(si="rad/s", factor=RPM),
     "rad/s^2": Unit(si="rad/s^2"),
-    "rpm/s": Unit(si="rad/s^2", factor=_PER_REVOLUTION),
+    "rpm/s": Unit(si="rad/s^2", factor=RPM),
     "N": Unit(si="N"),
     "N m": Unit(si="N m"),
     "N m s": Unit(si="N m s"),
@@ -47,5 +51,5 @@ UNITS = {
     "mA": Unit(si="A", factor=1e-3),
     "V": Unit(si="V"),
     "K": Unit(si="K"),
-    "degC": Unit(si="K", shift=273.15),
+    "degC": Unit(si="K", shift=ZERO_CELSIUS),
 }

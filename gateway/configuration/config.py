@@ -14,7 +14,6 @@ from typing import Any, get_type_hints
 
 from gateway.configuration.keys import checked, keys
 from gateway.configuration.sections import (
-    RPM,
     SECTIONS,
     BenchConfig,
     LimitsConfig,
@@ -28,7 +27,7 @@ from gateway.configuration.sweep_speeds import Sweep, from_sweep
 from gateway.errors import ConfigError
 from gateway.friction import THESIS, from_friction
 
-__all__ = ["RPM", "BenchConfig", "Config", "changed", "config_hash", "from_document"]
+__all__ = ["BenchConfig", "Config", "changed", "config_hash", "from_document"]
 
 Document = dict[str, dict[str, Any]]
 Place = Callable[[str, str], str]

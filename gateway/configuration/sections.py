@@ -3,13 +3,12 @@
 Each field declares its key once: name as in the file, factor to SI, range or choice, default.
 """
 
-import math
 from dataclasses import dataclass
 
 from gateway.configuration.keys import declared
 from gateway.friction import THESIS, Friction
+from register_maps.units import RPM
 
-RPM = 2.0 * math.pi / 60.0
 MILLI = 1e-3
 PERCENT = 1e-2
 

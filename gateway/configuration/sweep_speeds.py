@@ -7,12 +7,11 @@ put there by whoever wants the losses, so that the recording tells what was aske
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from math import pi
 from typing import Any, Final
 
 from gateway.errors import ConfigError
+from register_maps.units import RPM
 
-RPM: Final = 2.0 * pi / 60.0
 RANGES: Final = {"hold_s": (3.0, 3600.0), "rate_rpm_s": (10.0, 3000.0)}
 SLOWEST_RPM, FASTEST_RPM = 60.0, 4830.0
 DEFAULT: Final = (200.0, 400.0, 800.0, 1400.0, 2100.0, 2900.0, 3700.0, 4500.0)

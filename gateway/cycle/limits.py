@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from enum import Flag, auto
 from math import isfinite
 
-HOLD = 0.1
-"""[s] for which the PLC follows a slope after the last write."""
+from register_maps.timing import HOLD
 
 
 class Limit(Flag):

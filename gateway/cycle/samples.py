@@ -18,11 +18,10 @@ from gateway.regulators.window import Window
 from register_maps.codec import difference
 from register_maps.register_map import RegisterMap
 from register_maps.signals import Measurement
+from register_maps.timing import SCAN
 
 LINK_IS_DOWN = frozenset({Reason.NOT_CONNECTED, Reason.CONNECTION_LOST})
 """Faults that no waiting for the next poll cures."""
-SCAN = 0.01
-"""[s] in which the PLC makes one sample, and over which it takes its mean torque."""
 OUT_OF_STEP, JITTER = 0.5, 0.05
 """How far two clocks may differ over a window: as a share of it, and [s] besides."""
 MEMORY = 0.5

@@ -28,9 +28,8 @@ from gateway.recordings import recording
 from gateway.recordings.header import header
 from gateway.recordings.recording import SUFFIX, encode_header
 from gateway.runtime.loop import Loop
+from register_maps.timing import SCAN
 
-SCAN: Final = 0.01
-"""[s] Scan of the emulated PLC."""
 LOOK_EVERY: Final = 0.1
 CHANGE_WITHIN: Final = 30.0
 """[s] For each state that is waited for, beside the cycle itself."""

@@ -8,15 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from gateway.offline.evaluation import Array
+from gateway.arrays import Array
+from register_maps.units import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 KMH = 3.6
-RPM = 60.0 / (2.0 * np.pi)
 # Okabe and Ito's colours: told apart with every kind of colour vision.
 ROAD, BENCH, ASKED, WARM = "#999999", "#0072B2", "#E69F00", "#D55E00"
 
@@ -87,7 +85,7 @@ def _motor(axes: "Axes", curves: Curves) -> None:
     axes.set_ylabel("shaft torque [Nm]", color=WARM)
     axes.set_xlabel("time [s]")
     speeds = axes.twinx()
-    speeds.plot(curves.time, RPM * curves.motor_setpoint, color=ASKED, linewidth=2.4)
-    speeds.plot(curves.time, RPM * curves.motor_speed, color="black", linewidth=0.8)
+    speeds.plot(curves.time, curves.motor_setpoint / RPM, color=ASKED, linewidth=2.4)
+    speeds.plot(curves.time, curves.motor_speed / RPM, color="black", linewidth=0.8)
     speeds.set_ylabel("motor speed [rpm]\norange: asked, black: measured", fontsize=9)
     speeds.spines["top"].set_visible(False)

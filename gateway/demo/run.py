@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from gateway.arrays import Array
 from gateway.config_file import load
 from gateway.cycle.supervisor import State
 from gateway.demo import plot
@@ -20,7 +21,7 @@ from gateway.demo.operator import Session, operate_fast, operate_in_real_time
 from gateway.demo.options import UNLOADED, Options
 from gateway.demo.view import Screen
 from gateway.errors import GatewayError
-from gateway.offline.evaluation import Array, agreement, cruise, traction_energy
+from gateway.offline.evaluation import agreement, cruise, traction_energy
 from gateway.reasons import Reason
 from gateway.recordings import recording
 from gateway.recordings.recording import Recording

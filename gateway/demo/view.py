@@ -10,7 +10,8 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-RPM: Final = 60.0 / (2.0 * math.pi)
+from register_maps.units import RPM
+
 LINE_EVERY: Final = 5.0
 """[s] of the cycle between two lines where no table can be drawn."""
 
@@ -57,7 +58,7 @@ class Screen:
             self._next_line = LINE_EVERY * (math.floor(moment.time / LINE_EVERY) + 1)
             self._console.print(
                 f"  {moment.time:5.1f} s  {moment.state:9s} {3.6 * moment.rim_speed:5.1f} km/h  "
-                f"setpoint {RPM * moment.setpoint:6.0f} rpm  torque {moment.shaft_torque:6.1f} Nm",
+                f"setpoint {moment.setpoint / RPM:6.0f} rpm  torque {moment.shaft_torque:6.1f} Nm",
                 highlight=False,
             )
 
@@ -68,8 +69,8 @@ class Screen:
         rows = (
             ("time", f"{max(moment.time, 0.0):.1f} of {self._duration:g} s"),
             ("state", moment.state),
-            ("setpoint", f"{RPM * moment.setpoint:.0f} rpm"),
-            ("motor", f"{RPM * moment.motor_speed:.0f} rpm"),
+            ("setpoint", f"{moment.setpoint / RPM:.0f} rpm"),
+            ("motor", f"{moment.motor_speed / RPM:.0f} rpm"),
             ("drum", f"{moment.drum_speed:.2f} rad/s, {3.6 * moment.rim_speed:.1f} km/h"),
             ("shaft torque", f"{moment.shaft_torque:.1f} Nm"),
             ("latency", f"{1e3 * moment.latency:.2f} ms"),

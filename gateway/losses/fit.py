@@ -13,12 +13,10 @@ from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gateway.arrays import Array
 from gateway.friction import RANGES, Friction
 from gateway.losses.sections import LossesError, Section
-
-Array = NDArray[np.float64]
 
 FEWEST: Final = 4
 """Speeds: one more than the law has parameters, so that their distance to it can be told."""

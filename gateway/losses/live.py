@@ -5,11 +5,12 @@ from typing import Final
 
 from gateway.configuration import sweep_speeds
 from gateway.configuration.config import Config, from_document
-from gateway.configuration.sweep_speeds import HOLD_S, RATE_RPM_S, RPM, Sweep
+from gateway.configuration.sweep_speeds import HOLD_S, RATE_RPM_S, Sweep
 from gateway.cycle.cycle import Output
 from gateway.cycle.supervisor import State
 from gateway.errors import ConfigError
 from gateway.losses.fit import FEWEST, SPREAD, different
+from register_maps.units import RPM
 
 ENDED: Final = (State.RAMPDOWN, State.SAFE)
 BEGUN: Final = 0.5

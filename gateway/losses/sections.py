@@ -18,12 +18,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gateway.arrays import Array
 from gateway.configuration.config import BenchConfig
 from gateway.errors import GatewayError
-
-Array = NDArray[np.float64]
+from register_maps.units import RPM
 
 HALF: Final = 0.5
 """[s] Before and after a moment, over which its slope is taken."""
@@ -225,7 +224,7 @@ def _refuse_sign(sections: list[Section]) -> None:
     raise SignError(
         f"the sign of the shaft torque is wrong, or a truck pushes the drum: at steady forward "
         f"speed the sensor shows {worst.shaft_torque:+.2f} N m ({worst.start:.1f} .. "
-        f"{worst.end:.1f} s, {worst.motor_speed * 30.0 / np.pi:.0f} rpm; {len(wrong)} of "
+        f"{worst.end:.1f} s, {worst.motor_speed / RPM:.0f} rpm; {len(wrong)} of "
         f"{len(sections)} steady stretches); expected below zero, as the motor drives"
     )
 

@@ -13,11 +13,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gateway.arrays import Array
 from gateway.errors import GatewayError
-
-Array = NDArray[np.float64]
 
 # Cruise: the speed changes by less than this [m/s^2], for at least so long [s].
 STEADY = 0.02

@@ -12,15 +12,13 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gateway.arrays import Array
 from gateway.configuration.config import Config
 from gateway.cycle.cycle import Observation, Output, initial, step
 from gateway.cycle.supervisor import State
 from register_maps.register_map import RegisterMap
 from register_maps.signals import Alarm, Interlock, Measurement, PlcState, Status
-
-Column = NDArray[np.float64]
 
 REST: Final = 1.0
 """[s] Before the log: half of it with remote off, so that remote on is a wish of now."""
@@ -30,7 +28,7 @@ ALL_CLOSED: Final = Interlock(sum(Interlock))
 
 
 def replay(
-    config: Config, register_map: RegisterMap, time: Column, columns: Mapping[str, Column]
+    config: Config, register_map: RegisterMap, time: Array, columns: Mapping[str, Array]
 ) -> list[Output]:
     """Every sample of a log through the tick: times [s] and columns by signal, in SI."""
     state = initial(config, register_map)
@@ -46,7 +44,7 @@ def replay(
     return outputs[-len(time) :]
 
 
-def _samples(times: Column, columns: Mapping[str, Column]) -> Iterator[tuple[Measurement, bool]]:
+def _samples(times: Array, columns: Mapping[str, Array]) -> Iterator[tuple[Measurement, bool]]:
     """What the PLC would have sent, and whether remote was on."""
     step_size = float(np.median(np.diff(times)))
     resting = max(4, round(REST / step_size))

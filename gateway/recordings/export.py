@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.arrays import Array
 from gateway.cycle.record import READ, WRITTEN
 from gateway.errors import ConfigError
 from gateway.recordings.recording import Recording
@@ -87,7 +88,7 @@ def fresh(recording: Recording) -> NDArray[np.intp]:
     return new
 
 
-def elapsed(time: NDArray[np.float64], modulus: float | None) -> NDArray[np.float64]:
+def elapsed(time: Array, modulus: float | None) -> Array:
     """Time since the first sample, the PLC's clock unwrapped [s]."""
     steps = np.diff(time, prepend=time[:1])
     return np.cumsum(steps if modulus is None else np.mod(steps, modulus))

@@ -2,16 +2,14 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from gateway.arrays import Array
 from gateway.errors import ConfigError
 from register_maps import csv_log, mdf4_log, parquet_log
 from register_maps.log_table import LogTableError, check_sampling
 from register_maps.signals import LOG_COLUMNS
-
-Column = np.ndarray[Any, np.dtype[np.float64]]
 
 
 class LogError(ConfigError):
@@ -23,8 +21,8 @@ class Log:
     """A log in SI: `columns` by signal name, each as long as `time` [s]."""
 
     path: Path
-    time: Column
-    columns: dict[str, Column]
+    time: Array
+    columns: dict[str, Array]
 
     def missing(self) -> list[str]:
         """Optional columns that are not there."""

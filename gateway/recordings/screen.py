@@ -15,8 +15,7 @@ from rich.live import Live
 from rich.table import Table
 
 from gateway.cycle.record import NOTHING, SHADOW, Layout
-
-RPM: Final = 60.0 / (2.0 * math.pi)
+from register_maps.units import RPM
 
 
 class View:
@@ -84,9 +83,9 @@ def status_table(header: dict[str, Any], record: np.void) -> Table:
 
 
 ROWS: Final[tuple[tuple[str, str, Callable[[float], str]], ...]] = (
-    ("setpoint, motor", "setpoint_speed_setpoint", lambda v: f"{v * RPM:.1f} rpm"),
-    ("demand, motor", "demand", lambda v: f"{v * RPM:.1f} rpm"),
-    ("motor", "measured_motor_speed", lambda v: f"{v * RPM:.1f} rpm"),
+    ("setpoint, motor", "setpoint_speed_setpoint", lambda v: f"{v / RPM:.1f} rpm"),
+    ("demand, motor", "demand", lambda v: f"{v / RPM:.1f} rpm"),
+    ("motor", "measured_motor_speed", lambda v: f"{v / RPM:.1f} rpm"),
     ("drum", "measured_drum_speed", lambda v: f"{v:.3f} rad/s"),
     ("shaft torque", "measured_shaft_torque", lambda v: f"{v:.2f} Nm"),
     ("armature current", "measured_armature_current", lambda v: f"{v:.2f} A"),

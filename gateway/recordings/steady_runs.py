@@ -8,9 +8,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from gateway.arrays import Array
 from gateway.configuration.config import Config
 from gateway.errors import ConfigError
-from gateway.losses.sections import Array, LossesError, Trace
+from gateway.losses.sections import LossesError, Trace
 from gateway.recordings import log, recording
 from gateway.recordings.export import elapsed, fresh
 from gateway.recordings.header import config_of, map_of

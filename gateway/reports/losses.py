@@ -15,10 +15,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from gateway.configuration.config import RPM, BenchConfig
-from gateway.friction import CELSIUS, Friction
+from gateway.configuration.config import BenchConfig
+from gateway.friction import Friction
 from gateway.losses.fit import Fit
 from gateway.losses.sections import LeftOut, Section
+from register_maps.units import RPM, ZERO_CELSIUS
 
 DIRECTION: Final = "forward only: the bench turns 0..4830 rpm"
 WARMED: Final = 3.0
@@ -45,7 +46,7 @@ class Losses:
         known = [one.shell_temperature for one in self.sections]
         if any(one is None for one in known):
             return None
-        celsius = [one - CELSIUS for one in known if one is not None]
+        celsius = [one - ZERO_CELSIUS for one in known if one is not None]
         return min(celsius), max(celsius)
 
     @property
@@ -67,7 +68,6 @@ class Losses:
         """The stretches, slowest first, units in the names."""
         rows = []
         for one, residual in zip(self.sections, self.fit.residuals, strict=True):
-            shell = one.shell_temperature
             rows.append(
                 {
                     "run": one.run,
@@ -81,10 +81,14 @@ class Losses:
                     "law_torque_Nm": round(one.friction - float(residual), 3),
                     "residual_Nm": round(float(residual), 3) + 0.0,  # no -0.0
                     "rim_force_N": round(one.friction / self.bench.drum_radius, 2),
-                    "shell_temperature_degC": None if shell is None else round(shell - CELSIUS, 2),
+                    "shell_temperature_degC": _celsius(one.shell_temperature),
                 }
             )
         return sorted(rows, key=lambda row: row["gear_speed_rad_s"])
+
+
+def _celsius(temperature: float | None) -> float | None:
+    return None if temperature is None else round(temperature - ZERO_CELSIUS, 2)
 
 
 def answer(losses: Losses) -> dict[str, Any]:

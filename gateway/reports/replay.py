@@ -6,15 +6,14 @@ matplotlib is imported only when a picture is drawn.
 import csv
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gateway.arrays import Array
 from gateway.offline.evaluation import Agreement, agreement
+from register_maps.units import RPM
 
-Array = NDArray[np.float64]
-RPM: Final = 30.0 / np.pi
 GREY, BLUE, RED = "#999999", "#0072B2", "#D55E00"
 
 
@@ -63,8 +62,8 @@ class Compared:
         val = f"; Val1 {close.val1:.2f}, Val2 {close.val2:.2f}" if close else ""
         return (
             f"{self.title}: {len(error)} of {len(self.time)} samples compared\n"
-            f"difference rms {np.sqrt(np.mean(error**2)) * RPM:.3f} rpm, "
-            f"max {abs(error[worst]) * RPM:.3f} rpm at {when:.2f} s{val}"
+            f"difference rms {np.sqrt(np.mean(error**2)) / RPM:.3f} rpm, "
+            f"max {abs(error[worst]) / RPM:.3f} rpm at {when:.2f} s{val}"
         )
 
 
@@ -91,11 +90,11 @@ def draw(path: Path, compared: Compared) -> None:
     figure = Figure(figsize=(9.0, 6.0), layout="constrained", facecolor="white")
     speed, error = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1.2])
     speed.set_title(compared.title, loc="left")
-    speed.plot(compared.time, RPM * compared.wanted, color=GREY, linewidth=3.5, label="then")
-    speed.plot(compared.time, RPM * compared.found, color=BLUE, linewidth=1.3, label="replay")
+    speed.plot(compared.time, compared.wanted / RPM, color=GREY, linewidth=3.5, label="then")
+    speed.plot(compared.time, compared.found / RPM, color=BLUE, linewidth=1.3, label="replay")
     speed.set_ylabel("motor setpoint [rpm]")
     speed.legend(frameon=False)
-    error.plot(compared.time, RPM * (compared.wanted - compared.found), color=RED, linewidth=0.9)
+    error.plot(compared.time, (compared.wanted - compared.found) / RPM, color=RED, linewidth=0.9)
     error.set_ylabel("then - replay [rpm]")
     error.set_xlabel("time [s]")
     for axes in (speed, error):

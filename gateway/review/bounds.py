@@ -3,10 +3,10 @@
 from collections.abc import Iterator
 
 from gateway.configuration.config import Config
-from gateway.configuration.sections import RPM
 from gateway.review.finding import Finding
 from gateway.review.limits import delay_of
 from gateway.review.loop import lead_of
+from register_maps.units import RPM
 
 OVERSHOOT = 1.01
 """A drive under speed control overshoots a ramp by about 1 %."""

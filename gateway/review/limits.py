@@ -1,21 +1,20 @@
 """What is to be said of times, speeds and torques: whether a run fits into what is allowed."""
 
 from collections.abc import Iterator
-from math import pi
 
 from gateway.configuration.config import Config
-from gateway.cycle.samples import SCAN
 from gateway.friction import friction_torque
 from gateway.review.finding import Finding
 from gateway.review.loop import rho_of
 from gateway.review.stability import DRIVE
 from gateway.road_load import road_load
+from register_maps.timing import SCAN
+from register_maps.units import RPM
 
 RESPONSE = 0.1
 """[s] in which a dynamometer has to settle within 10 % (40 CFR 1066.245)."""
 DRIVE_LAG = 1.0 / DRIVE
 """[s] of the speed-controlled motor behind its reference."""
-RPM = 2.0 * pi / 60.0
 
 
 def timing(config: Config) -> Iterator[Finding]:

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from gateway.configuration.config import Config
-from gateway.cycle.samples import SCAN
 from gateway.review.finding import Finding
 from gateway.review.stability import Loop, smallest_mass, spectral_radius
+from register_maps.timing import SCAN
 
 RHO_REFUSED, RHO_WARNED = 0.9, 0.5
 

@@ -16,7 +16,8 @@ from dataclasses import dataclass
 from math import exp
 
 import numpy as np
-from numpy.typing import NDArray
+
+from gateway.arrays import Array
 
 STEP = 1e-3
 DRIVE = 105.0
@@ -27,8 +28,6 @@ CONTACT = 385.0
 MARGIN = 1e-7
 """By which an eigenvalue may exceed 1 for the rounding of its computation."""
 LIGHTEST, HEAVIEST = 60.0, 20000.0
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +91,7 @@ def _size(loop: Loop) -> int:
     return 7 + round(loop.dead_time / STEP)
 
 
-def _period(loop: Loop, rho: float, state: Vector) -> Vector:
+def _period(loop: Loop, rho: float, state: Array) -> Array:
     """State one poll later. The torque is counted in units of the drum's inertia: T = -w'.
 
     g, w : gear and drum; tau, y : filtered torque and speed; before : y at the last poll

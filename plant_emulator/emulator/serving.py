@@ -15,8 +15,8 @@ from collections.abc import Callable
 from plant_emulator import logs
 from plant_emulator.emulator.control_channel import ControlChannel
 from plant_emulator.emulator.emulator import Emulator, Options, build
-from plant_emulator.emulator.plc.plc import SCAN
 from plant_emulator.emulator.scan_timer import ScanTimer
+from register_maps.timing import SCAN
 
 LIVE_EVERY = 1.0  # [s] between two lines on the terminal
 PRIORITY = 20

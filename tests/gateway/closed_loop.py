@@ -9,13 +9,14 @@ from gateway.cycle.cycle import Observation, Output
 from gateway.cycle.supervisor import State
 from gateway.reasons import Reason
 from plant_emulator import parameter_sets
-from plant_emulator.emulator.plc.plc import SCAN, Plc
+from plant_emulator.emulator.plc.plc import Plc
 from plant_emulator.emulator.plc.surroundings import Backlash, Switches, Truck
 from plant_emulator.simulation.running_bench import Bench
 from plant_emulator.simulation.truck import Forklift, ReplayedTorque
 from register_maps import load
 from register_maps.codec import decode_measurement, encode_measurement, encode_setpoint
 from register_maps.signals import Measurement
+from register_maps.timing import SCAN
 
 PARAMETERS = parameter_sets.load("thesis_table_3_1")
 Reading = Measurement | Reason

@@ -14,7 +14,8 @@ from plant_emulator.simulation.truck import Forklift, road_speed
 from register_maps import load
 from register_maps.codec import encode_setpoint
 from register_maps.signals import Alarm, Control, Interlock, Measurement, Mode, Status
-from tests.gateway.closed_loop import SCAN, ClosedLoop
+from register_maps.timing import SCAN
+from tests.gateway.closed_loop import ClosedLoop
 
 CONFIG = Config().with_values({"truck.crr": "0.0117"})
 DETECTED = 0.15

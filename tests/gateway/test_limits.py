@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.cycle.limits import HOLD, Limit, Limits, limit
+from gateway.cycle.limits import Limit, Limits, limit
 from plant_emulator.emulator.plc import reference
 
 # At rates of 100 up and 200 down, 10 ms are worth 1 up and 2 down.
@@ -126,7 +126,10 @@ def test_slope_downward_is_free_at_every_ceiling():
 
 
 def test_slope_is_followed_for_as_long_as_the_plc_does():
-    assert HOLD == reference.HOLD
+    """The motor turns at 62 rad/s, so that the setpoint may end 40 rad/s above, at 102 rad/s."""
+    passed = of(100.0, 25.0, measured=62.0)
+    target = reference.Target(speed=passed.speed, slope=passed.rate, slew=inf, age=0.0)
+    assert target.at(0.05) < target.at(10.0) == pytest.approx(102.0)
 
 
 @pytest.mark.parametrize("rate", [nan, inf, -inf])
@@ -154,4 +157,4 @@ def test_no_input_gets_past_the_limits(wanted, rate, measured, age, dt, last):
     assert passed.speed <= last or age <= 0.1
     assert passed.speed <= last or passed.speed <= measured + 40.0
     if passed.rate > 0.0:
-        assert passed.speed + passed.rate * HOLD <= min(measured + 40.0, 500.0) + 1e-9
+        assert passed.speed + passed.rate * 0.1 <= min(measured + 40.0, 500.0) + 1e-9

@@ -21,8 +21,8 @@ from plant_emulator.emulator.plc.surroundings import CLOSED, Backlash, Bench, Sw
 from plant_emulator.simulation.running_bench import BenchSamples
 from register_maps.register_map import RegisterMap
 from register_maps.signals import Alarm, Control, Interlock, Measurement, Mode, PlcState, Status
+from register_maps.timing import SCAN
 
-SCAN = 0.01
 STEPS = 10
 STEP = SCAN / STEPS
 

@@ -6,13 +6,12 @@ clamped to the bench's speed range, and its slope to the slew limit.
 """
 
 from dataclasses import dataclass
-from math import pi
 
-RPM = 2 * pi / 60
+from register_maps.timing import HOLD
+from register_maps.units import RPM
+
 # Thesis: 4830 rpm is 105 % of the rated 4600 rpm; the bench does not run backwards.
 SPEED_MAX = 4830 * RPM
-# [s] Ten polls at 100 Hz, or one poll at the slowest sensible period.
-HOLD = 0.1
 
 
 @dataclass(frozen=True, kw_only=True)
