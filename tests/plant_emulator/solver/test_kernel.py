@@ -218,3 +218,32 @@ def test_cache_root_is_the_users_unless_told_otherwise(
     assert compiler.cache_root() == Path.home() / ".cache" / "road-load-bench"
     monkeypatch.setenv("ROADLOAD_CACHE", str(tmp_path / "mine"))
     assert compiler.cache_root() == tmp_path / "mine"
+
+
+COMPILING = """
+from plant_emulator.solver import compiler
+
+compiler.use_cache([], ["square"])
+
+def square(x):
+    return x * x
+
+function = compiler.compiled(square, on_disk=True)
+assert function(3.0) == 9.0
+print(sum(function.stats.cache_hits.values()))
+"""
+
+
+@needs_compiler
+def test_of_two_processes_one_compiles_and_the_other_waits_for_it(tmp_path: Path) -> None:
+    program = tmp_path / "square.py"
+    program.write_text(COMPILING)
+    both = [
+        subprocess.Popen(
+            [sys.executable, str(program)],
+            env={**os.environ, "ROADLOAD_CACHE": str(tmp_path / "cache"), "PYTHONPATH": str(ROOT)},
+            stdout=subprocess.PIPE, text=True,
+        )
+        for _ in range(2)
+    ]  # fmt: skip
+    assert sorted(one.communicate(timeout=120)[0].strip() for one in both) == ["0", "1"]
