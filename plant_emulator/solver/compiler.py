@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,8 +53,31 @@ def compiled(function: Callable[..., Any], *, on_disk: bool = False) -> Callable
         return function
     import numba
 
-    dispatcher: Callable[..., Any] = numba.njit(cache=on_disk, **OPTIONS)(function)
-    return dispatcher
+    dispatcher = numba.njit(cache=on_disk, **OPTIONS)(function)
+    if on_disk:
+        dispatcher.compile = one_at_a_time(dispatcher.compile, dispatcher.stats.cache_path)
+    found: Callable[..., Any] = dispatcher
+    return found
+
+
+def one_at_a_time(action: Callable[..., Any], folder: str) -> Callable[..., Any]:
+    """The action, done by one process at a time of all that use this folder.
+
+    A kernel takes ten to twenty seconds to compile. Processes that need the same one wait for the
+    first, and load what it left. Two at once could also mix up the entries of numba's index.
+    """
+    import fcntl
+
+    @wraps(action)
+    def alone(*arguments: Any) -> Any:
+        place = os.open(folder, os.O_RDONLY)
+        try:
+            fcntl.flock(place, fcntl.LOCK_EX)
+            return action(*arguments)
+        finally:
+            os.close(place)  # this also frees the lock, as does the end of the process
+
+    return alone
 
 
 def private_copy() -> Callable[..., Any]:
