@@ -11,8 +11,8 @@ import peers
 
 from plant_emulator import logs, parameter_sets
 from plant_emulator.estimation.free_parameters import free_parameters
-from plant_emulator.estimation.start_search import GAP_POSITION
 from plant_emulator.identification.identify import identify
+from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import recording
 from plant_emulator.simulation import programs
 

@@ -16,7 +16,7 @@ from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
 from plant_emulator.errors import UnsettledError
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
 from plant_emulator.estimation.least_squares import at, estimate
-from plant_emulator.estimation.start_search import GAP_POSITION
+from plant_emulator.model.stage import GAP_POSITION, split_gap_position
 from plant_emulator.recordings.recording import IMPOSSIBLE
 from plant_emulator.signals.log import COMPARED
 from plant_emulator.simulation.sensor_noise import SENSORS
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.blind.case import Case, Hidden
-    from plant_emulator.estimation.unknowns import Array, Residual, Unknown
+    from plant_emulator.estimation.unknowns import Residual, Unknown
     from plant_emulator.model.parameters import ParameterSet
-    from plant_emulator.signals.log import Log
+    from plant_emulator.signals.log import Array, Log
 
 # Norm above which an effect counts as detectable.
 DETECTABLE = 7.0
@@ -109,8 +109,8 @@ def _simulation(
     fixed = values_of(parameters.with_values(case.parameters), effects)
 
     def simulated(found: Mapping[str, float]) -> Array:
-        values = {**fixed, **found}
-        out = simulate(inputs, values, gap_position=values.pop(GAP_POSITION))
+        values, gap = split_gap_position({**fixed, **found})
+        out = simulate(inputs, values, gap_position=gap)
         return np.stack([out[name] for name in COMPARED]) / levels
 
     return simulated

@@ -15,7 +15,7 @@ import numpy as np
 
 from plant_emulator.blind.detectable import noise_levels
 from plant_emulator.estimation.initial_states import fit_states, states_of, with_own
-from plant_emulator.estimation.start_search import GAP_POSITION
+from plant_emulator.model.stage import split_gap_position
 from plant_emulator.recordings.recording import Recording
 from plant_emulator.signals.log import COMPARED
 from plant_emulator.simulation.simulate import run_of, values_of
@@ -23,9 +23,8 @@ from plant_emulator.simulation.simulate import run_of, values_of
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.estimation.unknowns import Array
     from plant_emulator.model.parameters import ParameterSet
-    from plant_emulator.signals.log import Log
+    from plant_emulator.signals.log import Array, Log
 
 # A channel counts from this gap on, in the noise.
 OPEN = 1.1
@@ -56,5 +55,4 @@ def _left(log: Log, saved: ParameterSet) -> Array:
     recording = with_own(bare, saved.effects)
     values = values_of(saved)
     states = fit_states(recording, values, states_of(saved.effects))
-    trial = {**values, **recording.own, **states}
-    return recording.residual(trial, trial.pop(GAP_POSITION))
+    return recording.residual(*split_gap_position({**values, **recording.own, **states}))

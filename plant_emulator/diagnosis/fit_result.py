@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from plant_emulator.estimation.unknowns import Array
+    from plant_emulator.signals.log import Array
 
 
 @dataclass(frozen=True, kw_only=True)

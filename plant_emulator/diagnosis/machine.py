@@ -12,8 +12,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.estimation.unknowns import Array, Residual, Unknown
+    from plant_emulator.estimation.unknowns import Residual, Unknown
     from plant_emulator.recordings.input_noise import Loud
+    from plant_emulator.signals.log import Array
 
 
 @dataclass(frozen=True, kw_only=True)

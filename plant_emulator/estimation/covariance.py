@@ -19,12 +19,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-Array = NDArray[np.float64]
+    from plant_emulator.signals.log import Array
 
 # Eigenvalue of an information matrix of unit diagonal that is 0 but for rounding [the largest], and
 # the part that an unknown has in such a direction.

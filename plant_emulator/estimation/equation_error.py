@@ -23,8 +23,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
-    from plant_emulator.estimation.unknowns import Array
-    from plant_emulator.signals.log import Log
+    from plant_emulator.signals.log import Array, Log
 
 # Smoothing before the derivative [s]; longer than the sensors' noise, shorter than a ramp.
 WINDOW = 0.25

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from plant_emulator.errors import IdentificationError
 from plant_emulator.estimation.initial_states import GAP
-from plant_emulator.estimation.start_search import GAP_POSITION
 from plant_emulator.estimation.unknowns import Unknown
+from plant_emulator.model.stage import GAP_POSITION
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -12,16 +12,17 @@ import numpy as np
 
 from plant_emulator.estimation.least_squares import estimate
 from plant_emulator.estimation.robust_scan import scanned
-from plant_emulator.estimation.start_search import GAP_POSITION, Search
+from plant_emulator.estimation.start_search import Search
 from plant_emulator.estimation.unknowns import Unknown
+from plant_emulator.model.stage import GAP_POSITION, split_gap_position
 from plant_emulator.solver.kernel import kernel
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.effects import Effect
-    from plant_emulator.estimation.unknowns import Array
     from plant_emulator.recordings.recording import Recording
+    from plant_emulator.signals.log import Array
 
     Effects = Mapping[str, Mapping[str, float]]
 
@@ -82,8 +83,7 @@ def fit_states(
     search.scan_gaps(41)
 
     def residual(found: Mapping[str, float]) -> Array:
-        trial = {**values, **found}
-        return recording.residual(trial, trial.pop(GAP_POSITION))
+        return recording.residual(*split_gap_position({**values, **found}))
 
     starts = {u.name: u.start for u in states} | {GAP_POSITION: search.gaps[0]}
     starts = scanned(residual, starts, [u for u in states if u.name != GAP_POSITION])

@@ -20,12 +20,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.estimation.covariance import sandwich
-from plant_emulator.estimation.unknowns import Array, Estimate, Unknown
+from plant_emulator.estimation.unknowns import Estimate, Unknown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from plant_emulator.estimation.unknowns import Residual
+    from plant_emulator.signals.log import Array
 
 # Forward differences: a change of the residual vector of this norm, within these steps of z. It is
 # small against what the noise hides (1), far above the simulation's own jitter (1e-5), and wide

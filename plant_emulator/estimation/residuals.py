@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plant_emulator.estimation.start_search import GAP_POSITION
+from plant_emulator.model.stage import split_gap_position
 from plant_emulator.recordings.input_noise import loud
 from plant_emulator.simulation.simulate import TOLERANCE
 
@@ -29,7 +29,7 @@ def residual_functions(
     def of(recording: Recording) -> Residual:
         def residual(found: Mapping[str, float]) -> Array:
             trial = {**fixed, **recording.own, **found}
-            return recording.residual(trial, trial.pop(GAP_POSITION), tolerance)
+            return recording.residual(*split_gap_position(trial), tolerance)
 
         return residual
 
@@ -46,7 +46,7 @@ def quieted_functions(
     louds = []
     for k, recording in enumerate(recordings):
         there = {**values, **recording.own, **near.parameters(), **near.states(k)}
-        louds.append(loud(recording, there, there.pop(GAP_POSITION)))
+        louds.append(loud(recording, *split_gap_position(there)))
     if not any(louds):
         return None
     plain = residual_functions(recordings, values, free)

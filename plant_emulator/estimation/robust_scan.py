@@ -15,7 +15,8 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from plant_emulator.estimation.unknowns import Array, Residual, Unknown
+    from plant_emulator.estimation.unknowns import Residual, Unknown
+    from plant_emulator.signals.log import Array
 
 # Angles that are tried [rad].
 ANGLES = np.linspace(-pi, pi, 24, endpoint=False)

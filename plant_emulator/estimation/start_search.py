@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.estimation.robust_scan import cauchy_loss
+from plant_emulator.model.stage import GAP_POSITION
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
 
     Progress = Callable[[str, float], None]
 
-
-GAP_POSITION = "gap_position"
 # A scan: name, factor either way, values. Coarse over what a first guess may be off, then fine.
 SCANS: tuple[tuple[str, float, int], ...] = (
     (GAP_POSITION, 1.0, 9),

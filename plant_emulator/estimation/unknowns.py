@@ -6,11 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant_emulator.estimation.covariance import data_errors
+from plant_emulator.signals.log import Array
 
-Array = NDArray[np.float64]
 # From the values by name to one run's whitened residual, shape (channels, samples).
 Residual = Callable[[Mapping[str, float]], Array]
 # Values that the start of a state is looked for among.

@@ -16,7 +16,7 @@ import numpy as np
 from plant_emulator.errors import UnsettledError
 from plant_emulator.estimation import least_squares
 from plant_emulator.estimation.covariance import data_errors
-from plant_emulator.estimation.start_search import GAP_POSITION
+from plant_emulator.model.stage import split_gap_position
 from plant_emulator.recordings.recording import Recording
 from plant_emulator.signals.log import COMPARED, VOLTAGE, Log
 from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram
@@ -25,8 +25,9 @@ from plant_emulator.simulation.simulate import run_of, simulate
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.estimation.unknowns import Array, Residual
+    from plant_emulator.estimation.unknowns import Residual
     from plant_emulator.identification.identify import Identification
+    from plant_emulator.signals.log import Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,8 +121,7 @@ def _information(
     )
 
     def residual(trial: Mapping[str, float]) -> Array:
-        trial = {**values, **trial}
-        return planned.settled(trial, trial.pop(GAP_POSITION))
+        return planned.settled(*split_gap_position({**values, **trial}))
 
     residuals: list[Residual] = [residual]
     count = len(found.parameters)

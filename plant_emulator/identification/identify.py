@@ -24,7 +24,8 @@ from plant_emulator.estimation.equation_error import start_values
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
 from plant_emulator.estimation.initial_states import GAP, states_of, with_own
 from plant_emulator.estimation.residuals import quieted_functions, residual_functions
-from plant_emulator.estimation.start_search import FINE_SCANS, GAP_POSITION, Search
+from plant_emulator.estimation.start_search import FINE_SCANS, Search
+from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.signals.log import VOLTAGE
 from plant_emulator.simulation.simulate import TOLERANCE, values_of
 

@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from plant_emulator.model.records import Record
 
-# Shell temperature that the nominal friction belongs to, 32 degC [K] (thesis, section 3.5).
-WARM_SHELL = 305.15
+# Temperature of the gearbox's shell at which the nominal friction holds, 32 degC [K] (thesis,
+# section 3.5, Fig 3.6).
+NOMINAL_SHELL_TEMPERATURE = 305.15
 
 # --- drive ------------------------------------------------------------------------------------
 
@@ -184,7 +185,7 @@ def measured_shaft_torque(s: Record, p: Record) -> float:
 
 def shell_temperature(s: Record, p: Record) -> float:
     """What the thermocouples on the gearbox's shell show [K]; the nominal bench is warm."""
-    return WARM_SHELL
+    return NOMINAL_SHELL_TEMPERATURE
 
 
 LAWS = (

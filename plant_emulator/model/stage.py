@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
 STATES = (
     "speed_integral",
     "current_integral",
@@ -14,6 +19,10 @@ STATES = (
 )
 MOTOR_SPEED, TWIST, GEAR_SPEED, BACKLASH, DRUM_SPEED = 3, 4, 5, 6, 7
 FIRST_MEMORY = 8
+
+# Start of a run in the backlash gap: (theta_g - theta_d) / alpha, -1 to 1 [1]; +1: the driving
+# flank is in contact.
+GAP_POSITION = "gap_position"
 
 # Everything that a stage reads and finds; the memories of the effects are added behind.
 STAGE = (
@@ -85,3 +94,9 @@ STAGE = (
     "contact_slope",
     "contact_stiffness",
 )
+
+
+def split_gap_position(values: Mapping[str, float]) -> tuple[dict[str, float], float]:
+    """Values of a run without its gap position, and that position [1]; KeyError if it has none."""
+    others = dict(values)
+    return others, others.pop(GAP_POSITION)

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant_emulator.road_load.signal import low_pass
-from plant_emulator.road_load.truck_model import GRAVITY, RoadParameters
+from plant_emulator.road_load.truck_model import RoadParameters
+from plant_emulator.simulation.truck import GRAVITY
 
 if TYPE_CHECKING:
     from plant_emulator.road_load.run import RoadRun

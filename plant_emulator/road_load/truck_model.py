@@ -16,12 +16,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from plant_emulator.road_load.kernel import compiled, travelled
+from plant_emulator.simulation.truck import GRAVITY
 
 if TYPE_CHECKING:
     from plant_emulator.road_load.signal import Mask
     from plant_emulator.signals.log import Array
-
-GRAVITY = 9.81
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,10 +9,14 @@ distribution. A median would do, but quantised sensors make it jump from level t
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
-Array = NDArray[np.float64]
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from plant_emulator.signals.log import Array
 
 CLIP = 3.0
 # Standard deviation left of a normal distribution cut at 3 deviations.

@@ -11,13 +11,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant_emulator.errors import ParameterError
 
-Array = NDArray[np.float64]
+if TYPE_CHECKING:
+    from plant_emulator.signals.log import Array
+
 SAMPLE_PERIOD = 0.01
 
 

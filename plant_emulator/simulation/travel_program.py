@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.model.laws import WARM_SHELL
+from plant_emulator.model.laws import NOMINAL_SHELL_TEMPERATURE
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation.programs import SAMPLE_PERIOD, TravelProgram, sample_times
 from plant_emulator.simulation.running_bench import Bench, BenchSamples
@@ -78,7 +78,7 @@ def travel(
     regulator = ThesisReference(parameters, truck)
     time = sample_times(program.duration)
     rows = np.zeros((len(time), 7))
-    rows[:, 6] = WARM_SHELL
+    rows[:, 6] = NOMINAL_SHELL_TEMPERATURE
     steps = round(SAMPLE_PERIOD / STEP)
     drum_speed, reference = 0.0, 0.0
     for k in range(1, len(time)):

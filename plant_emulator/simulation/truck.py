@@ -79,6 +79,7 @@ class Cycle:
 
 # Below this speed of the braking profile the truck's parking brake takes over [m/s].
 PARKING_SPEED = 0.05
+# Torque that the parking brake holds [N m at the wheel].
 PARKING_TORQUE = 300.0
 # A parked truck's wheel does not let the drum move before the start [N m at the wheel].
 PARKED_TORQUE = 1e6

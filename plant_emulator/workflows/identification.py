@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any, cast
 from plant_emulator import logs
 from plant_emulator.errors import IdentificationError
 from plant_emulator.estimation.initial_states import fit_states, states_of, with_own
-from plant_emulator.estimation.start_search import GAP_POSITION
 from plant_emulator.identification import report
 from plant_emulator.identification.experiment_design import experiments
 from plant_emulator.identification.identify import identify
+from plant_emulator.model.stage import split_gap_position
 from plant_emulator.recordings.preflight import preflight
 from plant_emulator.recordings.recording import recording
 from plant_emulator.simulation.fit_metrics import validate
@@ -123,8 +123,8 @@ def _simulated(
     recording: Recording, values: Mapping[str, float], states: Mapping[str, float]
 ) -> Pair:
     """A run as measured and as simulated."""
-    own = {**values, **recording.own, **states}
-    return recording.log, simulate(recording.run, own, gap_position=own.pop(GAP_POSITION))
+    own, gap = split_gap_position({**values, **recording.own, **states})
+    return recording.log, simulate(recording.run, own, gap_position=gap)
 
 
 def _hashes(paths: Sequence[str]) -> dict[str, str]:

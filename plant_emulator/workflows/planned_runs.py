@@ -11,7 +11,7 @@ from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.joint_fit import null_fit
 from plant_emulator.diagnosis.machines.bench import BenchModel, BenchRecipe
 from plant_emulator.errors import ParameterError
-from plant_emulator.estimation.start_search import GAP_POSITION
+from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import Recording
 from plant_emulator.signals.log import COMPARED
 from plant_emulator.simulation.programs import PROGRAMS

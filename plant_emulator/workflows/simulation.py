@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 
 from plant_emulator import logs
 from plant_emulator.estimation.initial_states import fit_states, states_of, with_own
-from plant_emulator.estimation.start_search import GAP_POSITION
+from plant_emulator.model.stage import split_gap_position
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log, without_voltage
 from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram, program
@@ -51,8 +51,9 @@ def followed(
     known = kernel().effects if left else {}
     if start == "fit" and any(p.per_run for name in left for p in known[name].parameters.values()):
         measured = with_own(recording(without_voltage(log), cast("Hold | None", hold)), left)
-        own = {**values, **measured.own, **fit_states(measured, values, states_of(left))}
-        return simulate(measured.run, own, gap_position=own.pop(GAP_POSITION))
+        states = fit_states(measured, values, states_of(left))
+        own, gap = split_gap_position({**values, **measured.own, **states})
+        return simulate(measured.run, own, gap_position=gap)
     run = run_of(log, cast("Hold | None", hold))
     position = fit_start(log, run, values) if start == "fit" else 0.0
     return simulate(run, values, gap_position=position)

@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model
-    from plant_emulator.estimation.unknowns import Array, Residual
+    from plant_emulator.estimation.unknowns import Residual
     from plant_emulator.recordings.input_noise import Loud
+    from plant_emulator.signals.log import Array
 
 
 def quieted(

@@ -9,7 +9,8 @@ import numpy as np
 from plant_emulator.estimation.robust_scan import ANGLES, turning, turns
 
 if TYPE_CHECKING:
-    from plant_emulator.estimation.unknowns import Array, Estimate
+    from plant_emulator.estimation.unknowns import Estimate
+    from plant_emulator.signals.log import Array
 
 
 class Tangents:

@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.task import Task
     from plant_emulator.diagnosis.machine import Candidate, Model
-    from plant_emulator.estimation.unknowns import Array, Residual, Unknown
+    from plant_emulator.estimation.unknowns import Residual, Unknown
+    from plant_emulator.signals.log import Array
 
 # Courses that are drawn: their variance is known to 30 %.
 COURSES = 24

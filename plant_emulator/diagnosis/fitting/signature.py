@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
     from plant_emulator.diagnosis.machine import Candidate, Model
-    from plant_emulator.estimation.unknowns import Array, Estimate, Unknown
+    from plant_emulator.estimation.unknowns import Estimate, Unknown
+    from plant_emulator.signals.log import Array
 
 # Sizes at which a signature is tried, in plausible sizes.
 SIZES = (0.03, 0.1, 0.3, 0.6, 1.0, 2.0)

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.machine import Candidate, Model
-    from plant_emulator.estimation.unknowns import Array, Unknown
+    from plant_emulator.estimation.unknowns import Unknown
+    from plant_emulator.signals.log import Array
 
 # How far sizes of many valleys are looked for, in plausible sizes.
 WIDEST = 3.0

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from plant_emulator.diagnosis.localisation.parity_relations import Measured
-    from plant_emulator.estimation.unknowns import Array
+    from plant_emulator.signals.log import Array
 
 # Windows of the smooth quantities, and steps of laws of time [s].
 WINDOW = 0.15

@@ -32,7 +32,7 @@ from plant_emulator.diagnosis.localisation.parity_relations import (
 )
 from plant_emulator.diagnosis.localisation.stacked_rows import Table
 from plant_emulator.errors import UnsettledError
-from plant_emulator.estimation.start_search import GAP_POSITION
+from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import voltage_errors
 from plant_emulator.simulation.simulate import simulate
 
@@ -42,9 +42,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.estimation.unknowns import Array, Estimate
+    from plant_emulator.estimation.unknowns import Estimate
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
+    from plant_emulator.signals.log import Array
 
 # Blocks that only the drum's speed can show.
 BESIDE = ("drum", "speed_sensor", "backlash_shaft")

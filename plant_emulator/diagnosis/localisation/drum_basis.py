@@ -11,7 +11,7 @@ from plant_emulator.diagnosis.localisation.parity_relations import NOISES, Measu
 from plant_emulator.signals.smoothing import smooth
 
 if TYPE_CHECKING:
-    from plant_emulator.estimation.unknowns import Array
+    from plant_emulator.signals.log import Array
 
 # Window of the speed that laws depend on, and step of laws of time [s].
 WINDOW, SLOW = 0.3, 2.0

@@ -15,7 +15,7 @@ from plant_emulator.solver import compiler
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from plant_emulator.estimation.unknowns import Array
+    from plant_emulator.signals.log import Array
 
 
 @cache

@@ -17,8 +17,8 @@ from plant_emulator.diagnosis.localisation.parity_relations import NOISES, smoot
 from plant_emulator.estimation.initial_states import GAP
 from plant_emulator.estimation.least_squares import at, estimate
 from plant_emulator.estimation.robust_scan import cauchy_loss
-from plant_emulator.estimation.start_search import GAP_POSITION
 from plant_emulator.estimation.unknowns import Unknown
+from plant_emulator.model.stage import GAP_POSITION
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -26,9 +26,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from plant_emulator.diagnosis.localisation.parity_relations import Measured
-    from plant_emulator.estimation.unknowns import Array, Estimate, Residual
+    from plant_emulator.estimation.unknowns import Estimate, Residual
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
+    from plant_emulator.signals.log import Array
 
 # What of the bench shapes the drum's speed; the drum's inertia only together with the damping.
 FREE = ("backlash_half_gap", "drum_shaft_damping")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from plant_emulator.estimation.unknowns import Array
+    from plant_emulator.signals.log import Array
 
 
 def hats(value: Array, knots: Array) -> Array:

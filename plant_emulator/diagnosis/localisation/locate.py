@@ -28,15 +28,15 @@ import numpy as np
 
 from plant_emulator.diagnosis.localisation.block_regression import Site
 from plant_emulator.diagnosis.localisation.residual_map import Cell, residual_map
-from plant_emulator.estimation.start_search import GAP_POSITION
+from plant_emulator.model.stage import GAP_POSITION
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.estimation.unknowns import Array
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
+    from plant_emulator.signals.log import Array
 
 # Gain of log probability that is worth a block: odds of e^15 before it is believed.
 WORTH = 15.0

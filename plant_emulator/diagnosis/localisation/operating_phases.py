@@ -15,7 +15,7 @@ from plant_emulator.signals.smoothing import smooth
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from plant_emulator.estimation.unknowns import Array
+    from plant_emulator.signals.log import Array
 
 PHASES = ("standstill", "breakaway", "acceleration", "cruise", "deceleration", "field_weakening")
 STANDSTILL, BREAKAWAY, ACCELERATION, CRUISE, DECELERATION = range(5)

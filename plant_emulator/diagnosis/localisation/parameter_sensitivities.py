@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.localisation.block_basis import Inside
-    from plant_emulator.estimation.unknowns import Array
     from plant_emulator.model.parameters import Parameter, ParameterSet
+    from plant_emulator.signals.log import Array
 
 # Prior standard deviations that a fit without effects is believed within.
 WIDE = 2.0

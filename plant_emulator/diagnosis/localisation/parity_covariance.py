@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from plant_emulator.estimation.unknowns import Array
+    from plant_emulator.signals.log import Array
 
 # Standard deviation of the torque of the truck's brake, which reacts at standstill [N m].
 BRAKE = 300.0

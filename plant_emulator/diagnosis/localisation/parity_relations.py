@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from plant_emulator.estimation.unknowns import Array
     from plant_emulator.recordings.recording import Recording
+    from plant_emulator.signals.log import Array
 
 MOTOR, GEAR, DRIVE, ARMATURE = range(4)
 # Of a run with its voltage; without it the armature's, the last one, is not there.

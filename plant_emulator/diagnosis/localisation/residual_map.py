@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from plant_emulator.estimation.unknowns import Array
     from plant_emulator.recordings.recording import Recording
+    from plant_emulator.signals.log import Array
 
 # Bands of frequency [Hz], as far as the sampling goes.
 BANDS = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from plant_emulator.diagnosis.localisation.parity_relations import Relations
-    from plant_emulator.estimation.unknowns import Array
+    from plant_emulator.signals.log import Array
 
     Columns = Sequence[Array | None]
 

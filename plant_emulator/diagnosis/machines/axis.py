@@ -33,8 +33,9 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machines.axis_effects import AxisEffect
     from plant_emulator.diagnosis.machines.axis_signals import Motion
-    from plant_emulator.estimation.unknowns import Array, Residual
+    from plant_emulator.estimation.unknowns import Residual
     from plant_emulator.signals.axis_log import AxisLog
+    from plant_emulator.signals.log import Array
 
 LEVEL = "friction_level"
 LEVEL_STD = 0.1

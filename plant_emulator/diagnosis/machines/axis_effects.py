@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from plant_emulator.diagnosis.machines.axis_signals import Motion
-    from plant_emulator.estimation.unknowns import Array
+    from plant_emulator.signals.log import Array
 
     Values = Mapping[str, float]
     Law = Callable[[Array, Motion, Values, "Scale"], Array]

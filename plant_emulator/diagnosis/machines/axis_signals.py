@@ -20,8 +20,8 @@ from plant_emulator.signals.noise import noise
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from plant_emulator.estimation.unknowns import Array
     from plant_emulator.signals.axis_log import AxisLog
+    from plant_emulator.signals.log import Array
 
 ORDER = 4
 TOPS = (2.0, 5.0, 10.0, 20.0, 40.0)

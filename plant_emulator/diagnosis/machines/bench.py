@@ -18,9 +18,10 @@ from plant_emulator.estimation.equation_error import start_values
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
 from plant_emulator.estimation.initial_states import states_of, with_own
 from plant_emulator.estimation.robust_scan import scanned
-from plant_emulator.estimation.start_search import GAP_POSITION, Search
+from plant_emulator.estimation.start_search import Search
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.model.parameters import UNITS
+from plant_emulator.model.stage import GAP_POSITION, split_gap_position
 from plant_emulator.recordings.input_noise import loud
 from plant_emulator.recordings.preflight import NAMES
 from plant_emulator.signals.log import VOLTAGE
@@ -33,10 +34,11 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.effects import Effect
-    from plant_emulator.estimation.unknowns import Array, Residual
+    from plant_emulator.estimation.unknowns import Residual
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.input_noise import Loud
     from plant_emulator.recordings.recording import Recording
+    from plant_emulator.signals.log import Array
 
 # Tolerance of a run with a truck, whose every sample is a corner: twice as fast as the usual one,
 # and it moves the residual by less than a hundredth of the noise (rms).
@@ -182,15 +184,14 @@ class BenchModel:
         tolerance = WITH_TRUCK if recording.run.truck else TOLERANCE
 
         def residual(found: Mapping[str, float]) -> Array:
-            trial = {**fixed, **found}
-            return recording.residual(trial, trial.pop(GAP_POSITION), tolerance)
+            return recording.residual(*split_gap_position({**fixed, **found}), tolerance)
 
         return residual
 
     def loud(self, run: int, where: FitResult, state: Mapping[str, float]) -> Loud | None:
         """See `Model`."""
         values = {**self._fixed(run, where.effects), **where.values, **state}
-        return loud(self._recordings[run], values, values.pop(GAP_POSITION))
+        return loud(self._recordings[run], *split_gap_position(values))
 
     def nominal(self, runs: Sequence[int]) -> dict[str, float]:  # noqa: ARG002 - `Model`'s signature
         """See `Model`: the parameter set's."""

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.errors import UnsettledError
-from plant_emulator.estimation.start_search import GAP_POSITION
 from plant_emulator.identification.experiment_design import noise_levels
+from plant_emulator.model.stage import split_gap_position
 from plant_emulator.recordings.preflight import LEAST_MOTION, NAMES
 from plant_emulator.recordings.recording import Recording
 from plant_emulator.signals.log import VOLTAGE, Log, compared
@@ -102,8 +102,8 @@ def _recorded(
     """The run as these values predict it; none where they cannot be driven through it."""
     run = run_of(inputs)
     with suppress(UnsettledError):
-        rest = dict(values)
-        log = simulate(run, rest, gap_position=rest.pop(GAP_POSITION))
+        others, gap = split_gap_position(values)
+        log = simulate(run, others, gap_position=gap)
         signals = {**log.signals, "speed_reference": inputs["speed_reference"]}
         if shell is not None:
             signals["shell_temperature"] = np.full(len(log.time), shell)

@@ -16,7 +16,7 @@ from plant_emulator.estimation.covariance import correlation_time
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from plant_emulator.estimation.unknowns import Array
+    from plant_emulator.signals.log import Array
 
 # A block in memories of the squares.
 MEMORIES = 3.0

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model, Run
-    from plant_emulator.estimation.unknowns import Array
+    from plant_emulator.signals.log import Array
 
 # A channel counts in the closed fraction from this gap on, in the noise.
 OPEN = 1.1

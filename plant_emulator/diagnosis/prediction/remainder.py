@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.prediction.trace import Trace
-    from plant_emulator.estimation.unknowns import Array
+    from plant_emulator.signals.log import Array
 
 FAST = 10.0
 """[Hz]"""

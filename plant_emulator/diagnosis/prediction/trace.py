@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from plant_emulator.estimation.unknowns import Array
+    from plant_emulator.signals.log import Array
 
 
 @dataclass(frozen=True, kw_only=True)

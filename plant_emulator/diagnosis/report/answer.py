@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation
     from plant_emulator.diagnosis.machine import Candidate, Run
     from plant_emulator.diagnosis.prediction.gap import Gap, Prediction
-    from plant_emulator.estimation.unknowns import Array
+    from plant_emulator.signals.log import Array
 
 # Effects of no account that a ranking still shows.
 SHOWN = 5

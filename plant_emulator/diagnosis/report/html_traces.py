@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from plant_emulator.diagnosis.prediction.trace import Trace
-    from plant_emulator.estimation.unknowns import Array
+    from plant_emulator.signals.log import Array
 
     Axis = Callable[[Array], Array]
 

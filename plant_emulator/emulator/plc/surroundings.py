@@ -7,11 +7,11 @@ from operator import or_
 from typing import Protocol
 
 from plant_emulator.simulation.running_bench import BenchSamples
+from plant_emulator.simulation.truck import PARKING_TORQUE
 from register_maps.signals import Interlock, PlcState
 
 CLOSED = reduce(or_, Interlock)
-PARKING_SPEED = 0.05  # [rad/s] of the drum
-PARKING_TORQUE = 300.0  # [N m] at the wheel
+PARKING_DRUM_SPEED = 0.05  # [rad/s]
 
 
 class Bench(Protocol):
@@ -67,7 +67,7 @@ class Truck:
         """Drive and brake torque at the truck's wheel [N m], at PLC time `time` [s]."""
         if self._driver is not None:
             return self._driver.torques(time - self._since, self._drum_radius * drum_speed)
-        stands = self._parks and abs(drum_speed) < PARKING_SPEED
+        stands = self._parks and abs(drum_speed) < PARKING_DRUM_SPEED
         return 0.0, PARKING_TORQUE if stands else 0.0
 
 

@@ -10,9 +10,8 @@ from plant_emulator.blind.detectable import norms, or_impossible
 from plant_emulator.blind.draw import draw
 from plant_emulator.blind.generate import measured, true_logs
 from plant_emulator.errors import UnsettledError
-from plant_emulator.estimation.unknowns import Array
 from plant_emulator.model.parameters import ParameterSet
-from plant_emulator.signals.log import COMPARED
+from plant_emulator.signals.log import COMPARED, Array
 from plant_emulator.simulation.sensor_noise import SENSORS
 from plant_emulator.simulation.simulate import run_of, simulate
 from plant_emulator.solver.kernel import kernel, know

@@ -11,7 +11,7 @@ from plant_emulator.diagnosis.machine import Run
 from plant_emulator.diagnosis.prediction.gap import Prediction, gap
 from plant_emulator.diagnosis.report.answer import noise_floor, ranged, rank, ranked, traces
 from plant_emulator.diagnosis.report.html_traces import path, rms
-from plant_emulator.estimation.unknowns import Array
+from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.test_contest import effect
 
 POINT = FitResult(

@@ -14,7 +14,8 @@ from plant_emulator.diagnosis.fitting.signature import signature
 from plant_emulator.diagnosis.machine import Candidate
 from plant_emulator.diagnosis.prediction.gap import Fold, refitted
 from plant_emulator.estimation.robust_scan import scanned
-from plant_emulator.estimation.unknowns import Array, Unknown
+from plant_emulator.estimation.unknowns import Unknown
+from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.test_contest import TIME, Line, explained, linear, noisy
 
 # One that the samples of a run of 2 s tell from others 0.5 Hz off, anywhere within 5.2 Hz.

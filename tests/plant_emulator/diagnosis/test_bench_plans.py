@@ -3,8 +3,7 @@
 import numpy as np
 
 from plant_emulator.diagnosis.machines.bench_programs import lacks, shows, undriven
-from plant_emulator.estimation.unknowns import Array
-from plant_emulator.signals.log import Log
+from plant_emulator.signals.log import Array, Log
 from plant_emulator.simulation.programs import PROGRAMS, in_words
 
 

@@ -12,7 +12,7 @@ from plant_emulator.diagnosis.fitting.random_effects import Weighted, unrest
 from plant_emulator.diagnosis.fitting.steps import show
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.selection.procedure import Inquiry
-from plant_emulator.estimation.unknowns import Array
+from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, effect, linear, noisy
 
 # How much a shake of the size 1 moves each sample (standard deviation): nothing in the first half.

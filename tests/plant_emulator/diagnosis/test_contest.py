@@ -33,8 +33,9 @@ from plant_emulator.diagnosis.selection.rules import noise_only
 from plant_emulator.diagnosis.selection.stepwise import Contest
 from plant_emulator.diagnosis.selection.subsystem import subsystem
 from plant_emulator.diagnosis.selection.verdict import decide
-from plant_emulator.estimation.unknowns import Array, Unknown
+from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.recordings.input_noise import Loud
+from plant_emulator.signals.log import Array
 
 TIME = np.linspace(-1.0, 1.0, 2000)
 

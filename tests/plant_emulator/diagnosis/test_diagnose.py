@@ -14,7 +14,7 @@ from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.prediction.gap import Fold, predict
 from plant_emulator.diagnosis.prediction.held_out import HeldOut, Plan
 from plant_emulator.estimation import least_squares
-from plant_emulator.estimation.unknowns import Array
+from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, noisy
 
 EACH_IN_TURN = Plan(fitted=(0, 1, 2), folds=(((1, 2), (0,)), ((0, 2), (1,)), ((0, 1), (2,))))

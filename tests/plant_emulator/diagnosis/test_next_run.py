@@ -16,10 +16,11 @@ from plant_emulator.diagnosis.fitting.joint_fit import fit, null_fit
 from plant_emulator.diagnosis.machine import Candidate, Run
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
 from plant_emulator.diagnosis.selection.verdict import Verdict
-from plant_emulator.estimation.start_search import GAP_POSITION
-from plant_emulator.estimation.unknowns import Array, Unknown
+from plant_emulator.estimation.unknowns import Unknown
+from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.input_noise import Loud
 from plant_emulator.recordings.recording import recording
+from plant_emulator.signals.log import Array
 from plant_emulator.simulation.sensor_noise import noisy
 from plant_emulator.workflows.simulation import simulated
 

@@ -12,8 +12,8 @@ from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.input_noise_model import Quieted, quieted
 from plant_emulator.diagnosis.fitting.joint_fit import null_fit
 from plant_emulator.diagnosis.selection.procedure import Inquiry
-from plant_emulator.estimation.unknowns import Array
 from plant_emulator.recordings.input_noise import Loud
+from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, noisy
 
 # What the fed input's noise adds to every sample by its one standard deviation.

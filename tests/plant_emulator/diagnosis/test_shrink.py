@@ -13,7 +13,7 @@ from plant_emulator.diagnosis.prediction.gap import (
     gap,
     interval,
 )
-from plant_emulator.estimation.unknowns import Array
+from plant_emulator.signals.log import Array
 
 
 def prediction(*channels: Array) -> Prediction:

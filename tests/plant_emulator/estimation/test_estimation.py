@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from plant_emulator.estimation.covariance import (
-    Array,
     autocovariance,
     correlation_time,
     data_errors,
@@ -15,6 +14,7 @@ from plant_emulator.estimation.covariance import (
 )
 from plant_emulator.estimation.least_squares import at, estimate
 from plant_emulator.estimation.unknowns import Unknown
+from plant_emulator.signals.log import Array
 
 
 def number(name: str, start: float, **more: object) -> Unknown:
