@@ -76,7 +76,7 @@ def outcome(package: str, error: BaseException) -> Result:
     def fail() -> None:
         raise error
 
-    group = type(FOLDERS[package])(name="group")
+    group = type(FOLDERS[package])(name="group", package=f"{package}.cli")
     group.list_commands = lambda ctx: ["fail"]
     group.get_command = lambda ctx, name: fail
     return CliRunner().invoke(group, ["fail"])

@@ -8,13 +8,13 @@ import click
 
 import register_maps
 from gateway.cli._settings import assignments
-from gateway.cli._types import Command, OutputFile
 from gateway.config_file import load, with_values
 from gateway.configuration.config import Config
 from gateway.link import device, inspection
 from gateway.link.plc import LinkError
 from gateway.review import review
 from gateway.review.finding import Finding, holds
+from register_maps.command_line.parameters import Command, OutputFile
 from register_maps.register_map import RegisterMap
 
 COLOURS = {"error": "red", "warning": "yellow", "info": "green"}

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gateway.cli._types import Command, Number, OutputFile
+from register_maps.command_line.parameters import Command, Number, OutputFile
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import click
 
-from gateway.cli._types import Command, OutputFile
 from gateway.recordings import export, recording
 from gateway.recordings.header import map_of
+from register_maps.command_line.parameters import Command, OutputFile
 
 EXAMPLE = """
 \b

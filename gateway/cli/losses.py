@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gateway.cli._settings import assignments
-from gateway.cli._types import PICTURES, Command, Number, OutputFile
+from register_maps.command_line.parameters import PICTURES, Command, Number, OutputFile
 
 if TYPE_CHECKING:
     from gateway.configuration.config import Config

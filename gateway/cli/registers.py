@@ -9,7 +9,6 @@ import click
 
 import register_maps
 from gateway.cli._register_rows import FOUND, LIVE, PAPER, compared, in_hex, live, paper, table
-from gateway.cli._types import LONGEST, Command, Number, OutputFile
 from gateway.errors import PlcError
 from gateway.link.device import (
     Device,
@@ -21,6 +20,7 @@ from gateway.link.device import (
     write_value,
 )
 from gateway.link.inspection import Reading, Row, Words, shown, verify
+from register_maps.command_line.parameters import LONGEST, Command, Number, OutputFile
 from register_maps.register_map import Register, RegisterMap
 from register_maps.signals import RESERVED
 

@@ -11,7 +11,6 @@ import numpy as np
 import register_maps
 from gateway import config_file
 from gateway.cli._settings import assignments
-from gateway.cli._types import PICTURES, Command, OutputFile
 from gateway.configuration.config import Config
 from gateway.cycle.cycle import Output
 from gateway.cycle.record import number
@@ -22,6 +21,7 @@ from gateway.recordings import log, recording, steady_runs
 from gateway.recordings.header import config_of, map_of
 from gateway.reports.replay import Compared, draw, write_csv
 from gateway.road_load import road_load
+from register_maps.command_line.parameters import PICTURES, Command, OutputFile
 
 EXAMPLE = """
 \b

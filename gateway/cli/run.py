@@ -9,9 +9,9 @@ import click
 
 import register_maps
 from gateway.cli._settings import assignments
-from gateway.cli._types import Command, Number
 from gateway.config_file import load, with_values
 from gateway.runtime import daemon
+from register_maps.command_line.parameters import Command, Number
 
 if TYPE_CHECKING:
     from gateway.configuration.config import Config

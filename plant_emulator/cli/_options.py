@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from plant_emulator.cli._types import PICTURES, OutputFile
+from register_maps.command_line.parameters import PICTURES, OutputFile
 
 parameters = click.option(
     "--parameters",

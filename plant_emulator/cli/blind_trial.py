@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from plant_emulator.cli import _options
-from plant_emulator.cli._types import Command
+from register_maps.command_line.parameters import Command
 
 EXAMPLE = """
 \b

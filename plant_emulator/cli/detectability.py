@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from plant_emulator.cli import _options
-from plant_emulator.cli._types import Command
+from register_maps.command_line.parameters import Command
 
 EXAMPLE = """
 \b

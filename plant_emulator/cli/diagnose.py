@@ -11,7 +11,7 @@ import click
 from click.core import ParameterSource
 
 from plant_emulator.cli import _options
-from plant_emulator.cli._types import Command, OutputFile
+from register_maps.command_line.parameters import Command, OutputFile
 
 EXAMPLE = """
 \b

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from plant_emulator.cli import _options
-from plant_emulator.cli._types import Command
+from register_maps.command_line.parameters import Command
 
 if TYPE_CHECKING:
     from plant_emulator.effects import Effect

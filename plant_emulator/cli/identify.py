@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from plant_emulator.cli import _options
-from plant_emulator.cli._types import Command, OutputFile
+from register_maps.command_line.parameters import Command, OutputFile
 
 EXAMPLE = """
 \b

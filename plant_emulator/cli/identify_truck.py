@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from plant_emulator.cli import _options
-from plant_emulator.cli._types import Command, Number, OutputFile
+from register_maps.command_line.parameters import Command, Number, OutputFile
 
 if TYPE_CHECKING:
     from plant_emulator.road_load.answer import RoadAnswer

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from plant_emulator.cli._types import Command, Number, OutputFile
+from register_maps.command_line.parameters import Command, Number, OutputFile
 
 MASS_HELP = "Mass of the truck on the drum [kg], or none. The driver sets off in road-load."
 

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from plant_emulator.cli import _options
-from plant_emulator.cli._types import Command, Number
+from register_maps.command_line.parameters import Command, Number
 
 EXAMPLE = """
 \b

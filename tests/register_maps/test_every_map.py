@@ -1,12 +1,13 @@
 """Every shipped map: it loads, it fits two requests, and it says what the bench's list says."""
 
 import hashlib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import register_maps
-from register_maps.codec import decode_value, encode_value
+from register_maps.codec import CodecError, decode_value, encode_value
 from register_maps.signals import LOG_COLUMNS, SIGNALS
 from register_maps.units import UNITS
 
@@ -191,6 +192,11 @@ def test_every_map_fits_one_read_and_one_write(name):
 def test_every_map_has_a_constant_that_proves_the_word_order(name):
     constants = [r for r in register_maps.load(name).registers if r.constant and r.raw.words == 2]
     assert constants
+    for register in constants:
+        words = encode_value(register, register.si_unit.to_si(register.constant))
+        for order in {"ABCD", "CDAB", "BADC", "DCBA"} - {register.word_order}:
+            with pytest.raises(CodecError, match="constant"):
+                decode_value(replace(register, word_order=order), words)
 
 
 @pytest.mark.parametrize("name", MAPS)

@@ -1,7 +1,4 @@
-"""What commands take beside texts: finite numbers and files to write; and a command that checks.
-
-The other program has the same file, because neither may import the other.
-"""
+"""Parameters of commands: finite numbers and output files, and a command that guards its inputs."""
 
 import math
 import os
@@ -12,9 +9,9 @@ from typing import Any, Final
 import click
 
 LONGEST: Final = 3600.0
-"""[s] That a wait may be told to last."""
+"""[s] Longest wait that an option accepts."""
 PICTURES: Final = ("", ".png", ".pdf", ".svg")
-"""What the name of a picture may end in."""
+"""Endings that the name of a picture may have."""
 
 
 class Number(click.FloatRange):
@@ -23,7 +20,7 @@ class Number(click.FloatRange):
     name = "number"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> float:
-        """Refuse what is no number, or none at all."""
+        """Refuse a text that is no number, and NaN and infinity."""
         found: float = super().convert(value, param, ctx)
         if not math.isfinite(found):
             self.fail(f"{value}: a finite number is expected.", param, ctx)
@@ -31,9 +28,10 @@ class Number(click.FloatRange):
 
 
 class OutputFile(click.Path):
-    """A file to write, as a text or a Path; refused before any work where it cannot be written.
+    """A file to write. A file that cannot be written is refused before any work.
 
-    dash : `-` may stand for standard output; endings : of the name, None: any
+    dash : `-` may stand for standard output
+    endings : endings that the name may have, None: any
     """
 
     def __init__(
@@ -47,14 +45,14 @@ class OutputFile(click.Path):
         self.endings = endings
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        """Try to open it; what was not there is not left behind."""
+        """Try to open the file; a file that did not exist is removed again."""
         found = super().convert(value, param, ctx)
         if why := "" if self.allow_dash and str(value) == "-" else self.objection(str(value)):
             self.fail(f"{str(value)!r}: {why}", param, ctx)
         return found
 
     def objection(self, name: str) -> str:
-        """Why no such file can be written; empty: it can."""
+        """Why no file of this name can be written; empty: it can."""
         path = Path(name)
         if not name:
             return "the name of a file is expected"
@@ -66,7 +64,7 @@ class OutputFile(click.Path):
 def obstacle(path: Path) -> str:
     """Why a file cannot be opened for writing; empty: it can.
 
-    Pipes and devices are not tried: opening one may wait, and closing it may end its reader.
+    Pipes and devices are not tried, because opening one may wait and closing it may end its reader.
     """
     there = os.path.lexists(path)
     if there and not path.is_file():
@@ -81,10 +79,10 @@ def obstacle(path: Path) -> str:
 
 
 class Command(click.Command):
-    """A command that writes no output over a file that it was given, or over another output."""
+    """A command that never writes an output over one of its inputs or over another output."""
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Check, then run."""
+        """Check every output, then run the command."""
         outputs: list[tuple[click.Parameter, Path]] = []
         for option in self.params:
             value = ctx.params.get(option.name or "")
@@ -100,7 +98,7 @@ class Command(click.Command):
         outputs: list[tuple[click.Parameter, Path]],
         ctx: click.Context,
     ) -> None:
-        """Raise BadParameter where this output is one of the others, or something to be read."""
+        """Raise BadParameter where this output is also another output or an input."""
         for other, written in outputs:
             if is_same(path, written):
                 raise click.BadParameter(
@@ -118,7 +116,7 @@ class Command(click.Command):
 
 
 def files(value: Any) -> Iterator[Path]:
-    """The files that exist of those that a parameter may name: FILE, KEY=FILE or FILE:VALUES."""
+    """Existing files that a parameter may name, written FILE, KEY=FILE or FILE:VALUES."""
     if isinstance(value, (tuple, list)):
         for part in value:
             yield from files(part)
@@ -129,7 +127,7 @@ def files(value: Any) -> Iterator[Path]:
 
 
 def is_same(first: Path, second: Path) -> bool:
-    """Whether two names are one file, or would be; a device or pipe may be named twice."""
+    """Whether two names are or would be one file. A device or a pipe may be named twice."""
     if first.exists() and second.exists():
         return first.is_file() and first.samefile(second)
     return os.path.realpath(first) == os.path.realpath(second)
