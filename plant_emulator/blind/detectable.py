@@ -15,7 +15,7 @@ import numpy as np
 from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
 from plant_emulator.errors import UnsettledError
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
-from plant_emulator.estimation.least_squares import at, estimate
+from plant_emulator.estimation.least_squares import estimate, linearise_at
 from plant_emulator.model.stage import GAP_POSITION, split_gap_position
 from plant_emulator.recordings.recording import IMPOSSIBLE
 from plant_emulator.signals.log import COMPARED
@@ -60,7 +60,9 @@ def _norm(case: Case, hidden: Hidden, logs: Sequence[Log], parameters: Parameter
     base = [part(start) for part, start in zip(without, starts, strict=True)]
     whole = [run(start) for run, start in zip(complete, starts, strict=True)]
     change = [after - before for after, before in zip(whole, base, strict=True)]
-    tangents = Tangents(at(wanted, [_less(p, b) for p, b in zip(without, base, strict=True)]))
+    tangents = Tangents(
+        linearise_at(wanted, [_less(p, b) for p, b in zip(without, base, strict=True)])
+    )
     norm = float(np.linalg.norm(tangents.rest(np.concatenate([c.ravel() for c in change]))))
     if norm <= DETECTABLE:
         return norm

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 # enough to look over the kinks that contact and limits leave in the cost.
 DIFFERENCE_NORM = 0.3
 SMALLEST_DIFFERENCE, LARGEST_DIFFERENCE = 1e-6, 1e-3
+# Step of the first differences, before any slope is known.
+FIRST_DIFFERENCE = 1e-5
 MAX_ITERATIONS = 60
 # Relative fall of the cost that ends a fit: some 1e-6 in units of chi squared.
 COST_SETTLED = 1e-10
@@ -184,7 +186,7 @@ def estimate(
     start = np.array([u.scaled(u.start) for u in unknowns])
     followed = None if follow is None else _Followed(unknowns, follow)
     problem = _Problem(unknowns, residuals, progress, followed, difference)
-    problem.steps = np.full(len(unknowns), 1e-5)
+    problem.steps = np.full(len(unknowns), FIRST_DIFFERENCE)
     # Threads that wait for each other in a decomposition of ten columns take most of the time.
     with threadpool_limits(1):
         found = least_squares(
@@ -201,13 +203,23 @@ def estimate(
     return _estimate(problem, found.x, bool(found.status > 0), str(found.message))
 
 
-def at(
+def linearise_at(
     unknowns: Sequence[Unknown],
     residuals: Sequence[Residual],
+    *,
+    near: Estimate | None = None,
 ) -> Estimate:
-    """The estimate as it would be if the starts were the optimum: what these data determine."""
+    """Linearise the residuals at the starts of the unknowns, and return it as an estimate there.
+
+    near : a linearisation nearby, whose slopes set the steps of the differences. Without it every
+        step is FIRST_DIFFERENCE: a residual that hardly changes over it, such as that of a weak
+        parameter, is then lost in the jitter of the simulation
+    """
     problem = _Problem(tuple(unknowns), residuals, None)
-    problem.steps = np.full(len(unknowns), 1e-5)
+    if near is None:
+        problem.steps = np.full(len(unknowns), FIRST_DIFFERENCE)
+    else:
+        problem.steps = _steps(near.jacobians, DIFFERENCE_NORM)
     z = np.array([u.scaled(u.start) for u in unknowns])
     return _estimate(problem, z, True, "not fitted")
 

@@ -130,4 +130,6 @@ def _information(
         for u, p in zip(found.estimate.unknowns[:count], found.parameters, strict=True)
     ]
     states = [replace(u, run=0) for u in found.estimate.unknowns[count:] if u.run == 0]
-    return without_states(least_squares.at([*parameters, *states], residuals).information, count)
+    return without_states(
+        least_squares.linearise_at([*parameters, *states], residuals).information, count
+    )

@@ -33,7 +33,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.estimation.covariance import correlation_time, structure
-from plant_emulator.estimation.least_squares import DIFFERENCE_NORM, at, estimate
+from plant_emulator.estimation.least_squares import DIFFERENCE_NORM, estimate, linearise_at
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -161,7 +161,7 @@ def again(
 def linearised(model: Model, where: FitResult, runs: Sequence[int]) -> Estimate:
     """Residuals and Jacobians of a fit that has ended."""
     unknowns = started(template(model, where.effects, runs), where.values, where.states)
-    return at(unknowns, [model.residual(k, where.effects) for k in runs])
+    return linearise_at(unknowns, [model.residual(k, where.effects) for k in runs])
 
 
 def point(effects: Sequence[str], found: Estimate, runs: int) -> FitResult:

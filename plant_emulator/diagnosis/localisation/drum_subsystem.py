@@ -15,7 +15,7 @@ import numpy as np
 from plant_emulator.diagnosis.localisation.drum_simulation import compiled, drum_speed
 from plant_emulator.diagnosis.localisation.parity_relations import NOISES, smoothed_speed
 from plant_emulator.estimation.initial_states import GAP
-from plant_emulator.estimation.least_squares import at, estimate
+from plant_emulator.estimation.least_squares import estimate, linearise_at
 from plant_emulator.estimation.robust_scan import cauchy_loss
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.model.stage import GAP_POSITION
@@ -124,7 +124,7 @@ class DrumSide:
 
     def at(self, start: Mapping[str, float], gaps: Sequence[float]) -> Estimate:
         """The same, not fitted: residuals and Jacobians there."""
-        return at(self.unknowns(start, gaps), self._functions())
+        return linearise_at(self.unknowns(start, gaps), self._functions())
 
     def _functions(self) -> list[Residual]:
         return [self._function(k) for k in range(len(self.recordings))]

@@ -12,7 +12,7 @@ from plant_emulator.estimation.covariance import (
     sandwich,
     structure,
 )
-from plant_emulator.estimation.least_squares import at, estimate
+from plant_emulator.estimation.least_squares import estimate, linearise_at
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.signals.log import Array
 
@@ -207,12 +207,14 @@ def test_bound_holds() -> None:
 
 
 def test_information_is_that_of_the_starts_where_nothing_is_fitted() -> None:
-    found = at([number("a", 2.0)], [lambda v: np.full((1, 25), v["a"] ** 2)])
+    found = linearise_at([number("a", 2.0)], [lambda v: np.full((1, 25), v["a"] ** 2)])
     assert found.information[0, 0] == pytest.approx(25 * (2 * 2.0) ** 2, rel=1e-4)
 
 
 def test_what_neither_data_nor_prior_know_has_no_finite_error() -> None:
-    found = at([number("seen", 1.0), number("unseen", 1.0)], [lambda v: np.full((1, 9), v["seen"])])
+    found = linearise_at(
+        [number("seen", 1.0), number("unseen", 1.0)], [lambda v: np.full((1, 9), v["seen"])]
+    )
     assert found.standard_errors[1] == np.inf
     assert found.data_errors[1] == np.inf
     assert found.correlation[0, 1] == 0.0
