@@ -24,15 +24,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-EVERY = "tests/gateway/test_every_regulator.py"
+EVERY = "tests/gateway/regulators/test_every_regulator.py"
 TARGETS = {
-    "gateway.cycle.limits": ("tests/gateway/test_limits.py",),
-    "gateway.cycle.supervisor": ("tests/gateway/test_supervisor.py",),
-    "gateway.cycle.samples": ("tests/gateway/test_samples.py",),
-    "gateway.cycle.checks": ("tests/gateway/test_checks.py",),
-    "gateway.cycle.command": ("tests/gateway/test_command.py",),
-    "gateway.regulators.thesis": (EVERY, "tests/gateway/test_thesis_regulator.py"),
-    "gateway.regulators.compensated": (EVERY, "tests/gateway/test_compensated_regulator.py"),
+    "gateway.cycle.limits": ("tests/gateway/cycle/test_limits.py",),
+    "gateway.cycle.supervisor": ("tests/gateway/cycle/test_supervisor.py",),
+    "gateway.cycle.samples": ("tests/gateway/cycle/test_samples.py",),
+    "gateway.cycle.checks": ("tests/gateway/cycle/test_checks.py",),
+    "gateway.cycle.command": ("tests/gateway/cycle/test_command.py",),
+    "gateway.regulators.thesis": (EVERY, "tests/gateway/regulators/test_thesis.py"),
+    "gateway.regulators.compensated": (EVERY, "tests/gateway/regulators/test_compensated.py"),
 }
 """Each module's tests, the quick ones first."""
 OPTIONS = ("-x", "-q", "-p", "no:cacheprovider", "-W", "ignore", "--tb=no", "--assert=plain")

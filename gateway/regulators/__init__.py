@@ -7,7 +7,7 @@ A regulator is one module here, found by its name. It gives `Params` (frozen, wi
     update(params, state, window) -> (State, Demand)    one new sample
     follow(params, state, demand, setpoint) -> State    the limits did not pass the demand
 
-All are pure. `test_every_regulator.py` holds whatever module it finds here to that.
+All are pure. `test_every_regulator.py` tests every module of this folder.
 """
 
 from functools import lru_cache

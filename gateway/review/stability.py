@@ -21,8 +21,8 @@ from gateway.arrays import Array
 
 STEP = 1e-3
 DRIVE = 105.0
-"""[rad/s] bandwidth of the speed loop: 133 below base speed, 70 at 14 km/h. With this value the
-smallest masses of tests/gateway/test_stability.py come out within about 10 %, without lead."""
+"""[rad/s] Bandwidth of the speed loop. It is 133 below base speed and 70 at 14 km/h. With this
+value and without lead, the smallest stable masses are those of the tests within about 10 %."""
 CONTACT = 385.0
 """[1/s] damping of the backlash shaft in contact over the drum's inertia (thesis, Table 3.1)."""
 MARGIN = 1e-7

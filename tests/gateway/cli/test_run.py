@@ -38,7 +38,7 @@ class Gateway:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            cwd=Path(__file__).parents[2],
+            cwd=Path(__file__).parents[3],
         )
 
     def ended(self) -> tuple[int, str]:
@@ -154,7 +154,7 @@ def test_a_bad_configuration_is_one_line_and_exit_code_2(
         [sys.executable, "-m", "gateway", "run", "-c", config],
         capture_output=True,
         text=True,
-        cwd=Path(__file__).parents[2],
+        cwd=Path(__file__).parents[3],
         check=False,
     )
     assert ended.returncode == 2

@@ -11,7 +11,7 @@ from gateway.errors import ConfigError
 from gateway.losses.sections import LossesError, Trace, steady
 from gateway.recordings.steady_runs import _mean_torque, read
 
-DATA = Path(__file__).parents[1] / "data"
+DATA = Path(__file__).parents[2] / "data"
 BENCH = BenchConfig()
 
 

@@ -16,7 +16,7 @@ from gateway.friction import friction_torque, from_friction
 from plant_emulator.emulator.process import EmulatorProcess
 from tests.system.gateway_process import until, until_armed
 
-DATA = Path(__file__).parents[1] / "data"
+DATA = Path(__file__).parents[2] / "data"
 PROGRAM_2 = DATA / "bench_nominal" / "program2.csv.gz"
 NOISY = [DATA / "bench_practice" / "practice_004" / f"program{k}.csv.gz" for k in (1, 2, 3)]
 

@@ -15,7 +15,7 @@ from gateway.configuration.config import Config
 from gateway.regulators import thesis
 from gateway.regulators.window import Window
 
-LOGS = Path(__file__).parents[1] / "data" / "bench_nominal"
+LOGS = Path(__file__).parents[2] / "data" / "bench_nominal"
 
 
 def read(name):

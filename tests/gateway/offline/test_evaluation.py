@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from gateway.cli.replay import command as replay
 from gateway.offline.evaluation import agreement, cruise, road_speed, traction_energy
 
-NOMINAL = Path(__file__).parents[1] / "data" / "bench_nominal"
+NOMINAL = Path(__file__).parents[2] / "data" / "bench_nominal"
 
 
 def test_agreement_is_that_of_a_hand_calculation():

@@ -18,7 +18,7 @@ from gateway.link.device import encoded
 from plant_emulator import logs
 from plant_emulator.signals.log import Log
 
-PROGRAM3 = Path(__file__).parents[1] / "data" / "bench_nominal" / "program3.csv.gz"
+PROGRAM3 = Path(__file__).parents[2] / "data" / "bench_nominal" / "program3.csv.gz"
 
 
 def run(*arguments: object) -> Result:

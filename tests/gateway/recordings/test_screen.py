@@ -8,7 +8,7 @@ from rich.console import Console
 
 from gateway.cycle.record import NOTHING, Tick
 from gateway.recordings.screen import View, state_line, status_table
-from tests.gateway.test_recorder import LAYOUT, tick
+from tests.gateway.recordings.test_recorder import LAYOUT, tick
 
 HEADER = {
     "started": 1000.0,

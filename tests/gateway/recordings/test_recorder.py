@@ -219,7 +219,7 @@ GATEWAY_THAT_IS_KILLED = """
 import os, signal, sys
 from pathlib import Path
 from gateway.recordings.recorder import Job, Recorder
-from tests.gateway.test_recorder import HEADER, LAYOUT, tick
+from tests.gateway.recordings.test_recorder import HEADER, LAYOUT, tick
 if __name__ == "__main__":
     recorder = Recorder(Job(path=Path(sys.argv[1]), header=HEADER, layout=LAYOUT))
     for index in range(100):
@@ -233,7 +233,7 @@ def test_a_gateway_that_is_killed_loses_no_tick(tmp_path: Path) -> None:
     script.write_text(GATEWAY_THAT_IS_KILLED)
     ended = subprocess.run(
         [sys.executable, script, path],
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])},
         timeout=60,
         check=False,
     )
