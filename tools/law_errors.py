@@ -11,6 +11,7 @@ from __future__ import annotations
 import csv
 import sys
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict
 from functools import partial
 from multiprocessing import get_context
 from tempfile import TemporaryDirectory
@@ -24,7 +25,7 @@ from plant_emulator.blind import draw, laws, score
 from plant_emulator.blind.generate import measured, true_logs
 from plant_emulator.diagnosis.execution.pool import Here, model_of
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
-from plant_emulator.diagnosis.report import answer
+from plant_emulator.diagnosis.report.ranking import rank
 from plant_emulator.diagnosis.selection.procedure import Inquiry
 from plant_emulator.recordings.recording import recording
 from plant_emulator.solver.kernel import kernel, know
@@ -62,7 +63,7 @@ def sizes(seed: int, only: tuple[str, ...], number: int) -> list[dict[str, Any]]
     candidate = model.candidates[hidden.effect]
     told = {
         "verdict": {"kind": "effect", "effects": [hidden.effect]},
-        "ranking": [answer.rank(contender, found, found.named, candidate, None, {})],
+        "ranking": [asdict(rank(contender, found, found.named, candidate))],
     }
     unsealed = score.Unsealed(case=case, norms={}, answer=told, closed=None)
     # A size of 0 is no size: the effect was found by its others.

@@ -88,6 +88,7 @@ def command(
     from plant_emulator import parameter_sets
     from plant_emulator.cli._progress import progress
     from plant_emulator.diagnosis.diagnose import Diagnose
+    from plant_emulator.diagnosis.report.document import to_json
     from plant_emulator.diagnosis.report.terminal import lines
     from plant_emulator.parameter_sets import with_effects
     from plant_emulator.workflows.diagnosis import (
@@ -125,8 +126,8 @@ def command(
         click.echo(f"note: {note}", err=True)
     if save:
         parameter_sets.save(parameter_set(found, given, run.fitted), save)
-        _own_in(save, own, found.answer["verdict"]["effects"])
-        if found.answer["verdict"]["kind"] == "unknown":
+        _own_in(save, own, found.answer.verdict.effects)
+        if found.answer.verdict.kind == "unknown":
             click.echo(
                 f"note: {save}: the cause is unknown: no effect is in it, and its parameters may "
                 "have moved to imitate one",
@@ -137,7 +138,7 @@ def command(
 
         Path(report).write_text(html(found.answer, found.details), encoding="utf-8")
     if json_file:
-        _options.write_json(found.answer, json_file)
+        _options.write_json(to_json(found.answer), json_file)
     if json_file != "-":
         click.echo("\n".join(lines(found.answer)))
 
@@ -152,7 +153,7 @@ def _only_of_the_bench() -> None:
             raise click.UsageError(f"{option} belongs to --model bench")
 
 
-def _own_in(saved: str, own: tuple[str, ...], named: list[str]) -> None:
+def _own_in(saved: str, own: tuple[str, ...], named: tuple[str, ...]) -> None:
     """Tell of effects in a saved set that the other commands do not know."""
     for file in own:
         if Path(file).stem in named:

@@ -6,11 +6,12 @@ The bench is one such machine, a single motor-driven axis another; nothing else 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from plant_emulator.diagnosis.answer import Location
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.estimation.unknowns import Residual, Unknown
     from plant_emulator.recordings.input_noise import Loud
@@ -133,11 +134,10 @@ class Model(Protocol):
     ) -> dict[str, float]:
         """States of a run near the best at these values of everything else."""
 
-    def located(self, where: FitResult, runs: Sequence[int]) -> Mapping[str, Any] | None:
+    def located(self, where: FitResult, runs: Sequence[int]) -> Location | None:
         """Where the gap of a fit without effects lies, without any hypothesis of its cause.
 
-        In the form of the answer's `location`, and the residual map along all axes as `maps`; None:
-        this machine has no blocks to tell apart.
+        None: this machine has no blocks to tell apart.
         """
 
     def with_planned(self, where: FitResult, runs: Sequence[int]) -> Model:

@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 from math import floor, isfinite, log10
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from register_maps.signals import LOG_COLUMNS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+
+    from plant_emulator.diagnosis.answer import (
+        HeldOutGap,
+        Location,
+        Logs,
+        ParameterShift,
+        Quantity,
+        Verdict,
+    )
 
 UNKNOWN = "not known"
 WITHOUT_UNIT = (None, "", "1")
@@ -21,6 +30,7 @@ KINDS = {
 }
 # What a subsystem's share is of.
 RESIDUAL, EXPLAINED = "of the residual", "of what effects explain"
+EXPLAINED_GAP = "explained"
 # Numbers of this size and more, or less, are written with an exponent.
 LARGE, SMALL = 1e6, 1e-4
 
@@ -82,10 +92,10 @@ def percent(share: float | None) -> str:
     return f"{round(100.0 * share, decimals) + 0.0:.{decimals}f} %"  # + 0.0: no minus zero
 
 
-def size(parameter: Mapping[str, Any], sign: str = "+-") -> str:
-    """A parameter of an effect: value, standard error and unit."""
-    text = with_error(parameter["value"], parameter["standard_error"], sign)
-    unit = parameter["unit"]
+def size(quantity: Quantity, sign: str = "+-") -> str:
+    """A value with its standard error and unit."""
+    text = with_error(quantity.value, quantity.standard_error, sign)
+    unit = quantity.unit
     return text if unit in WITHOUT_UNIT else f"{text} {printable(unit)}"
 
 
@@ -100,68 +110,74 @@ def own_name(parameter: str, effect: str) -> str:
     return printable(parameter.removeprefix(f"{effect}_"))
 
 
-def times_noise(
-    gap: Mapping[str, float | None] | None, noise_floor: Mapping[str, float]
-) -> float | None:
+def gap_rows(gap: HeldOutGap) -> dict[str, Mapping[str, float]]:
+    """By name in words: the gap of every channel at each step, and the noise floor."""
+    rows = {
+        "nominal": gap.nominal,
+        "recalibrated": gap.recalibrated,
+        EXPLAINED_GAP: gap.explained,
+        "noise floor": gap.noise_floor,
+    }
+    return {name: row for name, row in rows.items() if row}
+
+
+def times_noise(gap: Mapping[str, float], noise_floor: Mapping[str, float]) -> float | None:
     """Gap of all channels together in the noise: sqrt(mean((gap / floor)^2)) [1]."""
-    rows = [(g, noise_floor.get(c)) for c, g in (gap or {}).items()]
-    shares = [g / floor_ for g, floor_ in rows if g is not None and floor_]
+    rows = [(g, noise_floor.get(c)) for c, g in gap.items()]
+    shares = [g / floor_ for g, floor_ in rows if isfinite(g) and floor_]
     return (sum(s * s for s in shares) / len(shares)) ** 0.5 if shares else None
 
 
-def logs_used(logs: Mapping[str, Sequence[str]]) -> str:
+def logs_used(logs: Logs) -> str:
     """How many logs were fitted, and how many held out; the same ones are held out in turn."""
-    if len(logs["estimation"]) == 1 and logs["estimation"] == logs["held_out"]:
+    fitted, held_out = logs.estimation, logs.held_out
+    if len(fitted) == 1 and fitted == held_out:
         return "1 log, its last part held out"
-    if len(logs["estimation"]) > 1 and set(logs["estimation"]) == set(logs["held_out"]):
-        return f"{len(logs['estimation'])} logs, each held out in turn"
-    kinds = {"estimation": "fitted", "held_out": "held out"}
-    counts = [(len(logs[key]), words) for key, words in kinds.items()]
+    if len(fitted) > 1 and set(fitted) == set(held_out):
+        return f"{len(fitted)} logs, each held out in turn"
+    counts = [(len(fitted), "fitted"), (len(held_out), "held out")]
     return ", ".join(f"{n} log{'' if n == 1 else 's'} {words}" for n, words in counts)
 
 
-def closed(gap: Mapping[str, Any]) -> str | None:
+def closed(gap: HeldOutGap) -> str | None:
     """The closed fraction with its interval, or None where the answer has none."""
-    if gap["closed_fraction"] is None:
+    if gap.closed_fraction is None:
         return None
-    text, interval = percent(gap["closed_fraction"]), gap["closed_fraction_ci95"]
-    if not interval or None in interval:
+    text, interval = percent(gap.closed_fraction), gap.closed_fraction_ci95
+    if interval is None or not all(map(isfinite, interval)):
         return text
     return f"{text} (95 % interval {percent(interval[0])} to {percent(interval[1])})"
 
 
-def place(location: Mapping[str, Any], units: Mapping[str, str]) -> str | None:
+def place(location: Location, units: Mapping[str, str]) -> str | None:
     """Where the gap lies, in one line; None where there is none."""
-    if location["subsystem"] is None:
+    if location.subsystem is None:
         return None
-    shares = {s["name"]: s["share"] for s in location["subsystems"] or ()}
-    parts = [spoken(location["subsystem"])]
-    if location["subsystem"] in shares:
-        parts[0] += f" ({percent(shares[location['subsystem']])} {share_of(location)})"
-    channel, phase = location["channel"], location["phase"]
+    parts = [spoken(location.subsystem)]
+    if location.subsystem in location.shares:
+        parts[0] += f" ({percent(location.shares[location.subsystem])} {share_of(location)})"
+    channel, phase = location.channel, location.phase
     if channel is None:
         return parts[0]
     parts.append(spoken(channel) + (f" in {spoken(phase)}" if phase else ""))
-    for cell in location["map"] or ():
-        if (cell["channel"], cell["phase"]) == (channel, phase):
+    for cell in location.cells:
+        if (cell.channel, cell.axis, cell.bin) == (channel, "phase", phase):
             unit = units.get(channel)
-            parts[1] += f": {quantity(cell['gap'], unit)}, noise {quantity(cell['noise'], unit, 2)}"
+            parts[1] += f": {quantity(cell.gap, unit)}, noise {quantity(cell.noise, unit, 2)}"
     return ", ".join(parts)
 
 
-def share_of(location: Mapping[str, Any]) -> str:
+def share_of(location: Location) -> str:
     """What the subsystems' shares are of: without blocks to tell apart, of the effects' gains."""
-    return RESIDUAL if location["map"] else EXPLAINED
+    return RESIDUAL if location.cells else EXPLAINED
 
 
-def shifted(parameter: Mapping[str, Any], sign: str = "+-") -> str:
+def shifted(parameter: ParameterShift, sign: str = "+-") -> str:
     """A parameter that is not what the set says: from, to, standard error, unit."""
-    value = {**parameter, "value": parameter["estimated"]}
-    return (
-        f"{printable(parameter['name'])} {number(parameter['nominal'], 4)} -> {size(value, sign)}"
-    )
+    estimated = size(parameter.quantity, sign)
+    return f"{printable(parameter.name)} {number(parameter.nominal, 4)} -> {estimated}"
 
 
-def indistinguishable(verdict: Mapping[str, Any]) -> dict[str, Sequence[str]]:
+def indistinguishable(verdict: Verdict) -> dict[str, tuple[str, ...]]:
     """By accepted effect: the others that these logs cannot tell from it."""
-    return {group[0]: group[1:] for group in verdict["class"] or () if group}
+    return {group[0]: group[1:] for group in verdict.classes if group}

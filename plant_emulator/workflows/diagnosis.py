@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from plant_emulator.diagnosis.diagnose import Diagnosis
+    from plant_emulator.diagnosis.diagnose import Findings
     from plant_emulator.diagnosis.execution.pool import Recipe
     from plant_emulator.effects import Effect
     from plant_emulator.model.parameters import ParameterSet
@@ -208,14 +208,14 @@ def _digests(paths: Sequence[str]) -> dict[str, str]:
 
 
 def parameter_set(
-    diagnosis: Diagnosis, parameters: ParameterSet, recordings: Sequence[Recording]
+    findings: Findings, parameters: ParameterSet, recordings: Sequence[Recording]
 ) -> ParameterSet:
     """The set with the accepted effects in it; values of single runs as their mean.
 
     recordings : the runs that were fitted
     """
-    final, named = diagnosis.final, diagnosis.answer["verdict"]["effects"]
-    own = {name: dict(diagnosis.fixed[name]) for name in named}
+    final, named = findings.final, findings.answer.verdict.effects
+    own = {name: dict(findings.fixed[name]) for name in named}
     for name in named:
         effect = kernel().effects[name]
         fitted = {key: final.values.get(f"{name}_{key}") for key in effect.parameters}
@@ -231,8 +231,8 @@ def parameter_set(
         "date": datetime.now(UTC).date().isoformat(),
         "version": version("road-load-bench"),
         "before": parameters.name,
-        "logs": diagnosis.answer["logs"]["estimation"],
-        "verdict": diagnosis.answer["verdict"]["statement"],
+        "logs": list(findings.answer.logs.estimation),
+        "verdict": findings.answer.verdict.statement,
     }
     return replace(new, parameters=kept, origin=origin, effects={**parameters.effects, **own})
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from plant_emulator.diagnosis.report.document import from_json
 from plant_emulator.diagnosis.report.html import html
 from tests.plant_emulator.diagnosis import answers
 from tests.system.conftest import FITTED, PREDICTED, Diagnosed
@@ -57,7 +58,7 @@ def chromium(require_program, tmp_path) -> Callable[..., tuple[str, list[str]]]:
 
 def written(folder: Path, kind: str) -> Path:
     page = folder / "report.html"
-    page.write_text(html(answers.KINDS[kind](), answers.DETAILS), encoding="utf-8")
+    page.write_text(html(from_json(answers.KINDS[kind]()), answers.DETAILS), encoding="utf-8")
     return page
 
 

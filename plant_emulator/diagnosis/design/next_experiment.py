@@ -8,7 +8,7 @@ or other parameters only: the run that would show most of the effects that these
 from __future__ import annotations
 
 from math import sqrt
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.design.experiment_value import (
     Asked,
@@ -24,13 +24,14 @@ from plant_emulator.diagnosis.fitting.evidence import DETECTABLE
 from plant_emulator.diagnosis.wording import listed, spoken
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Sequence
 
+    from plant_emulator.diagnosis.answer import Location
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.explanation import Explanation
     from plant_emulator.diagnosis.machine import Model
-    from plant_emulator.diagnosis.selection.verdict import Verdict
+    from plant_emulator.diagnosis.selection.verdict import Decision
 
 # Rivals that are simulated, the nearest ones; each costs a fit a run.
 MOST_RIVALS = 2
@@ -62,13 +63,13 @@ class Advice:
     def next_experiment(
         self,
         explained: Explanation,
-        found: Verdict,
-        location: Mapping[str, Any],
+        found: Decision,
+        location: Location,
         hidden: Sequence[str],
     ) -> str | None:
         """The sentence, or None where nothing is left to decide.
 
-        location : of the answer; hidden : effects that these logs could not show
+        hidden : effects that these logs could not show
         """
         if found.kind == "effect":
             return self._separating(explained)
@@ -117,9 +118,9 @@ class Advice:
         what = listed(needs, NAMED, "; ")
         return f"To see what these logs could not show: {what}." if needs else None
 
-    def _narrowing(self, explained: Explanation, location: Mapping[str, Any]) -> str | None:
+    def _narrowing(self, explained: Explanation, location: Location) -> str | None:
         """The run that shows most of the place where the cause lies, and what the logs lack."""
-        place, model = location["subsystem"], self._model
+        place, model = location.subsystem, self._model
         if place is None:
             return None
         own = [c for c in explained.contenders if model.candidates[c.effect].subsystem == place]
@@ -132,7 +133,7 @@ class Advice:
         lacking = model.lacks(self._runs).get(place, ())
         parts = (
             f"drive {best}" if best else "",
-            MORE_OF.get(location["phase"], ""),
+            MORE_OF.get(location.phase or "", ""),
             f"add what these logs lack: {', '.join(lacking)}" if lacking else "",
         )
         advised = "; ".join(part for part in parts if part)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from plant_emulator.diagnosis.answer import Quantity
 from plant_emulator.diagnosis.fitting.joint_fit import linearised
 
 if TYPE_CHECKING:
@@ -21,8 +22,8 @@ STEP = 1e-4
 
 def in_terms(
     model: Model, found: FitResult, runs: Sequence[int]
-) -> dict[str, list[dict[str, Any]]]:
-    """By effect of a fit: its terms, in the form of the answer's parameters.
+) -> dict[str, tuple[Quantity, ...]]:
+    """By effect of a fit: its terms.
 
     The variance of a term t is g' C g, C the covariance of the fit and g the slope of t by it
     (propagation of errors: JCGM 100:2008, eq. 13).
@@ -31,22 +32,22 @@ def in_terms(
     if not any(named.values()):
         return {}
     where = linearised(model, found, runs)
-    return {name: [_parameter(term, where) for term in terms] for name, terms in named.items()}
+    return {name: tuple(_quantity(term, where) for term in terms) for name, terms in named.items()}
 
 
-def _parameter(term: Term, where: Estimate) -> dict[str, Any]:
+def _quantity(term: Term, where: Estimate) -> Quantity:
     shared = [k for k, u in enumerate(where.unknowns) if u.run is None]
     slope = np.zeros(len(where.z))
     for k in shared:
         step = STEP * np.eye(len(where.z))[k]
         slope[k] = (_at(term, where, step) - _at(term, where, -step)) / (2.0 * STEP)
     on = np.flatnonzero(slope)  # an unknown that the term is not of may have an infinite variance
-    return {
-        "name": term.name,
-        "value": _at(term, where, np.zeros(len(where.z))),
-        "standard_error": float(np.sqrt(slope[on] @ where.covariance[np.ix_(on, on)] @ slope[on])),
-        "unit": term.unit,
-    }
+    return Quantity(
+        name=term.name,
+        value=_at(term, where, np.zeros(len(where.z))),
+        standard_error=float(np.sqrt(slope[on] @ where.covariance[np.ix_(on, on)] @ slope[on])),
+        unit=term.unit,
+    )
 
 
 def _at(term: Term, where: Estimate, step: np.ndarray[Any, np.dtype[np.float64]]) -> float:

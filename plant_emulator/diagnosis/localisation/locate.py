@@ -21,13 +21,13 @@ damping of the motor's shaft moves no signal of this bench between two samples: 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.diagnosis.answer import Location
 from plant_emulator.diagnosis.localisation.block_regression import Site
-from plant_emulator.diagnosis.localisation.residual_map import Cell, residual_map
+from plant_emulator.diagnosis.localisation.residual_map import residual_map
 from plant_emulator.model.stage import GAP_POSITION
 
 if TYPE_CHECKING:
@@ -44,37 +44,6 @@ WORTH = 15.0
 APPROXIMATE = 0.02
 MOST_BLOCKS = 3
 SILENT = "motor_shaft"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Location:
-    """Where the gap lies; shares : of every subsystem, sum 1; gain : of log probability.
-
-    channel, phase : where the simulation's residual is largest over its noise
-    cells : the whole residual map, all axes
-    """
-
-    subsystem: str
-    channel: str
-    phase: str
-    shares: Mapping[str, float]
-    gain: float
-    cells: tuple[Cell, ...]
-
-    def as_answer(self) -> dict[str, Any]:
-        """The part `location` of the answer; and `maps`: the residual map by axis."""
-        maps: dict[str, list[dict[str, Any]]] = {}
-        for cell in self.cells:
-            maps.setdefault(cell.axis, []).append(cell.as_entry())
-        ordered = sorted(self.shares.items(), key=lambda pair: -pair[1])
-        return {
-            "subsystem": self.subsystem,
-            "channel": self.channel,
-            "phase": self.phase,
-            "subsystems": [{"name": name, "share": share} for name, share in ordered],
-            "map": maps["phase"],
-            "maps": maps,
-        }
 
 
 def locate(recordings: Sequence[Recording], parameters: ParameterSet, null: FitResult) -> Location:
@@ -99,9 +68,9 @@ def locate(recordings: Sequence[Recording], parameters: ParameterSet, null: FitR
         subsystem=max(shares, key=shares.__getitem__),
         channel=widest.channel,
         phase=widest.bin,
-        shares=shares,
-        gain=gain,
+        shares=dict(sorted(shares.items(), key=lambda pair: -pair[1])),
         cells=cells,
+        gain=gain,
     )
 
 

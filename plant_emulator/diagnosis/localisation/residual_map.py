@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.diagnosis.answer import Cell
 from plant_emulator.diagnosis.localisation.operating_phases import PHASES, field_weakened, phases
 from plant_emulator.signals.smoothing import smooth
 
@@ -27,25 +27,6 @@ TIMES = (0.0, 5.0, 10.0, 20.0, 40.0, 80.0)  # since the start [s]
 LOADED = 1.0
 # Motion, for the direction [rad/s at the motor].
 MOVING = 1.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Cell:
-    """The gap of a channel within a bin of an axis, and the sensor's noise [SI].
-
-    gap : rms of measured minus simulated; samples : that it was taken over
-    """
-
-    channel: str
-    axis: str
-    bin: str
-    gap: float
-    noise: float
-    samples: int
-
-    def as_entry(self) -> dict[str, Any]:
-        """As the answer's map has it."""
-        return {"channel": self.channel, self.axis: self.bin, "gap": self.gap, "noise": self.noise}
 
 
 def residual_map(

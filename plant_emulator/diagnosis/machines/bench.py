@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import pickle
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
+    from plant_emulator.diagnosis.answer import Location
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.effects import Effect
     from plant_emulator.estimation.unknowns import Residual
@@ -225,11 +226,11 @@ class BenchModel:
             found = scanned(lambda trial: residual({**values, **trial}), found, states)
         return found
 
-    def located(self, where: FitResult, runs: Sequence[int]) -> Mapping[str, Any] | None:
+    def located(self, where: FitResult, runs: Sequence[int]) -> Location | None:
         """See `Model`."""
         if self._given:
             return None
-        return locate([self._recordings[k] for k in runs], self._set, where).as_answer()
+        return locate([self._recordings[k] for k in runs], self._set, where)
 
     def with_planned(self, where: FitResult, runs: Sequence[int]) -> BenchModel:
         """See `Model`: drive programs that no log shows, starting as the last run did."""

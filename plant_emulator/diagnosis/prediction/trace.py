@@ -5,7 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from plant_emulator.diagnosis.machine import Run
+    from plant_emulator.diagnosis.prediction.gap import Prediction
     from plant_emulator.signals.log import Array
 
 
@@ -26,3 +32,39 @@ class Trace:
     recalibrated: Array
     explained: Array
     noise: float
+
+
+def traces(
+    runs: Sequence[Run], before: Sequence[Prediction], after: Sequence[Prediction]
+) -> tuple[Trace, ...]:
+    """Measured and predicted channels of all held-out runs, those with samples that count."""
+    pairs = zip(
+        runs,
+        [r for prediction in before for r in prediction.residuals],
+        [r for prediction in after for r in prediction.residuals],
+        strict=True,
+    )
+    return tuple(
+        Trace(
+            source=run.source,
+            channel=name,
+            unit=run.units[k],
+            time=run.time,
+            measured=run.measured[k],
+            recalibrated=_simulated(run, k, first),
+            explained=_simulated(run, k, second),
+            noise=float(run.noise[k]),
+        )
+        for run, first, second in pairs
+        for k, name in enumerate(run.channels)
+        if first[k].any()
+    )
+
+
+def _simulated(run: Run, channel: int, residual: Array) -> Array:
+    """The prediction behind a whitened residual; NaN where a sample does not count.
+
+    Of a voltage it holds what its sensor is off by.
+    """
+    whitened = np.where(residual[channel] == 0.0, np.nan, residual[channel])
+    return np.asarray(run.measured[channel] - whitened * run.noise[channel])

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from plant_emulator.diagnosis.prediction.remainder import Rest
     from plant_emulator.diagnosis.prediction.trace import Trace
@@ -32,8 +32,6 @@ class Details:
     settings : how to repeat it: command, version, date, hashes of logs and sets, thresholds
     notes : what the preflight told of the logs
     rest : of a machine in outline, of which more than the noise is left
-    maps : the gap without effects by channel and bin of an axis (phase, speed, load, direction,
-        frequency, time), in the form of the answer's map
     """
 
     traces: tuple[Trace, ...]
@@ -41,4 +39,3 @@ class Details:
     settings: Mapping[str, str]
     notes: tuple[str, ...]
     rest: Rest | None = None
-    maps: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict)

@@ -6,7 +6,7 @@ fitted to, where it lies, which effect, what remains open, and how to repeat it 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.report import html_tables as tables
 from plant_emulator.diagnosis.report import html_traces
@@ -29,6 +29,14 @@ from plant_emulator.diagnosis.wording import (
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from plant_emulator.diagnosis.answer import (
+        Answer,
+        HeldOutGap,
+        Location,
+        Logs,
+        ParameterShift,
+        Undetectable,
+    )
     from plant_emulator.diagnosis.prediction.remainder import Rest
     from plant_emulator.diagnosis.prediction.trace import Trace
     from plant_emulator.diagnosis.report.details import Details
@@ -44,11 +52,11 @@ LEGEND = {
 }
 
 
-def html(answer: Mapping[str, Any], details: Details) -> str:
+def html(answer: Answer, details: Details) -> str:
     """The report, a whole HTML document."""
-    verdict = answer["verdict"]
+    verdict = answer.verdict
     units = {**UNITS, **{t.channel: t.unit for t in details.traces}}
-    title = ", ".join([KINDS[verdict["kind"]], *verdict["effects"]])
+    title = ", ".join([KINDS[verdict.kind], *verdict.effects])
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
@@ -60,14 +68,14 @@ def html(answer: Mapping[str, Any], details: Details) -> str:
     body = tag(
         "main",
         _verdict(answer, units),
-        _shrinkage(answer, details),
-        _location(answer["location"], details.maps, units),
+        _shrinkage(answer.gap, details),
+        _location(answer.location, units),
         _rest(details.rest),
         _effects(answer),
-        _parameters(verdict),
-        _limits(answer["undetectable"]),
+        _parameters(verdict.parameters),
+        _limits(answer.undetectable),
         _runs(details.traces),
-        _repeat(answer["logs"], details),
+        _repeat(answer.logs, details),
     )
     return f"<!DOCTYPE html>\n{tag('html', head, tag('body', body), lang='en')}\n"
 
@@ -76,28 +84,28 @@ def _section(title: str, *content: str) -> Markup:
     return tag("section", tag("h2", title), *content)
 
 
-def _verdict(answer: Mapping[str, Any], units: Mapping[str, str]) -> Markup:
-    verdict = answer["verdict"]
+def _verdict(answer: Answer, units: Mapping[str, str]) -> Markup:
+    verdict = answer.verdict
     facts = {
-        "Effects": ", ".join(verdict["effects"]),
-        "Where": place(answer["location"], units),
-        "Gap closed on held-out runs": closed(answer["gap"]),
-        "Confidence": _confidence(verdict["confidence"]),
-        "Logs": logs_used(answer["logs"]),
+        "Effects": ", ".join(verdict.effects),
+        "Where": place(answer.location, units),
+        "Gap closed on held-out runs": closed(answer.gap),
+        "Confidence": _confidence(verdict.confidence),
+        "Logs": logs_used(answer.logs),
     }
     told = [join(tag("dt", key), tag("dd", value)) for key, value in facts.items() if value]
     parts = [
         tag("h1", "Gap between bench and model"),
         tag(
             "div",
-            tag("p", KINDS[verdict["kind"]], class_="kind"),
-            tag("p", verdict["statement"], class_="statement"),
+            tag("p", KINDS[verdict.kind], class_="kind"),
+            tag("p", verdict.statement, class_="statement"),
             class_="verdict",
         ),
         tag("dl", *told),
     ]
-    if verdict["next_experiment"]:
-        words = tag("p", tag("strong", "Next experiment: "), verdict["next_experiment"])
+    if verdict.next_experiment:
+        words = tag("p", tag("strong", "Next experiment: "), verdict.next_experiment)
         parts.append(tag("div", words, class_="next"))
     return tag("header", *parts)
 
@@ -108,7 +116,7 @@ def _confidence(share: float | None) -> str | None:
     return f"{percent(share)}: so often were answers of this kind right where the truth was known"
 
 
-def _shrinkage(answer: Mapping[str, Any], details: Details) -> Markup:
+def _shrinkage(gap: HeldOutGap, details: Details) -> Markup:
     parts = []
     if details.waterfall:
         caption = (
@@ -118,24 +126,20 @@ def _shrinkage(answer: Mapping[str, Any], details: Details) -> Markup:
         )
         drawn = scrolled(waterfall(details.waterfall), "Waterfall")
         parts.append(tag("figure", drawn, tag("figcaption", caption)))
-    share = closed(answer["gap"])
+    share = closed(gap)
     if share:
         parts.append(tag("p", tag("strong", f"Closed: {share}"), " of the gap above the noise."))
-    if answer["gap"]["noise_floor"]:
-        parts.append(tables.gap_by_channel(answer["gap"], details.traces))
+    if gap.noise_floor:
+        parts.append(tables.gap_by_channel(gap, details.traces))
     return _section("How far the gap shrinks", *parts)
 
 
-def _location(
-    location: Mapping[str, Any],
-    maps: Mapping[str, Sequence[Mapping[str, Any]]],
-    units: Mapping[str, str],
-) -> Markup:
+def _location(location: Location, units: Mapping[str, str]) -> Markup:
     parts = []
-    if location["map"]:
+    if location.cells:
         parts.append(tables.residual_map(location, units))
-        parts += tables.residual_maps(maps, units)
-    if location["subsystems"]:
+        parts += tables.residual_maps(location.maps, units)
+    if location.shares:
         parts.append(tables.subsystems(location))
     return _section("Where it lies", *(parts or [tag("p", "Nothing stands out of the noise.")]))
 
@@ -144,15 +148,14 @@ def _rest(rest: Rest | None) -> Markup:
     return Markup("") if rest is None else _section("What is left", rest_by_band(rest))
 
 
-def _effects(answer: Mapping[str, Any]) -> Markup:
-    entries = answer["ranking"]
-    if not entries:
+def _effects(answer: Answer) -> Markup:
+    if not answer.ranking:
         return _section("Which effect", tag("p", "No effect was worth a test."))
     classes = [
         tag("li", *_class(name, others))
-        for name, others in indistinguishable(answer["verdict"]).items()
+        for name, others in indistinguishable(answer.verdict).items()
     ]
-    parts = [tables.ranking(entries)]
+    parts = [tables.ranking(answer.ranking)]
     if classes:
         parts += [tag("h3", "Can another effect look the same?"), tag("ul", *classes)]
     return _section("Which effect", *parts)
@@ -165,13 +168,12 @@ def _class(name: str, others: Sequence[str]) -> list[str]:
     return [code(name), ": these logs cannot tell it from ", *listed, "."]
 
 
-def _parameters(verdict: Mapping[str, Any]) -> Markup:
-    shifted = verdict["parameters"]
+def _parameters(shifted: Sequence[ParameterShift]) -> Markup:
     none = tag("p", "None lies more than 3 standard errors away from the set.")
     return _section("Parameters that moved", tables.parameters(shifted) if shifted else none)
 
 
-def _limits(entries: Sequence[Mapping[str, Any]]) -> Markup:
+def _limits(entries: Sequence[Undetectable]) -> Markup:
     none = tag("p", "Every effect of the library would show in these logs.")
     return _section(
         "What these logs cannot show", tables.undetectable(entries) if entries else none
@@ -225,9 +227,9 @@ def _figure(trace: Trace, columns: int) -> Markup:
     return tag("figure", words, drawn)
 
 
-def _repeat(logs: Mapping[str, Sequence[str]], details: Details) -> Markup:
-    kinds = {"estimation": "Fitted", "held_out": "Held out"}
-    named = {title: ", ".join(logs[key]) or "none" for key, title in kinds.items()}
+def _repeat(logs: Logs, details: Details) -> Markup:
+    kinds = {"Fitted": logs.estimation, "Held out": logs.held_out}
+    named = {title: ", ".join(names) or "none" for title, names in kinds.items()}
     parts = [tables.named({**named, **details.settings})]
     if details.notes:
         notes = [tag("li", note, class_="any") for note in details.notes]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from math import isfinite, isnan, nan
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from plant_emulator.diagnosis.report.markup import Markup, join, tag
 from plant_emulator.diagnosis.wording import (
     EXPLAINED,
     RESIDUAL,
+    gap_rows,
     number,
     own_name,
     percent,
@@ -25,6 +27,15 @@ from plant_emulator.diagnosis.wording import (
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from plant_emulator.diagnosis.answer import (
+        Cell,
+        HeldOutGap,
+        Location,
+        ParameterShift,
+        Quantity,
+        RankedEffect,
+        Undetectable,
+    )
     from plant_emulator.diagnosis.prediction.trace import Trace
 
 # From which multiple of the noise a cell of the map takes which tint.
@@ -43,21 +54,21 @@ PLUS_MINUS = "\N{PLUS-MINUS SIGN}"
 TIMES = "\N{MULTIPLICATION SIGN}"
 
 
-def gap_by_channel(gap: Mapping[str, Any], traces: Sequence[Trace]) -> Markup:
+def gap_by_channel(gap: HeldOutGap, traces: Sequence[Trace]) -> Markup:
     """The held-out gap of every channel, in percent of its range and in its own unit."""
-    kinds = [k for k in ("nominal", "recalibrated", "explained", "noise_floor") if gap[k]]
+    steps = gap_rows(gap)
     both = any("after" in residuals(t) for t in traces)
     rows = [
         tag(
             "tr",
             row_head(spoken(channel)),
-            *(cell(_range_share(gap[k].get(channel))) for k in kinds),
+            *(cell(_range_share(step.get(channel, nan))) for step in steps.values()),
             *(cell(text) for text in _pooled([t for t in traces if t.channel == channel], both)),
         )
-        for channel in gap["noise_floor"]
+        for channel in gap.noise_floor
     ]
     rms_of = ["rms before", "rms after"] if both else ["rms"]
-    heads = [*(f"{spoken(k)} [%]" for k in kinds), *rms_of, "noise"]
+    heads = [*(f"{name} [%]" for name in steps), *rms_of, "noise"]
     return table(
         "Held-out runs, all samples of a channel together. Gap in percent of the channel's "
         "measured range; rms of the residual in the channel's unit.",
@@ -66,8 +77,8 @@ def gap_by_channel(gap: Mapping[str, Any], traces: Sequence[Trace]) -> Markup:
     )
 
 
-def _range_share(share: float | None) -> str:
-    return number(None) if share is None else f"{100.0 * share:.3f}"
+def _range_share(share: float) -> str:
+    return number(share) if isnan(share) else f"{100.0 * share:.3f}"
 
 
 def _pooled(traces: Sequence[Trace], both: bool) -> list[str]:
@@ -84,41 +95,38 @@ def _pooled(traces: Sequence[Trace], both: bool) -> list[str]:
     ]
 
 
-def residual_map(location: Mapping[str, Any], units: Mapping[str, str]) -> Markup:
+def residual_map(location: Location, units: Mapping[str, str]) -> Markup:
     """Channel by phase: the gap over the noise, tinted, and the gap in the channel's unit."""
-    seen = dict.fromkeys(c["phase"] for c in location["map"])
+    cells = location.maps["phase"]
+    seen = dict.fromkeys(cell_.bin for cell_ in cells)
     phases = [p for p in PHASES if p in seen] + [p for p in seen if p not in PHASES]
     return _map(
-        location["map"],
-        "phase",
+        cells,
         phases,
         units,
         "Residual by channel and phase of operation, in multiples of the noise, and in the "
         "channel's unit. Darker tint: from 1.2, 2, 5 and 10 times the noise. Framed: the place "
         "that the answer names.",
-        (location["channel"], location["phase"]),
+        (location.channel, location.phase),
     )
 
 
-def residual_maps(
-    maps: Mapping[str, Sequence[Mapping[str, Any]]], units: Mapping[str, str]
-) -> Iterator[Markup]:
-    """The same along the other axes."""
+def residual_maps(maps: Mapping[str, Sequence[Cell]], units: Mapping[str, str]) -> Iterator[Markup]:
+    """The residual along every axis but the phase, as `residual_map` shows it."""
     for axis, words in AXES.items():
         if axis in maps:
-            bins = list(dict.fromkeys(c[axis] for c in maps[axis]))
-            yield _map(maps[axis], axis, bins, units, f"The same by {words}.")
+            bins = list(dict.fromkeys(cell_.bin for cell_ in maps[axis]))
+            yield _map(maps[axis], bins, units, f"The same by {words}.")
 
 
 def _map(
-    entries: Sequence[Mapping[str, Any]],
-    axis: str,
+    entries: Sequence[Cell],
     bins: Sequence[str],
     units: Mapping[str, str],
     caption: str,
-    here: tuple[str, str] | None = None,
+    here: tuple[str | None, str | None] | None = None,
 ) -> Markup:
-    cells = {(c["channel"], c[axis]): c for c in entries}
+    cells = {(entry.channel, entry.bin): entry for entry in entries}
     channels = list(dict.fromkeys(c for c, _ in cells))
     rows = [
         tag(
@@ -134,22 +142,21 @@ def _map(
     return table(caption, ["channel", *(right(spoken(name)) for name in bins)], rows, "map")
 
 
-def _map_cell(found: Mapping[str, Any] | None, unit: str | None, here: bool) -> Markup:
+def _map_cell(found: Cell | None, unit: str | None, here: bool) -> Markup:
     if found is None:
         return tag("td", tag("span", "no samples", class_="soft small"))
-    gap, noise = found["gap"], found["noise"]
-    ratio = gap / noise if gap is not None and noise else None
+    ratio = found.gap / found.noise if isfinite(found.gap) and found.noise else None
     look = next((name for least, name in HEAT if ratio is not None and ratio >= least), "heat0")
     words = f"{ratio:.{0 if ratio >= 100.0 else 1}f} {TIMES}" if ratio is not None else number(None)
-    own = tag("span", quantity(gap, unit), class_="line soft small")
+    own = tag("span", quantity(found.gap, unit), class_="line soft small")
     return tag("td", words, own, class_=f"{look} here" if here else look)
 
 
-def subsystems(location: Mapping[str, Any]) -> Markup:
+def subsystems(location: Location) -> Markup:
     """Every subsystem's share of the residual."""
     rows = [
-        tag("tr", row_head(spoken(s["name"])), bar(percent(s["share"]), s["share"]))
-        for s in location["subsystems"]
+        tag("tr", row_head(spoken(name)), bar(percent(share), share))
+        for name, share in location.shares.items()
     ]
     whole = share_of(location)
     told = {
@@ -161,9 +168,9 @@ def subsystems(location: Mapping[str, Any]) -> Markup:
     )
 
 
-def ranking(entries: Sequence[Mapping[str, Any]]) -> Markup:
+def ranking(entries: Sequence[RankedEffect]) -> Markup:
     """The effects by evidence, each with its parameters and their 95 % intervals."""
-    most = max([1e-9, *(e["evidence"] or 0.0 for e in entries)])
+    most = max([1e-9, *(e.evidence for e in entries if isfinite(e.evidence))])
     return table(
         "Evidence: fall of the penalised cost, corrected for autocorrelation. Held-out gain: "
         "share of the gap that the effect closes alone on runs it was not fitted to. Standard "
@@ -180,42 +187,43 @@ def ranking(entries: Sequence[Mapping[str, Any]]) -> Markup:
     )
 
 
-def _ranked(entry: Mapping[str, Any], most: float) -> Markup:
-    evidence = entry["evidence"]
+def _ranked(entry: RankedEffect, most: float) -> Markup:
+    known = isfinite(entry.evidence)
+    evidence = f"{entry.evidence:.1f}" if known else number(None)
     sizes = [
-        tag("span", f"{own_name(p['name'], entry['effect'])} ", *_estimate(p), class_="line")
-        for p in entry["parameters"]
+        tag("span", f"{own_name(p.name, entry.effect)} ", *_estimate(p), class_="line")
+        for p in entry.parameters
     ]
     return tag(
         "tr",
-        row_head(code(entry["effect"])),
-        tag("td", spoken(entry["subsystem"])),
-        tag("td", "yes" if entry["accepted"] else "no"),
-        bar(number(None) if evidence is None else f"{evidence:.1f}", (evidence or 0.0) / most),
-        cell(percent(entry["held_out_gain"])),
+        row_head(code(entry.effect)),
+        tag("td", spoken(entry.subsystem)),
+        tag("td", "yes" if entry.accepted else "no"),
+        bar(evidence, entry.evidence / most if known else 0.0),
+        cell(percent(entry.held_out_gain)),
         tag("td", *sizes),
-        class_="accepted" if entry["accepted"] else "other",
+        class_="accepted" if entry.accepted else "other",
     )
 
 
-def _estimate(parameter: Mapping[str, Any]) -> list[Markup]:
+def _estimate(estimated: Quantity) -> list[Markup]:
     """Value with standard error, and the 95 % interval where there is one."""
-    value, error = parameter["value"], parameter["standard_error"]
-    found = [tag("span", size(parameter, PLUS_MINUS))]
-    if value is not None and error and np.isfinite(error):
+    value, error = estimated.value, estimated.standard_error
+    found = [tag("span", size(estimated, PLUS_MINUS))]
+    if isfinite(value) and error and isfinite(error):
         low, high = (number(value + k * NORMAL_95 * error, 4) for k in (-1, 1))
         found += [Markup(" "), tag("span", f"({low} to {high})", class_="soft")]
     return found
 
 
-def parameters(shifted: Sequence[Mapping[str, Any]]) -> Markup:
+def parameters(shifted: Sequence[ParameterShift]) -> Markup:
     """Parameters that the logs put more than 3 standard errors away from the set."""
     rows = [
         tag(
             "tr",
-            row_head(code(p["name"])),
-            cell(quantity(p["nominal"], p["unit"], 4)),
-            cell(size({**p, "value": p["estimated"]}, PLUS_MINUS)),
+            row_head(code(p.name)),
+            cell(quantity(p.nominal, p.unit, 4)),
+            cell(size(p.quantity, PLUS_MINUS)),
             cell(_change(p)),
             cell(_distance(p)),
         )
@@ -229,18 +237,18 @@ def parameters(shifted: Sequence[Mapping[str, Any]]) -> Markup:
     )
 
 
-def _change(p: Mapping[str, Any]) -> str:
-    return f"{100.0 * (p['estimated'] / p['nominal'] - 1.0):+.1f} %" if p["nominal"] else ""
+def _change(p: ParameterShift) -> str:
+    return f"{100.0 * (p.estimated / p.nominal - 1.0):+.1f} %" if p.nominal else ""
 
 
-def _distance(p: Mapping[str, Any]) -> str:
-    error = p["standard_error"]
-    return number(abs(p["estimated"] - p["nominal"]) / error, 2) if error else number(None)
+def _distance(p: ParameterShift) -> str:
+    error = p.standard_error
+    return number(abs(p.estimated - p.nominal) / error, 2) if error else number(None)
 
 
-def undetectable(entries: Sequence[Mapping[str, Any]]) -> Markup:
+def undetectable(entries: Sequence[Undetectable]) -> Markup:
     """Effects that may be there without these logs showing them."""
-    rows = [tag("tr", row_head(code(u["effect"])), tag("td", u["reason"])) for u in entries]
+    rows = [tag("tr", row_head(code(u.effect)), tag("td", u.reason)) for u in entries]
     return table(
         "Effects that these logs cannot show: that they are not named says nothing about them.",
         ["effect", "why, and what would show it"],

@@ -7,13 +7,16 @@ not fit is counted ("and 3 more"): the whole stands in the JSON answer and in th
 from __future__ import annotations
 
 import re
+from math import isfinite, isnan, nan
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.wording import (
+    EXPLAINED_GAP,
     KINDS,
     UNITS,
     closed,
+    gap_rows,
     indistinguishable,
     logs_used,
     number,
@@ -27,7 +30,9 @@ from plant_emulator.diagnosis.wording import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
+
+    from plant_emulator.diagnosis.answer import Answer, HeldOutGap, RankedEffect, Undetectable
 
 # A screen has 24 lines; the last is the prompt's.
 HEIGHT = 23
@@ -44,24 +49,18 @@ LEAST_OTHERS = 2
 # Spaces within "2.83 N m" at which no line ends.
 WITHIN_QUANTITY = re.compile(r"(?<=\d) (?=[%A-Za-z])|(?<=[\d ]N) (?=m\b)|(?<=kg) (?=m\^2)")
 UNBROKEN = "\N{NO-BREAK SPACE}"
-GAPS = {
-    "nominal": "nominal",
-    "recalibrated": "recalibrated",
-    "explained": "explained",
-    "noise_floor": "noise floor",
-}
 
 
-def lines(answer: Mapping[str, Any], width: int = 80) -> list[str]:
+def lines(answer: Answer, width: int = 80) -> list[str]:
     """The answer for a terminal of this width and 24 lines."""
     head = _verdict(answer, width)
-    shrinkage = _shrinkage(answer["gap"], width)
+    shrinkage = _shrinkage(answer.gap, width)
     rest = _rest(answer, width)
     room = HEIGHT - len(head) - len(shrinkage) - len(rest)
     if len(_ranking(answer, room, width)) < len(_ranking(answer, HEIGHT, width)):
         head = _verdict(answer, width, LEAST_STATEMENT)
         room = HEIGHT - len(head) - len(shrinkage) - len(rest)
-    ranking, others = _ranking(answer, room, width), _runners_up(answer["ranking"])
+    ranking, others = _ranking(answer, room, width), _runners_up(answer.ranking)
     room -= len(ranking)
     breaks = sum(map(bool, (ranking, shrinkage, rest)))
     spaced = room - breaks >= min(len(others), LEAST_OTHERS)
@@ -101,69 +100,67 @@ def _listed(
     return _paragraph("; ".join(items), width, most, label) if items else []
 
 
-def _verdict(answer: Mapping[str, Any], width: int, most: int = STATEMENT) -> list[str]:
-    verdict = answer["verdict"]
-    parts = [KINDS[verdict["kind"]].upper()]
-    if verdict["confidence"] is not None:
-        parts.append(f"confidence {percent(verdict['confidence'])}")
-    parts.append(logs_used(answer["logs"]))
-    where = place(answer["location"], UNITS)
+def _verdict(answer: Answer, width: int, most: int = STATEMENT) -> list[str]:
+    verdict = answer.verdict
+    parts = [KINDS[verdict.kind].upper()]
+    if verdict.confidence is not None:
+        parts.append(f"confidence {percent(verdict.confidence)}")
+    parts.append(logs_used(answer.logs))
+    where = place(answer.location, UNITS)
     return [
         ", ".join(parts),
-        *_paragraph(verdict["statement"], width, most),
+        *_paragraph(verdict.statement, width, most),
         *(_paragraph(where, width, 2, "where") if where else []),
     ]
 
 
-def _ranking(answer: Mapping[str, Any], room: int, width: int) -> list[str]:
+def _ranking(answer: Answer, room: int, width: int) -> list[str]:
     """Head of the ranking, and the accepted effects with what there is room for."""
-    accepted = [r for r in answer["ranking"] if r["accepted"]]
-    if not accepted and not _runners_up(answer["ranking"]):
+    accepted = [r for r in answer.ranking if r.accepted]
+    if not accepted and not _runners_up(answer.ranking):
         return []
-    classes = indistinguishable(answer["verdict"])
+    classes = indistinguishable(answer.verdict)
     room -= 1 + len(accepted)
     rows = [f"{'  effect':{NAME}}{'evidence':>{CELL}}{'gain':>7}  size +- standard error"]
     for entry in accepted:
-        beside = _beside(entry, classes.get(entry["effect"], ()), width)[: max(0, room)]
+        beside = _beside(entry, classes.get(entry.effect, ()), width)[: max(0, room)]
         rows += [_row(entry), *beside]
         room -= len(beside)
     return rows
 
 
-def _runners_up(ranking: Sequence[Mapping[str, Any]]) -> list[str]:
+def _runners_up(ranking: Sequence[RankedEffect]) -> list[str]:
     """The effects that were not accepted, a line each, but for those whose evidence reads 0.0."""
-    accepted = sum(bool(r["accepted"]) for r in ranking)
-    counting = [
-        r for r in ranking if r["evidence"] is None or round(r["evidence"], EVIDENCE_DECIMALS) > 0.0
-    ]
-    others = [_row(r) for r in counting if not r["accepted"]]
+    accepted = sum(r.accepted for r in ranking)
+    counting = [r for r in ranking if not round(r.evidence, EVIDENCE_DECIMALS) <= 0.0]
+    others = [_row(r) for r in counting if not r.accepted]
     return others[: max(0, MOST_RANKED - accepted)]
 
 
-def _row(entry: Mapping[str, Any]) -> str:
+def _row(entry: RankedEffect) -> str:
     """Effect, evidence, share of the held-out gap that it closes alone, its first size."""
-    mark = "*" if entry["accepted"] else " "
-    gain = "" if entry["held_out_gain"] is None else percent(entry["held_out_gain"])
-    evidence = "" if entry["evidence"] is None else f"{entry['evidence']:.{EVIDENCE_DECIMALS}f}"
-    first = size(entry["parameters"][0]) if entry["parameters"] else ""
-    name = printable(entry["effect"])[: NAME - 2]
+    mark = "*" if entry.accepted else " "
+    gain = "" if entry.held_out_gain is None else percent(entry.held_out_gain)
+    evidence = f"{entry.evidence:.{EVIDENCE_DECIMALS}f}" if isfinite(entry.evidence) else ""
+    first = size(entry.parameters[0]) if entry.parameters else ""
+    name = printable(entry.effect)[: NAME - 2]
     return f"{mark} {name:{NAME - 2}}{evidence:>{CELL}}{gain:>7}  {first}"
 
 
-def _beside(entry: Mapping[str, Any], others: Sequence[str], width: int) -> list[str]:
+def _beside(entry: RankedEffect, others: Sequence[str], width: int) -> list[str]:
     """Further parameters of an accepted effect, and what cannot be told from it."""
-    more = [f"{own_name(p['name'], entry['effect'])} {size(p)}" for p in entry["parameters"][1:]]
+    more = [f"{own_name(p.name, entry.effect)} {size(p)}" for p in entry.parameters[1:]]
     alike = [f"not told from {others[0]}", *others[1:]] if others else []
     return _listed(more, width, 1, "  with") + _listed(alike, width, 1, "  class")
 
 
-def _shrinkage(gap: Mapping[str, Any], width: int) -> list[str]:
+def _shrinkage(gap: HeldOutGap, width: int) -> list[str]:
     """The held-out gap in the noise as bars, and in percent of every channel's range."""
-    floor = gap["noise_floor"] or {}
-    rows = {key: gap[key] for key in GAPS if gap[key]}
-    if rows.get("explained") == rows.get("recalibrated"):
-        rows.pop("explained", None)
-    times = {key: times_noise(row, floor) for key, row in rows.items()}
+    floor = gap.noise_floor
+    rows = gap_rows(gap)
+    if gap.explained == gap.recalibrated:
+        rows.pop(EXPLAINED_GAP, None)
+    times = {name: times_noise(row, floor) for name, row in rows.items()}
     most = max((t for t in times.values() if t is not None), default=None)
     if most is None:
         return []
@@ -172,17 +169,17 @@ def _shrinkage(gap: Mapping[str, Any], width: int) -> list[str]:
     title = "held-out gap over noise, % of range"
     head = "".join(f"{name:>{CELL}}" for name in _short(channels))
     drawn = [f"{title:{width - len(head)}}{head}"]
-    for key, row in rows.items():
-        ratio = times[key]
+    for name, row in rows.items():
+        ratio = times[name]
         marks = "#" * max(1, round(bar * (ratio or 0.0) / most))
-        cells = "".join(f"{_range_share(row.get(c)):>{CELL}}" for c in channels)
-        drawn.append(f"{GAPS[key]:{LABEL}}{number(ratio):>5} {marks:{bar + 1}}{cells}")
+        cells = "".join(f"{_range_share(row.get(c, nan)):>{CELL}}" for c in channels)
+        drawn.append(f"{name:{LABEL}}{number(ratio):>5} {marks:{bar + 1}}{cells}")
     share = closed(gap)
     return drawn + ([f"closed: {share}"] if share else [])
 
 
-def _range_share(share: float | None) -> str:
-    return "" if share is None else f"{100.0 * share:.2f} %"
+def _range_share(share: float) -> str:
+    return "" if isnan(share) else f"{100.0 * share:.2f} %"
 
 
 def _short(channels: Sequence[str]) -> list[str]:
@@ -194,20 +191,20 @@ def _short(channels: Sequence[str]) -> list[str]:
     ]
 
 
-def _rest(answer: Mapping[str, Any], width: int) -> list[str]:
+def _rest(answer: Answer, width: int) -> list[str]:
     """Parameters that moved, effects that these logs cannot show, the next experiment."""
-    verdict = answer["verdict"]
-    moved = [shifted(p) for p in verdict["parameters"]]
-    names = [p["name"] for p in verdict["parameters"]]
-    rows = _listed(moved, width, 2 if verdict["kind"] == "parameter" else 1, "moved", names)
-    rows += _unseen(answer["undetectable"], width, 1 if len(verdict["effects"]) > 1 else 2)
-    return rows + _paragraph(verdict["next_experiment"] or "", width, 3, "next")
+    verdict = answer.verdict
+    moved = [shifted(p) for p in verdict.parameters]
+    names = [p.name for p in verdict.parameters]
+    rows = _listed(moved, width, 2 if verdict.kind == "parameter" else 1, "moved", names)
+    rows += _unseen(answer.undetectable, width, 1 if len(verdict.effects) > 1 else 2)
+    return rows + _paragraph(verdict.next_experiment or "", width, 3, "next")
 
 
-def _unseen(hidden: Sequence[Mapping[str, str]], width: int, most: int) -> list[str]:
+def _unseen(hidden: Sequence[Undetectable], width: int, most: int) -> list[str]:
     """Effects that these logs cannot show, each with its reason if there is room for all."""
-    reasons = "; ".join(f"{u['effect']} ({u['reason']})" for u in hidden)
+    reasons = "; ".join(f"{u.effect} ({u.reason})" for u in hidden)
     rows = _paragraph(reasons, width, most + 1, "unseen") if hidden else []
     if len(rows) <= most:
         return rows
-    return _listed([u["effect"] for u in hidden], width, most, "unseen")
+    return _listed([u.effect for u in hidden], width, most, "unseen")

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult, Unrest
     from plant_emulator.diagnosis.fitting.explanation import Explanation
     from plant_emulator.diagnosis.machine import Model
-    from plant_emulator.diagnosis.selection.verdict import Verdict
+    from plant_emulator.diagnosis.selection.verdict import Decision
 
 # Structure of a residual, as a share of its squares beyond the noise, up to which it may be chance:
 # that of a dead time that varies from scan to scan was 0.014.
@@ -47,7 +47,7 @@ class Inquiry:
         recipe, null = quieted(self.pool, self.recipe, self.model, self.runs)
         return replace(self, recipe=recipe, null=null)
 
-    def found(self) -> tuple[Explanation, Verdict, Recipe]:
+    def found(self) -> tuple[Explanation, Decision, Recipe]:
         """What the contest came to, the verdict, and the recipe whose noise its costs count in."""
         if not self.model.reaches_noise:
             explained = self._contest(self.recipe, self.null)
@@ -116,7 +116,7 @@ class Inquiry:
         found = self.pool.map(unrest, self.recipe, tasks)
         return [one for one in found if one.holds and one.evidence > THRESHOLD]
 
-    def _between(self, explained: Explanation, found: Verdict) -> Verdict:
+    def _between(self, explained: Explanation, found: Decision) -> Decision:
         """The verdict; unknown with that reason where runs agree each alone, but not together."""
         runs = self.runs
         if explained.unconverged or len(runs) < 2:

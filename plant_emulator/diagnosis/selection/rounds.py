@@ -219,8 +219,8 @@ class Rounds:
     def located(self, null: FitResult) -> frozenset[str]:
         """The subsystems that the gap of a fit without effects lies in, by themselves."""
         (found,) = self._pool.map(site, self._recipe, [Task(base=null, runs=self._runs)])
-        shares = [] if found is None else found["subsystems"]
-        return frozenset(one["name"] for one in shares if one["share"] >= PLACED)
+        shares = {} if found is None else found.shares
+        return frozenset(name for name, share in shares.items() if share >= PLACED)
 
     def restarted(self, base: FitResult, contenders: Sequence[Contender]) -> FitResult:
         """The best fit with the base's effects from the drift of the best contenders: a few steps

@@ -9,6 +9,7 @@ from __future__ import annotations
 from itertools import combinations
 from typing import TYPE_CHECKING
 
+from plant_emulator.diagnosis.answer import Quantity
 from plant_emulator.diagnosis.fitting.evidence import LEFT
 from plant_emulator.diagnosis.fitting.joint_fit import null_fit
 from plant_emulator.diagnosis.wording import size
@@ -78,10 +79,11 @@ def _variance(name: str, point: FitResult) -> float:
 def _told(model: Model, name: str, run: int, found: FitResult) -> str:
     """A parameter of a run, whose file is named with its folder."""
     value = size(
-        {
-            "value": found.values[name],
-            "standard_error": found.errors[name],
-            "unit": model.units[name],
-        }
+        Quantity(
+            name=name,
+            value=found.values[name],
+            standard_error=found.errors[name],
+            unit=model.units[name],
+        )
     )
     return f"{value} in {'/'.join(model.runs[run].source.split('/')[-2:])}"

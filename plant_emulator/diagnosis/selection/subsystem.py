@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from plant_emulator.diagnosis.answer import Location
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -10,7 +13,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fitting.explanation import Explanation
     from plant_emulator.diagnosis.fitting.task import Task
     from plant_emulator.diagnosis.machine import Candidate, Model
-    from plant_emulator.diagnosis.selection.verdict import Verdict
+    from plant_emulator.diagnosis.selection.verdict import Decision
 
 
 def evidence_shares(
@@ -28,44 +31,37 @@ def evidence_shares(
 
 
 def subsystem(
-    verdict: Verdict,
+    decision: Decision,
     candidates: Mapping[str, Candidate],
     shares: Mapping[str, float],
 ) -> str | None:
     """The place of the effect with the largest share there, of the most surprising parameter, or of
     the gap.
     """
-    if verdict.kind == "none":
+    if decision.kind == "none":
         return None
-    if verdict.kind == "parameter":
-        return verdict.shifts[0].subsystem
-    if verdict.kind == "effect":
-        places = [candidates[name].subsystem for name in verdict.effects]
+    if decision.kind == "parameter":
+        return decision.shifts[0].subsystem
+    if decision.kind == "effect":
+        places = [candidates[name].subsystem for name in decision.effects]
         return max(places, key=lambda place: shares.get(place, 0.0))
     return max(shares, key=shares.__getitem__, default=None)
 
 
-def site(model: Model, task: Task) -> Mapping[str, Any] | None:
+def site(model: Model, task: Task) -> Location | None:
     """Step of a diagnosis: the block that the gap of a fit lies in."""
     return model.located(task.base, task.runs)
 
 
-def location(
-    place: str | None, shares: Mapping[str, float], located: Mapping[str, Any] | None
-) -> dict[str, Any]:
-    """The part `location` of the answer.
+def location(place: str | None, shares: Mapping[str, float], located: Location | None) -> Location:
+    """The location of the answer.
 
     place : the verdict's; None: there is no gap
     located : what the machine's blocks say; None: the shares are those of the evidence
     """
     if located is None:
-        by_share = sorted(shares.items(), key=lambda pair: -pair[1])
-        blocks: Any = [{"name": name, "share": share} for name, share in by_share]
-        located = {"channel": None, "phase": None, "subsystems": blocks, "map": []}
-    return {
-        "subsystem": place,
-        "channel": None if place is None else located["channel"],
-        "phase": None if place is None else located["phase"],
-        "subsystems": located["subsystems"],
-        "map": located["map"],
-    }
+        ordered = dict(sorted(shares.items(), key=lambda pair: -pair[1]))
+        return Location(subsystem=place, channel=None, phase=None, shares=ordered, cells=())
+    if place is None:
+        return replace(located, subsystem=None, channel=None, phase=None)
+    return replace(located, subsystem=place)

@@ -1,23 +1,17 @@
-"""The verdict: an effect, other parameters, nothing, or unknown, and the sentence that says it."""
+"""What the hypothesis tests decide: an effect, other parameters, nothing, or unknown."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fitting.evidence import STRUCTURED, adequate, evident
-from plant_emulator.diagnosis.prediction.remainder import lies, shrinks
-from plant_emulator.diagnosis.wording import number, percent
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
+    from plant_emulator.diagnosis.answer import Kind
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.explanation import Explanation
-    from plant_emulator.diagnosis.machine import Candidate, Model
-    from plant_emulator.diagnosis.prediction.remainder import Rest
-
-Kind = Literal["effect", "parameter", "none", "unknown"]
+    from plant_emulator.diagnosis.machine import Model
 
 # A parameter has shifted from so many of its own standard errors on.
 SHIFTED = 3.0
@@ -46,8 +40,11 @@ class Shift:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Verdict:
-    """See the contract of the answer; reason : why it is unknown, empty else."""
+class Decision:
+    """The kind of the verdict, its accepted effects, and the parameters that shifted.
+
+    reason : why the cause is unknown; empty: it is known
+    """
 
     kind: Kind
     effects: tuple[str, ...]
@@ -79,7 +76,7 @@ def shifts(model: Model, found: FitResult) -> tuple[Shift, ...]:
     return tuple(sorted(moved, key=lambda shift: (not shift.sure, -shift.surprise)))
 
 
-def decide(model: Model, explained: Explanation) -> Verdict:
+def decide(model: Model, explained: Explanation) -> Decision:
     """The verdict of a contest."""
     found = _of_contest(model, explained)
     if explained.chance and found.kind != "unknown":
@@ -87,25 +84,25 @@ def decide(model: Model, explained: Explanation) -> Verdict:
     return found
 
 
-def _of_contest(model: Model, explained: Explanation) -> Verdict:
+def _of_contest(model: Model, explained: Explanation) -> Decision:
     null, final = explained.null, explained.final
     moved = shifts(model, final)
     if explained.unconverged:
-        return Verdict(kind="unknown", effects=(), shifts=moved, reason=explained.unconverged)
+        return Decision(kind="unknown", effects=(), shifts=moved, reason=explained.unconverged)
     if model.reaches_noise and _structured(explained):
         reason = "what is left is as small as the noise, but not as random"
-        return Verdict(kind="unknown", effects=(), shifts=moved, reason=reason)
+        return Decision(kind="unknown", effects=(), shifts=moved, reason=reason)
     if final.unsure and not (len(final.effects) == 1 and evident(final, null)):
         name = final.unsure[0]
         reason = f"it differs between the runs; {name} would do, but no size of it is certain"
-        return Verdict(kind="unknown", effects=(), shifts=moved, reason=reason)
+        return Decision(kind="unknown", effects=(), shifts=moved, reason=reason)
     if final.effects and (adequate(final, null) or not model.reaches_noise):
-        return Verdict(kind="effect", effects=final.effects, shifts=moved, reason="")
+        return Decision(kind="effect", effects=final.effects, shifts=moved, reason="")
     moved = shifts(model, null)
     if not final.effects and null.chi_squared <= NOISE_ONLY:
         kind: Kind = "parameter" if any(shift.sure for shift in moved) else "none"
-        return Verdict(kind=kind, effects=(), shifts=moved, reason="")
-    return Verdict(
+        return Decision(kind=kind, effects=(), shifts=moved, reason="")
+    return Decision(
         kind="unknown",
         effects=(),
         shifts=moved,
@@ -122,82 +119,3 @@ def _structured(explained: Explanation) -> bool:
     small = adequate(final, null) if final.effects else null.chi_squared <= NOISE_ONLY
     gained = null.cost - final.cost + sum(one.evidence for one in explained.chance)
     return small and final.structure > max(STRUCTURED, gained)
-
-
-def statement(
-    verdict: Verdict,
-    candidates: Mapping[str, Candidate],
-    closed: float | None,
-    place: str | None,
-    *,
-    terms: Mapping[str, Sequence[Mapping[str, Any]]] | None = None,
-    rest: Rest | None = None,
-) -> str:
-    """The verdict in one sentence.
-
-    terms : by effect, what the field knows it by
-    rest : of a machine in outline, of which more than the noise is left
-    """
-    if verdict.kind == "effect":
-        named = [_named(name, candidates[name], terms or {}) for name in verdict.effects]
-        share = "" if closed is None else f"the held-out gap closes by {percent(closed)}"
-        if rest is not None:
-            share = f"{shrinks(rest)}; {lies(rest)}"
-        them = "it" if len(verdict.effects) == 1 else "them"
-        more = f"; with {them} {share}" if share else ""
-        return f"The machine has what the model lacks: {' and '.join(named)}{more}."
-    if verdict.kind == "parameter":
-        first = verdict.shifts[0]
-        change = 100.0 * (first.estimated / first.nominal - 1.0)
-        others = len(verdict.shifts) - 1
-        more = "" if others == 0 else f" and {others} other parameters"
-        return (
-            f"The equations hold with other values: {first.name} is {change:+.1f} %{more}; "
-            "no unmodelled effect is needed."
-        )
-    if verdict.kind == "none":
-        return "The logs show no gap beyond the noise of the sensors."
-    where = "" if place is None else f" It lies in the {place.replace('_', ' ')}."
-    where = where if rest is None else f" Of the held-out {rest.channel}, {lies(rest)}."
-    return f"There is a gap whose cause is unknown: {verdict.reason}.{where}"
-
-
-def _named(
-    name: str, candidate: Candidate, terms: Mapping[str, Sequence[Mapping[str, Any]]]
-) -> str:
-    """An effect, what it is, and its terms."""
-    title = f"{candidate.title[:1].lower()}{candidate.title[1:]}"
-    values = ", ".join(
-        f"{number(t['value'], 4)} {t['unit']} {t['name']}" for t in terms.get(name, ())
-    )
-    chance = ", by chance, so that no simulation follows it" if candidate.untold else ""
-    return f"{name} ({title}{chance}{': ' if values else ''}{values})"
-
-
-def as_answer(
-    verdict: Verdict,
-    *,
-    classes: Sequence[Sequence[str]],
-    confidence: float | None,
-    sentence: str,
-    next_experiment: str | None,
-) -> dict[str, Any]:
-    """The part `verdict` of the answer."""
-    return {
-        "kind": verdict.kind,
-        "effects": list(verdict.effects),
-        "class": [list(names) for names in classes] if verdict.kind == "effect" else [],
-        "parameters": [
-            {
-                "name": s.name,
-                "nominal": s.nominal,
-                "estimated": s.estimated,
-                "standard_error": s.standard_error,
-                "unit": s.unit,
-            }
-            for s in verdict.shifts
-        ],
-        "confidence": confidence,
-        "statement": sentence,
-        "next_experiment": next_experiment,
-    }

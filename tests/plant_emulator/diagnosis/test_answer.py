@@ -9,8 +9,10 @@ from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation
 from plant_emulator.diagnosis.machine import Run
 from plant_emulator.diagnosis.prediction.gap import Prediction, gap
-from plant_emulator.diagnosis.report.answer import noise_floor, ranged, rank, ranked, traces
+from plant_emulator.diagnosis.prediction.trace import traces
 from plant_emulator.diagnosis.report.html_traces import path, rms
+from plant_emulator.diagnosis.report.ranking import rank, ranked
+from plant_emulator.diagnosis.report.shrinkage import noise_floor, ranged
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.test_contest import effect
 
@@ -57,9 +59,9 @@ def test_standard_error_of_a_size_holds_that_of_its_law(size: float, law: float)
     sized = {"values": {"cube_size": size}, "errors": {"cube_size": 0.3}}
     found = replace(found, final=replace(found.final, **sized))
     (one,) = found.contenders
-    row = rank(one, found, found.named, effect("cube"), None, {"cube_size": 0.5})
-    (told,) = row["parameters"]
-    assert told["standard_error"] == pytest.approx((0.3**2 + law**2) ** 0.5)
+    row = rank(one, found, found.named, effect("cube"), law_errors={"cube_size": 0.5})
+    (told,) = row.parameters
+    assert told.standard_error == pytest.approx((0.3**2 + law**2) ** 0.5)
 
 
 def test_effects_of_no_account_beyond_a_few_are_not_ranked() -> None:

@@ -304,9 +304,9 @@ def test_two_machines_are_told_and_no_effect_is_named() -> None:
     """80 kg, and 20 kg of which each log alone agrees with the equations."""
     lighter = truth.log(lambda _q, _v, a: -60.0 * a, phase=0.7, seed=2)
     recipe = AxisRecipe((truth.log(), lighter), fitted=(0, 1))
-    found = Diagnose(Here(), recipe, plan_of(2, 2), settings={}).diagnose().answer["verdict"]
-    assert (found["kind"], found["effects"]) == ("unknown", [])
+    found = Diagnose(Here(), recipe, plan_of(2, 2), settings={}).diagnose().answer.verdict
+    assert (found.kind, found.effects) == ("unknown", ())
     masses = r"inertia is (\S+) .* kg in axis 1 and (\S+) .* kg in axis 2"
-    told = re.search(masses, found["statement"])
+    told = re.search(masses, found.statement)
     assert told is not None
     assert [float(mass) for mass in told.groups()] == pytest.approx([80.0, 20.0], abs=0.1)

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
+from plant_emulator.diagnosis.answer import Location, Undetectable
 from plant_emulator.diagnosis.execution.pool import Here
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.elsewhere import (
@@ -24,7 +25,7 @@ from plant_emulator.diagnosis.fitting.looks import glance, glance_far, look
 from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
 from plant_emulator.diagnosis.fitting.signature import signature
 from plant_emulator.diagnosis.machine import Candidate, Run
-from plant_emulator.diagnosis.report.answer import undetectable
+from plant_emulator.diagnosis.report.ranking import undetectable
 from plant_emulator.diagnosis.selection import rounds as engine
 from plant_emulator.diagnosis.selection.contenders import best_of
 from plant_emulator.diagnosis.selection.drifts import Drifts
@@ -422,9 +423,10 @@ def test_far_from_the_cause_all_start_from_the_nominal_parameters() -> None:
 class Placed(Line):
     """The gap is known to lie where the kink belongs."""
 
-    def located(self, where: FitResult, runs: Sequence[int]) -> Mapping[str, Any]:  # type: ignore[override]
+    def located(self, where: FitResult, runs: Sequence[int]) -> Location:  # type: ignore[override]
         """See `Model`."""
-        return {"subsystems": [{"name": "here", "share": 0.8}, {"name": "there", "share": 0.2}]}
+        shares = {"here": 0.8, "there": 0.2}
+        return Location(subsystem="here", channel=None, phase=None, shares=shares, cells=())
 
 
 def test_effects_of_the_gaps_place_start_from_the_nominal_parameters_before_others() -> None:
@@ -479,7 +481,9 @@ def test_effect_of_chance_course_is_not_tried() -> None:
     found = explained(model)
     assert found.final.effects == ()
     assert [c.point for c in found.contenders] == [None]
-    assert undetectable(found, model.candidates) == [{"effect": "wave", "reason": "its course"}]
+    assert undetectable(found, model.candidates) == (
+        Undetectable(effect="wave", reason="its course"),
+    )
 
 
 class Stuck(Line):

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.diagnose import Diagnose, Diagnosis
+from plant_emulator.diagnosis.diagnose import Diagnose, Findings
 from plant_emulator.diagnosis.execution.pool import Here
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.joint_fit import fit
@@ -40,7 +40,7 @@ class Unplanned(Line):
         return {}
 
 
-def diagnosed(model: Line) -> Diagnosis:
+def diagnosed(model: Line) -> Findings:
     return Diagnose(Here(), Given(model), EACH_IN_TURN, settings={}).diagnose()
 
 
@@ -49,27 +49,27 @@ def test_run_that_alone_shows_the_effect_is_not_predicted_and_named() -> None:
     effect = 4.0 * np.abs(TIME)
     runs = [noisy(line + effect, 1), noisy(line, 2), noisy(line, 3)]
     found = diagnosed(OnlyInTheFirst(runs, ["kink", "wave"]))
-    assert found.answer["verdict"]["effects"] == ["kink"]
-    assert found.answer["logs"]["held_out"] == ["run 1", "run 2"]
+    assert found.answer.verdict.effects == ("kink",)
+    assert found.answer.logs.held_out == ("run 1", "run 2")
     assert found.details.notes == ("run 0: shows no shrinkage; the other runs do not show kink",)
 
 
 def test_effect_that_every_run_shows_is_predicted_in_all() -> None:
     line, effect = 2.0 + 3.0 * TIME, 4.0 * np.abs(TIME)
     found = diagnosed(Line([noisy(line + effect, seed) for seed in (1, 2, 3)], ["kink", "wave"]))
-    assert found.answer["logs"]["held_out"] == ["run 0", "run 1", "run 2"]
+    assert found.answer.logs.held_out == ("run 0", "run 1", "run 2")
     assert found.details.notes == ()
-    assert found.answer["gap"]["closed_fraction"] == pytest.approx(1.0, abs=0.05)
+    assert found.answer.gap.closed_fraction == pytest.approx(1.0, abs=0.05)
 
 
 def test_runs_that_agree_alone_with_other_values_are_told_as_such() -> None:
     slope = 3.0 * TIME
     levels = (2.0, 2.0, 9.0)
     runs = [noisy(level + slope, seed) for seed, level in enumerate(levels, 1)]
-    verdict = diagnosed(Unplanned(runs, ["kink"])).answer["verdict"]
-    assert (verdict["kind"], verdict["effects"]) == ("unknown", [])
+    verdict = diagnosed(Unplanned(runs, ["kink"])).answer.verdict
+    assert (verdict.kind, verdict.effects) == ("unknown", ())
     told = re.search(
-        r": a is (\S+) \+- \S+ in run [01] and (\S+) \+- \S+ in run 2;", verdict["statement"]
+        r": a is (\S+) \+- \S+ in run [01] and (\S+) \+- \S+ in run 2;", verdict.statement
     )
     assert told is not None
     assert [float(value) for value in told.groups()] == pytest.approx([2.0, 9.0], abs=0.5)
@@ -78,9 +78,9 @@ def test_runs_that_agree_alone_with_other_values_are_told_as_such() -> None:
 def test_runs_that_do_not_agree_alone_are_not_told_apart() -> None:
     bow = 40.0 * np.sin(5.0 * TIME)
     runs = [noisy(level + bow, seed) for seed, level in enumerate((2.0, 2.0, 9.0), 1)]
-    verdict = diagnosed(Unplanned(runs, ["kink"])).answer["verdict"]
-    assert verdict["kind"] == "unknown"
-    assert "each log alone" not in verdict["statement"]
+    verdict = diagnosed(Unplanned(runs, ["kink"])).answer.verdict
+    assert verdict.kind == "unknown"
+    assert "each log alone" not in verdict.statement
 
 
 class EachOwnEffect(Line):
@@ -98,10 +98,10 @@ def test_nothing_is_said_to_close_where_every_run_lacks_an_effect_of_another() -
     plan = Plan(fitted=(0, 1), folds=(((1,), (0,)), ((0,), (1,))))
     model = EachOwnEffect(runs, ["kink", "wave"])
     found = Diagnose(Here(), Given(model), plan, settings={}).diagnose()
-    assert set(found.answer["verdict"]["effects"]) == {"kink", "wave"}
-    assert found.answer["logs"]["held_out"] == ["run 0", "run 1"]
-    assert found.answer["gap"]["closed_fraction"] is None
-    assert "closes" not in found.answer["verdict"]["statement"]
+    assert set(found.answer.verdict.effects) == {"kink", "wave"}
+    assert found.answer.logs.held_out == ("run 0", "run 1")
+    assert found.answer.gap.closed_fraction is None
+    assert "closes" not in found.answer.verdict.statement
     assert found.details.notes == (
         "run 0: shows no shrinkage; the other runs do not show kink",
         "run 1: shows no shrinkage; the other runs do not show wave",
@@ -114,18 +114,18 @@ def test_both_of_two_effects_have_their_evidence_beside_the_other_and_their_gain
     """
     y = 2.0 + 3.0 * TIME + 20.0 * np.abs(TIME) + 0.5 * np.sin(20.0 * TIME)
     found = diagnosed(Line([noisy(y, seed) for seed in (1, 2, 3)], ["kink", "wave"]))
-    assert set(found.answer["verdict"]["effects"]) == {"kink", "wave"}
-    entries = {entry["effect"]: entry for entry in found.answer["ranking"]}
-    assert entries["kink"]["evidence"] == pytest.approx(200e3, rel=0.05)
-    assert entries["wave"]["evidence"] == pytest.approx(750.0, rel=0.2)
-    assert entries["wave"]["held_out_gain"] == pytest.approx(0.0, abs=0.05)
-    assert entries["kink"]["held_out_gain"] == pytest.approx(1.0, abs=0.05)
+    assert set(found.answer.verdict.effects) == {"kink", "wave"}
+    entries = {entry.effect: entry for entry in found.answer.ranking}
+    assert entries["kink"].evidence == pytest.approx(200e3, rel=0.05)
+    assert entries["wave"].evidence == pytest.approx(750.0, rel=0.2)
+    assert entries["wave"].held_out_gain == pytest.approx(0.0, abs=0.05)
+    assert entries["kink"].held_out_gain == pytest.approx(1.0, abs=0.05)
 
 
 def test_effect_with_little_evidence_beside_the_best_has_no_gain() -> None:
     line, effect = 2.0 + 3.0 * TIME, 4.0 * np.abs(TIME)
     found = diagnosed(Line([noisy(line + effect, seed) for seed in (1, 2, 3)], ["kink", "wave"]))
-    gains = {entry["effect"]: entry["held_out_gain"] for entry in found.answer["ranking"]}
+    gains = {entry.effect: entry.held_out_gain for entry in found.answer.ranking}
     assert gains["wave"] is None
     assert gains["kink"] == pytest.approx(1.0, abs=0.05)
 

@@ -6,8 +6,9 @@ from dataclasses import replace
 import pytest
 
 from plant_emulator import parameter_sets
+from plant_emulator.diagnosis.answer import Location
 from plant_emulator.diagnosis.fitting.joint_fit import null_fit
-from plant_emulator.diagnosis.localisation.locate import WORTH, Location, among, locate
+from plant_emulator.diagnosis.localisation.locate import WORTH, among, locate
 from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
@@ -61,12 +62,10 @@ def test_the_independent_bench_s_faults_are_placed_where_its_label_says(
     bench_log: Callable[[str], Log], case: str, programs: tuple[int, ...], subsystem: str
 ) -> None:
     found = located(*(bench_log(f"bench_practice/{case}/program{k}") for k in programs))
-    answer = found.as_answer()
-    assert answer["subsystem"] == subsystem
-    shares = {entry["name"]: entry["share"] for entry in answer["subsystems"]}
-    assert sum(shares.values()) == pytest.approx(1.0)
-    assert set(shares) <= SUBSYSTEMS
-    assert {entry["phase"] for entry in answer["map"]} >= {"cruise", "acceleration"}
+    assert found.subsystem == subsystem
+    assert sum(found.shares.values()) == pytest.approx(1.0)
+    assert set(found.shares) <= SUBSYSTEMS
+    assert {cell.bin for cell in found.maps["phase"]} >= {"cruise", "acceleration"}
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from plant_emulator import parameter_sets
+from plant_emulator.diagnosis.answer import Location
 from plant_emulator.diagnosis.design.next_experiment import Advice
 from plant_emulator.diagnosis.execution.pool import Here
 from plant_emulator.diagnosis.fit_result import FitResult
@@ -15,7 +16,7 @@ from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation
 from plant_emulator.diagnosis.fitting.joint_fit import fit, null_fit
 from plant_emulator.diagnosis.machine import Candidate, Run
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
-from plant_emulator.diagnosis.selection.verdict import Verdict
+from plant_emulator.diagnosis.selection.verdict import Decision
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.input_noise import Loud
@@ -168,11 +169,13 @@ def explanation(model: Slope) -> Explanation:
     )
 
 
+ROAD = Location(subsystem="road", channel=None, phase="deceleration", shares={}, cells=())
+
+
 def advice(model: Slope, explained: Explanation, kind: Any, hidden: Sequence[str] = ()) -> Any:
-    found = Verdict(kind=kind, effects=explained.final.effects, shifts=(), reason="")
-    where = {"subsystem": "road", "phase": "deceleration"}
+    found = Decision(kind=kind, effects=explained.final.effects, shifts=(), reason="")
     asked = Advice(Here(), Given(model), model, (0,))
-    return asked.next_experiment(explained, found, where, hidden)
+    return asked.next_experiment(explained, found, ROAD, hidden)
 
 
 def cannot_follow(planned: Array) -> float:
@@ -282,10 +285,10 @@ def test_bench_names_the_program_that_has_what_an_effect_needs():
         converged=True,
     )
     explained = Explanation(null=null, final=null, contenders=(), rivals={}, unconverged="")
-    nothing = Verdict(kind="none", effects=(), shifts=(), reason="")
+    nothing = Decision(kind="none", effects=(), shifts=(), reason="")
     asked = Advice(Here(), recipe, model, (0, 1, 2))
     for hidden, program in (("wheel_slip", "program6"), ("integrator_windup", "program4 (60 s")):
-        told = asked.next_experiment(explained, nothing, {}, [hidden])
+        told = asked.next_experiment(explained, nothing, ROAD, [hidden])
         assert told is not None
         assert told.startswith(f"Drive {program}")
         assert hidden in told

@@ -9,8 +9,10 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
+from plant_emulator.diagnosis.answer import Cell
 from plant_emulator.diagnosis.prediction.trace import Trace
 from plant_emulator.diagnosis.report.details import Step
+from plant_emulator.diagnosis.report.document import from_json
 from plant_emulator.diagnosis.report.html import MOST_RUNS, html
 from plant_emulator.diagnosis.report.html_pictures import waterfall
 from plant_emulator.diagnosis.report.html_style import STYLE
@@ -22,7 +24,7 @@ HOSTILE = "<script>alert(1)</script>\"'&amp;]]>--><svg onload=x>\x1b[31m\x00\ud8
 
 def page(kind, details=answers.DETAILS) -> ET.Element:
     """The report, read by a strict parser."""
-    return ET.fromstring(html(answers.KINDS[kind](), details))
+    return ET.fromstring(html(from_json(answers.KINDS[kind]()), details))
 
 
 def words(element) -> str:
@@ -70,7 +72,7 @@ def test_each_picture_and_each_table_stands_once(kind):
 
 @every_kind
 def test_nothing_is_loaded_from_elsewhere(kind):
-    text = html(answers.KINDS[kind](), answers.DETAILS).lower()
+    text = html(from_json(answers.KINDS[kind]()), answers.DETAILS).lower()
     for reference in ("http:", "https:", "//", "src=", "href", "@import", "url(", "<script"):
         assert reference not in text
     assert "default-src 'none'" in text
@@ -103,7 +105,7 @@ def test_hostile_names_stay_text(kind):
         settings={k + HOSTILE: v + HOSTILE for k, v in answers.DETAILS.settings.items()},
         notes=tuple(n + HOSTILE for n in answers.DETAILS.notes),
     )
-    text = html(answer, details)
+    text = html(from_json(answer), details)
     text.encode("utf-8")
     assert not re.search(r"[\x00-\x09\x0b-\x1f\x7f\u202e]", text)
     elements = Counter(e.tag for e in ET.fromstring(text).iter())
@@ -157,16 +159,15 @@ def test_map_frames_the_named_place_and_no_other():
 
 
 def test_residual_is_mapped_along_every_axis():
-    maps = {
-        "speed": [
-            {"channel": "armature_current", "speed": "0 to 25 rad/s", "gap": 0.5, "noise": 0.25},
-            {"channel": "armature_current", "speed": "25 to 50 rad/s", "gap": 1.0, "noise": 0.25},
-        ],
-        "direction": [
-            {"channel": "shaft_torque", "direction": "backward", "gap": 0.3, "noise": 0.25}
-        ],
-    }
-    found = page("effect", replace(answers.DETAILS, maps=maps))
+    cells = [
+        ("armature_current", "speed", "0 to 25 rad/s", 0.5),
+        ("armature_current", "speed", "25 to 50 rad/s", 1.0),
+        ("shaft_torque", "direction", "backward", 0.3),
+    ]
+    others = [Cell(channel=c, axis=a, bin=b, gap=gap, noise=0.25) for c, a, b, gap in cells]
+    answer = from_json(answers.effect())
+    location = replace(answer.location, cells=(*answer.location.cells, *others))
+    found = ET.fromstring(html(replace(answer, location=location), answers.DETAILS))
     tables = {words(t.find("caption")): t for t in found.iter("table") if t.get("class") == "map"}
     assert len(tables) == 3
     rows = [words(r) for r in tables["The same by the motor's speed."].iter("tr")]
@@ -287,7 +288,7 @@ def test_report_of_many_long_runs_stays_small_and_names_what_it_leaves_out():
         for trace in answers.traces(f"run_{k:02}.csv", samples=5_000)
         for twin in ("", "_again")
     ]
-    text = html(answers.effect(), answers.with_traces(*runs))
+    text = html(from_json(answers.effect()), answers.with_traces(*runs))
     assert len(text.encode()) < 2e6
     left_out = re.search(r"Not drawn, with smaller gaps: ([^<]*)\.<", text)
     assert left_out is not None

@@ -108,9 +108,9 @@ def test_coefficients_by_direction_are_those_of_a_fit_of_both() -> None:
     model = AxisModel([log, axis_truth.log(phase=1.0, seed=2)], fitted=(0,))
     start = {**model.search((0,))[0], "viscous_asymmetry_ratio": 0.1}
     found = fit(model, ("viscous_asymmetry",), (0,), start, [{}])
-    terms = {t["name"]: t for t in in_terms(model, found, (0,))["viscous_asymmetry"]}
+    terms = {t.name: t for t in in_terms(model, found, (0,))["viscous_asymmetry"]}
     for name, truth in {"forwards": 1.2, "backwards": 0.8}.items():
-        value, error = terms[name]["value"], terms[name]["standard_error"]
+        value, error = terms[name].value, terms[name].standard_error
         assert value == pytest.approx(truth * axis_truth.VISCOUS, rel=0.01)
         assert abs(value - truth * axis_truth.VISCOUS) < 4.0 * error
         # Of the mean of both and of half their difference, neither alone.

@@ -2,9 +2,15 @@
 
 import pytest
 
-from plant_emulator.diagnosis.report.terminal import lines
+from plant_emulator.diagnosis.report import terminal
+from plant_emulator.diagnosis.report.document import from_json
 from plant_emulator.diagnosis.wording import number, percent, with_error
 from tests.plant_emulator.diagnosis import answers
+
+
+def lines(answer):
+    return terminal.lines(from_json(answer))
+
 
 every_kind = pytest.mark.parametrize("kind", answers.KINDS)
 

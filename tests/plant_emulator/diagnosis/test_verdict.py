@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 
 from plant_emulator.diagnosis.fitting.joint_fit import null_fit
-from plant_emulator.diagnosis.selection.verdict import Verdict, decide, shifts
+from plant_emulator.diagnosis.selection.verdict import Decision, decide, shifts
 from tests.plant_emulator.diagnosis.test_contest import TIME, Line, explained, linear, noisy
 
 LINE = 2.0 + 3.0 * TIME
 SAMPLE = np.arange(len(TIME))
 
 
-def verdict(model: Line) -> Verdict:
+def verdict(model: Line) -> Decision:
     return decide(model, explained(model))
 
 

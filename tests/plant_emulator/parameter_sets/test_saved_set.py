@@ -9,21 +9,23 @@ import numpy as np
 import pytest
 
 from plant_emulator import effects
-from plant_emulator.diagnosis.diagnose import Diagnosis
+from plant_emulator.diagnosis.diagnose import Findings
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.joint_fit import null_fit
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
+from plant_emulator.diagnosis.report.document import from_json
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation.sensor_noise import SENSORS, noisy
 from plant_emulator.workflows.diagnosis import parameter_set
 from plant_emulator.workflows.simulation import followed, simulated
+from tests.plant_emulator.diagnosis import answers
 
 BenchLog = Callable[[str], Log]
 
 
-def diagnosis(name: str, **states: tuple[float, ...]) -> Diagnosis:
+def diagnosis(name: str, **states: tuple[float, ...]) -> Findings:
     """A diagnosis that names an effect, with these values of its states by run."""
     plausible = effects.load(name).plausible()
     runs = zip(*states.values(), strict=True)
@@ -32,9 +34,9 @@ def diagnosis(name: str, **states: tuple[float, ...]) -> Diagnosis:
         states=tuple({f"{name}_{k}": v for k, v in zip(states, run, strict=True)} for run in runs),
         cost=0.0, squares=0.0, samples=1, share=1.0, errors={}, converged=True,
     )  # fmt: skip
-    verdict = {"effects": [name], "statement": ""}
-    return Diagnosis(
-        answer={"verdict": verdict, "logs": {"estimation": []}},
+    answer = from_json(answers.effect())
+    return Findings(
+        answer=replace(answer, verdict=replace(answer.verdict, effects=(name,))),
         details=cast("Any", None),
         final=final,
         fixed={name: {k: v for k, v in plausible.items() if k not in states}},

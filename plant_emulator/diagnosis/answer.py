@@ -1,0 +1,174 @@
+"""The answer of a diagnosis as records; `report.document` writes and reads them as JSON."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+Kind = Literal["effect", "parameter", "none", "unknown"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Logs:
+    """Names of the logs whose runs were fitted, and of those whose runs were held out."""
+
+    estimation: tuple[str, ...]
+    held_out: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
+    """An estimated value and its standard error [unit]."""
+
+    name: str
+    value: float
+    standard_error: float
+    unit: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterShift:
+    """A parameter that lies more than 3 standard errors from its nominal value.
+
+    nominal, estimated, standard_error : [unit]
+    """
+
+    name: str
+    nominal: float
+    estimated: float
+    standard_error: float
+    unit: str
+
+    @property
+    def quantity(self) -> Quantity:
+        """The estimated value."""
+        return Quantity(
+            name=self.name,
+            value=self.estimated,
+            standard_error=self.standard_error,
+            unit=self.unit,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """What causes the gap.
+
+    effects : the accepted effects
+    classes : for each of them, the effects that these logs cannot tell from it, itself first
+    parameters : the parameters that shifted
+    confidence : share of right answers among trial cases with this evidence; None: not known
+    statement : the verdict in one sentence
+    next_experiment : the run that would decide what is open; None: nothing is open
+    """
+
+    kind: Kind
+    effects: tuple[str, ...]
+    classes: tuple[tuple[str, ...], ...]
+    parameters: tuple[ParameterShift, ...]
+    confidence: float | None
+    statement: str
+    next_experiment: str | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell:
+    """The gap of a channel within one bin of an axis, and the noise of its sensor [SI].
+
+    axis : phase, speed, load, direction, frequency or time
+    gap : rms of measured minus simulated, without effects
+    samples : how many samples the rms is taken over; 0: not known
+    """
+
+    channel: str
+    axis: str
+    bin: str
+    gap: float
+    noise: float
+    samples: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Location:
+    """Where the gap lies.
+
+    subsystem : None: there is no gap
+    channel, phase : where the residual is largest over its noise; None: not known
+    shares : each subsystem's share of the gap, the largest first, sum 1
+    cells : the residual map along all axes; empty: the machine has no blocks to tell apart
+    gain : of log probability, by unknown laws in the blocks that hold the gap; None: not asked
+    """
+
+    subsystem: str | None
+    channel: str | None
+    phase: str | None
+    shares: Mapping[str, float]
+    cells: tuple[Cell, ...]
+    gain: float | None = None
+
+    @property
+    def maps(self) -> dict[str, tuple[Cell, ...]]:
+        """Cells of the residual map by axis."""
+        axes = dict.fromkeys(cell.axis for cell in self.cells)
+        return {axis: tuple(c for c in self.cells if c.axis == axis) for axis in axes}
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeldOutGap:
+    """The gap on held-out runs: NRMSD by channel [1], that is rms over measured range.
+
+    nominal : with the parameter set as given
+    recalibrated : with the same equations and re-estimated parameters
+    explained : with the accepted effects and re-estimated parameters
+    noise_floor : of the noise alone
+    closed_fraction : share of the gap above the noise that the verdict closes; None: not defined
+    closed_fraction_ci95 : its 95 % interval
+    """
+
+    nominal: Mapping[str, float]
+    recalibrated: Mapping[str, float]
+    explained: Mapping[str, float]
+    noise_floor: Mapping[str, float]
+    closed_fraction: float | None
+    closed_fraction_ci95: tuple[float, float] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RankedEffect:
+    """An effect that was tested.
+
+    evidence : weighed fall of the cost that it brings
+    held_out_gain : closed fraction with this effect alone; None: not predicted
+    parameters : its sizes and shapes
+    accepted : whether the verdict names it
+    """
+
+    effect: str
+    subsystem: str
+    evidence: float
+    held_out_gain: float | None
+    parameters: tuple[Quantity, ...]
+    accepted: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Undetectable:
+    """An effect that these logs could not show at its plausible size, and why."""
+
+    effect: str
+    reason: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """The whole answer: the verdict, and what it rests on; `ranking`: the best effect first."""
+
+    logs: Logs
+    verdict: Verdict
+    location: Location
+    gap: HeldOutGap
+    ranking: tuple[RankedEffect, ...]
+    undetectable: tuple[Undetectable, ...]

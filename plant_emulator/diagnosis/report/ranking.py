@@ -1,0 +1,112 @@
+"""The effects of an answer: those ranked by evidence, and those that the logs cannot show."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import hypot
+from typing import TYPE_CHECKING
+
+from plant_emulator.diagnosis.answer import Quantity, RankedEffect, Undetectable
+from plant_emulator.diagnosis.calibration.model_form_error import scale
+from plant_emulator.diagnosis.fitting.evidence import DETECTABLE, THRESHOLD
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation
+    from plant_emulator.diagnosis.machine import Candidate
+
+# Effects of no account that a ranking still shows.
+SHOWN = 5
+
+
+def ranked(explained: Explanation) -> list[Contender]:
+    """Effects with evidence or accepted, and a few of those without, the best first.
+
+    What is needed beside another effect may have little evidence alone.
+    """
+    order = sorted(explained.contenders, key=explained.evidence, reverse=True)
+    counting = [c for c in order if explained.evidence(c) > THRESHOLD]
+    shown = max(SHOWN, len(counting))
+    accepted = [c for c in order[shown:] if c.effect in explained.named]
+    return [*order[:shown], *accepted]
+
+
+def with_chance(explained: Explanation) -> FitResult:
+    """The final fit with the sizes and shapes of effects whose course is chance."""
+    values: dict[str, float] = {}
+    for one in explained.chance:
+        values |= {one.name: one.size, **one.shape}
+    errors = {one.name: one.error for one in explained.chance}
+    final = explained.final
+    return replace(final, values={**final.values, **values}, errors={**final.errors, **errors})
+
+
+def rank(
+    contender: Contender,
+    explained: Explanation,
+    accepted: Sequence[str],
+    candidate: Candidate,
+    *,
+    gain: float | None = None,
+    law_errors: Mapping[str, float] | None = None,
+) -> RankedEffect:
+    """One effect of the ranking; sizes and errors of an accepted effect from the final fit.
+
+    gain : closed fraction with this effect alone; None: not predicted
+    law_errors : standard errors by name that other laws of an effect make, see `law_error`
+    """
+    name = contender.effect
+    point = with_chance(explained) if name in accepted else contender.point
+    sizes = () if point is None else _sizes(point, candidate, law_errors or {})
+    return RankedEffect(
+        effect=name,
+        subsystem=candidate.subsystem,
+        evidence=explained.evidence(contender),
+        held_out_gain=gain,
+        parameters=tuple(sizes),
+        accepted=name in accepted,
+    )
+
+
+def _sizes(
+    point: FitResult, candidate: Candidate, law_errors: Mapping[str, float]
+) -> Iterator[Quantity]:
+    """Sizes and shapes of an effect in a fit; their errors hold those of the effect's law."""
+    usual = {u.name: abs(u.start - candidate.neutral[u.name]) for u in candidate.sizes}
+    # Of an effect of chance course the size is all that is estimated.
+    shapes = () if candidate.untold else candidate.shapes
+    for name in (u.name for u in (*candidate.sizes, *shapes)):
+        value = point.values[name]
+        law_error = law_errors.get(name, 0.0) * scale(value, usual.get(name, 0.0))
+        yield Quantity(
+            name=name.removeprefix(f"{candidate.name}_"),
+            value=value,
+            standard_error=hypot(point.errors[name], law_error),
+            unit=candidate.units[name],
+        )
+
+
+def undetectable(
+    explained: Explanation, candidates: Mapping[str, Candidate]
+) -> tuple[Undetectable, ...]:
+    """Effects that these logs could not show at their plausible size, with the reason."""
+    return tuple(
+        Undetectable(effect=c.effect, reason=hidden(c, candidates[c.effect]))
+        for c in explained.contenders
+        if c.norm < DETECTABLE
+        and c.effect not in explained.named
+        and explained.evidence(c) <= THRESHOLD
+    )
+
+
+def hidden(contender: Contender, candidate: Candidate) -> str:
+    """Why an effect does not show."""
+    if candidate.untold:
+        return candidate.needs or "its course is chance, and too small here to be seen"
+    if contender.raw < DETECTABLE:
+        reason = "too small in these channels and runs at its plausible size"
+    else:
+        reason = f"drift of {contender.imitated_by} looks the same"
+    return f"{reason}; {candidate.needs}" if candidate.needs else reason

@@ -1,0 +1,110 @@
+"""The verdict of an answer: what was decided, and the sentence that says it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from plant_emulator.diagnosis.answer import ParameterShift, Verdict
+from plant_emulator.diagnosis.prediction.remainder import lies, shrinks
+from plant_emulator.diagnosis.wording import number, percent, spoken
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.diagnosis.answer import Quantity
+    from plant_emulator.diagnosis.machine import Candidate
+    from plant_emulator.diagnosis.prediction.remainder import Rest
+    from plant_emulator.diagnosis.selection.verdict import Decision
+
+    Terms = Mapping[str, Sequence[Quantity]]
+
+
+def verdict(
+    decision: Decision,
+    *,
+    classes: Sequence[Sequence[str]],
+    confidence: float | None,
+    sentence: str,
+    next_experiment: str | None,
+) -> Verdict:
+    """The verdict of the answer; classes : see `Verdict`, of the accepted effects."""
+    return Verdict(
+        kind=decision.kind,
+        effects=decision.effects,
+        classes=tuple(map(tuple, classes)) if decision.kind == "effect" else (),
+        parameters=tuple(
+            ParameterShift(
+                name=shift.name,
+                nominal=shift.nominal,
+                estimated=shift.estimated,
+                standard_error=shift.standard_error,
+                unit=shift.unit,
+            )
+            for shift in decision.shifts
+        ),
+        confidence=confidence,
+        statement=sentence,
+        next_experiment=next_experiment,
+    )
+
+
+def statement(
+    decision: Decision,
+    candidates: Mapping[str, Candidate],
+    closed: float | None,
+    place: str | None,
+    *,
+    terms: Terms | None = None,
+    rest: Rest | None = None,
+) -> str:
+    """The verdict in one sentence.
+
+    closed : closed fraction of the held-out gap; place : subsystem that the gap lies in
+    terms : by effect, the quantities that the field knows it by
+    rest : what a machine modelled in outline leaves beyond the noise
+    """
+    match decision.kind:
+        case "effect":
+            return _effects(decision, candidates, closed, terms or {}, rest)
+        case "parameter":
+            return _other_values(decision)
+        case "none":
+            return "The logs show no gap beyond the noise of the sensors."
+    where = "" if place is None else f" It lies in the {spoken(place)}."
+    where = where if rest is None else f" Of the held-out {rest.channel}, {lies(rest)}."
+    return f"There is a gap whose cause is unknown: {decision.reason}.{where}"
+
+
+def _effects(
+    decision: Decision,
+    candidates: Mapping[str, Candidate],
+    closed: float | None,
+    terms: Terms,
+    rest: Rest | None,
+) -> str:
+    named = [_named(name, candidates[name], terms.get(name, ())) for name in decision.effects]
+    share = "" if closed is None else f"the held-out gap closes by {percent(closed)}"
+    if rest is not None:
+        share = f"{shrinks(rest)}; {lies(rest)}"
+    them = "it" if len(decision.effects) == 1 else "them"
+    more = f"; with {them} {share}" if share else ""
+    return f"The machine has what the model lacks: {' and '.join(named)}{more}."
+
+
+def _named(name: str, candidate: Candidate, terms: Sequence[Quantity]) -> str:
+    """An effect, what it is, and its terms."""
+    title = f"{candidate.title[:1].lower()}{candidate.title[1:]}"
+    values = ", ".join(f"{number(t.value, 4)} {t.unit} {t.name}" for t in terms)
+    chance = ", by chance, so that no simulation follows it" if candidate.untold else ""
+    return f"{name} ({title}{chance}{': ' if values else ''}{values})"
+
+
+def _other_values(decision: Decision) -> str:
+    first = decision.shifts[0]
+    change = 100.0 * (first.estimated / first.nominal - 1.0)
+    others = len(decision.shifts) - 1
+    more = "" if others == 0 else f" and {others} other parameters"
+    return (
+        f"The equations hold with other values: {first.name} is {change:+.1f} %{more}; "
+        "no unmodelled effect is needed."
+    )
