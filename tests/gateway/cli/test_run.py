@@ -98,7 +98,7 @@ def test_sigkill_leaves_a_whole_recording_and_a_drum_that_is_ramped_down(
     until(lambda: emulator.status()["speed_reference"] == 0.0)
     assert emulator.status()["time"] - killed["time"] < ramp + 0.1  # as often as `until` looks
     assert gateway.ended()[0] == -signal.SIGKILL  # the output ends when the recorder does
-    found = gateway.recordings.recording
+    found = gateway.recording
     assert found.state(found.records["state"][-1]) == "RUN"
     assert found.records["measured_plc_time"][-1] == pytest.approx(killed["time"], abs=0.1)
 
@@ -131,7 +131,7 @@ def test_shadow_sends_no_command(emulator: EmulatorProcess, tmp_path: Path) -> N
     code, output = gateway.ended()
     assert code == 0, output
     assert gateway.states() == ["CONNECT", "SHADOW", "OFF"]
-    last = gateway.recordings.recording.records[-2]
+    last = gateway.recording.records[-2]
     assert (last["measured_command_sequence_echo"], last["measured_command_age"]) == (0, 65.535)
     assert last["demand"] == pytest.approx(0.0, abs=1.0)
 
