@@ -22,7 +22,7 @@ from threadpoolctl import threadpool_limits
 
 from plant_emulator import effects, logs, parameter_sets
 from plant_emulator.blind import draw, laws, score
-from plant_emulator.blind.generate import measured, true_logs
+from plant_emulator.blind.generate import measure, simulate_truth
 from plant_emulator.diagnosis.execution.pool import Here, model_of
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
 from plant_emulator.diagnosis.report.ranking import rank
@@ -61,21 +61,18 @@ def sizes(seed: int, only: tuple[str, ...], number: int) -> list[dict[str, Any]]
         return []
     (contender,) = found.contenders
     candidate = model.candidates[hidden.effect]
-    told = {
-        "verdict": {"kind": "effect", "effects": [hidden.effect]},
-        "ranking": [asdict(rank(contender, found, found.named, candidate))],
-    }
-    unsealed = score.Unsealed(case=case, norms={}, answer=told, closed=None)
-    # A size of 0 is no size: the effect was found by its others.
-    return [one for one in score.sizes(unsealed, known) if one["estimated"] != 0.0]
+    sized = rank(contender, found, found.named, candidate).parameters
+    pairs = score.sizes(case.hidden, [hidden.effect], {hidden.effect: sized}, known)
+    # An effect with an estimated size of 0 was found by its other parameters.
+    return [asdict(one) for one in pairs if one.estimated != 0.0]
 
 
 def _recordings(case: Case, nominal: ParameterSet) -> Iterator[Recording]:
     """The logs of a case as a diagnosis reads them."""
     with TemporaryDirectory() as folder:
-        for run, log in enumerate(true_logs(case, nominal)):
+        for run, log in enumerate(simulate_truth(case, nominal)):
             path = f"{folder}/{case.programs[run]}.csv.gz"
-            logs.write(measured(case, log, run), path)
+            logs.write(measure(case, log, run), path)
             yield recording(logs.read(path))
 
 

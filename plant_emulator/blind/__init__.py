@@ -1,1 +1,1 @@
-"""The blind trial: effects are hidden, diagnosed from logs alone, unsealed and scored."""
+"""The blind trial: it hides effects, lets `diagnose` see only logs, unseals and scores."""

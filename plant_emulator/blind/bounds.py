@@ -1,18 +1,22 @@
-"""Bounds of a share that was counted."""
+"""Confidence bounds of a counted share."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-# Each bound fails with this probability.
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+# Probability that a bound does not hold.
 TAIL = 0.05
 
 
 def clopper_pearson(hits: int, of: int, tail: float = TAIL) -> tuple[float, float]:
-    """Lower and upper bound of a share, each wrong with probability `tail` at most.
+    """Lower and upper bound of a probability after `hits` of `of` trials [1].
 
-    Quantiles of beta distributions: C. J. Clopper, E. S. Pearson, Biometrika 26 (1934) 404.
+    Each bound fails with probability `tail` at most. The bounds are quantiles of beta
+    distributions: C. J. Clopper, E. S. Pearson, Biometrika 26 (1934) 404.
     """
     from scipy.stats import beta
 
@@ -23,12 +27,12 @@ def clopper_pearson(hits: int, of: int, tail: float = TAIL) -> tuple[float, floa
 
 @dataclass(frozen=True)
 class Share:
-    """So many of so many."""
+    """A count of hits among `of` cases."""
 
     hits: int
     of: int
 
-    def as_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """The share with its one-sided 95 % bounds."""
         lower, upper = clopper_pearson(self.hits, self.of)
         share = self.hits / self.of if self.of else None
@@ -45,6 +49,6 @@ class Share:
         return f"{text:10} {share:5.1f} %   above {100 * lower:5.1f} %, below {100 * upper:5.1f} %"
 
 
-def share_of(flags: list[bool]) -> Share:
-    """How many are true."""
+def share_of(flags: Sequence[bool]) -> Share:
+    """Share of the flags that are true."""
     return Share(sum(flags), len(flags))

@@ -1,4 +1,4 @@
-"""What one case of the trial hides, as plain data."""
+"""The truth of one case of the trial, as plain data."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ Kind = Literal["none", "drift", "effect", "two", "outside"]
 class Hidden:
     """A hidden effect.
 
-    effect : name in the library; of an effect outside the library the law's own
-    law : what it was simulated with: of `blind.laws`, or the library's where there is no other
-    values : of the law, by parameter [SI]; states : of every run, by parameter
+    effect : name in the library; outside the library the name of the law
+    law : name of the law that simulates the effect, in `blind.laws` or in the library
+    values : parameters of the law [SI]
+    states : parameters of the law that belong to one run, one mapping per run [SI]
     """
 
     effect: str
@@ -28,17 +29,19 @@ class Hidden:
     states: tuple[Mapping[str, float], ...]
 
     def in_run(self, run: int) -> dict[str, float]:
-        """All values of the law in one run [SI]."""
+        """All parameters of the law in one run [SI]."""
         return {**self.values, **self.states[run]}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """One bench with its runs.
+    """The truth of one bench and its runs.
 
-    parameters : true values of what drifts, by name [SI]
-    gaps : position in the gap at the start of every run, -1 to 1
-    noise : seed of the sensors' noise
+    kind : "none": the nominal bench; "drift": parameters deviate; "effect": one effect of the
+        library; "two": two of them; "outside": one effect outside the library
+    parameters : true values of the parameters that deviate [SI]
+    gaps : backlash gap position at the start of every run, -1 to 1
+    noise : seed of the sensor noise
     """
 
     number: int
@@ -57,13 +60,13 @@ class Case:
         names = "+".join(sorted(hidden.effect for hidden in self.hidden))
         return f"outside: {names}" if self.kind == "outside" else names
 
-    def as_json(self) -> dict[str, Any]:
-        """The case as JSON takes it."""
+    def to_json(self) -> dict[str, Any]:
+        """The case as JSON types."""
         return asdict(self)
 
 
 def case_of(data: Mapping[str, Any]) -> Case:
-    """The case that `as_json` has written."""
+    """The case from the data of `Case.to_json`."""
     hidden = tuple(Hidden(**{**h, "states": tuple(h["states"])}) for h in data["hidden"])
     tuples = {"programs": tuple(data["programs"]), "gaps": tuple(data["gaps"])}
     return Case(**{**data, **tuples, "hidden": hidden})

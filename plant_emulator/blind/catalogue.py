@@ -1,7 +1,7 @@
-"""What may be hidden: every effect of the library with the law it is simulated by, and some more.
+"""The effects that a case may hide: every effect of the library, and some outside it.
 
-The law is another one than the library's wherever nature offers one. A sensor's constant or
-proportional error and the weight of an imbalance have one law only; there the library's is used.
+Each effect of the library is simulated with another law, if physics offers one. A sensor's constant
+or proportional error and the weight of an imbalance have only one law, that of the library.
 """
 
 from __future__ import annotations
@@ -17,11 +17,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
-    """An effect that may be hidden.
+    """An effect that a case may hide.
 
-    programs : that it needs besides programs 1 to 3
-    ranges : of values that are not drawn around the plausible one [SI]
-    starts : of the values of a run's own [SI]
+    effect : name of the effect; law : name of the law that simulates it
+    programs : programs that the effect needs in addition to programs 1 to 3
+    ranges : of the parameters that are not drawn around their plausible value [SI]
+    starts : ranges of the parameters that belong to one run [SI]
     """
 
     effect: str
@@ -31,14 +32,14 @@ class Entry:
     starts: Mapping[str, Range] = field(default_factory=dict)
 
 
-# Temperature that the nominal friction belongs to: a gear that has run for a while [K].
+# Oil temperature to which the nominal friction belongs: a gear that has run for a while [K].
 WARM_OIL = {"nominal_temperature": (303.15, 323.15)}
 ANY_ANGLE = (-3.14, 3.14)
-# A bench in a hall: its oil and its shell at the start of a run [K].
+# Temperatures of oil and shell at the start of a run: a bench in a hall [K].
 OIL = {"start_temperature": (287.0, 306.0), "shell_temperature": (288.0, 303.0)}
 
 INSIDE = (
-    # A slope that the steepest ramps of the programs exceed: one that they keep is not there.
+    # The steepest ramps of the programs exceed these slopes. A steeper limit would have no effect.
     Entry(
         effect="reference_ramp_limit",
         law="soft_landing_ramp",
@@ -46,14 +47,14 @@ INSIDE = (
     ),
     Entry(effect="reference_filter", law="three_lag_reference"),
     Entry(effect="delay_jitter", law="two_valued_delay"),
-    # A limit that the programs reach, and with which the bench still goes.
+    # The programs reach these limits, and the bench still moves with them.
     Entry(
         effect="current_limit",
         law="knee_current_limit",
         programs=("program4",),
         ranges={"reduction": (44.0, 54.0)},
     ),
-    # Beyond it a braking current takes away the voltage that limits it, and runs away.
+    # Above this range a braking current lowers the voltage that limits it, and grows without bound.
     Entry(
         effect="voltage_sag",
         law="progressive_voltage_sag",

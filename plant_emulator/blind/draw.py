@@ -1,8 +1,8 @@
-"""Draws the cases of a trial: the same number of the same seed is always the same case.
+"""Draws the cases of a trial. Seed and number determine a case completely.
 
-Kinds come in shuffled decks of twenty: five without an effect (two of them without any drift), ten
-with one effect, two with two, three with one outside the library. Single and outside effects go
-round, so that each comes up as often as any other.
+The kinds come in shuffled decks of twenty cases. Five have no effect, two of them with nominal
+parameters. Ten have one effect of the library, two have two, three have one outside the library.
+Effects are dealt round by round, so each comes up equally often.
 """
 
 from __future__ import annotations
@@ -23,18 +23,19 @@ if TYPE_CHECKING:
 
 DECK: dict[Kind, int] = {"none": 2, "drift": 3, "effect": 10, "two": 2, "outside": 3}
 KINDS = [kind for kind in get_args(Kind) for _ in range(DECK[kind])]
-# Sizes over the plausible one; shape constants over theirs.
+# Ranges of a size and of a shape constant, each over its plausible value.
 SIZES = (0.5, 2.0)
 SHAPES = (0.75, 1.25)
-# A parameter drifts by its prior deviation, but not by more than so many [deviations].
+# Largest parameter deviation [prior standard deviations].
 FURTHEST = 2.5
 PROGRAMS = ("program1", "program2", "program3")
-# Runs that some benches have besides, whatever they hide: the programs must not tell the effect.
+# Probability of an additional program, whatever a case hides: the programs must not betray the
+# effect.
 FURTHER = {"program4": 0.05, "program6": 0.05}
 
 
 def kinds(seed: int, count: int) -> list[Kind]:
-    """Kinds of the first cases of a seed."""
+    """Kinds of the first `count` cases of a seed."""
     found: list[Kind] = []
     for deck in range(-(-count // len(KINDS))):
         order = np.random.default_rng([seed, 1, deck]).permutation(len(KINDS))
@@ -43,16 +44,17 @@ def kinds(seed: int, count: int) -> list[Kind]:
 
 
 def _in_turn(entries: Sequence[Entry], seed: int, stream: int, index: int) -> Entry:
-    """The entry that comes up as number `index` when all go round in shuffled order."""
+    """Entry number `index` of the entries dealt round by round, each round in shuffled order."""
     turn, place = divmod(index, len(entries))
     order = np.random.default_rng([seed, stream, turn]).permutation(len(entries))
     return entries[int(order[place])]
 
 
-def draw(seed: int, number: int, parameters: ParameterSet, known: Mapping[str, Effect]) -> Case:
-    """Case `number`, from 0, of a seed.
+def draw(seed: int, number: int, parameters: ParameterSet, effects: Mapping[str, Effect]) -> Case:
+    """Draw case `number` of a seed; the first number is 0.
 
-    known : the library's effects and the trial's own laws by name
+    parameters : the nominal set
+    effects : the library's effects and the trial's own laws by name
     """
     before = kinds(seed, number + 1)
     kind = before.pop()
@@ -64,46 +66,47 @@ def draw(seed: int, number: int, parameters: ParameterSet, known: Mapping[str, E
         entries = [_in_turn(OUTSIDE, seed, 3, before.count(kind))]
     elif kind == "two":
         entries = [INSIDE[k] for k in random.choice(len(INSIDE), 2, replace=False)]
-    programs = _programs(entries, random)
+    programs = _draw_programs(entries, random)
     return Case(
         number=number,
         kind=kind,
         programs=programs,
         hidden=tuple(
-            _hidden(entry, known, len(programs), kind == "outside", random) for entry in entries
+            _hide(entry, effects, len(programs), kind == "outside", random) for entry in entries
         ),
-        parameters={} if kind == "none" else _drift(parameters, random),
+        parameters={} if kind == "none" else _deviate(parameters, random),
         gaps=tuple(float(gap) for gap in random.uniform(-1.0, 1.0, len(programs))),
         noise=int(random.integers(1 << 31)),
     )
 
 
-def _programs(entries: Sequence[Entry], random: np.random.Generator) -> tuple[str, ...]:
+def _draw_programs(entries: Sequence[Entry], random: np.random.Generator) -> tuple[str, ...]:
     needed = {name for entry in entries for name in entry.programs}
     drawn = {name for name, share in FURTHER.items() if random.random() < share}
     return (*PROGRAMS, *sorted(needed | drawn))
 
 
-def _drift(parameters: ParameterSet, random: np.random.Generator) -> dict[str, float]:
-    """Values of everything that drifts [SI]."""
-    drifting = [p for p in parameters if p.kind == "estimated" and p.std is not None]
-    steps = np.clip(random.standard_normal(len(drifting)), -FURTHEST, FURTHEST)
+def _deviate(parameters: ParameterSet, random: np.random.Generator) -> dict[str, float]:
+    """Draw values of all estimated parameters from their priors [SI]."""
+    deviating = [p for p in parameters if p.kind == "estimated" and p.std is not None]
+    steps = np.clip(random.standard_normal(len(deviating)), -FURTHEST, FURTHEST)
     return {
-        p.name: p.value + float(z) * (p.std or 0.0) for p, z in zip(drifting, steps, strict=True)
+        p.name: p.value + float(z) * (p.std or 0.0) for p, z in zip(deviating, steps, strict=True)
     }
 
 
-def _hidden(
+def _hide(
     entry: Entry,
-    known: Mapping[str, Effect],
+    effects: Mapping[str, Effect],
     runs: int,
     outside: bool,
     random: np.random.Generator,
 ) -> Hidden:
-    law = known[entry.law]
+    """Draw the parameters of a hidden effect."""
+    law = effects[entry.law]
     declared = law.parameters
     values = {
-        key: _value(one, entry.ranges.get(key), random)
+        key: _draw_value(one, entry.ranges.get(key), random)
         for key, one in declared.items()
         if not one.per_run
     }
@@ -125,12 +128,15 @@ def _hidden(
     )
 
 
-def _value(
-    declared: EffectParameter, drawn_from: Range | None, random: np.random.Generator
+def _draw_value(
+    declared: EffectParameter, given: Range | None, random: np.random.Generator
 ) -> float:
-    """A size around the plausible one, evenly on a logarithmic scale, or a shape constant [SI]."""
-    if drawn_from is not None:
-        drawn = random.uniform(*drawn_from)
+    """Draw a size (log-uniform around the plausible one) or a shape constant (uniform) [SI].
+
+    given : range to draw from uniformly instead
+    """
+    if given is not None:
+        drawn = random.uniform(*given)
     elif declared.neutral == declared.plausible:
         drawn = declared.plausible * random.uniform(*SHAPES)
     else:

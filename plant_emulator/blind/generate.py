@@ -1,4 +1,4 @@
-"""From a case to its logs, by fixed fine steps, with the sensors' noise and quantisation."""
+"""Simulates the logs of a case with small fixed steps, and adds sensor noise and quantisation."""
 
 from __future__ import annotations
 
@@ -19,40 +19,44 @@ if TYPE_CHECKING:
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.simulation.simulate import Run
 
-# A fiftieth of a sample [s]; the diagnosis simulates with adapted steps up to a whole one. Halved
-# so many times at most where a stage of the truth does not settle.
-STEP, HALVED = 2e-4, 3
-# The bench of the thesis does not log it.
+# [s] A fiftieth of a sample. The diagnosis uses adaptive steps of up to a whole sample. The step is
+# halved at most HALVINGS times if the solver does not converge.
+STEP, HALVINGS = 2e-4, 3
+# The bench of the thesis does not log the armature voltage.
 NOT_LOGGED = "armature_voltage"
 
 
-def true_logs(case: Case, parameters: ParameterSet) -> list[Log]:
-    """The noise-free log of every run; parameters : the nominal set."""
-    return [_true_log(case, run, parameters) for run in range(len(case.programs))]
+def simulate_truth(case: Case, parameters: ParameterSet) -> list[Log]:
+    """Simulate the noise-free log of every run.
+
+    parameters : the nominal set
+    Raises UnsettledError if the solver does not converge with the smallest step.
+    """
+    return [_simulate_run(case, run, parameters) for run in range(len(case.programs))]
 
 
-def _true_log(case: Case, run: int, parameters: ParameterSet) -> Log:
+def _simulate_run(case: Case, run: int, parameters: ParameterSet) -> Log:
     bench = parameters.with_values(case.parameters)
     effects = {hidden.law: hidden.in_run(run) for hidden in case.hidden}
-    known = program(case.programs[run])
-    if isinstance(known, SpeedProgram):
-        time, reference = known.reference()
-        inputs = run_of(Log(time, {"speed_reference": reference}, known.name))
-        log = _settled(inputs, values_of(bench, effects), case.gaps[run])
+    found = program(case.programs[run])
+    if isinstance(found, SpeedProgram):
+        time, reference = found.reference()
+        inputs = run_of(Log(time, {"speed_reference": reference}, found.name))
+        log = _simulate_converged(inputs, values_of(bench, effects), case.gaps[run])
     else:
-        log = travel(known, bench, effects, gap_position=case.gaps[run])
+        log = travel(found, bench, effects, gap_position=case.gaps[run])
     signals = {name: signal for name, signal in log.signals.items() if name != NOT_LOGGED}
-    return Log(log.time, signals, known.name)
+    return Log(log.time, signals, found.name)
 
 
-def _settled(inputs: Run, values: Mapping[str, float], gap_position: float) -> Log:
-    """The simulation by the largest step that settles; UnsettledError where none does."""
-    for halved in range(HALVED):
+def _simulate_converged(inputs: Run, values: Mapping[str, float], gap_position: float) -> Log:
+    """Simulate with the largest step with which the solver converges."""
+    for halvings in range(HALVINGS):
         with suppress(UnsettledError):
-            return simulate(inputs, values, gap_position=gap_position, step=STEP / 2**halved)
-    return simulate(inputs, values, gap_position=gap_position, step=STEP / 2**HALVED)
+            return simulate(inputs, values, gap_position=gap_position, step=STEP / 2**halvings)
+    return simulate(inputs, values, gap_position=gap_position, step=STEP / 2**HALVINGS)
 
 
-def measured(case: Case, log: Log, run: int) -> Log:
-    """The log as the sensors show it."""
+def measure(case: Case, log: Log, run: int) -> Log:
+    """Add the sensor noise and quantisation of one run to its noise-free log."""
     return noisy(log, case.noise + run)

@@ -1,33 +1,34 @@
-"""Whether an answer is right, and the shares of right answers over a trial."""
+"""Judges whether a diagnosis of a case is right."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import permutations
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from plant_emulator.blind.detectable import DETECTABLE
+from plant_emulator.blind.orthogonal_norm import DETECTABLE
+from plant_emulator.blind.result import CaseResult, HiddenEffect, Size
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.blind.case import Case, Hidden
+    from plant_emulator.diagnosis.answer import Answer, Quantity
     from plant_emulator.effects import Effect
 
-# A class of more names is no answer.
+# A larger class counts as a single name.
 LARGEST_CLASS = 3
 # Half width of a 95 % interval [standard errors].
 INTERVAL = 1.96
 
-Answer = dict[str, Any]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Unsealed:
-    """A case beside its answer.
+    """An unsealed case and its diagnosis.
 
-    norms : of every hidden effect; answer : None where the diagnosis failed
-    closed : the true closed fraction
+    norms : orthogonal norm of every hidden effect by name
+    answer : of the diagnosis; None if it failed
+    closed : true closed fraction of the gap
     """
 
     case: Case
@@ -37,7 +38,7 @@ class Unsealed:
 
     @property
     def wanted(self) -> set[str]:
-        """Hidden effects of the library that can be detected."""
+        """Hidden effects of the library that are detectable."""
         return {
             h.effect
             for h in self.case.hidden
@@ -46,18 +47,18 @@ class Unsealed:
 
     @property
     def detectable(self) -> bool:
-        """Whether anything hidden can be detected."""
+        """Whether any hidden effect is detectable."""
         return any(norm > DETECTABLE for norm in self.norms.values())
 
     @property
     def kind(self) -> str:
-        """The verdict."""
-        return "failed" if self.answer is None else str(self.answer["verdict"]["kind"])
+        """Kind of the verdict, or "failed"."""
+        return "failed" if self.answer is None else self.answer.verdict.kind
 
     @property
-    def named(self) -> list[str]:
-        """Effects in the answer."""
-        return [] if self.answer is None else list(self.answer["verdict"]["effects"])
+    def named(self) -> tuple[str, ...]:
+        """Effects that the verdict names."""
+        return () if self.answer is None else self.answer.verdict.effects
 
     @property
     def column(self) -> str:
@@ -66,28 +67,30 @@ class Unsealed:
 
 
 def classes(unsealed: Unsealed) -> list[set[str]]:
-    """For every effect that is named the class it stands for."""
+    """Class of every named effect: the effects that its name stands for."""
     assert unsealed.answer is not None
-    found = [set(names) for names in unsealed.answer["verdict"]["class"]]
-    pairs = zip(unsealed.named, found, strict=True)
-    return [names if len(names) <= LARGEST_CLASS else {name} for name, names in pairs]
+    pairs = zip(unsealed.named, unsealed.answer.verdict.classes, strict=True)
+    return [set(names) if len(names) <= LARGEST_CLASS else {name} for name, names in pairs]
 
 
-def hit(unsealed: Unsealed) -> bool:
-    """Whether the classes named stand for hidden effects, all detectable ones among them."""
+def is_hit(unsealed: Unsealed) -> bool:
+    """Whether each class holds a hidden effect of its own, and no detectable one is missed."""
     if unsealed.kind != "effect":
         return False
-    stand = classes(unsealed)
+    found = classes(unsealed)
     hidden = [h.effect for h in unsealed.case.hidden]
     return any(
         unsealed.wanted <= set(order)
-        and all(name in names for name, names in zip(order, stand, strict=True))
-        for order in permutations(hidden, len(stand))
+        and all(name in names for name, names in zip(order, found, strict=True))
+        for order in permutations(hidden, len(found))
     )
 
 
-def right(unsealed: Unsealed) -> bool:
-    """Whether the verdict is right; what cannot be detected need not be, but no other be named."""
+def is_right(unsealed: Unsealed) -> bool:
+    """Whether the verdict is right.
+
+    A hidden effect that is not detectable may be missed, but no other effect may be named.
+    """
     kind = unsealed.kind
     match unsealed.case.kind:
         case "none":
@@ -97,113 +100,113 @@ def right(unsealed: Unsealed) -> bool:
         case "outside":
             return kind == "unknown" or (not unsealed.detectable and kind in {"none", "parameter"})
         case _:
-            return hit(unsealed) or (not unsealed.wanted and kind in {"none", "parameter"})
+            return is_hit(unsealed) or (not unsealed.wanted and kind in {"none", "parameter"})
 
 
-def false_alarm(unsealed: Unsealed) -> bool:
-    """Whether a cause is claimed, or a gap without a cause, where only parameters drifted."""
+def is_false_alarm(unsealed: Unsealed) -> bool:
+    """Whether the verdict is an effect or unknown, although the case hides no effect."""
     return unsealed.case.kind in {"none", "drift"} and unsealed.kind in {"effect", "unknown"}
 
 
-def located(unsealed: Unsealed) -> bool:
-    """Whether the place is that of a hidden effect."""
+def is_located(unsealed: Unsealed) -> bool:
+    """Whether the fault location is the subsystem of a hidden effect."""
     if unsealed.answer is None:
         return False
-    place = unsealed.answer["location"]["subsystem"]
-    return place in {h.subsystem for h in unsealed.case.hidden}
+    return unsealed.answer.location.subsystem in {h.subsystem for h in unsealed.case.hidden}
 
 
 def evidence(unsealed: Unsealed) -> float | None:
-    """Evidence of the weakest effect that is named, or of the best one where none is."""
+    """Smallest evidence of the named effects; without a name, the largest of the ranking."""
     if unsealed.answer is None:
         return None
-    found = {one["effect"]: float(one["evidence"]) for one in unsealed.answer["ranking"]}
+    found = {one.effect: one.evidence for one in unsealed.answer.ranking}
     named = [found[name] for name in unsealed.named if name in found]
     return min(named) if named else max(found.values(), default=0.0)
 
 
-def sizes(unsealed: Unsealed, known: Mapping[str, Effect]) -> list[dict[str, Any]]:
-    """True and estimated sizes of effects that are rightly named, where law and library share them.
+def sizes(
+    hidden: Sequence[Hidden],
+    named: Sequence[str],
+    estimates: Mapping[str, Sequence[Quantity]],
+    effects: Mapping[str, Effect],
+) -> tuple[Size, ...]:
+    """True and estimated sizes of the hidden effects that are named.
 
-    A size is shared that both declare by the same name.
+    A size is compared if hidden law and library declare it by the same name.
+    estimates : of every effect by name; effects : library and laws of the trial by name
     """
-    if unsealed.answer is None:
-        return []
-    ranking = {one["effect"]: one["parameters"] for one in unsealed.answer["ranking"]}
-    return [
-        _size(hidden, estimated)
-        for hidden in unsealed.case.hidden
-        if hidden.effect in unsealed.named
-        for estimated in ranking.get(hidden.effect, [])
-        if _shared(estimated["name"], hidden, known)
-    ]
+    return tuple(
+        _size(one, estimated)
+        for one in hidden
+        if one.effect in named
+        for estimated in estimates.get(one.effect, ())
+        if _is_shared(estimated.name, one, effects)
+    )
 
 
-def _shared(name: str, hidden: Hidden, known: Mapping[str, Effect]) -> bool:
-    declared = known[hidden.law].parameters.get(name)
+def _is_shared(name: str, hidden: Hidden, effects: Mapping[str, Effect]) -> bool:
+    declared = effects[hidden.law].parameters.get(name)
     return declared is not None and declared.neutral != declared.plausible
 
 
-def _size(hidden: Hidden, estimated: Mapping[str, Any]) -> dict[str, Any]:
-    """One size; the amplitude of a ripple has no sign of its own, but its phase."""
-    true, value = hidden.values[estimated["name"]], estimated["value"]
+def _size(hidden: Hidden, estimated: Quantity) -> Size:
+    """True and estimated size; of an amplitude with a phase the magnitudes are compared."""
+    true, value = hidden.values[estimated.name], estimated.value
     if any("phase" in state for state in hidden.states):
         true, value = abs(true), abs(value)
-    error = estimated["standard_error"]
-    return {
-        "effect": hidden.effect,
-        "parameter": estimated["name"],
-        "true": true,
-        "estimated": value,
-        "standard_error": error,
-        "covered": abs(value - true) <= INTERVAL * error,
-        "same_law": hidden.law == hidden.effect,
-    }
+    return Size(
+        effect=hidden.effect,
+        parameter=estimated.name,
+        true=true,
+        estimated=value,
+        standard_error=estimated.standard_error,
+        covered=abs(value - true) <= INTERVAL * estimated.standard_error,
+        same_law=hidden.law == hidden.effect,
+    )
 
 
-def detail(unsealed: Unsealed, known: Mapping[str, Effect]) -> dict[str, Any]:
-    """One case as the answer and the spreadsheet tell it."""
+def score(
+    unsealed: Unsealed, effects: Mapping[str, Effect], *, seconds: float = 0.0, error: str = ""
+) -> CaseResult:
+    """Score one case.
+
+    effects : library and laws of the trial by name
+    seconds : duration of the case; error : last line of a failed diagnosis
+    """
     case, answer = unsealed.case, unsealed.answer
-    verdict = {} if answer is None else answer["verdict"]
-    gap = {} if answer is None else answer["gap"]
-    return {
-        "case": case.number + 1,
-        "kind": case.kind,
-        "truth": case.truth,
-        "hidden": [
-            {
-                "effect": h.effect,
-                "law": h.law,
-                "subsystem": h.subsystem,
-                "values": dict(h.values),
-                "norm": unsealed.norms[h.effect],
-            }
-            for h in case.hidden
-        ],
-        "programs": list(case.programs),
-        "detectable": unsealed.detectable,
-        "verdict": unsealed.kind,
-        "effects": unsealed.named,
-        "class": verdict.get("class", []),
-        "answered": unsealed.column,
-        "evidence": evidence(unsealed),
-        "confidence": verdict.get("confidence"),
-        "right": right(unsealed),
-        "top1": sorted(unsealed.named) == sorted(h.effect for h in case.hidden),
-        "false_alarm": false_alarm(unsealed),
-        "subsystem": None if answer is None else answer["location"]["subsystem"],
-        "located": located(unsealed),
-        "closed_fraction": gap.get("closed_fraction"),
-        "closed_fraction_ci95": gap.get("closed_fraction_ci95"),
-        "closed_fraction_true": unsealed.closed,
-        "sizes": sizes(unsealed, known),
-    }
+    estimates = {one.effect: one.parameters for one in answer.ranking} if answer else {}
+    return CaseResult(
+        case=case.number + 1,
+        kind=case.kind,
+        truth=case.truth,
+        hidden=tuple(_hidden_effect(h, unsealed.norms[h.effect]) for h in case.hidden),
+        programs=case.programs,
+        detectable=unsealed.detectable,
+        verdict=unsealed.kind,
+        effects=unsealed.named,
+        classes=answer.verdict.classes if answer else (),
+        answered=unsealed.column,
+        evidence=evidence(unsealed),
+        confidence=answer.verdict.confidence if answer else None,
+        right=is_right(unsealed),
+        top1=sorted(unsealed.named) == sorted(h.effect for h in case.hidden),
+        false_alarm=is_false_alarm(unsealed),
+        subsystem=answer.location.subsystem if answer else None,
+        located=is_located(unsealed),
+        closed_fraction=answer.gap.closed_fraction if answer else None,
+        closed_fraction_ci95=answer.gap.closed_fraction_ci95 if answer else None,
+        closed_fraction_true=unsealed.closed,
+        sizes=sizes(case.hidden, unsealed.named, estimates, effects),
+        seconds=seconds,
+        error=error,
+    )
 
 
-def confusion(details: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, int]]:
-    """How often each truth got each answer."""
-    counts: dict[str, dict[str, int]] = {}
-    for one in details:
-        row = counts.setdefault(one["truth"], {})
-        row[one["answered"]] = row.get(one["answered"], 0) + 1
-    return {truth: dict(sorted(row.items())) for truth, row in sorted(counts.items())}
+def _hidden_effect(hidden: Hidden, norm: float) -> HiddenEffect:
+    return HiddenEffect(
+        effect=hidden.effect,
+        law=hidden.law,
+        subsystem=hidden.subsystem,
+        values=dict(hidden.values),
+        norm=norm,
+    )

@@ -1,8 +1,8 @@
-"""Commit and reveal: the hash of an answer is known before its case is diagnosed.
+"""Commitment to the truth of a case: its hash is published before the case is diagnosed.
 
-The hash covers the answer and a random nonce; without the nonce it could be guessed from the seed.
-Who has the hashes of the manifest can check later that no answer was changed (R. Cramer, I.
-Damgard, Commitment schemes and zero-knowledge protocols, 1999: commitment by a hash).
+The hash covers the truth and a random nonce. Without the nonce, the seed would reveal the truth.
+The published hashes prove later that no truth was changed (commitment by a hash: R. Cramer,
+I. Damgard, Commitment schemes and zero-knowledge protocols, 1999).
 """
 
 from __future__ import annotations
@@ -18,14 +18,18 @@ if TYPE_CHECKING:
     from plant_emulator.blind.case import Case
 
 
-def sealed(case: Case, nonce: str) -> tuple[str, str]:
-    """The text of a sealed answer, and its SHA-256."""
-    text = json.dumps({"nonce": nonce, "case": case.as_json()}, sort_keys=True, indent=1)
+def seal(case: Case, nonce: str) -> tuple[str, str]:
+    """Text that holds case and nonce, and its SHA-256 (the commitment)."""
+    text = json.dumps({"nonce": nonce, "case": case.to_json()}, sort_keys=True, indent=1)
     return text, sha256(text)
 
 
-def opened(text: str, commitment: str, place: str) -> Case:
-    """The case in a sealed answer; EmulatorError where it is not the one that was sealed."""
+def unseal(text: str, commitment: str, place: str) -> Case:
+    """Read the case from a sealed text.
+
+    place : name of the file, for the error
+    Raises EmulatorError if the text does not match its commitment.
+    """
     if sha256(text) != commitment:
         raise EmulatorError(
             f"{place}: SHA-256 {sha256(text)[:16]}...; {commitment[:16]}... was sealed: the answer "
@@ -36,5 +40,5 @@ def opened(text: str, commitment: str, place: str) -> Case:
 
 
 def sha256(text: str) -> str:
-    """Hash of a text."""
+    """SHA-256 of a text, in hexadecimal digits."""
     return hashlib.sha256(text.encode()).hexdigest()

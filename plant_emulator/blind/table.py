@@ -1,4 +1,4 @@
-"""The cases as a table for a spreadsheet, and the pairs that calibrate the confidence."""
+"""The cases of a trial as CSV tables: one for a spreadsheet, one to calibrate the confidence."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ import io
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
+
+    from plant_emulator.blind.result import CaseResult
 
 COLUMNS = (
     "case", "kind", "truth", "norm", "detectable", "programs", "verdict", "answered", "class",
@@ -16,46 +18,41 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def row(one: Mapping[str, Any]) -> list[Any]:
-    """One case by COLUMNS."""
-    hidden = one["hidden"]
+def row(one: CaseResult) -> list[Any]:
+    """One case in the order of COLUMNS."""
     return [
-        one["case"],
-        one["kind"],
-        one["truth"],
-        " ".join(f"{h['norm']:.1f}" for h in hidden),
-        one["detectable"],
-        " ".join(one["programs"]),
-        one["verdict"],
-        one["answered"],
-        " | ".join(" ".join(names) for names in one["class"]),
-        one["evidence"],
-        one["confidence"],
-        one["right"],
-        one["top1"],
-        one["false_alarm"],
-        " ".join(h["subsystem"] for h in hidden),
-        one["subsystem"],
-        one["located"],
-        one["closed_fraction"],
-        one["closed_fraction_true"],
-        one["seconds"],
-        one["error"],
+        one.case,
+        one.kind,
+        one.truth,
+        " ".join(f"{h.norm:.1f}" for h in one.hidden),
+        one.detectable,
+        " ".join(one.programs),
+        one.verdict,
+        one.answered,
+        " | ".join(" ".join(names) for names in one.classes),
+        one.evidence,
+        one.confidence,
+        one.right,
+        one.top1,
+        one.false_alarm,
+        " ".join(h.subsystem for h in one.hidden),
+        one.subsystem,
+        one.located,
+        one.closed_fraction,
+        one.closed_fraction_true,
+        one.seconds,
+        one.error,
     ]
 
 
-def cases(details: Sequence[Mapping[str, Any]]) -> str:
-    """All cases as CSV."""
-    return _text(COLUMNS, [row(one) for one in details])
+def cases(results: Sequence[CaseResult]) -> str:
+    """CSV text with all cases."""
+    return _text(COLUMNS, [row(one) for one in results])
 
 
-def evidence(details: Sequence[Mapping[str, Any]]) -> str:
-    """Kind of verdict, evidence and whether it is right, of every case with an answer, as CSV."""
-    rows = [
-        [one["verdict"], one["evidence"], one["right"]]
-        for one in details
-        if one["evidence"] is not None
-    ]
+def evidence(results: Sequence[CaseResult]) -> str:
+    """CSV text with verdict, evidence and correctness of every case that has an answer."""
+    rows = [[one.verdict, one.evidence, one.right] for one in results if one.evidence is not None]
     return _text(("kind", "evidence", "right"), rows)
 
 

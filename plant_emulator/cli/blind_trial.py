@@ -1,4 +1,4 @@
-"""Hide effects in simulated logs, diagnose them blindly, unseal and score."""
+"""Hide effects in simulated logs, diagnose them blindly, unseal and score them."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ Examples:
 
 @click.command(cls=Command, epilog=EXAMPLE)
 @click.option(
-    "--cases", type=click.IntRange(min=1), default=80, show_default=True, help="How many benches."
+    "--cases", type=click.IntRange(min=1), default=80, show_default=True, help="Number of cases."
 )
 @click.option(
     "--seed",
     type=click.IntRange(min=0),
     default=1,
     show_default=True,
-    help="What everything hidden is drawn from.",
+    help="Seed of all hidden values.",
 )
 @click.option(
     "--out",
     metavar="DIR",
-    help="Folder of the trial; default blind_trial_seed_SEED. One that holds a part is continued.",
+    help="Folder of the trial; default blind_trial_seed_SEED. A started trial is continued.",
 )
 @click.option(
     "--workers",
@@ -41,17 +41,16 @@ Examples:
     default=os.cpu_count() or 1,
     show_default="all cores",
     metavar="N",
-    help="Diagnoses that run side by side.",
+    help="Diagnoses that run at once.",
 )
 @_options.json_file
 def command(cases: int, seed: int, out: str | None, workers: int, json_file: str | None) -> None:
-    """Let the diagnosis be examined by a bench that hides what it has.
+    """Test the diagnosis on simulated benches whose truth is hidden.
 
-    Each case is a bench with drifted parameters and, mostly, an effect of hidden size, simulated by
-    another law than the library's. The answers are sealed first: their hashes stand in
-    DIR/manifest.json.
+    Each case is a bench with parameter deviations and usually with an effect of unknown size.
+    Another law than that of the library simulates the effect. The truth of every case is sealed
+    before the first diagnosis: its hash is in DIR/manifest.json.
     """
-    from plant_emulator.blind.summary import lines
     from plant_emulator.cli._progress import progress
     from plant_emulator.workflows.blind_trial.trial import Trial
 
@@ -59,19 +58,20 @@ def command(cases: int, seed: int, out: str | None, workers: int, json_file: str
     trial = Trial(path, seed, cases)
     manifest = trial.seal()
     click.echo(f"{path}: {cases} answers sealed, SHA-256 of the manifest {manifest}", err=True)
-    before = signal.signal(signal.SIGTERM, _interrupt)  # its diagnoses must not outlive the trial
+    # SIGTERM becomes an interrupt, because the diagnoses must end with the trial.
+    before = signal.signal(signal.SIGTERM, _interrupt)
     try:
-        with progress() as tell:
-            details = trial.run(workers, tell)
+        with progress() as report:
+            answer = trial.run(workers, report)
     except KeyboardInterrupt:
-        click.echo(f"{path}: the same command goes on from here", err=True)
+        click.echo(f"{path}: the same command continues this trial", err=True)
         raise
     finally:
         signal.signal(signal.SIGTERM, before)
     if json_file:
-        _options.write_json(trial.answer(details), json_file)
+        _options.write_json(answer.to_json(), json_file)
     if json_file != "-":
-        click.echo("\n".join([*lines(details, seed), f"All cases: {path / 'cases.csv'}"]))
+        click.echo(f"{answer}\nAll cases: {path / 'cases.csv'}")
 
 
 def _interrupt(_signal: int, _frame: object) -> None:

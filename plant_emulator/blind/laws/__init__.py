@@ -1,7 +1,7 @@
-"""Laws that only the blind trial simulates with: other forms than the library's, or none of it.
+"""Laws of the blind trial: other forms of the library's effects, and effects outside the library.
 
-Every module is declared like an effect of `plant_emulator.effects`, under a name of its own. The
-diagnosis must not know them: only `plant_emulator.blind` may import this folder.
+Every module declares its law like an effect of `plant_emulator.effects`, under its own name. Only
+`plant_emulator.blind` may import this folder, because the diagnosis must not see these laws.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
 
 def names() -> list[str]:
-    """Names of the laws."""
+    """Names of all laws, sorted."""
     return sorted(module.name for module in pkgutil.iter_modules(__path__))
 
 
 def load(name: str) -> Effect:
-    """The law of that name."""
+    """Load the law of that name."""
     return effect_of(name, importlib.import_module(f"{__name__}.{name}"))

@@ -3,7 +3,7 @@
     tau^3/15 y''' + 2/5 tau^2 y'' + tau y' + y = T,   T_meas = y
 
 Source: W. E. Thomson, Delay networks having maximally flat frequency characteristics, Proc. IEE 96
-(1949) 487. tau is the delay of a slow change. tau = 0: the torque itself.
+(1949) 487. tau: delay of a slow change. tau = 0: no filter.
 """
 
 from __future__ import annotations
@@ -27,32 +27,32 @@ SUM, PRODUCT = 6.0 - REAL, 15.0 / REAL
 
 
 def start(p: Record) -> float:
-    """The bench starts at rest: nothing of the torque, no slope."""
+    """Torque [N m] and slope [N m/s] at the start: 0, because the bench starts at rest."""
     return 0.0
 
 
 def advance(base: float, a: float, value: float, s: Record, p: Record) -> float:
-    """Behind the lag of the real root, at the end of an implicit stage of size a [N m]."""
+    """Output of the lag of the real root at the end of an implicit stage of size a [N m]."""
     lag = p.bessel_torque_sensor_time_constant / REAL
     return base if lag == 0.0 else value + (base - value) * (lag / (lag + a))
 
 
 def slope_of(shown: float, slope: float, a: float, s: Record, p: Record) -> float:
-    """Slope behind the pair of roots at the end of the stage [N m/s]."""
+    """Slope of the output of the complex pair of roots at the end of the stage [N m/s]."""
     tau = p.bessel_torque_sensor_time_constant
     force = PRODUCT * (s.bessel_torque_sensor_lagging - shown)
     return (tau * tau * slope + a * force) / (tau * tau + SUM * tau * a + PRODUCT * a * a)
 
 
 def advance_shown(base: float, a: float, slope: float, s: Record, p: Record) -> float:
-    """Behind all roots [N m]."""
+    """Output of the filter at the end of the stage [N m]."""
     if p.bessel_torque_sensor_time_constant == 0.0:
         return base
     return base + a * slope_of(base, slope, a, s, p)
 
 
 def advance_slope(base: float, a: float, shown: float, s: Record, p: Record) -> float:
-    """The slope of that [N m/s]."""
+    """Slope of the filter's output at the end of the stage [N m/s]."""
     if p.bessel_torque_sensor_time_constant == 0.0:
         return base
     return slope_of(shown, base, a, s, p)
@@ -66,7 +66,7 @@ MEMORIES = {
 
 
 def measured_shaft_torque(value: float, s: Record, p: Record) -> float:
-    """What is shown [N m]."""
+    """Measured shaft torque [N m]."""
     if p.bessel_torque_sensor_time_constant == 0.0:
         return value
     return s.bessel_torque_sensor_shown

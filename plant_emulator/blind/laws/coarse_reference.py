@@ -1,9 +1,9 @@
-"""The drive reads its speed reference through a coarse converter.
+"""A coarse converter quantises the speed reference of the drive.
 
     omega_r = q round(reference / q)
 
-Source: B. Widrow, I. Kollar, Quantization Noise (2008), the uniform quantiser. q = 0: the reference
-itself.
+Source: B. Widrow, I. Kollar, Quantization Noise (2008), the uniform quantiser. q = 0: no
+quantisation.
 """
 
 from __future__ import annotations
@@ -25,6 +25,6 @@ PARAMETERS = {
 
 
 def reference(value: float, s: Record, p: Record) -> float:
-    """Reference that was read [rad/s]."""
+    """Quantised reference [rad/s]."""
     step = p.coarse_reference_step
     return value if step == 0.0 else step * floor(value / step + 0.5)

@@ -1,4 +1,4 @@
-"""The gear's Coulomb friction differs by direction, its viscous friction does not.
+"""The gear's Coulomb friction depends on the direction. Its viscous friction does not.
 
     T_f(omega_g) = ((1 + a sgn omega_g) f_gc + f_g |omega_g|^delta_g) sgn omega_g
 
@@ -24,5 +24,5 @@ PARAMETERS = {
 
 
 def gear_coulomb_friction(value: float, s: Record, p: Record) -> float:
-    """Level of the Coulomb friction in the direction of the gear [N m]."""
+    """Coulomb friction in the gear's direction of motion [N m]."""
     return value * (1.0 + p.coulomb_asymmetry_coulomb_share * s.gear_direction)

@@ -1,10 +1,10 @@
-"""The zero of the torque sensor creeps, ever more slowly.
+"""The zero of the torque sensor creeps at a falling rate.
 
     T_meas = T + r tau ln(1 + t / tau)
 
-Source: JCGM 200, International Vocabulary of Metrology, 4.21 (instrumental drift), with the
-logarithmic creep of loaded polymers (I. M. Ward, Mechanical Properties of Solid Polymers), as of
-the glue under a strain gauge. r is the rate at the start of the run. r = 0: no drift.
+Sources: JCGM 200, International Vocabulary of Metrology, 4.21 (instrumental drift); I. M. Ward,
+Mechanical Properties of Solid Polymers, on the logarithmic creep of loaded polymers, here the glue
+under a strain gauge. r: rate at the start of the run. r = 0: no drift.
 """
 
 from __future__ import annotations
@@ -29,6 +29,6 @@ PARAMETERS = {
 
 
 def measured_shaft_torque(value: float, s: Record, p: Record) -> float:
-    """What the sensor shows [N m]."""
+    """Measured shaft torque [N m]."""
     tau = p.creeping_torque_drift_slowing_time
     return value + p.creeping_torque_drift_first_rate * tau * log(1.0 + s.time / tau)

@@ -1,4 +1,4 @@
-"""Coulomb friction of the gear is a spring up to a displacement, and slides from there on.
+"""Coulomb friction of the gear acts like a spring up to a displacement, and then slides.
 
     z' = omega_g while |z| < k z_s, then 0 outwards;   Coulomb friction = f_gc z / z_s
 
@@ -22,17 +22,17 @@ PARAMETERS = {
     ),
 }
 
-# Share of the Coulomb friction that stays rigid, so that a spring at rest is at rest.
+# Rigid share of the Coulomb friction, which keeps a bench at rest exactly at rest.
 RIGID_SHARE = 1e-4
 
 
 def start(p: Record) -> float:
-    """Bend of the contacts at the start of a run [rad]."""
+    """Deflection of the contacts at the start of a run [rad]."""
     return 0.0
 
 
 def advance(base: float, a: float, s: Record, p: Record) -> float:
-    """Bend of the contacts at the end of an implicit stage of size a [rad]."""
+    """Deflection of the contacts at the end of an implicit stage of size a [rad]."""
     if p.elastoplastic_presliding_displacement == 0.0:
         return base
     limit = s.gear_direction_factor * p.elastoplastic_presliding_displacement
@@ -43,14 +43,14 @@ MEMORIES = {"bend": Memory(start, advance)}
 
 
 def gear_coulomb_friction(value: float, s: Record, p: Record) -> float:
-    """What stays of the Coulomb friction as a level at which the gear sticks [N m]."""
+    """The rigid share of the Coulomb friction, at which the gear sticks [N m]."""
     if p.elastoplastic_presliding_displacement == 0.0:
         return value
     return max(0.0, value - (1.0 - RIGID_SHARE) * p.gear_coulomb_friction)
 
 
 def gear_torque(value: float, s: Record, p: Record) -> float:
-    """Torque of the bent contacts against the motion of the gear output [N m]."""
+    """Torque of the deflected contacts against the motion of the gear output [N m]."""
     if p.elastoplastic_presliding_displacement == 0.0:
         return value
     stiffness = (

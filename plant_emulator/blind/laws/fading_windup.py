@@ -1,6 +1,6 @@
-"""The drive's integrators go on while limited, ever slower: each has a soft bound of its own.
+"""The drive's limited integrators do not stop but slow down, because each has its own soft bound.
 
-    share of the error taken in = k / (1 + |e_s| / e_0)          e_s: integral of the speed error
+    integrated share of the error = k / (1 + |e_s| / e_0)        e_s: integral of the speed error
 
 Source: K. J. Astrom, T. Hagglund, PID Controllers: Theory, Design, and Tuning, chapter on
 integrator windup (bounds of the integral part). k = 0: conditional integration.
@@ -27,7 +27,7 @@ PARAMETERS = {
 
 
 def integration_at_limit(value: float, s: Record, p: Record) -> float:
-    """Share of its error that a limited integrator takes in [1]."""
+    """Share of its error that a limited integrator integrates [1]."""
     if p.fading_windup_share == 0.0:
         return value
     full = abs(s.speed_integral) / p.fading_windup_bound

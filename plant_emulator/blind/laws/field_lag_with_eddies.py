@@ -1,4 +1,4 @@
-"""Of a change of the field one part comes at once, the rest through the eddy currents of the poles.
+"""One part of a field change acts at once. Eddy currents in the poles delay the other part.
 
     k Phi = e (k Phi)_0(omega_m) + (1 - e) phi,   tau dphi/dt = (k Phi)_0 - phi
 
@@ -27,12 +27,12 @@ PARAMETERS = {
 
 
 def start(p: Record) -> float:
-    """The bench starts at rest, with the full field [N m/A]."""
+    """Flux at the start of a run: the full field, because the bench is at rest [N m/A]."""
     return min(p.flux_constant, p.flux_constant_1 / p.flux_constant_2)
 
 
 def advance(base: float, a: float, value: float, s: Record, p: Record) -> float:
-    """The late part at the end of an implicit stage of size a [N m/A]."""
+    """Delayed part of the flux at the end of an implicit stage of size a [N m/A]."""
     tau = p.field_lag_with_eddies_time_constant
     return base if tau == 0.0 else value + (base - value) * (tau / (tau + a))
 
@@ -41,7 +41,7 @@ MEMORIES = {"late": Memory(start, advance, follows="flux")}
 
 
 def flux(value: float, s: Record, p: Record) -> float:
-    """Flux that acts [N m/A]."""
+    """Effective flux [N m/A]."""
     if p.field_lag_with_eddies_time_constant == 0.0:
         return value
     at_once = p.field_lag_with_eddies_at_once

@@ -1,4 +1,4 @@
-"""The torque sensor shows a change only once it exceeds the play of its element.
+"""The torque sensor shows a change only after the change exceeds the play of its element.
 
     T_meas = play of width 2 h on T
 
@@ -24,12 +24,12 @@ PARAMETERS = {
 
 
 def start(p: Record) -> float:
-    """The bench starts at rest, without torque [N m]."""
+    """Measured torque at the start of a run: 0, because the bench is at rest [N m]."""
     return 0.0
 
 
 def advance(base: float, a: float, value: float, s: Record, p: Record) -> float:
-    """Shown torque at the end of an implicit stage of size a [N m]."""
+    """Measured torque at the end of an implicit stage of size a [N m]."""
     half = p.hysteretic_torque_sensor_half_width
     return base if half == 0.0 else max(value - half, min(value + half, base))
 
@@ -38,7 +38,7 @@ MEMORIES = {"shown": Memory(start, advance, follows="measured_shaft_torque")}
 
 
 def measured_shaft_torque(value: float, s: Record, p: Record) -> float:
-    """What the sensor shows [N m]."""
+    """Measured shaft torque [N m]."""
     return (
         value if p.hysteretic_torque_sensor_half_width == 0.0 else s.hysteretic_torque_sensor_shown
     )

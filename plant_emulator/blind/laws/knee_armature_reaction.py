@@ -1,9 +1,9 @@
-"""The flux falls in proportion to the armature current above a rounded knee, and hardly below it.
+"""Above a rounded knee the flux falls in proportion to the armature current; below it hardly.
 
     k Phi = (k Phi)_0 (1 - a (hypot(x, x_k) - x_k) / (hypot(1, x_k) - x_k)),  x = i / i_max
 
-Source: A. E. Fitzgerald, C. Kingsley, S. D. Umans, Electric Machinery, chapter on DC machines (a
-pole tip that is not yet saturated loses nothing). a = 0: the flux that does not know the current.
+Source: A. E. Fitzgerald, C. Kingsley, S. D. Umans, Electric Machinery, chapter on DC machines (an
+unsaturated pole tip loses no flux). a = 0: flux independent of the current.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The drive limits the armature current with a knee instead of a corner.
+"""The drive limits the armature current smoothly, with a knee instead of a corner.
 
     |i_ref| = |i| below (1 - n) I,   I (1 - n) + n I tanh((|i| - (1 - n) I) / (n I)) above it
     I = i_max - R
@@ -29,7 +29,7 @@ PARAMETERS = {
 
 
 def current_limit(value: float, s: Record, p: Record) -> float:
-    """Largest current reference at the current that is wanted [A]."""
+    """Limit of the current reference at the wanted current [A]."""
     if p.knee_current_limit_reduction == 0.0:
         return value
     largest = max(0.0, value - p.knee_current_limit_reduction)

@@ -1,9 +1,9 @@
-"""Friction of the gear rises towards standstill, in the form of Hess and Soom.
+"""Friction of the gear rises towards standstill (Stribeck effect) in the form of Hess and Soom.
 
     T_s(omega_g) = dT / (1 + (omega_g / omega_s)^2)
 
-Source: D. P. Hess, A. Soom, J. Tribology 112 (1990) 147. dT is what the gear holds at rest beyond
-its Coulomb friction. dT = 0: no rise.
+Source: D. P. Hess, A. Soom, J. Tribology 112 (1990) 147. dT: additional friction at rest beyond the
+Coulomb friction. dT = 0: no rise.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ PARAMETERS = {
 
 
 def gear_speed_friction(value: float, s: Record, p: Record) -> float:
-    """Friction beyond that of the table at the gear's speed [N m]."""
+    """Friction at the gear's speed in addition to Coulomb and viscous friction [N m]."""
     if p.lorentzian_stribeck_rise == 0.0:
         return value
     share = s.gear_speed / p.lorentzian_stribeck_width

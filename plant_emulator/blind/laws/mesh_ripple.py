@@ -1,4 +1,4 @@
-"""A damaged tooth of an intermediate shaft brakes the gear once per revolution of that shaft.
+"""A damaged tooth of an intermediate shaft brakes the gear once per revolution of the shaft.
 
     T = A (1 + cos(n theta_g + phi)) / 2 against the motion
 
@@ -31,7 +31,7 @@ PARAMETERS = {
 
 
 def start(p: Record) -> float:
-    """Angle of the gear output at the start of a run, from there [rad]."""
+    """Angle of the gear output at the start of a run: its zero [rad]."""
     return 0.0
 
 
@@ -44,7 +44,7 @@ MEMORIES = {"angle": Memory(start, advance)}
 
 
 def gear_speed_friction(value: float, s: Record, p: Record) -> float:
-    """Friction beyond that of the table at the angle of the shaft [N m]."""
+    """Friction at the shaft's angle in addition to Coulomb and viscous friction [N m]."""
     torque = p.mesh_ripple_torque
     if torque == 0.0:
         return value

@@ -1,10 +1,10 @@
-"""The gear loses a share of the torque it transmits that rises with it and falls with the speed.
+"""The gear loses a share of its torque. The share rises with the torque and falls with the speed.
 
     T_l = a |T_gd| ((|T_gd| / T_0) 2 / (1 + |omega_g| / omega_0))^n,   T_0 = 500 N m
 
 Source: ISO/TR 14179-2 (2001), the coefficient of friction of a mesh: the power n = 0.2 of the load
-over the speed, with a mixed film between the teeth. a: the share at T_0 and omega_0; a = 0: a gear
-without losses by load.
+over the speed, with a mixed film between the teeth. a: share at T_0 and omega_0. a = 0: no
+load-dependent loss.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ PARAMETERS = {
         neutral=2.0, lower=0.01, upper=100.0, plausible=2.0, unit="rad/s", meaning="omega_0"
     ),
 }
-# Of the drum while a truck of 3 t accelerates by 0.26 m/s^2 [N m].
+# Drum torque while a truck of 3 t accelerates by 0.26 m/s^2 [N m].
 USUAL_TORQUE = 500.0
 
 
 def gear_load_friction(value: float, s: Record, p: Record) -> float:
-    """Friction beyond that of the table at the torque to the drum [N m]."""
+    """Friction at the drum's shaft torque in addition to Coulomb and viscous friction [N m]."""
     share = p.mixed_film_gear_share
     if share == 0.0:
         return value

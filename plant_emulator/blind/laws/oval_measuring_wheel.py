@@ -1,9 +1,9 @@
-"""The measuring wheel is not round: it shows the drum's speed with a ripple of its own turns.
+"""The measuring wheel is not round, so the measured drum speed ripples with the wheel's turns.
 
-    omega_meas = omega_d (1 + a cos(n theta_d + phi)),   n = r_d over the wheel's radius
+    omega_meas = omega_d (1 + a cos(n theta_d + phi)),   n = drum radius / wheel radius
 
-Source: JCGM 200, International Vocabulary of Metrology, on influence quantities; a wheel that rolls
-turns by the ratio of the radii. a = 0: a round wheel.
+Source: JCGM 200, International Vocabulary of Metrology, on influence quantities. A wheel that rolls
+on the drum turns n times as fast. a = 0: a round wheel.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ PARAMETERS = {
 
 
 def start(p: Record) -> float:
-    """Angle of the drum at the start of a run, from there [rad]."""
+    """Angle of the drum at the start of a run: its zero [rad]."""
     return 0.0
 
 
@@ -44,7 +44,7 @@ MEMORIES = {"angle": Memory(start, advance)}
 
 
 def measured_drum_speed(value: float, s: Record, p: Record) -> float:
-    """What the measuring wheel shows [rad/s]."""
+    """Measured drum speed [rad/s]."""
     amplitude = p.oval_measuring_wheel_amplitude
     if amplitude == 0.0:
         return value

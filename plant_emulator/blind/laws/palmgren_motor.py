@@ -1,10 +1,10 @@
-"""The motor's bearings lose by their lubricant's film, its brushes by Coulomb friction, its fan.
+"""The motor loses torque in its bearings' lubricant, in its brushes and in its fan.
 
     T_mw = T_c sgn omega_m + b |omega_m|^(2/3) sgn omega_m + k |omega_m|^1.8 sgn omega_m
 
-Sources: A. Palmgren, Ball and Roller Bearing Engineering (1959): the lubricant's part goes with the
-speed to the power 2/3; H. Schlichting, Boundary-Layer Theory: turbulent drag on a rotating disc
-goes with the power 1.8. T_c, b, k = 0: a motor without losses.
+Sources: A. Palmgren, Ball and Roller Bearing Engineering (1959): the lubricant's torque grows with
+the power 2/3 of the speed; H. Schlichting, Boundary-Layer Theory: turbulent drag on a rotating disc
+grows with the power 1.8. The brushes have Coulomb friction. T_c, b, k = 0: no losses.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ PARAMETERS = {
     ),
 }
 
-# The film's slope at rest is that at this speed [rad/s].
+# Speed that bounds the slope of the film's torque at rest [rad/s].
 SLOW = 1.0
 
 
 def motor_coulomb_friction(value: float, s: Record, p: Record) -> float:
-    """Level of the motor's Coulomb friction [N m]."""
+    """Coulomb friction of the motor [N m]."""
     return value + p.palmgren_motor_coulomb
 
 
 def motor_viscous_friction(value: float, s: Record, p: Record) -> float:
-    """Torque of film and fan over the motor speed [N m s/rad]."""
+    """Torque of lubricant and fan divided by the motor speed [N m s/rad]."""
     speed = abs(s.motor_speed)
     film: float = p.palmgren_motor_lubricant * (speed + SLOW) ** (-1.0 / 3.0)
     drag: float = p.palmgren_motor_drag * speed**0.8

@@ -1,9 +1,9 @@
-"""The truck's tyre slips on the drum more than in proportion to its force.
+"""The truck's tyre slips on the drum, and its slip grows faster than its force.
 
     tau dT/dt = T_w - T,   tau = c (1 + |T| / T_0) J_w |v| / r_w^2,   v = r_d omega_d
 
 Source: H. B. Pacejka, Tyre and Vehicle Dynamics, on the bend of the slip curve. c = 0: no slip.
-Only with a truck.
+Needs a truck.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ PARAMETERS = {
 
 
 def start(p: Record) -> float:
-    """The truck stands at the start [N m]."""
+    """Torque on the drum at the start of a run: 0, because the truck stands [N m]."""
     return 0.0
 
 
@@ -49,7 +49,7 @@ MEMORIES = {"torque": Memory(start, advance, follows="drum_torque")}
 
 
 def drum_torque(value: float, s: Record, p: Record) -> float:
-    """Torque on the drum from outside [N m]."""
+    """External torque on the drum [N m]."""
     return (
         value if p.progressive_tyre_slip_slip_per_force == 0.0 else s.progressive_tyre_slip_torque
     )

@@ -1,10 +1,10 @@
-"""The available armature voltage falls under load, late, and steeper the heavier the load is.
+"""The available armature voltage falls under load, with a lag and faster than the load grows.
 
     |u_a| <= u_max - U_s,   tau dU_s/dt = R_s |i| (1 + r |i| / i_max) - U_s
 
-Source: J. Schaefer, Rectifier Circuits: Theory and Design, on regulation, which becomes steeper
-where commutations overlap; W. Leonhard, Control of Electrical Drives, on the transient of a supply
-of resistance and inductance. R_s = 0: a stiff supply.
+Sources: J. Schaefer, Rectifier Circuits: Theory and Design: the voltage falls faster where
+commutations overlap; W. Leonhard, Control of Electrical Drives, on the transient of a supply with
+resistance and inductance. R_s = 0: a stiff supply.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ PARAMETERS = {
 
 
 def start(p: Record) -> float:
-    """The bench starts without current [V]."""
+    """Voltage sag at the start of a run: 0, because no current flows [V]."""
     return 0.0
 
 
 def advance(base: float, a: float, s: Record, p: Record) -> float:
-    """Sag at the end of an implicit stage of size a [V]."""
+    """Voltage sag at the end of an implicit stage of size a [V]."""
     if p.progressive_voltage_sag_source_resistance == 0.0:
         return base
     tau, current = p.progressive_voltage_sag_time_constant, abs(s.armature_current)
@@ -49,7 +49,7 @@ MEMORIES = {"sag": Memory(start, advance)}
 
 
 def voltage_limit(value: float, s: Record, p: Record) -> float:
-    """Largest armature voltage [V]."""
+    """Available armature voltage [V]."""
     if p.progressive_voltage_sag_source_resistance == 0.0:
         return value
     return max(0.0, value - s.progressive_voltage_sag_sag)

@@ -1,9 +1,9 @@
-"""The truck's tyre takes a rolling loss from the drum that rises with the square of the speed.
+"""The rolling loss of the truck's tyre on the drum rises with the square of the speed.
 
     T_d = ... - r_d F (1 + (v / v_2)^2) sgn omega_d,   v = r_d omega_d
 
 Source: H. B. Pacejka, Tyre and Vehicle Dynamics, on rolling resistance against speed. F = 0: no
-loss. Only with a truck.
+loss. Needs a truck.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def drum_coulomb_friction(value: float, s: Record, p: Record) -> float:
 
 
 def drum_viscous_friction(value: float, s: Record, p: Record) -> float:
-    """Torque of the rise over the drum speed [N m s/rad]."""
+    """Torque of the rising part divided by the drum speed [N m s/rad]."""
     doubled = p.rising_rolling_loss_speed_of_double
     speed = p.drum_radius * abs(s.drum_speed)
     share: float = p.drum_radius**2 * speed / (doubled * doubled)

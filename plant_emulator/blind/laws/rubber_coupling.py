@@ -1,9 +1,9 @@
-"""A coupling with rubber elements damps the shaft, the more the harder they are pressed.
+"""A coupling with rubber elements damps the shaft. Its damping grows with the torque.
 
     T_mg = k_mg q + d (1 + |T_mg| / T_0) (omega_m - xi omega_g)
 
-Source: H. Dresig, F. Holzweissig, Dynamics of Machinery, on couplings with elastomers. d = 0: the
-spring of the nominal bench.
+Source: H. Dresig, F. Holzweissig, Dynamics of Machinery, on couplings with elastomers. d = 0: no
+damping.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ PARAMETERS = {
 
 
 def motor_shaft_damping(value: float, s: Record, p: Record) -> float:
-    """Damping of the shaft at its torque [N m s/rad], motor side."""
+    """Damping of the shaft at its torque, at the motor [N m s/rad]."""
     if p.rubber_coupling_damping == 0.0:
         return value
     pressed = (

@@ -1,4 +1,4 @@
-"""Friction of the gear swings with its output, which is neither centred nor round.
+"""Friction of the gear varies with its output angle: the output is neither centred nor round.
 
     factor = 1 + a (cos(theta_g + phi) + v cos 2 (theta_g + phi))
 
@@ -31,7 +31,7 @@ PARAMETERS = {
 
 
 def start(p: Record) -> float:
-    """Angle of the gear output at the start of a run, from there [rad]."""
+    """Angle of the gear output at the start of a run: its zero [rad]."""
     return 0.0
 
 
@@ -44,7 +44,7 @@ MEMORIES = {"angle": Memory(start, advance)}
 
 
 def gear_direction_factor(value: float, s: Record, p: Record) -> float:
-    """Friction at the angle of the gear output, over that of the table [1]."""
+    """Friction at the gear output's angle divided by the nominal friction [1]."""
     amplitude = p.runout_two_harmonics_amplitude
     if amplitude == 0.0:
         return value

@@ -1,9 +1,9 @@
-"""The measuring wheel slips with the drum's acceleration, up to what its tread can slip.
+"""The measuring wheel slips in proportion to the drum's acceleration, up to a limit.
 
     omega_meas = (1 - s_m tanh(k omega_d' / s_m)) omega_d
 
-Source: H. B. Pacejka, Tyre and Vehicle Dynamics: slip in proportion to a small force, with a bend.
-k = 0: no slip.
+Source: H. B. Pacejka, Tyre and Vehicle Dynamics: the slip is proportional to a small force, then
+saturates. k = 0: no slip.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ PARAMETERS = {
 
 
 def measured_drum_speed(value: float, s: Record, p: Record) -> float:
-    """What the measuring wheel shows [rad/s]."""
+    """Measured drum speed [rad/s]."""
     k = p.saturating_wheel_slip_slip_per_acceleration
     if k == 0.0:
         return value

@@ -1,9 +1,9 @@
-"""The drum's bearings have Coulomb friction and that of a grease that thins as it is sheared.
+"""The drum's bearings have Coulomb friction and the friction of a shear-thinning grease.
 
     T_dw = T_c sgn omega_d + b omega_d / (1 + |omega_d| / omega_s)
 
-Source: P. M. Lugt, Grease Lubrication in Rolling Bearings (2013), on the apparent viscosity of
-greases, which falls with the shear rate. T_c, b = 0: bearings without friction.
+Source: P. M. Lugt, Grease Lubrication in Rolling Bearings (2013): the apparent viscosity of a
+grease falls with the shear rate. T_c, b = 0: no friction.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ PARAMETERS = {
 
 
 def drum_coulomb_friction(value: float, s: Record, p: Record) -> float:
-    """Level of the bearings' Coulomb friction [N m]."""
+    """Coulomb friction of the drum's bearings [N m]."""
     return value + p.shear_thinning_drum_coulomb
 
 
 def drum_viscous_friction(value: float, s: Record, p: Record) -> float:
-    """Torque of the grease over the drum speed [N m s/rad]."""
+    """Torque of the grease divided by the drum speed [N m s/rad]."""
     thinned = 1.0 + abs(s.drum_speed) / p.shear_thinning_drum_thinning_speed
     grease: float = p.shear_thinning_drum_grease / thinned
     return value + grease

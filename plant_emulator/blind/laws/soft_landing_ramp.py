@@ -1,9 +1,9 @@
-"""The slope of the drive's reference is limited, and it lands softly where it is to arrive.
+"""A ramp generator limits the slope of the drive's reference and rounds the end of the ramp.
 
     domega_r/dt = limited((reference - omega_r) / tau, omega_max / T)
 
 Source: W. Leonhard, Control of Electrical Drives, chapter on the cascade control of drives: a ramp
-generator as a loop of a limited amplifier and an integrator. T = 0: the reference itself.
+generator as a loop of a limited amplifier and an integrator. T = 0: no limit.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ PARAMETERS = {
 
 
 def start(p: Record) -> float:
-    """The bench starts at rest [rad/s]."""
+    """Limited reference at the start of a run: 0, because the bench is at rest [rad/s]."""
     return 0.0
 
 
@@ -44,7 +44,7 @@ MEMORIES = {"reference": Memory(start, advance, follows="reference")}
 
 
 def reference(value: float, s: Record, p: Record) -> float:
-    """Reference behind the ramp generator [rad/s]."""
+    """Output of the ramp generator [rad/s]."""
     if p.soft_landing_ramp_ramp_time == 0.0:
         return value
     return s.soft_landing_ramp_reference

@@ -1,14 +1,14 @@
-"""A thyristor bridge drops a voltage, pauses at reversal, and its current ripples with the mains.
+"""A thyristor bridge drops voltage, pauses at current reversal, and ripples with the mains.
 
     u_a = u - U tanh(i / i_g)
     i = 0 for t_0 where it would change sign
     i_meas = i + I cos(6 psi + phi) tanh^2(i / i_g)
     psi = 2 pi f t + (D / f_s) sin(2 pi f_s t)        the mains: f(t) = f + D cos(2 pi f_s t)
 
-Sources: W. Leonhard, Control of Electrical Drives, chapter on line-commutated converters; the
-smooth drop after J. J. Slotine, W. Li, Applied Nonlinear Control (tanh for a sign). The mains are
-near 50 Hz but not on it, and swing: P. Kundur, Power System Stability and Control, chapter on
-small-signal stability (inter-area modes, 0.1 to 0.7 Hz). U, t_0, I = 0: an ideal converter.
+Sources: W. Leonhard, Control of Electrical Drives, chapter on line-commutated converters;
+J. J. Slotine, W. Li, Applied Nonlinear Control (tanh instead of a sign). The mains frequency is not
+exactly 50 Hz, and it swings: P. Kundur, Power System Stability and Control, chapter on small-signal
+stability (inter-area modes, 0.1 to 0.7 Hz). U, t_0, I = 0: an ideal converter.
 """
 
 from __future__ import annotations
@@ -60,12 +60,15 @@ def sense(s: Record) -> float:
 
 
 def start(p: Record) -> float:
-    """Time for which the current has flowed forwards, less that backwards [1], in pauses."""
+    """Readiness of the bridge at the start of a run: ready for forward current [1]."""
     return 1.0
 
 
 def advance(base: float, a: float, s: Record, p: Record) -> float:
-    """Readiness of the bridge at the end of an implicit stage of size a [1]."""
+    """Readiness of the bridge at the end of an implicit stage of size a [1].
+
+    It moves from -1 (ready for backward current) to 1 (forward) in one pause.
+    """
     pause = p.tanh_converter_pause
     return base if pause == 0.0 else max(-1.0, min(1.0, base + 2.0 * a / pause * sense(s)))
 
@@ -74,14 +77,14 @@ MEMORIES = {"ready": Memory(start, advance)}
 
 
 def resistance(value: float, s: Record, p: Record) -> float:
-    """Resistance of the armature's circuit [ohm]."""
+    """Resistance of the armature circuit; huge during the pause [ohm]."""
     sign = sense(s)
     blocked = p.tanh_converter_pause > 0.0 and sign != 0.0 and s.tanh_converter_ready * sign < 1.0
     return OPEN if blocked else value
 
 
 def converter_voltage_drop(value: float, s: Record, p: Record) -> float:
-    """What the converter loses [V]."""
+    """Voltage drop of the converter [V]."""
     if p.tanh_converter_drop == 0.0:
         return value
     return value + p.tanh_converter_drop * tanh(
@@ -90,7 +93,7 @@ def converter_voltage_drop(value: float, s: Record, p: Record) -> float:
 
 
 def measured_armature_current(value: float, s: Record, p: Record) -> float:
-    """Current with its ripple [A]."""
+    """Measured armature current with its ripple [A]."""
     if p.tanh_converter_ripple == 0.0:
         return value
     share = tanh(s.armature_current / p.tanh_converter_discontinuous_below)

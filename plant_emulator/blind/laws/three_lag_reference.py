@@ -1,4 +1,4 @@
-"""The drive smooths its speed reference with three equal lags, one behind the other.
+"""The drive smooths its speed reference with three equal lags in series.
 
     (T_3 d/dt + 1)^3 omega_r = reference
 
@@ -24,24 +24,24 @@ PARAMETERS = {
 
 
 def start(p: Record) -> float:
-    """The bench starts at rest [rad/s]."""
+    """Output of a lag at the start of a run: 0, because the bench is at rest [rad/s]."""
     return 0.0
 
 
 def advance(base: float, a: float, value: float, s: Record, p: Record) -> float:
-    """Behind the first lag, at the end of an implicit stage of size a [rad/s]."""
+    """Output of the first lag at the end of an implicit stage of size a [rad/s]."""
     lag = p.three_lag_reference_lag
     return base if lag == 0.0 else value + (base - value) * (lag / (lag + a))
 
 
 def advance_second(base: float, a: float, s: Record, p: Record) -> float:
-    """Behind the second lag [rad/s]."""
+    """Output of the second lag at the end of an implicit stage of size a [rad/s]."""
     lag, value = p.three_lag_reference_lag, s.three_lag_reference_first
     return base if lag == 0.0 else value + (base - value) * (lag / (lag + a))
 
 
 def advance_third(base: float, a: float, s: Record, p: Record) -> float:
-    """Behind the third lag [rad/s]."""
+    """Output of the third lag at the end of an implicit stage of size a [rad/s]."""
     lag, value = p.three_lag_reference_lag, s.three_lag_reference_second
     return base if lag == 0.0 else value + (base - value) * (lag / (lag + a))
 
@@ -54,5 +54,5 @@ MEMORIES = {
 
 
 def reference(value: float, s: Record, p: Record) -> float:
-    """Reference behind the filter [rad/s]."""
+    """Filtered reference [rad/s]."""
     return value if p.three_lag_reference_lag == 0.0 else s.three_lag_reference_third

@@ -1,9 +1,9 @@
-"""The motor's flux ripples once per revolution of its rotor, which is not centred in the field.
+"""The motor's rotor is not centred in the field, so the flux ripples once per revolution.
 
     k Phi = (k Phi)_0 (1 + a cos(theta_m + phi))
 
-Source: A. E. Fitzgerald, C. Kingsley, S. D. Umans, Electric Machinery, on the air gap's part in
-the flux. a = 0: a centred rotor.
+Source: A. E. Fitzgerald, C. Kingsley, S. D. Umans, Electric Machinery, on the influence of the air
+gap on the flux. a = 0: a centred rotor.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ PARAMETERS = {
 
 
 def start(p: Record) -> float:
-    """Angle of the rotor at the start of a run, from there [rad]."""
+    """Angle of the rotor at the start of a run: its zero [rad]."""
     return 0.0
 
 
@@ -41,7 +41,7 @@ MEMORIES = {"angle": Memory(start, advance)}
 
 
 def flux(value: float, s: Record, p: Record) -> float:
-    """Flux at the angle of the rotor [N m/A]."""
+    """Flux at the rotor's angle [N m/A]."""
     amplitude = p.torque_ripple_amplitude
     if amplitude == 0.0:
         return value

@@ -1,11 +1,10 @@
-"""The armature's winding warms by its current and gives its heat to the iron, which warms later.
+"""The current warms the armature winding. The winding warms the iron with a delay.
 
     R_a = R_a0 (1 + alpha theta_w)
     C_w dtheta_w/dt = R_a i^2 - G_w (theta_w - theta_i),   C_i dtheta_i/dt = G_w (theta_w - theta_i)
 
 Source: thermal network of two bodies, e.g. J. R. Hendershot, T. J. E. Miller, Design of Brushless
-Permanent-Magnet Machines, chapter on cooling. alpha = 0: a resistance that does not know the
-temperature.
+Permanent-Magnet Machines, chapter on cooling. alpha = 0: a resistance independent of temperature.
 """
 
 from __future__ import annotations
@@ -44,12 +43,12 @@ PARAMETERS = {
 
 
 def start(p: Record) -> float:
-    """Rise of temperature at the start of a run [K]."""
+    """Temperature rise of winding and iron at the start of a run [K]."""
     return p.two_body_heating_start_rise
 
 
 def advance(base: float, a: float, s: Record, p: Record) -> float:
-    """Rise of the winding at the end of an implicit stage of size a [K]."""
+    """Temperature rise of the winding at the end of an implicit stage of size a [K]."""
     if p.two_body_heating_temperature_coefficient == 0.0:
         return base
     rate = a / p.two_body_heating_winding_capacity
@@ -59,7 +58,7 @@ def advance(base: float, a: float, s: Record, p: Record) -> float:
 
 
 def advance_iron(base: float, a: float, s: Record, p: Record) -> float:
-    """Rise of the iron at the end of an implicit stage of size a [K]."""
+    """Temperature rise of the iron at the end of an implicit stage of size a [K]."""
     if p.two_body_heating_temperature_coefficient == 0.0:
         return base
     rate = a * p.two_body_heating_conductance / p.two_body_heating_iron_capacity

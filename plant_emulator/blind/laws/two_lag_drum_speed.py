@@ -1,9 +1,9 @@
-"""The drum's speed is shown through two equal lags.
+"""Two equal lags in series filter the measured drum speed.
 
     (tau/2 d/dt + 1)^2 omega_meas = omega_d
 
-Source: K. Ogata, Modern Control Engineering, on critically damped second-order systems. tau is the
-delay of a slow change. tau = 0: the speed itself.
+Source: K. Ogata, Modern Control Engineering, on critically damped second-order systems. tau: delay
+of a slow change. tau = 0: no filter.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ PARAMETERS = {
 
 
 def start(p: Record) -> float:
-    """The bench starts at rest [rad/s]."""
+    """Output of a lag at the start of a run: 0, because the bench is at rest [rad/s]."""
     return 0.0
 
 
 def advance(base: float, a: float, value: float, s: Record, p: Record) -> float:
-    """Behind the first lag, at the end of an implicit stage of size a [rad/s]."""
+    """Output of the first lag at the end of an implicit stage of size a [rad/s]."""
     lag = 0.5 * p.two_lag_drum_speed_time_constant
     return base if lag == 0.0 else value + (base - value) * (lag / (lag + a))
 
 
 def advance_second(base: float, a: float, s: Record, p: Record) -> float:
-    """Behind the second lag [rad/s]."""
+    """Output of the second lag at the end of an implicit stage of size a [rad/s]."""
     lag, value = 0.5 * p.two_lag_drum_speed_time_constant, s.two_lag_drum_speed_first
     return base if lag == 0.0 else value + (base - value) * (lag / (lag + a))
 
@@ -47,5 +47,5 @@ MEMORIES = {
 
 
 def measured_drum_speed(value: float, s: Record, p: Record) -> float:
-    """What is shown [rad/s]."""
+    """Measured drum speed [rad/s]."""
     return value if p.two_lag_drum_speed_time_constant == 0.0 else s.two_lag_drum_speed_second

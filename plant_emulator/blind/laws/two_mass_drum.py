@@ -1,4 +1,4 @@
-"""A part of the drum's mass hangs on it elastically, such as a ring on worn keys.
+"""A part of the drum's mass is connected elastically, like a ring on worn keys.
 
     T_d = ... - (k psi + d psi'),   psi' = omega_d - omega_2,   J_2 omega_2' = k psi + d psi'
     k = J_2 (2 pi f)^2,   d = 2 D J_2 2 pi f
@@ -32,12 +32,12 @@ PARAMETERS = {
 
 
 def start(p: Record) -> float:
-    """The bench starts at rest."""
+    """Twist [rad] and speed [rad/s] at the start of a run: 0, because the bench is at rest."""
     return 0.0
 
 
 def rate(p: Record) -> float:
-    """Natural frequency of the ring on a drum that stands [rad/s]."""
+    """Natural angular frequency of the ring on a fixed drum [rad/s]."""
     return 2.0 * pi * p.two_mass_drum_frequency
 
 
@@ -47,7 +47,10 @@ def advance(base: float, a: float, s: Record, p: Record) -> float:
 
 
 def advance_speed(base: float, a: float, s: Record, p: Record) -> float:
-    """Speed of the ring [rad/s]; comes after `advance`, whose base it takes from its result."""
+    """Speed of the ring at the end of the stage [rad/s].
+
+    It runs after `advance` and recovers that base from its result.
+    """
     twist = s.two_mass_drum_twist + a * s.two_mass_drum_speed
     k, d = rate(p) ** 2, 2.0 * p.two_mass_drum_damping_ratio * rate(p)
     return (base + a * (k * twist + d * s.drum_speed)) / (1.0 + a * (k * a + d))
@@ -57,7 +60,7 @@ MEMORIES = {"twist": Memory(start, advance), "speed": Memory(start, advance_spee
 
 
 def drum_torque(value: float, s: Record, p: Record) -> float:
-    """Torque on the drum from outside and from the ring [N m]."""
+    """External torque on the drum plus the torque of the ring [N m]."""
     inertia = p.two_mass_drum_inertia
     if inertia == 0.0:
         return value

@@ -1,12 +1,12 @@
-"""The dead time of the reference is long in some scans and short in the others.
+"""The dead time of the reference jumps between two values from scan to scan.
 
-    b_k = b + A / sqrt(3) or b - A / sqrt(3), as a fieldbus telegram just misses a scan of length
-    T_s or not
+    b_k = b + A / sqrt(3) or b - A / sqrt(3)
 
-Source: J. Nilsson, Real-Time Control Systems with Delays, thesis, Lund 1998 (delays that jump
-between a few values). Which it is follows from the scan's number: the fractional part of its
-square times the golden ratio. A is that of delays evenly spread over b - A .. b + A with the same
-standard deviation. A = 0: the constant dead time.
+A fieldbus telegram just misses a scan of length T_s, or it does not. Source: J. Nilsson, Real-Time
+Control Systems with Delays, thesis, Lund 1998 (delays that jump between a few values). The scan's
+number k decides: b_k is the long value if the fractional part of k^2 times the golden ratio is less
+than 0.5. The standard deviation is that of a uniform distribution over b - A .. b + A. A = 0: the
+constant dead time.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ GOLDEN = 0.6180339887498949
 
 
 def dead_time(value: float, s: Record, p: Record) -> float:
-    """Dead time in the scan that runs [s]."""
+    """Dead time in the current scan [s]."""
     amplitude = p.two_valued_delay_amplitude
     if amplitude == 0.0:
         return value

@@ -1,11 +1,11 @@
-"""The gear's viscous friction follows Vogel's viscosity of its oil, which its losses warm.
+"""The gear's viscous friction follows Vogel's viscosity of the oil, which the losses warm.
 
     f_g(T) = f_g exp(B (1 / (T - T_V) - 1 / (T_n - T_V))),   B = beta (T_n - T_V)^2
     C dT/dt = T_f omega_g - G (T - T_shell)
 
-Sources: H. Vogel, Physikalische Zeitschrift 22 (1921) 645, the viscosity of oils; the heat balance
-is the lumped one of a gearbox (ISO/TR 14179-1). beta is the relative slope at T_n; beta = 0: a
-friction that does not know the temperature.
+Sources: H. Vogel, Physikalische Zeitschrift 22 (1921) 645, on the viscosity of oils; ISO/TR 14179-1
+for the lumped heat balance of a gearbox. beta: relative slope at T_n. beta = 0: friction
+independent of temperature.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ MEMORIES = {"oil": Memory(start, advance)}
 
 
 def gear_viscous_friction(value: float, s: Record, p: Record) -> float:
-    """Factor of the viscous friction at the oil's temperature [N m (s/rad)^delta_g]."""
+    """Coefficient of the viscous friction at the oil's temperature [N m (s/rad)^delta_g]."""
     beta = p.vogel_oil_viscosity_coefficient
     if beta == 0.0:
         return value
@@ -82,5 +82,5 @@ def gear_viscous_friction(value: float, s: Record, p: Record) -> float:
 
 
 def shell_temperature(value: float, s: Record, p: Record) -> float:
-    """What the thermocouples show [K]."""
+    """Measured shell temperature [K]."""
     return value if p.vogel_oil_viscosity_coefficient == 0.0 else p.vogel_oil_shell_temperature

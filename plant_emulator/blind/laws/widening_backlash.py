@@ -1,9 +1,9 @@
-"""The gap of the backlash changes during the run, as teeth and housing warm unequally.
+"""The backlash width changes during the run, because teeth and housing warm unequally.
 
     alpha(t) = alpha (1 + r t)
 
 Source: G. Niemann, H. Winter, Maschinenelemente, vol. 2, on backlash and temperature. r = 0: a
-constant gap.
+constant backlash width.
 """
 
 from __future__ import annotations
@@ -24,5 +24,5 @@ PARAMETERS = {
 
 
 def backlash_half_gap(value: float, s: Record, p: Record) -> float:
-    """Half of the gap at that time [rad]."""
+    """Half of the backlash width at the current time [rad]."""
     return value * (1.0 + p.widening_backlash_rate * s.time)

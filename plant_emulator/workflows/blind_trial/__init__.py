@@ -1,1 +1,1 @@
-"""The blind trial as it runs: sealed folder, diagnosis in a process of its own, scoring."""
+"""Runs a blind trial: the folder with its sealed cases, the diagnoses in processes, the scores."""

@@ -1,7 +1,7 @@
-"""Runs one diagnosis in a process of its own that gets nothing but the logs.
+"""Runs one diagnosis in its own process, which gets nothing but the logs.
 
-The logs are copied to an empty temporary folder, which is all that the process is told of; it runs
-the command that a user types, which imports nothing of the trial.
+The logs are copied to an empty temporary folder, the working directory of the process. The process
+runs the command `plant-emulator diagnose`, which imports nothing of the trial.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Diagnosed:
-    """The answer and the saved parameter set; error: the last line of a failed diagnosis."""
+class Outcome:
+    """JSON answer and saved parameter set of a diagnosis; error: last line of a failed one."""
 
     answer: dict[str, Any] | None
     saved: ParameterSet | None
@@ -37,24 +37,24 @@ class Diagnosed:
 
 @dataclass
 class Examiner:
-    """Starts diagnoses, several side by side if need be, and can end them all."""
+    """Runs diagnoses, also several at once, and can end them all."""
 
     stopped: bool = False
     _running: set[subprocess.Popen[str]] = field(default_factory=set)
     _lock: Lock = field(default_factory=Lock)
 
-    def diagnose(self, logs: Sequence[Path]) -> Diagnosed:
-        """The diagnosis of these logs."""
+    def diagnose(self, logs: Sequence[Path]) -> Outcome:
+        """Diagnose these logs."""
         with tempfile.TemporaryDirectory(prefix="blind-") as name:
             folder = Path(name)
             for log in logs:
                 shutil.copyfile(log, folder / log.name)
-            code, told = self._run([log.name for log in logs], folder)
+            code, errors = self._run([log.name for log in logs], folder)
             if code != 0:
-                last = told.strip().splitlines()[-1:] or [f"exit code {code}"]
-                return Diagnosed(None, None, last[0])
+                last = errors.strip().splitlines()[-1:] or [f"exit code {code}"]
+                return Outcome(None, None, last[0])
             answer = json.loads((folder / "answer.json").read_text(encoding="utf-8"))
-            return Diagnosed(answer, parameter_sets.load(str(folder / "set.toml")), "")
+            return Outcome(answer, parameter_sets.load(str(folder / "set.toml")), "")
 
     def _run(self, logs: Sequence[str], folder: Path) -> tuple[int, str]:
         """Exit code and standard error of the command."""
@@ -64,7 +64,7 @@ class Examiner:
         with self._lock:
             if self.stopped:
                 return -1, "stopped"
-            # A session of its own: an interrupt from the keyboard is the trial's to handle.
+            # In its own session the process gets no Ctrl-C; the trial handles it.
             process = subprocess.Popen(
                 command,
                 cwd=folder,
@@ -76,14 +76,14 @@ class Examiner:
             )
             self._running.add(process)
         try:
-            _, told = process.communicate()
+            _, errors = process.communicate()
         finally:
             with self._lock:
                 self._running.discard(process)
-        return process.returncode, told
+        return process.returncode, errors
 
     def stop(self) -> None:
-        """End all diagnoses that run, and start none any more."""
+        """End all diagnoses and start no more."""
         with self._lock:
             self.stopped = True
             for process in self._running:

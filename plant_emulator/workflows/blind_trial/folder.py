@@ -1,12 +1,14 @@
-"""The folder of a trial on disk.
+"""The folder of a trial.
 
-    manifest.json        seed, program, and the SHA-256 of every answer, before any is looked for
-    sealed/case_001.json the answers, each with its nonce
-    logs/case_001/*      the logs that the diagnosis gets
-    results/case_001.json what became of a case: done cases are not done again
-    cases.csv, evidence.csv    the outcome
+    manifest.json         seed, hash of the program, SHA-256 of every sealed case
+    sealed/case_001.json  truth of a case, with its nonce
+    logs/case_001/*       logs for the diagnosis
+    results/case_001.json result of a finished case, which is not repeated
+    cases.csv             all cases as a table
+    evidence.csv          data to calibrate the confidence
 
-A file is written beside its place and moved there: a trial that is interrupted leaves no half one.
+The manifest is complete before the first diagnosis starts. A file is written under a temporary name
+and then renamed, so an interrupted trial leaves no incomplete file.
 """
 
 from __future__ import annotations
@@ -17,22 +19,24 @@ import secrets
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from plant_emulator.blind.sealing import opened, sealed, sha256
+from plant_emulator.blind.result import result_from
+from plant_emulator.blind.sealing import seal, sha256, unseal
 from plant_emulator.errors import EmulatorError, InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from plant_emulator.blind.case import Case
+    from plant_emulator.blind.result import CaseResult
 
 SCHEMA = "blind-trial-manifest/1"
-# The packages whose source decides what a trial gives.
+# Packages whose source decides the results of a trial.
 PACKAGES = ("plant_emulator", "register_maps")
 ROOT = Path(__file__).parents[3]
 
 
 def program_hash() -> str:
-    """SHA-256 of the program's source and its data."""
+    """SHA-256 of the program's source and data files."""
     state = hashlib.sha256()
     for package in PACKAGES:
         for file in sorted((ROOT / package).rglob("*")):
@@ -42,28 +46,32 @@ def program_hash() -> str:
 
 
 class Folder:
-    """A trial's folder; InputError where it holds another trial, or something else."""
+    """The folder of a trial. A folder with a part of the trial is continued.
+
+    program : SHA-256 of the program
+    Raises InputError if the folder holds another trial or other files.
+    """
 
     def __init__(self, path: Path, seed: int, program: str) -> None:
         self.path = path
-        self._manifest = self._continued(seed, program)
+        self._manifest = self._load_manifest(seed, program)
         for name in ("sealed", "logs", "results"):
             (path / name).mkdir(parents=True, exist_ok=True)
 
-    def _continued(self, seed: int, program: str) -> dict[str, Any]:
-        """The manifest of the trial that the folder holds, or a new one."""
+    def _load_manifest(self, seed: int, program: str) -> dict[str, Any]:
+        """Manifest of the trial in the folder, or a new one."""
         file = self.path / "manifest.json"
         new = {"schema": SCHEMA, "seed": seed, "program_sha256": program, "cases": {}}
         if not file.is_file():
             if self.path.is_dir() and any(self.path.iterdir()):
-                raise InputError(f"{self.path}: not empty, and no trial; give another --out")
+                raise InputError(f"{self.path}: not empty and not a trial; give another --out")
             return new
         try:
             old: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
             there = (old["schema"], old["seed"], old["program_sha256"], dict(old["cases"]))
         except (ValueError, KeyError, TypeError) as error:
             raise InputError(
-                f"{file}: no manifest of a trial ({error!r}); give another --out"
+                f"{file}: not a manifest of a trial ({error!r}); give another --out"
             ) from error
         if there[:2] != (SCHEMA, seed):
             raise InputError(
@@ -73,66 +81,68 @@ class Folder:
         if there[2] != program:
             raise InputError(
                 f"{file}: begun by another version of the program ({there[2][:12]}..., now "
-                f"{program[:12]}...); go on with that one, or give another --out"
+                f"{program[:12]}...); continue with that version, or give another --out"
             )
         return old
 
     @property
     def manifest_hash(self) -> str:
-        """SHA-256 of the manifest as it stands on disk."""
+        """SHA-256 of the manifest on disk."""
         return sha256((self.path / "manifest.json").read_text(encoding="utf-8"))
 
     def seal(self, cases: Sequence[Case]) -> None:
-        """Seal what is not sealed yet, and publish all hashes in the manifest."""
+        """Seal the cases that are not sealed yet, and write all hashes to the manifest."""
         for case in cases:
             if _name(case.number) in self._manifest["cases"]:
                 continue
-            text, commitment = sealed(case, secrets.token_hex(16))
+            text, commitment = seal(case, secrets.token_hex(16))
             self._manifest["cases"][_name(case.number)] = commitment
-            write(self._sealed(case.number), text)
+            write(self._sealed_file(case.number), text)
         write(self.path / "manifest.json", json.dumps(self._manifest, indent=1))
 
     def unseal(self, number: int) -> Case:
-        """The answer of a case; EmulatorError where it is not what was sealed."""
-        file = self._sealed(number)
+        """Read the truth of a case. Raises EmulatorError if it differs from its commitment."""
+        file = self._sealed_file(number)
         text = file.read_text(encoding="utf-8")
-        return opened(text, self._manifest["cases"][_name(number)], str(file))
+        return unseal(text, self._manifest["cases"][_name(number)], str(file))
 
-    def _sealed(self, number: int) -> Path:
+    def _sealed_file(self, number: int) -> Path:
         return self.path / "sealed" / f"{_name(number)}.json"
 
     def logs(self, number: int) -> Path:
-        """The folder of a case's logs."""
+        """Folder of a case's logs."""
         folder = self.path / "logs" / _name(number)
         folder.mkdir(exist_ok=True)
         return folder
 
-    def keep(self, number: int, result: dict[str, Any]) -> None:
-        """Write what became of a case."""
-        write(self._result(number), json.dumps(result, indent=1))
+    def write_result(
+        self, number: int, result: CaseResult, answer: Mapping[str, Any] | None
+    ) -> None:
+        """Write the result of a case with the JSON answer of its diagnosis."""
+        data = {"detail": result.to_json(), "answer": answer}
+        write(self._result_file(number), json.dumps(data, indent=1))
 
-    def kept(self, number: int) -> dict[str, Any] | None:
-        """What became of a case; None: it is still to be done."""
-        file = self._result(number)
+    def read_result(self, number: int) -> CaseResult | None:
+        """Result of a case; None if the case is not finished. Raises EmulatorError if damaged."""
+        file = self._result_file(number)
         if not file.is_file():
             return None
         try:
-            found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-        except ValueError as error:
-            raise EmulatorError(f"{file}: damaged ({error}); delete it to do it again") from error
-        return found
+            return result_from(json.loads(file.read_text(encoding="utf-8"))["detail"])
+        except (ValueError, KeyError, TypeError) as error:
+            raise EmulatorError(f"{file}: damaged ({error}); delete it to repeat it") from error
 
-    def _result(self, number: int) -> Path:
+    def _result_file(self, number: int) -> Path:
         return self.path / "results" / f"{_name(number)}.json"
 
 
 def _name(number: int) -> str:
-    """Name of a case, counted from 1."""
+    """Name of a case; the first is case_001."""
     return f"case_{number + 1:03}"
 
 
 def write(path: Path, text: str) -> None:
-    """Write a file as a whole or not at all."""
+    """Write a file completely or not at all."""
     beside = path.with_name(f"{path.name}.part")
     beside.write_text(text, encoding="utf-8")
     beside.replace(path)

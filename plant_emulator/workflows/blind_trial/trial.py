@@ -1,35 +1,42 @@
-"""The blind trial: seal all answers, then case by case write logs, diagnose, unseal, score.
+"""Runs a blind trial: seals all cases, then simulates, diagnoses, unseals and scores each.
 
-Cases run side by side, each diagnosis as one process. What is done is on disk: an interrupted trial
-goes on where it was.
+Several cases run at once, and each diagnosis is a process. Results are on disk, so an interrupted
+trial continues with the cases that are not finished.
 """
 
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from plant_emulator import logs, parameter_sets
-from plant_emulator.blind import laws, score, summary, table
-from plant_emulator.blind.detectable import norms
+from plant_emulator.blind import laws, table
+from plant_emulator.blind.closed_fraction import true_closed_fraction
 from plant_emulator.blind.draw import draw
-from plant_emulator.blind.generate import measured, true_logs
-from plant_emulator.blind.shrinkage import true_closed_fraction
+from plant_emulator.blind.generate import measure, simulate_truth
+from plant_emulator.blind.orthogonal_norm import norms
+from plant_emulator.blind.score import Unsealed, score
+from plant_emulator.blind.summary import TrialAnswer
+from plant_emulator.diagnosis.report import document
 from plant_emulator.errors import EmulatorError
 from plant_emulator.solver.kernel import kernel, know
 from plant_emulator.workflows.blind_trial.examiner import Examiner
 from plant_emulator.workflows.blind_trial.folder import Folder, program_hash, write
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from pathlib import Path
+
+    from plant_emulator.blind.case import Case
+    from plant_emulator.signals.log import Log
+    from plant_emulator.workflows.blind_trial.examiner import Outcome
 
     Progress = Callable[[str, float], None]
 
 
 class Trial:
-    """A trial in its folder; the folder may hold a part of it."""
+    """A trial of `count` cases in its folder, which may already hold a part of it."""
 
     def __init__(self, path: Path, seed: int, count: int) -> None:
         self.seed, self.count, self.program = seed, count, program_hash()
@@ -39,76 +46,81 @@ class Trial:
         self._examiner = Examiner()
 
     def seal(self) -> str:
-        """Draw and seal all answers; the SHA-256 of the manifest that holds their hashes."""
-        known = kernel().effects
-        self.folder.seal([draw(self.seed, k, self.nominal, known) for k in range(self.count)])
+        """Draw and seal all cases; return the SHA-256 of the manifest with their hashes."""
+        self.folder.seal([self._draw(number) for number in range(self.count)])
         return self.folder.manifest_hash
 
-    def run(self, workers: int, progress: Progress | None = None) -> list[dict[str, Any]]:
-        """Do what is not done yet; the details of all cases."""
-        left = [k for k in range(self.count) if self.folder.kept(k) is None]
+    def run(self, workers: int, progress: Progress | None = None) -> TrialAnswer:
+        """Run the cases that are not finished, `workers` at once; return the answer of all."""
+        open_cases = [k for k in range(self.count) if self.folder.read_result(k) is None]
         executor = ThreadPoolExecutor(workers)
-        left.sort(key=self._logs, reverse=True)  # long ones last would leave workers idle
-        waiting = [executor.submit(self._do, number) for number in left]
+        # The longest cases come first, because a long last case would leave workers idle.
+        open_cases.sort(key=lambda number: len(self._draw(number).programs), reverse=True)
+        waiting = [executor.submit(self._run_case, number) for number in open_cases]
         try:
-            for done, future in enumerate(as_completed(waiting)):
+            for done, future in enumerate(as_completed(waiting), start=1):
                 future.result()
                 if progress is not None:
-                    progress(f"case {done + 1} of {len(left)}", (done + 1) / len(left))
+                    progress(f"case {done} of {len(open_cases)}", done / len(open_cases))
         finally:
             self._examiner.stop()
             executor.shutdown(cancel_futures=True)
-        return self._closed()
+        return self._collect()
 
-    def _logs(self, number: int) -> int:
-        """How many logs a case has."""
-        return len(draw(self.seed, number, self.nominal, kernel().effects).programs)
+    def _draw(self, number: int) -> Case:
+        return draw(self.seed, number, self.nominal, kernel().effects)
 
-    def _do(self, number: int) -> None:
-        """One case from its logs to its score."""
-        self._unchanged()
-        begun = perf_counter()
-        case = draw(self.seed, number, self.nominal, kernel().effects)
-        true = true_logs(case, self.nominal)
-        place = self.folder.logs(number)
-        files = [place / f"{name}.csv.gz" for name in case.programs]
-        for run, (log, file) in enumerate(zip(true, files, strict=True)):
-            logs.write(measured(case, log, run), file)
-        found = self._examiner.diagnose(files)
+    def _run_case(self, number: int) -> None:
+        """Simulate, diagnose, unseal and score one case."""
+        self._check_program()
+        begin = perf_counter()
+        case = self._draw(number)
+        truth = simulate_truth(case, self.nominal)
+        outcome = self._examiner.diagnose(self._write_logs(case, truth))
         if self._examiner.stopped:
             return
-        self._unchanged()
-        case = self.folder.unseal(number)  # nobody has read it since it was sealed
-        closed = None
-        if found.answer is not None and found.saved is not None:
-            closed = true_closed_fraction(found.answer, found.saved, true)
-        unsealed = score.Unsealed(
-            case=case,
-            norms=norms(case, true, self.nominal),
-            answer=found.answer,
-            closed=closed,
-        )
-        detail = score.detail(unsealed, kernel().effects)
-        detail |= {"seconds": round(perf_counter() - begun, 1), "error": found.error}
-        self.folder.keep(number, {"detail": detail, "answer": found.answer})
+        self._check_program()
+        unsealed = self._unseal(number, truth, outcome)
+        seconds = round(perf_counter() - begin, 1)
+        result = score(unsealed, kernel().effects, seconds=seconds, error=outcome.error)
+        self.folder.write_result(number, result, outcome.answer)
 
-    def _unchanged(self) -> None:
-        """Refuse to mix answers of two programs."""
+    def _write_logs(self, case: Case, truth: Sequence[Log]) -> list[Path]:
+        """Write the measured logs of a case."""
+        folder = self.folder.logs(case.number)
+        files = [folder / f"{name}.csv.gz" for name in case.programs]
+        for run, (log, file) in enumerate(zip(truth, files, strict=True)):
+            logs.write(measure(case, log, run), file)
+        return files
+
+    def _unseal(self, number: int, truth: Sequence[Log], outcome: Outcome) -> Unsealed:
+        """Unseal a case, which nobody has read since it was sealed, beside its diagnosis."""
+        case = self.folder.unseal(number)
+        answer = None if outcome.answer is None else document.from_json(outcome.answer)
+        closed = None
+        if answer is not None and outcome.saved is not None:
+            closed = true_closed_fraction(answer, outcome.saved, truth)
+        return Unsealed(
+            case=case, norms=norms(case, truth, self.nominal), answer=answer, closed=closed
+        )
+
+    def _check_program(self) -> None:
+        """Refuse to mix results of two programs."""
         if program_hash() != self.program:
             raise EmulatorError(
-                f"{self.folder.path}: the program's source changed while the trial ran; what is "
-                "done belongs to the old one"
+                f"{self.folder.path}: the program's source changed during the trial; the finished "
+                "cases belong to the old source"
             )
 
-    def _closed(self) -> list[dict[str, Any]]:
-        """All details, written as tables and as the answer."""
-        found = [self.folder.kept(number) for number in range(self.count)]
-        details = [result["detail"] for result in found if result is not None]
-        path = self.folder.path
-        write(path / "cases.csv", table.cases(details))
-        write(path / "evidence.csv", table.evidence(details))
-        return details
-
-    def answer(self, details: list[dict[str, Any]]) -> dict[str, Any]:
-        """The machine-readable answer."""
-        return summary.answer(details, self.seed, self.folder.manifest_hash, self.program)
+    def _collect(self) -> TrialAnswer:
+        """Read all results and write the tables."""
+        found = [self.folder.read_result(number) for number in range(self.count)]
+        results = tuple(result for result in found if result is not None)
+        write(self.folder.path / "cases.csv", table.cases(results))
+        write(self.folder.path / "evidence.csv", table.evidence(results))
+        return TrialAnswer(
+            results=results,
+            seed=self.seed,
+            manifest_sha256=self.folder.manifest_hash,
+            program_sha256=self.program,
+        )

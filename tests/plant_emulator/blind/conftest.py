@@ -1,4 +1,4 @@
-"""The library and the trial's own laws in one kernel, for these tests only."""
+"""A kernel with the library and the trial's own laws, for these tests only."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -7,20 +7,21 @@ import pytest
 
 from plant_emulator.blind import laws
 from plant_emulator.blind.case import Case, Hidden
+from plant_emulator.blind.result import CaseResult
 from plant_emulator.effects import Effect
 from plant_emulator.solver import kernel as kernels
 
 
 @pytest.fixture(scope="package", autouse=True)
-def known() -> Iterator[dict[str, Effect]]:
-    """Effects of the library and laws of the trial, known to this process meanwhile."""
+def all_effects() -> Iterator[dict[str, Effect]]:
+    """Effects of the library and laws of the trial, registered in this process meanwhile."""
     kernels.know(*(laws.load(name) for name in laws.names()))
     yield dict(kernels.kernel().effects)
     kernels.know()
 
 
 def case_with(*hidden: Hidden, kind: str = "effect", runs: int = 1) -> Case:
-    """A case of program 1 that hides these."""
+    """A case of program 1 that hides these effects."""
     return Case(
         number=0,
         kind=kind,  # type: ignore[arg-type]
@@ -42,5 +43,16 @@ def hidden(effect: str, subsystem: str, *, outside: bool = False, **values: floa
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder for a trial."""
+    """Path of a trial's folder."""
     return tmp_path / "trial"
+
+
+def finished(number: int, *, right: bool) -> CaseResult:
+    """The result of a case without effect; a wrong one is a false alarm."""
+    return CaseResult(
+        case=number + 1, kind="none", truth="none", hidden=(), programs=(), detectable=False,
+        verdict="none" if right else "unknown", effects=(), classes=(), answered="none",
+        evidence=3.0, confidence=None, right=right, top1=False, false_alarm=not right,
+        subsystem=None, located=False, closed_fraction=None, closed_fraction_ci95=None,
+        closed_fraction_true=None, sizes=(), seconds=1.0,
+    )  # fmt: skip

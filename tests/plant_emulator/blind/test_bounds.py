@@ -1,4 +1,4 @@
-"""Clopper-Pearson bounds against published figures and the binomial distribution itself."""
+"""Clopper-Pearson bounds against published figures and the binomial distribution."""
 
 import pytest
 from scipy.stats import binom
@@ -27,7 +27,7 @@ def test_bounds_are_where_the_tails_hold_5_percent(hits: int, of: int) -> None:
 
 def test_nothing_counted_says_nothing() -> None:
     assert clopper_pearson(0, 0) == (0.0, 1.0)
-    assert Share(0, 0).as_json()["share"] is None
+    assert Share(0, 0).to_json()["share"] is None
 
 
 def test_share_counts_what_is_true() -> None:

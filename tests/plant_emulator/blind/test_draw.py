@@ -1,5 +1,6 @@
-"""What the trial hides."""
+"""The draw of the hidden cases."""
 
+import json
 from collections import Counter
 
 import numpy as np
@@ -15,8 +16,8 @@ from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram
 
 
 @pytest.fixture(scope="module")
-def cases(nominal: ParameterSet, known: dict[str, Effect]) -> list[Case]:
-    return [draw(3, number, nominal, known) for number in range(80)]
+def cases(nominal: ParameterSet, all_effects: dict[str, Effect]) -> list[Case]:
+    return [draw(3, number, nominal, all_effects) for number in range(80)]
 
 
 def test_a_quarter_of_the_cases_hides_no_effect() -> None:
@@ -30,10 +31,10 @@ def test_more_cases_begin_with_the_same() -> None:
 
 
 def test_a_seed_and_a_number_are_always_the_same_case(
-    nominal: ParameterSet, known: dict[str, Effect], cases: list[Case]
+    nominal: ParameterSet, all_effects: dict[str, Effect], cases: list[Case]
 ) -> None:
-    assert draw(3, 17, nominal, known) == cases[17]
-    assert draw(4, 17, nominal, known) != cases[17]
+    assert draw(3, 17, nominal, all_effects) == cases[17]
+    assert draw(4, 17, nominal, all_effects) != cases[17]
 
 
 def test_every_effect_comes_up_in_40_single_cases(cases: list[Case]) -> None:
@@ -43,16 +44,16 @@ def test_every_effect_comes_up_in_40_single_cases(cases: list[Case]) -> None:
 
 
 def test_case_survives_json(cases: list[Case]) -> None:
-    import json
-
-    assert all(case_of(json.loads(json.dumps(case.as_json()))) == case for case in cases)
+    assert all(case_of(json.loads(json.dumps(case.to_json()))) == case for case in cases)
 
 
-def test_sizes_are_half_to_twice_the_plausible(cases: list[Case], known: dict[str, Effect]) -> None:
+def test_sizes_are_half_to_twice_the_plausible(
+    cases: list[Case], all_effects: dict[str, Effect]
+) -> None:
     own = {(entry.law, key) for entry in INSIDE for key in entry.ranges}
     for hidden in (h for case in cases for h in case.hidden):
         for key, value in hidden.values.items():
-            declared = known[hidden.law].parameters[key]
+            declared = all_effects[hidden.law].parameters[key]
             if (hidden.law, key) in own:
                 continue
             ratio = abs(value / declared.plausible)
@@ -61,16 +62,16 @@ def test_sizes_are_half_to_twice_the_plausible(cases: list[Case], known: dict[st
             assert low - 1e-9 <= ratio <= high + 1e-9, (hidden.law, key)
 
 
-def test_all_that_is_estimated_drifts_by_its_prior(
+def test_every_estimated_parameter_deviates_by_its_prior(
     cases: list[Case], nominal: ParameterSet
 ) -> None:
-    drifting = {p.name for p in nominal if p.kind == "estimated" and p.std is not None}
-    drifted = [case for case in cases if case.kind != "none"]
-    assert all(set(case.parameters) == drifting for case in drifted)
+    estimated = {p.name for p in nominal if p.kind == "estimated" and p.std is not None}
+    deviating = [case for case in cases if case.kind != "none"]
+    assert all(set(case.parameters) == estimated for case in deviating)
     steps = [
         (case.parameters[name] - nominal.value(name)) / (nominal[name].std or 1.0)
-        for case in drifted
-        for name in drifting
+        for case in deviating
+        for name in estimated
     ]
     assert np.std(steps) == pytest.approx(0.98, abs=0.08)
 
@@ -82,7 +83,7 @@ def test_runs_start_anywhere_in_the_gap(cases: list[Case]) -> None:
     assert np.abs(gaps).max() <= 1.0
 
 
-def test_programs_of_a_truck_do_not_tell_that_its_wheel_is_the_cause(cases: list[Case]) -> None:
+def test_programs_with_a_truck_do_not_betray_that_the_wheel_is_the_cause(cases: list[Case]) -> None:
     with_truck = [case for case in cases if "program6" in case.programs]
     assert any(case.kind in {"none", "drift"} for case in with_truck)
 
@@ -94,7 +95,7 @@ def test_effects_of_a_truck_have_one(cases: list[Case]) -> None:
 
 
 def test_every_limit_of_a_ramp_is_below_the_steepest_of_the_programs(nominal: ParameterSet) -> None:
-    """One that no ramp reaches is not there, and its law's landing a mere lag."""
+    """A limit above all ramps has no effect, and its law would only be a lag."""
     (entry,) = [one for one in INSIDE if one.effect == "reference_ramp_limit"]
     shortest, _ = entry.ranges["ramp_time"]
     steepest = max(

@@ -1,4 +1,4 @@
-"""Conformance: what holds for every file in plant_emulator/blind/laws."""
+"""Conformance: claims that hold for every law in plant_emulator/blind/laws."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ every_law = pytest.mark.parametrize("name", laws.names())
 
 
 def size(found: Log, other: Log) -> float:
-    """Norm of a difference over the sensors' noise."""
+    """Norm of the difference of two logs over the sensor noise."""
     return float(
         np.sqrt(sum(np.sum(((found[c] - other[c]) / SENSORS[c][0]) ** 2) for c in COMPARED))
     )
@@ -73,7 +73,7 @@ def test_law_of_plausible_size_shows(
 def test_law_differs_from_that_of_the_library_at_any_size(
     entry: object, nominal: ParameterSet, nominals: dict[str, Log]
 ) -> None:
-    """What of its change is no multiple of the library's: a part of it, or more than the noise."""
+    """The part orthogonal to the library's change exceeds 1 % of the change, or the noise."""
     law, effect = entry.law, entry.effect  # type: ignore[attr-defined]
     ours = values_of(nominal, {law: _plausible(law)})
     theirs = values_of(nominal, {effect: _plausible(effect)})
@@ -86,8 +86,8 @@ def test_law_differs_from_that_of_the_library_at_any_size(
         ]
         parts.append(changes)
     a, b = (np.concatenate(column) for column in zip(*parts, strict=True))
-    rest = a - b * (a @ b) / (b @ b)
-    assert np.linalg.norm(rest) > min(0.01 * float(np.linalg.norm(a)), 10.0)
+    orthogonal = a - b * (a @ b) / (b @ b)
+    assert np.linalg.norm(orthogonal) > min(0.01 * float(np.linalg.norm(a)), 10.0)
 
 
 @every_law
@@ -114,7 +114,7 @@ def test_every_effect_of_the_library_may_be_hidden() -> None:
 
 
 def test_library_law_is_used_only_where_there_is_no_other() -> None:
-    """Constant and proportional sensor errors, and the weight of an imbalance."""
+    """Constant and proportional sensor errors and the weight of an imbalance have one law only."""
     same = {entry.effect for entry in INSIDE if entry.effect == entry.law}
     assert same == {
         "torque_sensor_offset", "torque_sensor_gain", "drum_speed_scale", "motor_speed_scale",
@@ -141,6 +141,6 @@ def test_law_sits_where_its_effect_sits(entry: object) -> None:
 
 
 @pytest.mark.parametrize("entry", [*INSIDE, *OUTSIDE], ids=lambda entry: entry.effect)
-def test_entry_tells_every_value_of_a_runs_own(entry: object) -> None:
+def test_entry_has_a_range_for_every_parameter_of_a_single_run(entry: object) -> None:
     own = {key for key, p in _law(entry.law).parameters.items() if p.per_run}  # type: ignore[attr-defined]
     assert own == set(entry.starts)  # type: ignore[attr-defined]

@@ -1,4 +1,4 @@
-"""The logs of a case."""
+"""The logs of a case, and the orthogonal norm of its hidden effects."""
 
 from collections.abc import Mapping
 
@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from plant_emulator.blind import laws
-from plant_emulator.blind.detectable import norms, or_impossible
 from plant_emulator.blind.draw import draw
-from plant_emulator.blind.generate import measured, true_logs
+from plant_emulator.blind.generate import measure, simulate_truth
+from plant_emulator.blind.orthogonal_norm import norms, or_impossible
 from plant_emulator.errors import UnsettledError
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import COMPARED, Array
@@ -18,9 +18,9 @@ from plant_emulator.solver.kernel import kernel, know
 from tests.plant_emulator.blind.conftest import case_with, hidden
 
 
-def test_truth_has_the_start_in_the_gap_and_the_drift_of_its_case(nominal: ParameterSet) -> None:
-    """Fixed fine steps against adapted ones: the same bench within half a noise."""
-    (log,) = true_logs(case_with(kind="none"), nominal)
+def test_truth_has_the_gap_position_and_the_parameters_of_its_case(nominal: ParameterSet) -> None:
+    """Small fixed steps and adaptive steps agree within half of the noise."""
+    (log,) = simulate_truth(case_with(kind="none"), nominal)
     found = simulate(run_of(log), nominal.values(), gap_position=0.3)
     other = simulate(run_of(log), nominal.values(), gap_position=-0.3)
     errors = [np.abs(log[c] - found[c]).max() / SENSORS[c][0] for c in COMPARED]
@@ -28,20 +28,22 @@ def test_truth_has_the_start_in_the_gap_and_the_drift_of_its_case(nominal: Param
     assert max(np.abs(log[c] - other[c]).max() / SENSORS[c][0] for c in COMPARED) > 5.0
 
 
-def test_truth_that_does_not_settle_by_its_step_takes_a_shorter_one(nominal: ParameterSet) -> None:
-    """Presliding that left one stage of program 3 unsettled by 0.2 ms, and ended a trial."""
+def test_truth_that_does_not_converge_is_simulated_with_a_smaller_step(
+    nominal: ParameterSet,
+) -> None:
+    """With steps of 0.2 ms one stage of program 3 does not converge in this case of presliding."""
     know(*(laws.load(name) for name in laws.names()))
     case = draw(86028, 32, nominal, kernel().effects)
     assert [h.law for h in case.hidden] == ["elastoplastic_presliding"]
-    found = true_logs(case, nominal)
+    found = simulate_truth(case, nominal)
     assert [log.source for log in found] == ["program1", "program2", "program3"]
     assert all(np.isfinite(log["shaft_torque"]).all() for log in found)
 
 
 def test_measured_log_is_quantised_and_noisy(nominal: ParameterSet) -> None:
     case = case_with(kind="none")
-    (true,) = true_logs(case, nominal)
-    seen = measured(case, true, 0)
+    (true,) = simulate_truth(case, nominal)
+    seen = measure(case, true, 0)
     deviation, step = SENSORS["armature_current"]
     counts = seen["armature_current"] / step
     np.testing.assert_allclose(counts, np.round(counts), atol=1e-6)
@@ -52,32 +54,33 @@ def test_measured_log_is_quantised_and_noisy(nominal: ParameterSet) -> None:
 
 
 def test_log_has_the_columns_of_the_bench_and_no_voltage(nominal: ParameterSet) -> None:
-    (log,) = true_logs(case_with(kind="none"), nominal)
+    (log,) = simulate_truth(case_with(kind="none"), nominal)
     assert set(log.signals) == {"speed_reference", *COMPARED, "shell_temperature"}
 
 
 def test_offset_of_a_sensor_has_the_norm_of_its_samples(nominal: ParameterSet) -> None:
-    """No parameter moves the torque alone: nearly offset / noise x sqrt(samples) is left."""
+    """No parameter moves the torque alone, so nearly offset / noise x sqrt(samples) is left."""
     case = case_with(hidden("torque_sensor_offset", "torque_sensor", offset=0.5))
-    found = norms(case, true_logs(case, nominal), nominal)
+    found = norms(case, simulate_truth(case, nominal), nominal)
     level = np.hypot(0.25, 100 / 4096 / np.sqrt(12))
     whole = 0.5 / level * np.sqrt(1851)
     assert 0.5 * whole < found["torque_sensor_offset"] < whole
 
 
 @pytest.mark.parametrize(("asymmetry", "left"), [(0.02, 7.0), (-0.3, 15.0)])
-def test_effect_that_drift_imitates_is_not_detectable(
+def test_effect_confounded_with_parameter_deviations_is_not_detectable(
     asymmetry: float, left: float, nominal: ParameterSet
 ) -> None:
-    """A bench that only goes forwards: an asymmetry is another Coulomb friction. A large one drift
-    follows further than along its tangents, beyond which 159 would be left.
+    """A bench that only runs forwards cannot tell an asymmetry from another Coulomb friction.
+
+    The tangents alone would leave a norm of 159 of the large asymmetry.
     """
     case = case_with(hidden("friction_asymmetry", "gear", asymmetry=asymmetry))
-    assert norms(case, true_logs(case, nominal), nominal)["friction_asymmetry"] < left
+    assert norms(case, simulate_truth(case, nominal), nominal)["friction_asymmetry"] < left
 
 
-def test_drift_that_no_bench_can_be_simulated_with_is_a_bad_place_and_no_error() -> None:
-    """A fit that looks how far drift follows an effect may try any."""
+def test_parameters_without_a_simulation_have_a_huge_residual_and_raise_nothing() -> None:
+    """The nuisance fit may try any parameters."""
 
     def residual(values: Mapping[str, float]) -> Array:
         if values["drum_inertia"] < 100.0:

@@ -1,32 +1,32 @@
-"""Answers are fixed before they are looked for."""
+"""The commitment to the truth of a case."""
 
 import json
 from pathlib import Path
 
 import pytest
 
-from plant_emulator.blind.sealing import opened, sealed
+from plant_emulator.blind.sealing import seal, unseal
 from plant_emulator.errors import EmulatorError, InputError
 from plant_emulator.workflows.blind_trial.folder import Folder
-from tests.plant_emulator.blind.conftest import case_with, hidden
+from tests.plant_emulator.blind.conftest import case_with, finished, hidden
 
 CASE = case_with(hidden("torque_sensor_offset", "torque_sensor", offset=0.5))
 
 
 def test_what_was_sealed_comes_out() -> None:
-    text, commitment = sealed(CASE, "nonce")
-    assert opened(text, commitment, "here") == CASE
+    text, commitment = seal(CASE, "nonce")
+    assert unseal(text, commitment, "here") == CASE
 
 
 def test_changed_answer_is_refused() -> None:
-    text, commitment = sealed(CASE, "nonce")
+    text, commitment = seal(CASE, "nonce")
     with pytest.raises(EmulatorError, match=r"here: SHA-256 .* the answer has been changed"):
-        opened(text.replace("0.5", "0.7"), commitment, "here")
+        unseal(text.replace("0.5", "0.7"), commitment, "here")
 
 
 def test_commitment_does_not_tell_the_answer() -> None:
-    """The same answer has another hash with another nonce."""
-    assert sealed(CASE, "one")[1] != sealed(CASE, "two")[1]
+    """Another nonce gives another hash of the same truth."""
+    assert seal(CASE, "one")[1] != seal(CASE, "two")[1]
 
 
 def test_manifest_holds_the_hash_and_nothing_of_the_answer(folder: Path) -> None:
@@ -72,7 +72,7 @@ def test_folder_of_another_trial_is_refused(
 def test_folder_of_something_else_is_refused(folder: Path) -> None:
     folder.mkdir()
     (folder / "thesis.txt").write_text("mine")
-    with pytest.raises(InputError, match="not empty, and no trial"):
+    with pytest.raises(InputError, match="not empty and not a trial"):
         Folder(folder, 1, "program")
 
 
@@ -80,15 +80,15 @@ def test_folder_of_something_else_is_refused(folder: Path) -> None:
 def test_broken_manifest_is_refused(folder: Path, text: str) -> None:
     folder.mkdir()
     (folder / "manifest.json").write_text(text)
-    with pytest.raises(InputError, match=r"manifest\.json: no manifest of a trial"):
+    with pytest.raises(InputError, match=r"manifest\.json: not a manifest of a trial"):
         Folder(folder, 1, "program")
 
 
-def test_result_is_kept_and_a_damaged_one_told(folder: Path) -> None:
-    trial = Folder(folder, 1, "program")
-    assert trial.kept(0) is None
-    trial.keep(0, {"detail": {"right": True}})
-    assert trial.kept(0) == {"detail": {"right": True}}
+def test_result_is_kept_and_a_damaged_one_refused(folder: Path) -> None:
+    trial, result = Folder(folder, 1, "program"), finished(0, right=True)
+    assert trial.read_result(0) is None
+    trial.write_result(0, result, {"schema": "gap-diagnosis/1"})
+    assert trial.read_result(0) == result
     (folder / "results" / "case_001.json").write_text('{"detail": ')
     with pytest.raises(EmulatorError, match=r"case_001\.json: damaged"):
-        trial.kept(0)
+        trial.read_result(0)

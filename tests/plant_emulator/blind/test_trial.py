@@ -1,11 +1,10 @@
-"""The trial as a whole: the diagnosis sees logs only, and an interrupted trial goes on."""
+"""The whole trial: the diagnosis sees only logs, and an interrupted trial can be continued."""
 
 import json
 import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,16 +18,17 @@ from plant_emulator.simulation.simulate import run_of, simulate
 from plant_emulator.workflows.blind_trial.examiner import Examiner
 from plant_emulator.workflows.blind_trial.folder import ROOT, program_hash
 from plant_emulator.workflows.blind_trial.trial import Trial
+from tests.plant_emulator.blind.conftest import finished
 from tests.plant_emulator.runs import linear
 
-# Tells every file that a process opens and every module that it has in the end.
+# Records every file that a process opens, and every module that it has imported at its end.
 WITNESS = """
 import atexit, sys
 out = open({out!r}, "w")
-def told(event, arguments):
+def record(event, arguments):
     if event in ("open", "os.listdir", "os.scandir"):
         out.write(f"{{event}} {{arguments[0]}}\\n")
-sys.addaudithook(told)
+sys.addaudithook(record)
 atexit.register(lambda: (out.write("\\n".join(f"module {{m}}" for m in sys.modules)), out.close()))
 """
 
@@ -46,7 +46,7 @@ def short_log(tmp_path: Path, nominal: ParameterSet) -> Path:
 
 
 @pytest.mark.slow
-def test_diagnosis_opens_no_answer_and_knows_no_law_of_the_trial(
+def test_diagnosis_opens_no_sealed_case_and_imports_no_law_of_the_trial(
     tmp_path: Path, short_log: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     trial = Trial(folder, 1, 2)
@@ -60,15 +60,15 @@ def test_diagnosis_opens_no_answer_and_knows_no_law_of_the_trial(
     assert found.error == ""
     assert found.answer is not None
     assert found.answer["schema"] == "gap-diagnosis/1"
-    told = record.read_text().splitlines()
-    assert "module plant_emulator.diagnosis.fitting.joint_fit" in told
-    assert any(line.startswith("open ") and "program1.csv.gz" in line for line in told)
-    assert not [line for line in told if str(folder) in line or "sealed" in line]
-    assert not [line for line in told if "plant_emulator/blind" in line]
-    assert not [line for line in told if "plant_emulator.blind" in line]
+    seen = record.read_text().splitlines()
+    assert "module plant_emulator.diagnosis.fitting.joint_fit" in seen
+    assert any(line.startswith("open ") and "program1.csv.gz" in line for line in seen)
+    assert not [line for line in seen if str(folder) in line or "sealed" in line]
+    assert not [line for line in seen if "plant_emulator/blind" in line]
+    assert not [line for line in seen if "plant_emulator.blind" in line]
 
 
-def test_witness_would_tell_of_an_opened_answer(tmp_path: Path, folder: Path) -> None:
+def test_witness_would_record_an_opened_sealed_case(tmp_path: Path, folder: Path) -> None:
     Trial(folder, 1, 1).seal()
     record = tmp_path / "record.txt"
     answer = folder / "sealed" / "case_001.json"
@@ -77,7 +77,7 @@ def test_witness_would_tell_of_an_opened_answer(tmp_path: Path, folder: Path) ->
     assert f"open {answer}" in record.read_text()
 
 
-def test_refused_log_is_told_by_its_one_line(tmp_path: Path, nominal: ParameterSet) -> None:
+def test_refused_log_is_reported_by_its_one_line(tmp_path: Path, nominal: ParameterSet) -> None:
     still = simulate(run_of(linear((0.0, 0.0), duration=1.0)), nominal.values())
     file = tmp_path / "program1.csv.gz"
     logs.write(still, file)
@@ -92,33 +92,20 @@ def test_stopped_examiner_starts_nothing(short_log: Path) -> None:
     assert examiner.diagnose([short_log]).error == "stopped"
 
 
-def result(number: int, right: bool) -> dict[str, Any]:
-    """A case that is done."""
-    detail = {
-        "case": number + 1, "kind": "none", "truth": "none", "hidden": [], "programs": [],
-        "detectable": False, "verdict": "none" if right else "unknown", "effects": [],
-        "class": [], "answered": "none", "evidence": 3.0, "confidence": None, "right": right,
-        "top1": False, "false_alarm": not right, "subsystem": None, "located": False,
-        "closed_fraction": None, "closed_fraction_ci95": None, "closed_fraction_true": None,
-        "sizes": [], "seconds": 1.0, "error": "",
-    }  # fmt: skip
-    return {"detail": detail, "answer": None}
-
-
 def done(folder: Path, *right: bool) -> Trial:
-    """A trial all of whose cases are done."""
+    """A trial with finished cases only."""
     trial = Trial(folder, 1, len(right))
     trial.seal()
     for number, one in enumerate(right):
-        trial.folder.keep(number, result(number, one))
+        trial.folder.write_result(number, finished(number, right=one), None)
     return trial
 
 
-def test_what_is_done_is_not_done_again(folder: Path) -> None:
+def test_a_finished_case_is_not_repeated(folder: Path) -> None:
     done(folder, True, False)
     again = Trial(folder, 1, 2)
     again.seal()
-    found = again.answer(again.run(1))
+    found = again.run(1).to_json()
     assert (found["cases"], found["correct"], found["false_alarms"]) == (2, 1, 1)
     assert len((folder / "cases.csv").read_text().splitlines()) == 3
     assert (folder / "evidence.csv").read_text() == (
@@ -132,9 +119,9 @@ def test_cases_of_many_logs_come_first(folder: Path, monkeypatch: pytest.MonkeyP
 
     def do(self: Trial, number: int) -> None:
         order.append(len(self.folder.unseal(number).programs))
-        self.folder.keep(number, result(number, True))
+        self.folder.write_result(number, finished(number, right=True), None)
 
-    monkeypatch.setattr(Trial, "_do", do)
+    monkeypatch.setattr(Trial, "_run_case", do)
     trial.run(1)
     assert order == sorted(order, reverse=True)
     assert len(set(order)) > 1
@@ -157,7 +144,7 @@ def test_command_shows_the_table_and_writes_the_answer(
 
 
 def diagnoses_of(process: int) -> list[str]:
-    """Children of a process that diagnose."""
+    """Ids of the child processes that run a diagnosis."""
     listed = subprocess.run(["ps", "--ppid", str(process), "-o", "pid=,args="], text=True,
                             capture_output=True, check=False)  # fmt: skip
     return [line.split()[0] for line in listed.stdout.splitlines() if " diagnose " in line]
@@ -173,9 +160,9 @@ def test_ended_trial_leaves_no_diagnosis_behind(folder: Path) -> None:
         children = diagnoses_of(trial.pid)
         time.sleep(0.1)
     trial.terminate()
-    _, told = trial.communicate(timeout=30)
+    _, errors = trial.communicate(timeout=30)
     assert children
-    assert "the same command goes on from here" in told
+    assert "the same command continues this trial" in errors
     assert not any(Path("/proc", child).exists() for child in children)
 
 
@@ -207,14 +194,15 @@ def test_program_hash_follows_the_source(tmp_path: Path, monkeypatch: pytest.Mon
 def test_a_bench_without_effect_is_diagnosed_unsealed_and_scored(
     folder: Path, nominal: ParameterSet
 ) -> None:
-    """One whole case, chosen by its truth from the cases of a seed."""
+    """One whole case, the first of its seed without an effect."""
     trial = Trial(folder, 2, 20)
     trial.seal()
     [number] = [k for k in range(20) if trial.folder.unseal(k).kind == "none"][:1]
     for other in set(range(20)) - {number}:
-        trial.folder.keep(other, result(other, True))
-    details = trial.run(1)
-    assert details[number]["error"] == ""
-    assert details[number]["verdict"] in {"none", "parameter"}
-    assert not details[number]["false_alarm"]
-    assert np.isfinite(details[number]["evidence"])
+        trial.folder.write_result(other, finished(other, right=True), None)
+    result = trial.run(1).results[number]
+    assert result.error == ""
+    assert result.verdict in {"none", "parameter"}
+    assert not result.false_alarm
+    assert result.evidence is not None
+    assert np.isfinite(result.evidence)

@@ -1,8 +1,9 @@
-"""How large a hidden effect is in the logs, after drift has done what it can to imitate it.
+"""The orthogonal norm of a hidden effect: its size in the logs after nuisance projection.
 
-The norm of the whitened change that the true law makes at its hidden size, less what parameters and
-start states can follow: their tangents at the truth, with their priors; and, for drift can follow
-further than its tangents tell, their fit to the noiseless logs where little is left.
+The true law changes the noise-free logs at its hidden size. The whitened change is projected
+orthogonally to the tangents of the nuisance parameters and initial states at the truth, with their
+priors. A large norm is checked by a nonlinear fit of the nuisance parameters to the noise-free
+logs, because they can imitate more than their tangents show. The smaller norm counts.
 """
 
 from __future__ import annotations
@@ -32,19 +33,22 @@ if TYPE_CHECKING:
 
 # Norm above which an effect counts as detectable.
 DETECTABLE = 7.0
-# The fit of the drift: relative fall of the cost that ends it, steps, and the norm of a change that
-# slopes are first taken over.
+# The nuisance fit: relative fall of the cost that ends it, number of iterations, and norm of the
+# change over which the first derivatives are taken.
 SETTLED, FEW, COARSE = 1e-4, 10, 10.0
 
 
 def noise_levels(channels: Sequence[str]) -> Array:
-    """Standard deviation of noise and quantisation of each channel [SI]."""
+    """Standard deviation of noise and quantisation of each channel [SI], shape (channels,)."""
     pairs = [SENSORS[name] for name in channels]
     return np.array([np.hypot(deviation, step / np.sqrt(12.0)) for deviation, step in pairs])
 
 
 def norms(case: Case, logs: Sequence[Log], parameters: ParameterSet) -> dict[str, float]:
-    """The norm of every hidden effect by its name, the others in place; logs : the true ones."""
+    """Orthogonal norm of every hidden effect by name, with the other hidden effects present.
+
+    logs : noise-free log of every run; parameters : the nominal set
+    """
     return {hidden.effect: _norm(case, hidden, logs, parameters) for hidden in case.hidden}
 
 
@@ -57,8 +61,8 @@ def _norm(case: Case, hidden: Hidden, logs: Sequence[Log], parameters: Parameter
     complete = [_simulation(case, k, log, parameters, case.hidden) for k, log in enumerate(logs)]
     truth = {name: bench[name] for name in free}
     starts = [{**truth, GAP_POSITION: gap} for gap in case.gaps]
-    base = [part(start) for part, start in zip(without, starts, strict=True)]
-    whole = [run(start) for run, start in zip(complete, starts, strict=True)]
+    base = [simulate_run(start) for simulate_run, start in zip(without, starts, strict=True)]
+    whole = [simulate_run(start) for simulate_run, start in zip(complete, starts, strict=True)]
     change = [after - before for after, before in zip(whole, base, strict=True)]
     tangents = Tangents(
         linearise_at(wanted, [_less(p, b) for p, b in zip(without, base, strict=True)])
@@ -68,11 +72,14 @@ def _norm(case: Case, hidden: Hidden, logs: Sequence[Log], parameters: Parameter
         return norm
     away = [_less(p, w) for p, w in zip(without, whole, strict=True)]
     bounded = [or_impossible(one, w) for one, w in zip(away, whole, strict=True)]
-    return min(norm, _followed(wanted, bounded))
+    return min(norm, _norm_after_fit(wanted, bounded))
 
 
-def _followed(wanted: Sequence[Unknown], residuals: Sequence[Residual]) -> float:
-    """Norm of what a fit of drift from the truth leaves, at first with slopes over the hollows."""
+def _norm_after_fit(wanted: Sequence[Unknown], residuals: Sequence[Residual]) -> float:
+    """Norm that a fit of the nuisance parameters from the truth leaves.
+
+    The first fit takes its derivatives over large differences, which smooths small local minima.
+    """
     coarse = estimate(wanted, residuals, settled=SETTLED, iterations=FEW, difference=COARSE)
     starts = [
         replace(u, start=float(np.clip(u.value(float(z)), u.lower, u.upper)))
@@ -83,8 +90,9 @@ def _followed(wanted: Sequence[Unknown], residuals: Sequence[Residual]) -> float
 
 
 def or_impossible(residual: Residual, like: Array) -> Residual:
-    """A residual of that one's shape, far off where the bench cannot be simulated: a bad place for
-    drift to go, but no end of the search.
+    """The residual; a huge constant, shape of `like`, if the simulation does not converge.
+
+    The search then turns away from such parameters instead of ending.
     """
 
     def found(values: Mapping[str, float]) -> Array:
@@ -97,14 +105,14 @@ def or_impossible(residual: Residual, like: Array) -> Residual:
 
 
 def _less(simulated: Residual, base: Array) -> Residual:
-    """The change of a simulation from what it was."""
+    """A simulation minus the constant `base`."""
     return lambda found: simulated(found) - base
 
 
 def _simulation(
     case: Case, run: int, log: Log, parameters: ParameterSet, hidden: Sequence[Hidden]
 ) -> Residual:
-    """A run by parameters and start in the gap, whitened, shape (channels, samples)."""
+    """A run simulated from parameters and gap position, whitened, shape (channels, samples)."""
     inputs = run_of(log)
     levels = noise_levels(COMPARED)[:, None]
     effects = {h.law: h.in_run(run) for h in hidden}
