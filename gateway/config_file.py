@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from gateway import regulators
-from gateway.configuration.config import Config, Place, changed, from_document
+from gateway.configuration.config import Config, Place, from_document, merge
 from gateway.configuration.keys import check_text
 from gateway.errors import ConfigError
-from gateway.friction import friction_of_file
+from gateway.friction import friction_table
 
 
 def load(path: str | Path) -> Config:
@@ -22,25 +22,25 @@ def load(path: str | Path) -> Config:
         return _place(file, text, section, key)
 
     document = _with_friction(_toml(file, text), file.parent, place)
-    return _checked(from_document(document, place=place), place)
+    return _refuse_unknown_regulator(from_document(document, place=place), place)
 
 
 def with_values(config: Config, values: Mapping[str, str]) -> Config:
     """`Config.with_values` where `regulator.friction` may also be the path of a friction file."""
     try:
-        document = changed(config.document, values)
+        document = merge(config.document, values)
     except (ValueError, RecursionError) as error:
         raise ConfigError(_why(error), place="--set", expected="KEY=VALUE as in TOML") from error
     place = "{}.{}".format
-    return _checked(from_document(_with_friction(document, Path(), place)), place)
+    return _refuse_unknown_regulator(from_document(_with_friction(document, Path(), place)), place)
 
 
 def load_friction(path: str | Path) -> dict[str, Any]:
     """The friction's table out of a friction map or a parameter set of the bench."""
-    return friction_of_file(_toml(Path(path), _text(Path(path))), path)
+    return friction_table(_toml(Path(path), _text(Path(path))), path)
 
 
-def _checked(config: Config, place: Place) -> Config:
+def _refuse_unknown_regulator(config: Config, place: Place) -> Config:
     """Refuse a regulator that does not exist; otherwise return the configuration."""
     name = config.regulator.name
     if name not in regulators.names():

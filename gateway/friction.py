@@ -72,14 +72,14 @@ def friction_torque(omega: float, friction: Friction, temperature: float | None 
     return torque * math.exp(-friction.temperature_coefficient * above)
 
 
-def from_friction(table: object, place: str) -> Friction:
+def read_friction(table: object, place: str) -> Friction:
     """The friction in a table; `place` names it in the error."""
     if not isinstance(table, Mapping):
         raise ConfigError("no friction table", place=place, value=table, expected=", ".join(RANGES))
-    return Friction(**{key: _checked(key, value, place) for key, value in table.items()})
+    return Friction(**{key: _read_value(key, value, place) for key, value in table.items()})
 
 
-def friction_of_file(document: Mapping[str, Any], file: object) -> dict[str, Any]:
+def friction_table(document: Mapping[str, Any], file: object) -> dict[str, Any]:
     """The friction's keys in a friction file: a friction map or a parameter set of the bench."""
     in_set = [name for name in PARAMETERS if name in document]
     in_map = [key for key in RANGES if key in document]
@@ -117,7 +117,7 @@ def _parameter(document: Mapping[str, Any], name: str, file: object) -> float:
     return _in_range(key, table["value"], f"{file}: {name}.value")
 
 
-def _checked(key: str, value: Any, place: str) -> float:
+def _read_value(key: str, value: Any, place: str) -> float:
     where = f"{place}.{key}"
     if key not in RANGES:
         raise ConfigError("unknown key", place=where, value=key, expected=", ".join(RANGES))

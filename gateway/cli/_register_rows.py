@@ -6,13 +6,20 @@ from typing import Final
 import click
 
 from gateway.link.device import Device
-from gateway.link.inspection import Row, Words, constant_words, in_other_order, shown, swapped
+from gateway.link.inspection import (
+    Row,
+    Words,
+    constant_words,
+    swap_words,
+    value_in_other_order,
+    value_text,
+)
 from register_maps.register_map import Register
 
 PAPER: Final = ("name", "signal", "address", "form", "type", "order", "raw to", "range", "access")
 
 
-def paper(register: Register) -> tuple[str, ...]:
+def paper_row(register: Register) -> tuple[str, ...]:
     """A register as the map has it."""
     low, high = register.range
     constant = "" if register.constant is None else f" = {register.constant:.10g} {_both(register)}"
@@ -34,7 +41,7 @@ def _both(register: Register) -> str:
     """Words of a constant in its own order and with the words exchanged."""
     if register.raw.words == 1:
         return ""
-    orders = (register.word_order, swapped(register.word_order))
+    orders = (register.word_order, swap_words(register.word_order))
     return ", ".join(f"{order} {in_hex(constant_words(register, order))}" for order in orders)
 
 
@@ -50,15 +57,15 @@ LIVE: Final = (
 )
 
 
-def live(register: Register, found: Words | str, age: float, device: Device) -> tuple[str, ...]:
+def live_row(register: Register, found: Words | str, age: float, device: Device) -> tuple[str, ...]:
     """A register as the device shows it. age : of what was found [s]"""
     words = () if isinstance(found, str) else found
     return (
         register.name,
         f"{register.address} ({register.reference})",
         in_hex(words),
-        found if isinstance(found, str) else shown(register, found),
-        in_other_order(register, words) if words else "",
+        found if isinstance(found, str) else value_text(register, found),
+        value_in_other_order(register, words) if words else "",
         register.unit,
         f"{age * 1e3:.0f} ms",
         device.mbpoll(register),
@@ -77,9 +84,9 @@ FOUND: Final = (
 )
 
 
-def compared(row: Row, device: Device) -> tuple[str, ...]:
+def comparison_row(row: Row, device: Device) -> tuple[str, ...]:
     """A register as the device shows it, and what speaks against it."""
-    line = live(row.register, row.words or row.finding, 0.0, device)
+    line = live_row(row.register, row.words or row.finding, 0.0, device)
     return (*line[:6], ("" if row.holds else "! ") + row.finding, line[7])
 
 

@@ -28,7 +28,7 @@ def command(file: Path, target: Path) -> None:
     """Write the samples of a RECORDING as a log that every command here reads."""
     found = recording.read(file)
     columns = export.columns(found, map_of(found.header))
-    export.write(target, columns, export.began(found))
+    export.write(target, columns, export.start_date(found))
     if found.note:
         click.echo(f"note: {found.note}", err=True)
     click.echo(f"{target}: {len(columns['time_s'])} samples of {len(found)} ticks")

@@ -150,11 +150,11 @@ def _swept(
     """The recording of a sweep on the live bench."""
     import register_maps
     from gateway.errors import ConfigError, GatewayError
-    from gateway.losses.live import Progress, swept_config
+    from gateway.losses.live import Progress, sweep_config
     from gateway.review import review
     from gateway.runtime import daemon
 
-    config = swept_config(settings, speeds, hold)
+    config = sweep_config(settings, speeds, hold)
     register_map = register_maps.load(config.plc.map)
     for one in review.review(config, register_map):
         if one.severity == "error" and one.where.startswith(CONCERNS):

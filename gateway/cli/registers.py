@@ -8,18 +8,27 @@ from typing import Any
 import click
 
 import register_maps
-from gateway.cli._register_rows import FOUND, LIVE, PAPER, compared, in_hex, live, paper, table
+from gateway.cli._register_rows import (
+    FOUND,
+    LIVE,
+    PAPER,
+    comparison_row,
+    in_hex,
+    live_row,
+    paper_row,
+    table,
+)
 from gateway.errors import PlcError
 from gateway.link.device import (
     Device,
-    encoded,
+    encode_scaled,
     is_exact,
     read_all,
     two_readings,
     writable,
     write_value,
 )
-from gateway.link.inspection import Reading, Row, Words, shown, verify
+from gateway.link.inspection import Reading, Row, Words, value_text, verify
 from register_maps.command_line.parameters import LONGEST, Command, Number, OutputFile
 from register_maps.register_map import Register, RegisterMap
 from register_maps.signals import RESERVED
@@ -68,7 +77,7 @@ def _on_a_device(wrapped: Callable[..., Any]) -> Callable[..., Any]:
 @click.argument("name", metavar="MAP")
 def list_registers(name: str) -> None:
     """Print the map: addresses in both forms, types, orders, units, ranges."""
-    rows = [paper(register) for register in register_maps.load(name).registers]
+    rows = [paper_row(register) for register in register_maps.load(name).registers]
     table(PAPER, rows)
 
 
@@ -81,7 +90,7 @@ def read(name: str, **where: Any) -> None:
         reading = read_all(link, register_map)
         begun = time.monotonic()
     rows = [
-        live(register, reading[register.name], time.monotonic() - begun, device)
+        live_row(register, reading[register.name], time.monotonic() - begun, device)
         for register in _meaning(register_map)
     ]
     table(LIVE, rows)
@@ -124,7 +133,7 @@ def _changes(
         before, since = seen.get(register.name, (None, now))
         if found != before:
             seen[register.name] = (found, now)
-            rows.append(live(register, found, now - since, device))
+            rows.append(live_row(register, found, now - since, device))
     table(LIVE, rows)
 
 
@@ -141,7 +150,7 @@ def verify_device(name: str, json_file: str | None, **where: Any) -> int:
         with click.open_file(json_file, "w", encoding="utf-8") as target:
             target.write(json.dumps(answer) + "\n")
     if json_file != "-":
-        table(FOUND, [compared(row, device) for row in rows])
+        table(FOUND, [comparison_row(row, device) for row in rows])
         click.echo("the map holds" if holds else "the map does not hold")
     return 0 if holds else 1
 
@@ -166,8 +175,8 @@ def write(name: str, register_name: str, value: float, *, yes: bool, **where: An
     """Write VALUE (in the map's unit) to a REGISTER that the map lets one write."""
     register_map, device = register_maps.load(name), Device(**where)
     register = writable(register_map, register_name)
-    words = encoded(register, value)
-    what = f"{register.name} = {shown(register, words)} {register.unit}".rstrip()
+    words = encode_scaled(register, value)
+    what = f"{register.name} = {value_text(register, words)} {register.unit}".rstrip()
     near = "" if is_exact(register, words, value) else f", nearest to {value:.10g}"
     click.echo(f"{what}{near}: {in_hex(words)} to {register.address}")
     click.echo(device.mbpoll(register, words))
@@ -175,7 +184,7 @@ def write(name: str, register_name: str, value: float, *, yes: bool, **where: An
         click.confirm("write it", abort=True)
     with device.link() as link:
         back = write_value(link, register, words)
-    click.echo(f"reads back {in_hex(back)} = {shown(register, back)} {register.unit}")
+    click.echo(f"reads back {in_hex(back)} = {value_text(register, back)} {register.unit}")
 
 
 def _meaning(register_map: RegisterMap) -> list[Register]:

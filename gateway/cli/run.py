@@ -63,7 +63,7 @@ def _repeated(option: str, values: tuple[str, ...]) -> list[str]:
     return [word for value in values for word in (option, value)]
 
 
-def report(ended: daemon.Ended) -> str:
+def report(ended: daemon.RunResult) -> str:
     """What is worth knowing afterwards."""
     times = "  ".join(f"{name} {value * 1e3:.2f} ms" for name, value in ended.latency.items())
     why = "by the operator" if ended.reason is None else f"{ended.reason.name}: {ended.reason.text}"

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, get_type_hints
 
-from gateway.configuration.keys import checked, keys
+from gateway.configuration.keys import keys, read_value
 from gateway.configuration.sections import (
     SECTIONS,
     BenchConfig,
@@ -23,11 +23,11 @@ from gateway.configuration.sections import (
     RegulatorConfig,
     TruckConfig,
 )
-from gateway.configuration.sweep_speeds import Sweep, from_sweep
+from gateway.configuration.sweep_speeds import Sweep, read_sweep
 from gateway.errors import ConfigError
-from gateway.friction import THESIS, from_friction
+from gateway.friction import THESIS, read_friction
 
-__all__ = ["BenchConfig", "Config", "changed", "config_hash", "from_document"]
+__all__ = ["BenchConfig", "Config", "config_hash", "from_document", "merge"]
 
 Document = dict[str, dict[str, Any]]
 Place = Callable[[str, str], str]
@@ -63,10 +63,10 @@ class Config:
 
     def with_values(self, values: Mapping[str, str]) -> "Config":
         """The same with `{"section.key": "value as in TOML"}` instead."""
-        return from_document(changed(self.document, values), place=_set_place)
+        return from_document(merge(self.document, values), place=_set_place)
 
 
-def changed(document: Document, values: Mapping[str, str]) -> Document:
+def merge(document: Document, values: Mapping[str, str]) -> Document:
     """A document with `{"section.key": "value as in TOML"}` put in."""
     result = {section: dict(entries) for section, entries in document.items()}
     for name, text in values.items():
@@ -92,7 +92,7 @@ def from_document(document: Mapping[str, Any], *, place: Place = _set_place) -> 
     sections: dict[str, Any] = {}
     for name, entries in document.items():
         if name == SWEEP:
-            sections[name] = from_sweep(entries, place(name, "").rstrip(" ."))
+            sections[name] = read_sweep(entries, place(name, "").rstrip(" ."))
             written[name] = dict(entries)
             continue
         if name not in SECTIONS or not isinstance(entries, Mapping):
@@ -113,13 +113,13 @@ def _section(name: str, section: type, entries: Mapping[str, Any], place: Place)
     for entry, value in entries.items():
         where = place(name, entry)
         if section is RegulatorConfig and entry == "friction":
-            values["friction"] = from_friction(value, where)
+            values["friction"] = read_friction(value, where)
             continue
         if entry not in known:
             expected = ", ".join(sorted(known))
             raise ConfigError("unknown key", place=where, value=entry, expected=expected)
         field_name, key = known[entry]
-        values[field_name] = checked(key, hints[field_name], value, where)
+        values[field_name] = read_value(key, hints[field_name], value, where)
     return section(**values)
 
 

@@ -23,7 +23,7 @@ class Key:
     choices: tuple[str, ...]
 
 
-def declared(
+def declare(
     name: str,
     default: Any,
     *,
@@ -47,7 +47,7 @@ def keys(section: type) -> dict[str, Key]:
     return {one.name: one.metadata["key"] for one in fields(section) if "key" in one.metadata}
 
 
-def checked(key: Key, kind: Any, value: Any, where: str) -> Any:
+def read_value(key: Key, kind: Any, value: Any, where: str) -> Any:
     """Value in SI; raises ConfigError that names `where`, value and what would be right."""
     wanted = next((one for one in (str, bool, int) if kind is one), float)
     numeric = wanted is float and isinstance(value, int) and not isinstance(value, bool)

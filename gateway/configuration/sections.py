@@ -5,7 +5,7 @@ Each field declares its key once: name as in the file, factor to SI, range or ch
 
 from dataclasses import dataclass
 
-from gateway.configuration.keys import declared
+from gateway.configuration.keys import declare
 from gateway.friction import THESIS, Friction
 from register_maps.units import RPM
 
@@ -17,11 +17,11 @@ PERCENT = 1e-2
 class PlcConfig:
     """Where the PLC is, and how long it may take [s]."""
 
-    host: str = declared("host", "127.0.0.1")
-    port: int = declared("port", 5020, lower=1, upper=65535)
-    unit: int = declared("unit", 1, lower=0, upper=255)
-    map: str = declared("map", "bench_int16")
-    timeout: float = declared("timeout_ms", 40.0, scale=MILLI, lower=1.0, upper=1000.0)
+    host: str = declare("host", "127.0.0.1")
+    port: int = declare("port", 5020, lower=1, upper=65535)
+    unit: int = declare("unit", 1, lower=0, upper=255)
+    map: str = declare("map", "bench_int16")
+    timeout: float = declare("timeout_ms", 40.0, scale=MILLI, lower=1.0, upper=1000.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,10 +29,10 @@ class LoopConfig:
     """The clock. `stale`: age at which a sample is of no more use; `overruns`: deadlines in a row
     that may be missed."""
 
-    period: float = declared("period_ms", 10.0, scale=MILLI, lower=1.0, upper=200.0)
-    stale: float = declared("stale_ms", 100.0, scale=MILLI, lower=5.0, upper=1000.0)
-    overruns: int = declared("overruns", 15, lower=1, upper=1000)
-    realtime: bool = declared("realtime", True)
+    period: float = declare("period_ms", 10.0, scale=MILLI, lower=1.0, upper=200.0)
+    stale: float = declare("stale_ms", 100.0, scale=MILLI, lower=5.0, upper=1000.0)
+    overruns: int = declare("overruns", 15, lower=1, upper=1000)
+    realtime: bool = declare("realtime", True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,16 +42,16 @@ class BenchConfig:
     torque_filter, speed_filter : time constants of first-order filters before the PLC's values [s]
     """
 
-    drum_inertia: float = declared("drum_inertia_kg_m2", 312.69, lower=1.0, upper=1e5)
-    gear_inertia: float = declared("gear_inertia_kg_m2", 0.02242, lower=0.0, upper=1e4)
-    drum_radius: float = declared("drum_radius_m", 0.645, lower=0.05, upper=5.0)
-    gear_ratio: float = declared("gear_ratio", 62.6, lower=1.0, upper=1000.0)
-    dead_time: float = declared("dead_time_ms", 63.947, scale=MILLI, lower=0.0, upper=500.0)
-    torque_filter: float = declared("torque_filter_ms", 0.0, scale=MILLI, lower=0.0, upper=1000.0)
-    speed_filter: float = declared("speed_filter_ms", 0.0, scale=MILLI, lower=0.0, upper=1000.0)
-    flux_constant: float = declared("flux_constant", 1.8506, lower=0.01, upper=100.0)
-    flux_constant_1: float = declared("flux_constant_1", 366.83, lower=1.0, upper=1e5)
-    flux_constant_2: float = declared("flux_constant_2", 8.0644, lower=0.0, upper=1e3)
+    drum_inertia: float = declare("drum_inertia_kg_m2", 312.69, lower=1.0, upper=1e5)
+    gear_inertia: float = declare("gear_inertia_kg_m2", 0.02242, lower=0.0, upper=1e4)
+    drum_radius: float = declare("drum_radius_m", 0.645, lower=0.05, upper=5.0)
+    gear_ratio: float = declare("gear_ratio", 62.6, lower=1.0, upper=1000.0)
+    dead_time: float = declare("dead_time_ms", 63.947, scale=MILLI, lower=0.0, upper=500.0)
+    torque_filter: float = declare("torque_filter_ms", 0.0, scale=MILLI, lower=0.0, upper=1000.0)
+    speed_filter: float = declare("speed_filter_ms", 0.0, scale=MILLI, lower=0.0, upper=1000.0)
+    flux_constant: float = declare("flux_constant", 1.8506, lower=0.01, upper=100.0)
+    flux_constant_1: float = declare("flux_constant_1", 366.83, lower=1.0, upper=1e5)
+    flux_constant_2: float = declare("flux_constant_2", 8.0644, lower=0.0, upper=1e3)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,18 +63,18 @@ class TruckConfig:
     grade : rise over run [1]; top_speed, acceleration, braking : what the run will ask for
     """
 
-    mass: float = declared("mass_kg", 3640.0, lower=50.0, upper=1e5)
-    load: float = declared("load_kg", 0.0, lower=0.0, upper=1e5)
-    wheel_radius: float = declared("wheel_radius_m", 0.1715, lower=0.02, upper=2.0)
-    crr: float = declared("crr", 0.011721, lower=0.0, upper=0.2)
-    crr_v: float = declared("crr_v", 9.3882e-6, lower=0.0, upper=0.1)
-    f0: float | None = declared("f0_N", None, lower=0.0, upper=1e5)
-    f1: float | None = declared("f1_N_per_m_s", None, lower=-1e4, upper=1e4)
-    f2: float | None = declared("f2_N_per_m2_s2", None, lower=-1e3, upper=1e3)
-    grade: float = declared("grade_percent", 0.0, scale=PERCENT, lower=-50.0, upper=50.0)
-    top_speed: float = declared("top_speed_km_h", 14.0, scale=1.0 / 3.6, lower=0.1, upper=100.0)
-    acceleration: float = declared("acceleration_m_s2", 0.65, lower=0.0, upper=10.0)
-    braking: float = declared("braking_m_s2", 1.05, lower=0.0, upper=10.0)
+    mass: float = declare("mass_kg", 3640.0, lower=50.0, upper=1e5)
+    load: float = declare("load_kg", 0.0, lower=0.0, upper=1e5)
+    wheel_radius: float = declare("wheel_radius_m", 0.1715, lower=0.02, upper=2.0)
+    crr: float = declare("crr", 0.011721, lower=0.0, upper=0.2)
+    crr_v: float = declare("crr_v", 9.3882e-6, lower=0.0, upper=0.1)
+    f0: float | None = declare("f0_N", None, lower=0.0, upper=1e5)
+    f1: float | None = declare("f1_N_per_m_s", None, lower=-1e4, upper=1e4)
+    f2: float | None = declare("f2_N_per_m2_s2", None, lower=-1e3, upper=1e3)
+    grade: float = declare("grade_percent", 0.0, scale=PERCENT, lower=-50.0, upper=50.0)
+    top_speed: float = declare("top_speed_km_h", 14.0, scale=1.0 / 3.6, lower=0.1, upper=100.0)
+    acceleration: float = declare("acceleration_m_s2", 0.65, lower=0.0, upper=10.0)
+    braking: float = declare("braking_m_s2", 1.05, lower=0.0, upper=10.0)
 
     @property
     def total_mass(self) -> float:
@@ -94,20 +94,20 @@ class RegulatorConfig:
     breakaway : torque over the road load at which a standing truck starts to roll [N m at the drum]
     """
 
-    name: str = declared("name", "compensated")
-    torque: str = declared(
+    name: str = declare("name", "compensated")
+    torque: str = declare(
         "torque", "integrated", choices=("integrated", "averaged", "instantaneous")
     )
-    lead: float = declared("lead_s", 0.085, lower=0.0, upper=1.0)
-    trim: float = declared("trim", 0.5, lower=0.0, upper=5.0)
-    under_compensation: float = declared(
+    lead: float = declare("lead_s", 0.085, lower=0.0, upper=1.0)
+    trim: float = declare("trim", 0.5, lower=0.0, upper=5.0)
+    under_compensation: float = declare(
         "under_compensation_percent", 0.3, scale=PERCENT, lower=0.0, upper=20.0
     )
-    under_compensation_slow: float = declared(
+    under_compensation_slow: float = declare(
         "under_compensation_slow_percent", 2.0, scale=PERCENT, lower=0.0, upper=20.0
     )
-    torque_offset: float = declared("torque_offset_Nm", 0.0, lower=-20.0, upper=20.0)
-    breakaway: float = declared("breakaway_Nm", 30.0, lower=0.0, upper=2000.0)
+    torque_offset: float = declare("torque_offset_Nm", 0.0, lower=-20.0, upper=20.0)
+    breakaway: float = declare("breakaway_Nm", 30.0, lower=0.0, upper=2000.0)
     friction: Friction = THESIS
 
 
@@ -120,20 +120,20 @@ class LimitsConfig:
     watchdog : after which the PLC ramps down by itself
     """
 
-    speed_max: float = declared("speed_max_rpm", 4830.0, scale=RPM, lower=1.0, upper=4830.0)
-    rate_up: float = declared("rate_up_rpm_s", 3000.0, scale=RPM, lower=1.0, upper=30000.0)
-    rate_down: float = declared("rate_down_rpm_s", 3000.0, scale=RPM, lower=1.0, upper=30000.0)
-    deviation: float = declared("deviation_rpm", 400.0, scale=RPM, lower=1.0, upper=4830.0)
-    overspeed: float = declared("overspeed_rpm", 5070.0, scale=RPM, lower=1.0, upper=6000.0)
-    current: float = declared("current_limit_A", 72.0, lower=0.0, upper=72.0)
-    watchdog: float = declared("watchdog_ms", 200.0, scale=MILLI, lower=50.0, upper=1000.0)
+    speed_max: float = declare("speed_max_rpm", 4830.0, scale=RPM, lower=1.0, upper=4830.0)
+    rate_up: float = declare("rate_up_rpm_s", 3000.0, scale=RPM, lower=1.0, upper=30000.0)
+    rate_down: float = declare("rate_down_rpm_s", 3000.0, scale=RPM, lower=1.0, upper=30000.0)
+    deviation: float = declare("deviation_rpm", 400.0, scale=RPM, lower=1.0, upper=4830.0)
+    overspeed: float = declare("overspeed_rpm", 5070.0, scale=RPM, lower=1.0, upper=6000.0)
+    current: float = declare("current_limit_A", 72.0, lower=0.0, upper=72.0)
+    watchdog: float = declare("watchdog_ms", 200.0, scale=MILLI, lower=50.0, upper=1000.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class RecordingConfig:
     """Where recordings go."""
 
-    dir: str = declared("dir", "recordings")
+    dir: str = declare("dir", "recordings")
 
 
 SECTIONS: dict[str, type] = {

@@ -38,7 +38,7 @@ class Sweep:
         return ways / self.rate + self.hold * len(self.speeds)
 
 
-def from_sweep(table: object, place: str) -> Sweep:
+def read_sweep(table: object, place: str) -> Sweep:
     """The sweep in a table with speeds_rpm, hold_s, rate_rpm_s; `place` names it in the error."""
     if not isinstance(table, Mapping) or set(table) != {"speeds_rpm", *RANGES}:
         wanted = ", ".join(("speeds_rpm", *RANGES))

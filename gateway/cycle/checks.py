@@ -9,7 +9,7 @@ from gateway.reasons import Reason
 from register_maps.signals import Alarm, Interlock, Measurement, Status
 
 ALL_CLOSED = Interlock(sum(Interlock))
-OF_SILENCE = Alarm.COMMUNICATION | Alarm.SETPOINT_REJECTED
+ALARMS_OF_LAST_RUN = Alarm.COMMUNICATION | Alarm.SETPOINT_REJECTED
 """Alarms that stand until they are acknowledged; before a run they tell of the last one."""
 APART_AT_REST, APART_RUNNING = 0.5, 3.0
 """[rad/s] that motor / ratio and drum may differ: in the backlash the drum runs ahead by 1.3."""
@@ -35,7 +35,7 @@ def check(
     problem = (
         _bench(config, measurement)
         or _alarm(measurement, running=running)
-        or _apart(config, measurement, APART_RUNNING if running else APART_AT_REST)
+        or _speeds_apart(config, measurement, APART_RUNNING if running else APART_AT_REST)
     )
     if problem is not None:
         return problem
@@ -65,7 +65,7 @@ def _alarm(measurement: Measurement, *, running: bool) -> Reason | None:
         return Reason.PLC_FAULT
     if Alarm.SETPOINT_REJECTED in alarm:
         return Reason.SETPOINT_REJECTED if running else Reason.MAP_VERSION
-    if alarm & ~OF_SILENCE or (running and alarm):
+    if alarm & ~ALARMS_OF_LAST_RUN or (running and alarm):
         return Reason.PLC_ALARM
     return None
 
@@ -76,7 +76,7 @@ def _running(config: Config, overruns: int, echo_age: float) -> Reason | None:
     return Reason.NOT_ECHOED if echo_age > config.loop.stale else None
 
 
-def _apart(config: Config, measurement: Measurement, allowed: float) -> Reason | None:
+def _speeds_apart(config: Config, measurement: Measurement, allowed: float) -> Reason | None:
     """Whether motor and drum turn as one gear joins them: wiring, scaling, word order."""
     gear_speed = measurement.motor_speed / config.bench.gear_ratio
     far = abs(gear_speed - measurement.drum_speed) > allowed

@@ -51,30 +51,30 @@ class Command:
     down: bool = False
 
 
-def echoed(
+def note_echo(
     register_map: RegisterMap, command: Command, sample: Measurement | None, now: float
 ) -> Command:
     """Note which command the PLC has taken over by a new sample, and whether it was one of ours."""
     if sample is None:
         return command
-    if _is_fed(command, sample.command_age, now):
+    if _other_master_wrote(command, sample.command_age, now):
         command = replace(command, other_wrote=now)
     echo, before = sample.command_sequence_echo, command.echo
     if echo is None or echo == before:
         return command
     moved = replace(command, echo=echo, echo_moved=now)
-    since = _since(register_map, command, echo)
+    since = _blocks_since(register_map, command, echo)
     if since is not None:
         return replace(moved, unanswered=since)
     return moved if before is None else replace(moved, other_wrote=now)
 
 
-def _is_fed(command: Command, age: float | None, now: float) -> bool:
+def _other_master_wrote(command: Command, age: float | None, now: float) -> bool:
     """Whether the PLC has taken a command over after our last one, of `age` [s] now."""
     return age is not None and age < RECENT and now - command.sent > age + JITTER
 
 
-def _since(register_map: RegisterMap, command: Command, echo: int) -> int | None:
+def _blocks_since(register_map: RegisterMap, command: Command, echo: int) -> int | None:
     """How many blocks have been written after the one that is echoed; None: it is not ours."""
     if command.number is None:
         return None
@@ -84,7 +84,7 @@ def _since(register_map: RegisterMap, command: Command, echo: int) -> int | None
     return since if since in range(command.unanswered) else None
 
 
-def answered(command: Command, measurement: Measurement | None, fault: Reason | None) -> Command:
+def note_reply(command: Command, measurement: Measurement | None, fault: Reason | None) -> Command:
     """Note what became of the last block: a fault beside a good reading is that of the write.
 
     Without a reading the fault is the reading's, and tells nothing of the write before it.
@@ -96,18 +96,20 @@ def answered(command: Command, measurement: Measurement | None, fault: Reason | 
     return replace(command, fault=command.fault or fault, down=fault in NOT_BY_WAITING)
 
 
-def complaint(command: Command, now: float, stale: float) -> Reason | None:
+def fault(command: Command, now: float, stale: float) -> Reason | None:
     """Why no block has got through for too long, or will; None: they do."""
     late = now - command.got_through > stale
     return command.fault if command.down or late else None
 
 
-def nothing(command: Command, now: float) -> Command:
+def reset(command: Command, now: float) -> Command:
     """Nothing is written: the setpoint counts as zero."""
     return replace(command, speed=0.0, written=now)
 
 
-def following(register_map: RegisterMap, command: Command, limited: Limited, now: float) -> Command:
+def next_command(
+    register_map: RegisterMap, command: Command, limited: Limited, now: float
+) -> Command:
     """The next block: one number up. The first is that of the moment, but not the echo's.
 
     The PLC ignores repeats; and of two gateways that begin together each knows its numbers.
@@ -128,14 +130,14 @@ def following(register_map: RegisterMap, command: Command, limited: Limited, now
     )
 
 
-def driven(config: Config) -> Mode:
+def run_mode(config: Config) -> Mode:
     """The PLC's mode of a run: in a sweep of steady speeds nobody may drive a truck."""
     return Mode.ROAD_LOAD if config.sweep is None else Mode.SPEED
 
 
-def confirmed(config: Config, status: Status) -> bool:
+def is_confirmed(config: Config, status: Status) -> bool:
     """Whether the PLC is enabled, and in the mode of the run."""
-    road_load = driven(config) is Mode.ROAD_LOAD
+    road_load = run_mode(config) is Mode.ROAD_LOAD
     return Status.ENABLED in status and (Status.ROAD_LOAD in status) is road_load
 
 
@@ -148,7 +150,7 @@ def block(
         command_sequence=number,
         gateway_heartbeat=number,
         control=Control.ENABLE if enable else Control(0),
-        mode=driven(config) if enable else Mode.READY,
+        mode=run_mode(config) if enable else Mode.READY,
         speed_setpoint=limited.speed,
         speed_rate=limited.rate,
         ramp_limit=max(config.limits.rate_up, config.limits.rate_down),

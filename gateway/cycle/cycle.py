@@ -126,17 +126,17 @@ def step(
     """One tick."""
     now = observation.now
     read = samples.take(state.samples, observation.measurement, observation.fault, now)
-    read = samples.weighed(config, register_map, read)
-    sent = command.answered(state.command, observation.measurement, observation.fault)
-    sent = command.echoed(register_map, sent, read.newest if read.is_new else None, now)
+    read = samples.windowed(config, register_map, read)
+    sent = command.note_reply(state.command, observation.measurement, observation.fault)
+    sent = command.note_echo(register_map, sent, read.newest if read.is_new else None, now)
     state = replace(state, samples=read, command=sent)
     supervisor = advance(state.supervisor, _facts(config, state, observation))
     if supervisor.state is State.RUN and state.supervisor.state is not State.RUN:
-        state = _bumpless(state, now)
-    state = _regulated(config, replace(state, supervisor=supervisor), now)
-    limited = _limited(config, state, now)
-    state = _followed(config, state, limited, now)
-    state, setpoint = _written(config, register_map, state, limited, now)
+        state = _start_bumpless(state, now)
+    state = _regulate(config, replace(state, supervisor=supervisor), now)
+    limited = _limit(config, state, now)
+    state = _follow_limits(config, state, limited, now)
+    state, setpoint = _write(config, register_map, state, limited, now)
     return state, Output(
         setpoint=setpoint,
         demand=None if state.demand is None else state.demand.speed,
@@ -152,8 +152,8 @@ def _facts(config: Config, state: CycleState, observation: Observation) -> Facts
     before = state.supervisor.state
     return Facts(
         now=now,
-        link=samples.complaint(state.samples, now, config.loop.stale),
-        write=command.complaint(sent, now, config.loop.stale),
+        link=samples.fault(state.samples, now, config.loop.stale),
+        write=command.fault(sent, now, config.loop.stale),
         check=None
         if newest is None
         else check(
@@ -165,14 +165,14 @@ def _facts(config: Config, state: CycleState, observation: Observation) -> Facts
             other_age=now - sent.other_wrote,
         ),
         remote=Status.REMOTE in status,
-        confirmed=command.confirmed(config, status),
+        confirmed=command.is_confirmed(config, status),
         at_rest=state.command.speed == 0.0,
         stop_requested=observation.stop_requested,
         shadow=observation.shadow,
     )
 
 
-def _bumpless(state: CycleState, now: float) -> CycleState:
+def _start_bumpless(state: CycleState, now: float) -> CycleState:
     """A run begins: the measured speed counts as the last setpoint, the wait for an echo starts."""
     newest = state.samples.newest
     measured = 0.0 if newest is None else newest.motor_speed
@@ -181,7 +181,7 @@ def _bumpless(state: CycleState, now: float) -> CycleState:
     return replace(state, command=started)
 
 
-def _regulated(config: Config, state: CycleState, now: float) -> CycleState:
+def _regulate(config: Config, state: CycleState, now: float) -> CycleState:
     """State after the regulator has seen this tick's window, if there is one."""
     newest, supervisor = state.samples.newest, state.supervisor
     if newest is None or supervisor.state in UNLINKED:
@@ -200,10 +200,10 @@ def _regulated(config: Config, state: CycleState, now: float) -> CycleState:
     return replace(state, regulator=after, demand=demand, demanded=now)
 
 
-def _limited(config: Config, state: CycleState, now: float) -> Limited:
+def _limit(config: Config, state: CycleState, now: float) -> Limited:
     """What the limits pass of what this state wants."""
     last, newest = state.command, state.samples.newest
-    wanted = _wanted(config, state, now)
+    wanted = _demand_now(config, state, now)
     stopping = newest is None or state.supervisor.state is not State.RUN
     return limits.limit(
         wanted.speed,
@@ -216,7 +216,7 @@ def _limited(config: Config, state: CycleState, now: float) -> Limited:
     )
 
 
-def _wanted(config: Config, state: CycleState, now: float) -> Demand:
+def _demand_now(config: Config, state: CycleState, now: float) -> Demand:
     """Motor speed that this state wants: in RUN the regulator's, on along its slope for a while."""
     demand = state.demand
     if state.supervisor.state is not State.RUN or demand is None:
@@ -225,7 +225,7 @@ def _wanted(config: Config, state: CycleState, now: float) -> Demand:
     return replace(demand, speed=demand.speed + demand.rate * since)
 
 
-def _followed(config: Config, state: CycleState, limited: Limited, now: float) -> CycleState:
+def _follow_limits(config: Config, state: CycleState, limited: Limited, now: float) -> CycleState:
     """State after the regulator has been told, once, what the limits did to a demand of its."""
     newest, demand = state.samples.newest, state.demand
     is_told = state.supervisor.state is State.RUN and state.demanded == now
@@ -239,13 +239,13 @@ def _followed(config: Config, state: CycleState, limited: Limited, now: float) -
     return replace(state, regulator=after)
 
 
-def _written(
+def _write(
     config: Config, register_map: RegisterMap, state: CycleState, limited: Limited, now: float
 ) -> tuple[CycleState, Setpoint | None]:
     """The command block of this tick, and the state that knows of it."""
     if state.supervisor.state not in command.WRITING:
-        return replace(state, command=command.nothing(state.command, now)), None
-    after = command.following(register_map, state.command, limited, now)
+        return replace(state, command=command.reset(state.command, now)), None
+    after = command.next_command(register_map, state.command, limited, now)
     return replace(state, command=after), command.block(
         config, register_map, after, limited, enable=state.supervisor.state in command.ENABLING
     )

@@ -60,20 +60,20 @@ def limit(
     last : setpoint before [rad/s], dt ago [s]; measured : motor [rad/s]; age : of that sample [s]
     """
     stale = not age <= limits.stale
-    speed, by = _finite(wanted)
+    speed, by = _replace_not_finite(wanted)
     ceiling = _ceiling(last, measured, limits)
-    speed, by = _at_most(speed, ceiling, Limit.DEVIATION, by)
+    speed, by = _limit_ceiling(speed, ceiling, Limit.DEVIATION, by)
     if stale:
-        speed, by = _at_most(speed, last, Limit.STALE, by)
-    speed, by = _sloped(speed, by, last, _interval(dt, limits), limits)
-    speed, by = _ranged(speed, by, limits)
+        speed, by = _limit_ceiling(speed, last, Limit.STALE, by)
+    speed, by = _limit_slope(speed, by, last, _interval(dt, limits), limits)
+    speed, by = _limit_range(speed, by, limits)
     if by or not isfinite(rate):
         return Limited(speed=speed, rate=0.0, by=by)
     steepest = 0.0 if stale else _steepest(speed, ceiling, limits)
     return Limited(speed=speed, rate=min(max(rate, -limits.rate_down), steepest), by=by)
 
 
-def _finite(wanted: float) -> tuple[float, Limit]:
+def _replace_not_finite(wanted: float) -> tuple[float, Limit]:
     return (wanted, Limit.NONE) if isfinite(wanted) else (0.0, Limit.NOT_FINITE)
 
 
@@ -82,8 +82,8 @@ def _ceiling(last: float, measured: float, limits: Limits) -> float:
     return measured + limits.deviation if isfinite(measured) else last
 
 
-def _at_most(speed: float, ceiling: float, name: Limit, by: Limit) -> tuple[float, Limit]:
-    return _noted(speed, min(speed, ceiling), name, by)
+def _limit_ceiling(speed: float, ceiling: float, name: Limit, by: Limit) -> tuple[float, Limit]:
+    return _note(speed, min(speed, ceiling), name, by)
 
 
 def _interval(dt: float, limits: Limits) -> float:
@@ -91,19 +91,19 @@ def _interval(dt: float, limits: Limits) -> float:
     return min(max(0.0, dt), limits.stale)
 
 
-def _sloped(
+def _limit_slope(
     speed: float, by: Limit, last: float, interval: float, limits: Limits
 ) -> tuple[float, Limit]:
     lowest = last - limits.rate_down * interval
     highest = last + limits.rate_up * interval
-    return _noted(speed, min(max(speed, lowest), highest), Limit.RATE, by)
+    return _note(speed, min(max(speed, lowest), highest), Limit.RATE, by)
 
 
-def _ranged(speed: float, by: Limit, limits: Limits) -> tuple[float, Limit]:
-    return _noted(speed, min(max(speed, 0.0), limits.speed_max), Limit.RANGE, by)
+def _limit_range(speed: float, by: Limit, limits: Limits) -> tuple[float, Limit]:
+    return _note(speed, min(max(speed, 0.0), limits.speed_max), Limit.RANGE, by)
 
 
-def _noted(speed: float, allowed: float, name: Limit, by: Limit) -> tuple[float, Limit]:
+def _note(speed: float, allowed: float, name: Limit, by: Limit) -> tuple[float, Limit]:
     return allowed, by if allowed == speed else by | name
 
 

@@ -171,6 +171,6 @@ def values(record: Measurement | Setpoint | None, names: Sequence[str]) -> list[
     return [number(getattr(record, name)) for name in names]
 
 
-def intact(record: bytes) -> bool:
+def is_intact(record: bytes) -> bool:
     """Whether a record is whole: its checksum fits."""
     return zlib.crc32(record[:-4]) == int.from_bytes(record[-4:], "little")

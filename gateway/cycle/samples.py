@@ -39,7 +39,7 @@ class Samples:
     fault : the first since the last good reading; down : the link is known to be gone
     is_new : this tick has brought a new sample; before_came : when the one before it came [s]
     window : what lies between the two, None: nothing new, or nothing that can be used
-    used : when the last window came that can be [s]; doubt : why a later one cannot
+    used : when the last window came that can be [s]; window_fault : why a later one cannot
     ahead : by how much the PLC's clock has got ahead of ours in the last MEMORY [s]
     """
 
@@ -53,7 +53,7 @@ class Samples:
     before_came: float = -inf
     window: Window | None = None
     used: float = -inf
-    doubt: Reason = Reason.STALE
+    window_fault: Reason = Reason.STALE
     ahead: float = 0.0
 
     def age(self, now: float) -> float:
@@ -64,7 +64,7 @@ class Samples:
 def take(
     samples: Samples, measurement: Measurement | None, fault: Reason | None, now: float
 ) -> Samples:
-    """Samples after one reading; whether its window can be used is for `weighed` to say."""
+    """Samples after one reading; whether its window can be used is for `windowed` to say."""
     samples = replace(samples, is_new=False, window=None)
     if measurement is None:
         first = samples.fault or fault or Reason.STALE
@@ -87,19 +87,19 @@ def take(
     )
 
 
-def complaint(samples: Samples, now: float, stale: float) -> Reason | None:
+def fault(samples: Samples, now: float, stale: float) -> Reason | None:
     """Why there is no fresh sample; None: there is one."""
     if samples.down or samples.newest is None:
         return samples.fault or Reason.STALE
     if samples.age(now) <= stale:
-        return samples.doubt if now - samples.used > stale else None
+        return samples.window_fault if now - samples.used > stale else None
     if samples.fault is not None:
         return samples.fault
     frozen = samples.heartbeat_moved <= samples.sequence_moved
     return Reason.HEARTBEAT_FROZEN if frozen else Reason.SEQUENCE_FROZEN
 
 
-def weighed(config: Config, register_map: RegisterMap, samples: Samples) -> Samples:
+def windowed(config: Config, register_map: RegisterMap, samples: Samples) -> Samples:
     """Samples with the window that a new one ends, or with why it cannot be used."""
     now, before = samples.newest, samples.before
     if not samples.is_new or now is None or before is None:
@@ -107,13 +107,13 @@ def weighed(config: Config, register_map: RegisterMap, samples: Samples) -> Samp
     own = samples.sequence_moved - samples.before_came
     duration = difference(now.plc_time, before.plc_time, register_map.modulus("plc_time"))
     if not _in_step(duration, own):
-        return replace(samples, doubt=Reason.PLC_CLOCK)
+        return replace(samples, window_fault=Reason.PLC_CLOCK)
     samples = replace(samples, ahead=samples.ahead * exp(-own / MEMORY) + duration - own)
     if abs(samples.ahead) > OUT_OF_STEP * MEMORY:
-        return replace(samples, doubt=Reason.PLC_CLOCK)
+        return replace(samples, window_fault=Reason.PLC_CLOCK)
     torque = _torque(config.regulator.torque, register_map, now, before, duration)
     if not _is_possible(register_map, torque, now.shaft_torque_mean, duration):
-        return replace(samples, doubt=Reason.TORQUE_IMPLAUSIBLE)
+        return replace(samples, window_fault=Reason.TORQUE_IMPLAUSIBLE)
     window = Window(
         duration=duration,
         shaft_torque=torque - config.regulator.torque_offset,

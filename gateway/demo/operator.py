@@ -57,14 +57,14 @@ class Session:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Operated:
+class GatewayRun:
     """What a gateway left behind: its recording and its exit code."""
 
     recording: Path
     exit_code: int
 
 
-def operate_in_real_time(session: Session) -> Operated:
+def operate_in_real_time(session: Session) -> GatewayRun:
     """The daemon through one cycle."""
     folder, words = session.file.parent, session.file.with_suffix(".txt")
     before = set(folder.glob(f"*{SUFFIX}"))
@@ -85,7 +85,7 @@ def operate_in_real_time(session: Session) -> Operated:
             raise GatewayError(f"{error}; the daemon's words: {words}") from error
         finally:
             daemon.send_signal(signal.SIGTERM)
-    return Operated(recording=path, exit_code=daemon.returncode)
+    return GatewayRun(recording=path, exit_code=daemon.returncode)
 
 
 def _operate(session: Session, look: "_Follower", daemon: "subprocess.Popen[bytes]") -> None:
@@ -207,7 +207,7 @@ class _FileSink:
         self._file.close()
 
 
-def operate_fast(session: Session) -> Operated:
+def operate_fast(session: Session) -> GatewayRun:
     """The same loop through one cycle as fast as the machine allows."""
     config = session.config
     register_map = register_maps.load(config.plc.map)
@@ -235,4 +235,4 @@ def operate_fast(session: Session) -> Operated:
         loop.run(stop_requested)
     finally:
         sink.close()
-    return Operated(recording=path, exit_code=0)
+    return GatewayRun(recording=path, exit_code=0)

@@ -32,7 +32,7 @@ from plant_emulator.simulation import truck
 
 
 @dataclass(frozen=True, kw_only=True)
-class Driven:
+class BenchRun:
     """One truck's cycle on the bench, on the road, and in the gateway; SI, shape (n,) each.
 
     exit_code : of the gateway
@@ -58,14 +58,14 @@ class Driven:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shown:
+class DemoResult:
     """The summary of all runs, and what went wrong in them: a line each."""
 
     summary: dict[str, Any]
     failures: list[str]
 
 
-def demo(options: Options, console: Console) -> Shown:
+def demo(options: Options, console: Console) -> DemoResult:
     """Drive every truck; the summary is also written to `out` beside logs and picture."""
     options.out.mkdir(parents=True, exist_ok=True)
     driven = [drive(options, load_mass, console) for load_mass in options.loads]
@@ -75,10 +75,10 @@ def demo(options: Options, console: Console) -> Shown:
     summary = {"schema": "demo/1", "runs": entries}
     (options.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", "utf-8")
     failures = [failure(one, entry) for one, entry in zip(driven, entries, strict=True)]
-    return Shown(summary=summary, failures=list(filter(None, failures)))
+    return DemoResult(summary=summary, failures=list(filter(None, failures)))
 
 
-def failure(run: Driven, entry: dict[str, Any]) -> str:
+def failure(run: BenchRun, entry: dict[str, Any]) -> str:
     """Why the run is none to show: only the operator may end it. Empty: he did."""
     reason, code = entry["stop_reason"], run.exit_code
     if reason == Reason.REMOTE_OFF.name and not code:
@@ -89,7 +89,7 @@ def failure(run: Driven, entry: dict[str, Any]) -> str:
     )
 
 
-def drive(options: Options, load_mass: float, console: Console) -> Driven:
+def drive(options: Options, load_mass: float, console: Console) -> BenchRun:
     """One truck through its cycle."""
     forklift = truck.Forklift(mass=UNLOADED + load_mass)
     title = (
@@ -129,7 +129,7 @@ def drive(options: Options, load_mass: float, console: Console) -> Driven:
         console.print(f"  bench: {emulator.report}", highlight=False)
     logs.write(log, file.with_suffix(".csv"))
     road_speed, road_force = _road(options, forklift, log)
-    return Driven(
+    return BenchRun(
         truck=forklift,
         log=log,
         recording=recording.read(operated.recording),
@@ -163,7 +163,7 @@ def _road(options: Options, forklift: truck.Forklift, log: Log) -> tuple[Array, 
     return speed, torque / forklift.wheel_radius
 
 
-def figures(options: Options, run: Driven) -> dict[str, Any]:
+def figures(options: Options, run: BenchRun) -> dict[str, Any]:
     """Key figures of one run, as the command answers them (run/1)."""
     found = agreement(run.road_speed, run.speed)
     target, error = _cruise_force(run)
@@ -189,7 +189,7 @@ def figures(options: Options, run: Driven) -> dict[str, Any]:
     }
 
 
-def _cruise_force(run: Driven) -> tuple[float | None, float | None]:
+def _cruise_force(run: BenchRun) -> tuple[float | None, float | None]:
     """Road load in cruise and the bench's mean error [N]; None without 5 s of steady travel."""
     steady = cruise(run.log.time, run.speed)
     if steady is None:
@@ -206,7 +206,7 @@ def _latency(options: Options, seconds: Array) -> dict[str, float | None]:
     return {"p50": p50, "p99": p99, "max": highest}
 
 
-def _curves(run: Driven, entry: dict[str, Any]) -> plot.Curves:
+def _curves(run: BenchRun, entry: dict[str, Any]) -> plot.Curves:
     velocity = entry["velocity"]
     return plot.Curves(
         title=f"{run.truck.mass:.0f} kg, regulator {entry['regulator']}, driver {entry['driver']}",

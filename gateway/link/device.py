@@ -21,7 +21,7 @@ VERIFY_PAUSE: Final = 0.15
 
 
 @contextmanager
-def opened(host: str, port: int, unit: int, timeout: float) -> Iterator[TcpLink]:
+def open_link(host: str, port: int, unit: int, timeout: float) -> Iterator[TcpLink]:
     """A link that is connected, for a command that may wait."""
     link = TcpLink(host, port, unit, timeout)
     deadline = time.monotonic() + timeout
@@ -55,7 +55,7 @@ class Device:
     @contextmanager
     def link(self) -> Iterator[TcpLink]:
         """A connection to it."""
-        with opened(self.host, self.port, self.unit, self.timeout) as link:
+        with open_link(self.host, self.port, self.unit, self.timeout) as link:
             yield link
 
     def mbpoll(self, register: Register, words: Words | None = None) -> str:
@@ -133,7 +133,7 @@ def writable(register_map: RegisterMap, name: str) -> Register:
     return allowed[name]
 
 
-def encoded(register: Register, scaled_value: float) -> Words:
+def encode_scaled(register: Register, scaled_value: float) -> Words:
     """Words of a value in the register's unit, if the map's range has it."""
     value = UNITS[register.unit].to_si(scaled_value)
     if SIGNALS[register.signal].type is not float and not value.is_integer():

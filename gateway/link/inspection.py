@@ -36,7 +36,7 @@ class Row:
     holds: bool
 
 
-def shown(register: Register, words: Words) -> str:
+def value_text(register: Register, words: Words) -> str:
     """Value in the register's unit, or why there is none."""
     try:
         value = decode_value(register, words)
@@ -51,14 +51,14 @@ def shown(register: Register, words: Words) -> str:
     return f"{scaled(register, value):.10g}"
 
 
-def in_other_order(register: Register, words: Words) -> str:
+def value_in_other_order(register: Register, words: Words) -> str:
     """Value with the two words exchanged; empty for one word."""
     if register.raw.words == 1:
         return ""
-    return shown(replace(register, word_order=swapped(register.word_order)), words)
+    return value_text(replace(register, word_order=swap_words(register.word_order)), words)
 
 
-def swapped(order: WordOrder) -> WordOrder:
+def swap_words(order: WordOrder) -> WordOrder:
     """The order with the two words exchanged."""
     orders: dict[WordOrder, WordOrder] = {
         "ABCD": "CDAB",

@@ -22,7 +22,7 @@ from pymodbus.pdu import ModbusPDU
 
 from gateway.errors import PlcError
 from gateway.link.connector import LAST_DELAY, Connector
-from gateway.link.reply import Asked, Objection, objection
+from gateway.link.reply import Rejection, Request, check_reply
 from gateway.reasons import Reason
 
 READ_HOLDING: Final = 3
@@ -77,10 +77,10 @@ class TcpLink:
         self._timeout = timeout
         self._connector = Connector(host, port, clock)
         self._client: _Client | None = None
-        self._given_up: set[int] = set()
+        self._abandoned: set[int] = set()
         self._failures = 0
         self._proven = False
-        self._last = Objection(reason=Reason.NOT_CONNECTED, text="not connected yet")
+        self._last = Rejection(reason=Reason.NOT_CONNECTED, text="not connected yet")
 
     def connect(self) -> None:
         """Have a connection: start or continue an attempt, never wait for it."""
@@ -89,12 +89,12 @@ class TcpLink:
         connection = self._connector.poll()
         if connection is None:
             if self._connector.problem:
-                self._last = Objection(
+                self._last = Rejection(
                     reason=Reason.NOT_CONNECTED, text=f"cannot connect: {self._connector.problem}"
                 )
             raise self._error(self._last)
         self._client = _Client(connection, self._timeout)
-        self._given_up.clear()
+        self._abandoned.clear()
         self._failures = 0
 
     def read(self, address: int, count: int, function: int = READ_HOLDING) -> tuple[int, ...]:
@@ -153,41 +153,41 @@ class TcpLink:
         client = self._connected()
         client.begin()
         reply, refusal = _attempt(call)
-        asked = Asked(
+        request = Request(
             transaction=client.transaction.next_tid,
             unit=self._unit,
             function=function,
             length=length,
         )
-        self._given_up.discard(asked.transaction)  # ids come round again after 65000 requests
-        against = refusal or objection(client.received, asked, self._given_up)
-        if against is not None:
-            if against.reason is Reason.TIMEOUT:
-                self._given_up.add(asked.transaction)
-            raise self._fail(against)
+        self._abandoned.discard(request.transaction)  # ids come round again after 65000 requests
+        rejection = refusal or check_reply(client.received, request, self._abandoned)
+        if rejection is not None:
+            if rejection.reason is Reason.TIMEOUT:
+                self._abandoned.add(request.transaction)
+            raise self._fail(rejection)
         if reply is None:
             raise self._fail(_wrong_count("reply cannot be decoded"))
         self._failures = 0
         self._connector.succeeded()
         return reply
 
-    def _fail(self, against: Objection) -> LinkError:
+    def _fail(self, rejection: Rejection) -> LinkError:
         """Draw the consequences for the connection; the error to raise."""
-        self._last = against
-        if against.exception is None:
+        self._last = rejection
+        if rejection.exception is None:
             self._failures += 1
-        if self._failures >= FAILURES_TO_CLOSE or against.out_of_step:
+        if self._failures >= FAILURES_TO_CLOSE or rejection.out_of_sync:
             self._hang_up(None)
-        elif against.exception in PERMANENT and not self._proven:
+        elif rejection.exception in PERMANENT and not self._proven:
             self._hang_up(LAST_DELAY)
-        return self._error(against)
+        return self._error(rejection)
 
     def _hang_up(self, delay: float | None) -> None:
         self.close()
         self._connector.failed(delay)
 
-    def _error(self, against: Objection) -> LinkError:
-        return LinkError(against.reason, f"{self._peer} unit {self._unit}: {against.text}")
+    def _error(self, rejection: Rejection) -> LinkError:
+        return LinkError(rejection.reason, f"{self._peer} unit {self._unit}: {rejection.text}")
 
 
 class _Client(ModbusTcpClient):
@@ -221,16 +221,16 @@ class _Client(ModbusTcpClient):
         return chunk
 
 
-def _attempt(call: Callable[[], ModbusPDU]) -> tuple[ModbusPDU | None, Objection | None]:
+def _attempt(call: Callable[[], ModbusPDU]) -> tuple[ModbusPDU | None, Rejection | None]:
     """The reply as pymodbus sees it, and the objection when the connection itself failed."""
     try:
         return call(), None
     except (ConnectionException, OSError) as error:
         text = f"connection lost: {getattr(error, 'strerror', None) or error}"
-        return None, Objection(reason=Reason.CONNECTION_LOST, text=text, out_of_step=True)
+        return None, Rejection(reason=Reason.CONNECTION_LOST, text=text, out_of_sync=True)
     except ModbusException:
         return None, None
 
 
-def _wrong_count(text: str) -> Objection:
-    return Objection(reason=Reason.WRONG_COUNT, text=text)
+def _wrong_count(text: str) -> Rejection:
+    return Rejection(reason=Reason.WRONG_COUNT, text=text)

@@ -1,4 +1,4 @@
-"""Whether the bytes that came back are the reply to what was asked (pure).
+"""Check that the bytes that came back are the reply to the request (pure).
 
 A Modbus TCP frame is the MBAP header (transaction id, protocol id 0, length, unit id; Modbus
 Messaging on TCP/IP Implementation Guide V1.0b, 3.1.3) and a PDU: function code and data, or
@@ -19,7 +19,7 @@ EXCEPTION_BIT: Final = 0x80
 
 
 @dataclass(frozen=True, kw_only=True)
-class Asked:
+class Request:
     """One request, as far as its reply depends on it."""
 
     transaction: int
@@ -39,13 +39,13 @@ class Frame(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Objection:
+class Rejection:
     """Why bytes are not the reply."""
 
     reason: Reason
     text: str
     exception: int | None = None
-    out_of_step: bool = False
+    out_of_sync: bool = False
     """What is left of these bytes would come as the head of the next reply."""
 
 
@@ -62,53 +62,55 @@ def split(received: bytes) -> tuple[list[Frame], bytes]:
     return frames, received
 
 
-def objection(received: bytes, asked: Asked, given_up: Set[int] = frozenset()) -> Objection | None:
+def check_reply(
+    received: bytes, request: Request, abandoned: Set[int] = frozenset()
+) -> Rejection | None:
     """What is wrong with these bytes as the reply, or None.
 
-    given_up : transaction ids of earlier requests whose replies may still come
+    abandoned : transaction ids of earlier requests whose replies may still come
     """
     frames, rest = split(received)
-    frames = [frame for frame in frames if frame.transaction not in given_up]
+    frames = [frame for frame in frames if frame.transaction not in abandoned]
     if rest:
-        return Objection(
-            reason=Reason.TIMEOUT, text=f"reply stops after {len(rest)} bytes", out_of_step=True
+        return Rejection(
+            reason=Reason.TIMEOUT, text=f"reply stops after {len(rest)} bytes", out_of_sync=True
         )
     if not frames:
-        return Objection(reason=Reason.TIMEOUT, text="no reply in time")
+        return Rejection(reason=Reason.TIMEOUT, text="no reply in time")
     if len(frames) > 1:
-        return Objection(
+        return Rejection(
             reason=Reason.WRONG_TRANSACTION,
             text=f"{len(frames)} replies to one request",
-            out_of_step=True,
+            out_of_sync=True,
         )
-    return _frame_objection(frames[0], asked)
+    return _check_frame(frames[0], request)
 
 
-def _frame_objection(frame: Frame, asked: Asked) -> Objection | None:
+def _check_frame(frame: Frame, request: Request) -> Rejection | None:
     function = frame.pdu[0]
-    if (frame.transaction, frame.protocol, frame.unit) != (asked.transaction, 0, asked.unit):
-        return Objection(
+    if (frame.transaction, frame.protocol, frame.unit) != (request.transaction, 0, request.unit):
+        return Rejection(
             reason=Reason.WRONG_TRANSACTION,
             text=f"reply has transaction {frame.transaction}, protocol {frame.protocol}, "
-            f"unit {frame.unit}; expected {asked.transaction}, 0, {asked.unit}",
+            f"unit {frame.unit}; expected {request.transaction}, 0, {request.unit}",
         )
-    if function == asked.function | EXCEPTION_BIT and len(frame.pdu) == 2:
+    if function == request.function | EXCEPTION_BIT and len(frame.pdu) == 2:
         return _exception(frame.pdu[1])
-    if function != asked.function:
-        return Objection(
+    if function != request.function:
+        return Rejection(
             reason=Reason.WRONG_FUNCTION,
-            text=f"reply has function code 0x{function:02x}, expected 0x{asked.function:02x}",
+            text=f"reply has function code 0x{function:02x}, expected 0x{request.function:02x}",
         )
-    if len(frame.pdu) != asked.length:
-        return Objection(
+    if len(frame.pdu) != request.length:
+        return Rejection(
             reason=Reason.WRONG_COUNT,
-            text=f"reply has {len(frame.pdu)} bytes of PDU, expected {asked.length}",
+            text=f"reply has {len(frame.pdu)} bytes of PDU, expected {request.length}",
         )
     return None
 
 
-def _exception(code: int) -> Objection:
+def _exception(code: int) -> Rejection:
     reason = Reason.__members__.get(f"EXCEPTION_{code}")
     if reason is None:
-        return Objection(reason=Reason.WRONG_FUNCTION, text=f"exception {code}, expected 1 .. 11")
-    return Objection(reason=reason, text=reason.text, exception=code)
+        return Rejection(reason=Reason.WRONG_FUNCTION, text=f"exception {code}, expected 1 .. 11")
+    return Rejection(reason=reason, text=reason.text, exception=code)

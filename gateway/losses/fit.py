@@ -95,7 +95,7 @@ def fit(sections: Sequence[Section]) -> Fit:
     )
 
 
-def different(speeds: Iterable[float]) -> int:
+def count_speeds(speeds: Iterable[float]) -> int:
     """How many speeds there are, those within APART of each other taken as one."""
     counted, last = 0, 0.0
     for one in sorted(speeds):
@@ -105,7 +105,7 @@ def different(speeds: Iterable[float]) -> int:
 
 
 def _refuse_too_few(omega: Array) -> None:
-    speeds = different(omega)
+    speeds = count_speeds(omega)
     if speeds < FEWEST:
         raise LossesError(
             f"too few steady speeds, found {speeds}; expected at least {FEWEST}, each held for a "

@@ -9,7 +9,7 @@ from gateway.configuration.sweep_speeds import HOLD_S, RATE_RPM_S, Sweep
 from gateway.cycle.cycle import Output
 from gateway.cycle.supervisor import State
 from gateway.errors import ConfigError
-from gateway.losses.fit import FEWEST, SPREAD, different
+from gateway.losses.fit import FEWEST, SPREAD, count_speeds
 from register_maps.units import RPM
 
 ENDED: Final = (State.RAMPDOWN, State.SAFE)
@@ -17,7 +17,7 @@ BEGUN: Final = 0.5
 """Of the first speed: what was asked for before is where the bench happened to stand."""
 
 
-def swept_config(config: Config, speeds: Sequence[float] | None, hold: float | None) -> Config:
+def sweep_config(config: Config, speeds: Sequence[float] | None, hold: float | None) -> Config:
     """The same with a sweep; speeds in rpm, hold in s, None: as usual."""
     highest = config.limits.speed_max / RPM
     usual = [one for one in sweep_speeds.DEFAULT if one <= highest * (1.0 + 1e-9)]
@@ -35,7 +35,7 @@ def swept_config(config: Config, speeds: Sequence[float] | None, hold: float | N
 def _refuse(speeds: Sequence[float], highest: float) -> None:
     """Refuse what the law cannot be fitted to, before anything turns."""
     ordered = sorted(speeds)
-    if different(speeds) < FEWEST or ordered[-1] < SPREAD * ordered[0]:
+    if count_speeds(speeds) < FEWEST or ordered[-1] < SPREAD * ordered[0]:
         raise ConfigError(
             "speeds that do not determine the friction",
             place="--speeds",

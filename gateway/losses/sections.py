@@ -124,7 +124,7 @@ def steady(trace: Trace, bench: BenchConfig, torque_offset: float = 0.0) -> Stea
     sections: list[Section] = []
     left_out: list[LeftOut] = []
     for part in _stretches(trace):
-        why = _objection(trace, part, bench.gear_ratio)
+        why = _rejection(trace, part, bench.gear_ratio)
         if why:
             left_out.append(_left_out(trace, part, why))
         else:
@@ -165,7 +165,7 @@ def _moving_mean(values: Array, count: int) -> Array:
     return mean
 
 
-def _objection(trace: Trace, part: slice, gear_ratio: float) -> str:
+def _rejection(trace: Trace, part: slice, gear_ratio: float) -> str:
     """Why a stretch cannot be used; empty: it can."""
     time, speed, torque = trace.time[part], trace.motor_speed[part], trace.shaft_torque[part]
     if speed.mean() < 0.0:

@@ -53,13 +53,13 @@ SUFFIXES: Final = {
 
 def columns(recording: Recording, register_map: RegisterMap) -> Columns:
     """Every column that the recording can fill."""
-    rows = recording.records[fresh(recording)]
+    rows = recording.records[new_samples(recording)]
     found: Columns = {}
     for column in LOG_COLUMNS.values():
         if column.measured is not None:
             unit = UNITS[column.unit]
             found[column.column] = (rows[f"measured_{column.measured}"] - unit.shift) / unit.factor
-    found["time_s"] = elapsed(found["time_s"], register_map.modulus("plc_time"))
+    found["time_s"] = unwrap_time(found["time_s"], register_map.modulus("plc_time"))
     found |= {name: rows[field] for name, field in OWN.items()}
     found["gateway_time_s"] = rows["now"] - recording.header["started"]
     found["written"] = (rows["flags"] & WRITTEN) > 0
@@ -70,15 +70,15 @@ def columns(recording: Recording, register_map: RegisterMap) -> Columns:
     return {name: values for name, values in found.items() if not _missing(values)}
 
 
-def began(recording: Recording) -> datetime:
+def start_date(recording: Recording) -> datetime:
     """When the time of the columns was zero: the date of the first sample that was read."""
     date = datetime.fromisoformat(recording.header["date"])
-    rows = recording.records[fresh(recording)]
+    rows = recording.records[new_samples(recording)]
     waited = float(rows["now"][0] - recording.header["started"]) if len(rows) else 0.0
     return date + timedelta(seconds=waited)
 
 
-def fresh(recording: Recording) -> NDArray[np.intp]:
+def new_samples(recording: Recording) -> NDArray[np.intp]:
     """Ticks that read a sample which no tick before had read."""
     read = np.flatnonzero(recording.records["flags"] & READ)
     samples = recording.records["measured_plc_time"][read]
@@ -88,7 +88,7 @@ def fresh(recording: Recording) -> NDArray[np.intp]:
     return new
 
 
-def elapsed(time: Array, modulus: float | None) -> Array:
+def unwrap_time(time: Array, modulus: float | None) -> Array:
     """Time since the first sample, the PLC's clock unwrapped [s]."""
     steps = np.diff(time, prepend=time[:1])
     return np.cumsum(steps if modulus is None else np.mod(steps, modulus))

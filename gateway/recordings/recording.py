@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from gateway.cycle.record import MAGIC, NOTHING, Layout, intact
+from gateway.cycle.record import MAGIC, NOTHING, Layout, is_intact
 from gateway.cycle.supervisor import State
 from gateway.errors import ConfigError
 
@@ -103,7 +103,7 @@ def _finished(body: bytes, size: int) -> int:
     After it may stand zeros: a file system gives a file its length before its content.
     """
     last = -(-len(body.rstrip(b"\0")) // size)
-    torn = last > 0 and not intact(body[(last - 1) * size : last * size])
+    torn = last > 0 and not is_intact(body[(last - 1) * size : last * size])
     return last - torn
 
 
@@ -111,7 +111,7 @@ def _check(path: Path, body: bytes, records: "np.ndarray[Any, np.dtype[np.void]]
     """Refuse records that are not what was written; the record before tells a bad one's tick."""
     size = records.itemsize
     places = range(0, len(records) * size, size)
-    bad = [k for k, at in enumerate(places) if not intact(body[at : at + size])]
+    bad = [k for k, at in enumerate(places) if not is_intact(body[at : at + size])]
     if bad:
         tick = int(records[bad[0] - 1]["tick"]) + 1 if bad[0] else 0
         raise DamageError(

@@ -56,13 +56,13 @@ def state_line(header: dict[str, Any], record: np.void) -> str:
     state = header["states"][str(record["state"])]
     parts = [f"{record['now'] - header['started']:9.3f} s  {state:9s}"]
     if record["reason"] != NOTHING:
-        parts.append(explained(header, record["reason"]))
+        parts.append(reason_text(header, record["reason"]))
     if record["fault"] not in (NOTHING, record["reason"]):
-        parts.append(f"fault {explained(header, record['fault'])}")
+        parts.append(f"fault {reason_text(header, record['fault'])}")
     return "  ".join(parts).rstrip()
 
 
-def explained(header: dict[str, Any], reason: int) -> str:
+def reason_text(header: dict[str, Any], reason: int) -> str:
     """Code and text of a reason; a dash where there is none."""
     return ": ".join(header["reasons"][str(reason)]) if reason != NOTHING else "-"
 
@@ -74,7 +74,7 @@ def status_table(header: dict[str, Any], record: np.void) -> Table:
     table.add_column(justify="right")
     state = header["states"][str(record["state"])]
     table.add_row("state", state + (" (shadow)" if record["flags"] & SHADOW else ""))
-    table.add_row("reason", explained(header, record["reason"]))
+    table.add_row("reason", reason_text(header, record["reason"]))
     for label, field, show in ROWS:
         value = float(record[field])
         table.add_row(label, show(value) if math.isfinite(value) else "-")

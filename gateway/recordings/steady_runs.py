@@ -13,7 +13,7 @@ from gateway.configuration.config import Config
 from gateway.errors import ConfigError
 from gateway.losses.sections import LossesError, Trace
 from gateway.recordings import log, recording
-from gateway.recordings.export import elapsed, fresh
+from gateway.recordings.export import new_samples, unwrap_time
 from gateway.recordings.header import config_of, map_of
 from gateway.recordings.log import LogError
 from register_maps.register_map import RegisterMap
@@ -82,7 +82,7 @@ def _of_log(found: log.Log) -> Trace:
 
 
 def _of_recording(found: recording.Recording, register_map: RegisterMap) -> Trace:
-    rows = found.records[fresh(found)]
+    rows = found.records[new_samples(found)]
     if len(rows) < 2:
         raise LossesError(f"{found.path}: holds no samples of the PLC; expected a run")
     if np.any(rows["measured_status"].astype(int) & Status.ROAD_LOAD):
@@ -90,7 +90,7 @@ def _of_recording(found: recording.Recording, register_map: RegisterMap) -> Trac
             f"{found.path}: was made in road load: a truck is on the drum, and what it pushes is "
             "no loss of the bench; expected a sweep of steady speeds (gateway losses -c CONFIG)"
         )
-    time = elapsed(rows["measured_plc_time"], register_map.modulus("plc_time"))
+    time = unwrap_time(rows["measured_plc_time"], register_map.modulus("plc_time"))
     return Trace(
         name=found.path.name,
         time=time,

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from gateway.configuration.config import Config
-from gateway.cycle.command import driven
+from gateway.cycle.command import run_mode
 from gateway.cycle.samples import NEEDS
 from gateway.review.finding import Finding
 from register_maps.codec import CodecError, Value, encode_value
@@ -79,7 +79,7 @@ def _needs(
     yield "current_limit", "limits.current_limit_A", (most.current,)
     yield "watchdog_timeout", "limits.watchdog_ms", (most.watchdog,)
     yield "control", "the start", (Control(0), Control.ENABLE)
-    yield "mode", "the run", (Mode.READY, driven(config))
+    yield "mode", "the run", (Mode.READY, run_mode(config))
     yield "map_version", "the version of the map", (register_map.version,)
     for signal in ("command_sequence", "gateway_heartbeat"):
         yield signal, "the count of commands", (0, last)

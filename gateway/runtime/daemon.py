@@ -36,7 +36,7 @@ APART: Final = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ended:
+class RunResult:
     """How a run went. Times in seconds; `reason`: why it ended, None: because it was asked to."""
 
     recording: Path
@@ -85,7 +85,7 @@ def run(
     duration: float | None = None,
     view: bool = True,
     over: Callable[[Output], bool] = _never,
-) -> Ended:
+) -> RunResult:
     """Run the gateway until it is asked to stop, for so long [s], or until a tick says `over`."""
     link = TcpLink(config.plc.host, config.plc.port, config.plc.unit, config.plc.timeout)
     granted = real_time() if config.loop.realtime else nullcontext("not asked for")
@@ -136,8 +136,8 @@ def fault_of(before: Output | None) -> Reason | None:
     return before.reason
 
 
-def _ended(loop: Loop, recorder: Recorder, real: str) -> Ended:
-    return Ended(
+def _ended(loop: Loop, recorder: Recorder, real: str) -> RunResult:
+    return RunResult(
         recording=recorder.path,
         reason=fault_of(loop.before_stop),
         cycles=loop.cycles,

@@ -9,7 +9,7 @@ import pytest
 import plant_emulator
 from gateway.config_file import load_friction
 from gateway.errors import ConfigError
-from gateway.friction import THESIS, friction_of_file, friction_torque, from_friction
+from gateway.friction import THESIS, friction_table, friction_torque, read_friction
 
 WARMER = replace(THESIS, temperature_coefficient=0.01)
 
@@ -44,7 +44,7 @@ def test_without_a_coefficient_temperature_changes_nothing():
 
 
 def test_a_document_makes_the_same_friction_again():
-    assert from_friction(WARMER.document, "here") == WARMER
+    assert read_friction(WARMER.document, "here") == WARMER
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ def test_a_document_makes_the_same_friction_again():
 )
 def test_a_bad_table_is_refused_with_its_place(table, match):
     with pytest.raises(ConfigError, match=match):
-        from_friction(table, "here")
+        read_friction(table, "here")
 
 
 def parameter_set(**changes):
@@ -74,18 +74,18 @@ def parameter_set(**changes):
 
 
 def test_a_parameter_set_gives_its_three_friction_values():
-    table = friction_of_file(parameter_set(), "set.toml")
+    table = friction_table(parameter_set(), "set.toml")
     assert table == {"coulomb": 39.5879, "viscous": 379.918, "exponent": 0.4418}
 
 
 def test_the_shipped_parameter_set_is_the_friction_that_the_gateway_starts_with():
     shipped = Path(plant_emulator.__file__).parent / "parameter_sets" / "thesis_table_3_1.toml"
-    assert from_friction(load_friction(shipped), "here") == THESIS
+    assert read_friction(load_friction(shipped), "here") == THESIS
 
 
 def test_origin_of_a_measured_map_changes_nothing():
     document = {"coulomb": 40.0, "viscous": 300.0, "measured": {"date": "2026-11-21"}}
-    assert friction_of_file(document, "map.toml") == {"coulomb": 40.0, "viscous": 300.0}
+    assert friction_table(document, "map.toml") == {"coulomb": 40.0, "viscous": 300.0}
 
 
 @pytest.mark.parametrize(
@@ -108,4 +108,4 @@ def test_origin_of_a_measured_map_changes_nothing():
 )
 def test_a_friction_file_that_is_neither_or_broken_is_refused_by_name(document, match):
     with pytest.raises(ConfigError, match=match):
-        friction_of_file(document, "f.toml")
+        friction_table(document, "f.toml")

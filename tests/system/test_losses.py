@@ -17,7 +17,7 @@ from gateway.cli import main
 from gateway.configuration.config import Config
 from gateway.demo.operator import Session, operate_fast
 from gateway.demo.view import Screen
-from gateway.losses.live import swept_config
+from gateway.losses.live import sweep_config
 from plant_emulator.emulator.process import EmulatorProcess
 
 pytestmark = pytest.mark.slow
@@ -42,7 +42,7 @@ def gateway(*arguments: object) -> Result:
 def sweep(folder: Path, parameters: Path) -> Path:
     """The recording of a sweep of steady speeds, without waiting for the clock."""
     with EmulatorProcess(parameters=str(parameters), truck_mass=None, speed=None) as emulator:
-        config = swept_config(
+        config = sweep_config(
             Config().with_values({"plc.port": str(emulator.port)}), speeds=None, hold=None
         )
         assert config.sweep is not None

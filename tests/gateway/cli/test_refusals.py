@@ -14,7 +14,7 @@ from gateway.cli import main
 from gateway.cli.registers import command as registers
 from gateway.errors import ConfigError, PlcError
 from gateway.link.connector import resolve
-from gateway.link.device import encoded
+from gateway.link.device import encode_scaled
 from plant_emulator import logs
 from plant_emulator.signals.log import Log
 
@@ -72,7 +72,7 @@ def test_an_empty_name_of_a_map_is_called_empty() -> None:
 def test_no_bits_state_or_counter_is_rounded(name: str, value: float) -> None:
     register = next(r for r in register_maps.load("bench_int16").registers if r.name == name)
     with pytest.raises(ConfigError, match=f"{name}.*{value}.*whole number"):
-        encoded(register, value)
+        encode_scaled(register, value)
 
 
 @pytest.fixture

@@ -49,27 +49,27 @@ def test_writing_begins_in_armed_and_enables_from_run_to_the_end_of_the_rampdown
 )
 def test_the_first_number_is_of_the_moment_and_up_from_the_echo(now, number):
     """One up and the microseconds modulo 30011; so it is never the echo's."""
-    seen = command.echoed(MAP, Command(), READING, now)
-    first = command.following(MAP, seen, PASSED, now)
+    seen = command.note_echo(MAP, Command(), READING, now)
+    first = command.next_command(MAP, seen, PASSED, now)
     assert first.number == number
-    assert command.following(MAP, first, PASSED, now + 0.01).number == number + 1
+    assert command.next_command(MAP, first, PASSED, now + 0.01).number == number + 1
 
 
 def test_without_an_echo_the_first_number_counts_from_one():
-    assert command.following(MAP, Command(), PASSED, 0.0).number == 1
+    assert command.next_command(MAP, Command(), PASSED, 0.0).number == 1
 
 
 def test_a_first_number_wraps_too():
-    assert command.following(MAP, Command(echo=65530), PASSED, 0.00001).number == 5
+    assert command.next_command(MAP, Command(echo=65530), PASSED, 0.00001).number == 5
 
 
 def test_number_zero_counts_as_one_that_was_written():
-    assert command.following(MAP, Command(number=0, echo=41), PASSED, 5.0).number == 1
+    assert command.next_command(MAP, Command(number=0, echo=41), PASSED, 5.0).number == 1
 
 
 def test_numbers_wrap_with_the_register_of_16_bits():
     numbers = [
-        command.following(MAP, Command(number=n), PASSED, 5.0).number for n in (65534, 65535)
+        command.next_command(MAP, Command(number=n), PASSED, 5.0).number for n in (65534, 65535)
     ]
     assert numbers == [65535, 0]
 
@@ -77,34 +77,36 @@ def test_numbers_wrap_with_the_register_of_16_bits():
 def test_a_map_without_the_number_does_not_wrap_it():
     kept = tuple(one for one in MAP.registers if one.signal != "command_sequence")
     bare = replace(MAP, registers=kept)
-    assert command.following(bare, Command(number=65535), PASSED, 5.0).number == 65536
+    assert command.next_command(bare, Command(number=65535), PASSED, 5.0).number == 65536
 
 
 def test_what_was_written_is_kept_with_its_time():
-    after = command.following(MAP, Command(), PASSED, 5.0)
+    after = command.next_command(MAP, Command(), PASSED, 5.0)
     assert (after.speed, after.written, after.sent, after.unanswered) == (120.0, 5.0, 5.0, 1)
-    stopped = command.nothing(after, 6.0)
+    stopped = command.reset(after, 6.0)
     assert (stopped.speed, stopped.written, stopped.sent) == (0.0, 6.0, 5.0)
     assert stopped.number == after.number
 
 
 def test_the_echo_moves_when_it_changes():
-    seen = command.echoed(MAP, Command(), READING, 5.0)
+    seen = command.note_echo(MAP, Command(), READING, 5.0)
     assert (seen.echo, seen.echo_moved) == (41, 5.0)
-    assert command.echoed(MAP, seen, READING, 6.0) == seen
-    later = command.echoed(MAP, seen, replace(READING, command_sequence_echo=42), 6.0)
+    assert command.note_echo(MAP, seen, READING, 6.0) == seen
+    later = command.note_echo(MAP, seen, replace(READING, command_sequence_echo=42), 6.0)
     assert (later.echo, later.echo_moved) == (42, 6.0)
 
 
 @pytest.mark.parametrize("reading", [None, replace(READING, command_sequence_echo=None)])
 def test_no_echo_is_no_news(reading):
-    assert command.echoed(MAP, Command(), reading, 5.0) == Command()
+    assert command.note_echo(MAP, Command(), reading, 5.0) == Command()
 
 
 def echo_of(number, *, written, last, unanswered, register_map=MAP):
     """What becomes of a command when the PLC echoes this number after another."""
     begin = Command(number=written, echo=last, unanswered=unanswered, sent=9.99)
-    return command.echoed(register_map, begin, replace(READING, command_sequence_echo=number), 10.0)
+    return command.note_echo(
+        register_map, begin, replace(READING, command_sequence_echo=number), 10.0
+    )
 
 
 @pytest.mark.parametrize(
@@ -137,11 +139,11 @@ def test_numbers_that_do_not_wrap_are_told_apart_as_well():
 
 
 def test_an_echo_that_moves_before_anything_was_written_is_another_masters():
-    seen = command.echoed(MAP, Command(), READING, 9.0)
+    seen = command.note_echo(MAP, Command(), READING, 9.0)
     assert seen.other_wrote == -inf
-    later = command.echoed(MAP, seen, replace(READING, command_sequence_echo=42), 10.0)
+    later = command.note_echo(MAP, seen, replace(READING, command_sequence_echo=42), 10.0)
     assert later.other_wrote == 10.0
-    zero = command.echoed(MAP, seen, replace(READING, command_sequence_echo=0), 10.0)
+    zero = command.note_echo(MAP, seen, replace(READING, command_sequence_echo=0), 10.0)
     assert zero.other_wrote == 10.0
 
 
@@ -160,13 +162,13 @@ def test_an_echo_that_moves_before_anything_was_written_is_another_masters():
 def test_a_command_younger_than_our_last_one_is_another_masters(sent, age, seen):
     """Its age by the PLC; ours was written at `sent`, 10 s is now; 0.1 s may lie between."""
     reading = replace(READING, command_age=age)
-    after = command.echoed(MAP, Command(echo=41, sent=sent), reading, 10.0)
+    after = command.note_echo(MAP, Command(echo=41, sent=sent), reading, 10.0)
     assert after.other_wrote == (10.0 if seen else -inf)
 
 
 def test_a_command_exactly_as_late_as_may_be_is_ours():
     reading = replace(READING, command_age=0.0)
-    assert command.echoed(MAP, Command(echo=41, sent=0.0), reading, 0.1).other_wrote == -inf
+    assert command.note_echo(MAP, Command(echo=41, sent=0.0), reading, 0.1).other_wrote == -inf
 
 
 SENT = Command(number=3, written=5.0, got_through=4.99)
@@ -174,39 +176,39 @@ SENT = Command(number=3, written=5.0, got_through=4.99)
 
 def test_a_good_reading_without_a_fault_says_that_the_write_got_through():
     failed = replace(SENT, fault=Reason.TIMEOUT, down=True)
-    after = command.answered(failed, READING, None)
+    after = command.note_reply(failed, READING, None)
     assert (after.got_through, after.fault, after.down) == (5.0, None, False)
 
 
 def test_a_fault_beside_a_good_reading_is_that_of_the_write():
-    after = command.answered(SENT, READING, Reason.TIMEOUT)
+    after = command.note_reply(SENT, READING, Reason.TIMEOUT)
     assert (after.got_through, after.fault, after.down) == (4.99, Reason.TIMEOUT, False)
-    again = command.answered(after, READING, Reason.CONNECTION_LOST)
+    again = command.note_reply(after, READING, Reason.CONNECTION_LOST)
     assert (again.fault, again.down) == (Reason.TIMEOUT, True)
-    assert not command.answered(again, READING, Reason.TIMEOUT).down
+    assert not command.note_reply(again, READING, Reason.TIMEOUT).down
 
 
 @pytest.mark.parametrize("fault", [None, Reason.TIMEOUT])
 def test_without_a_reading_nothing_is_known_of_the_write(fault):
-    assert command.answered(SENT, None, fault) == SENT
+    assert command.note_reply(SENT, None, fault) == SENT
 
 
 def test_writes_are_complained_of_when_none_got_through_in_time():
-    failed = command.answered(replace(SENT, got_through=5.0), READING, Reason.TIMEOUT)
-    assert command.complaint(failed, 5.125, 0.125) is None
-    assert command.complaint(failed, 5.126, 0.125) is Reason.TIMEOUT
+    failed = command.note_reply(replace(SENT, got_through=5.0), READING, Reason.TIMEOUT)
+    assert command.fault(failed, 5.125, 0.125) is None
+    assert command.fault(failed, 5.126, 0.125) is Reason.TIMEOUT
 
 
 @pytest.mark.parametrize(
     "fault", [Reason.CONNECTION_LOST, Reason.NOT_CONNECTED, Reason.NOT_ENCODABLE]
 )
 def test_what_no_waiting_cures_is_complained_of_at_once(fault):
-    failed = command.answered(SENT, READING, fault)
-    assert command.complaint(failed, 5.0, 0.1) is fault
+    failed = command.note_reply(SENT, READING, fault)
+    assert command.fault(failed, 5.0, 0.1) is fault
 
 
 def test_without_a_fault_there_is_no_complaint_however_long_nothing_was_written():
-    assert command.complaint(Command(), 5.0, 0.1) is None
+    assert command.fault(Command(), 5.0, 0.1) is None
 
 
 @pytest.mark.parametrize(
@@ -245,7 +247,7 @@ def test_a_sweep_of_steady_speeds_is_run_in_the_mode_of_speed():
     ],
 )
 def test_confirmed_is_what_is_enabled_in_the_mode_of_the_run(config, status, confirmed):
-    assert command.confirmed(config, status) is confirmed
+    assert command.is_confirmed(config, status) is confirmed
 
 
 def test_a_block_before_any_number_has_number_zero():

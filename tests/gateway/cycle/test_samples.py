@@ -42,7 +42,7 @@ def after(*readings, begin=100.0, config=CONFIG, every=0.01):
     for number, reading in enumerate(readings):
         fault = None if isinstance(reading, Measurement) else reading
         seen = samples.take(seen, None if fault else reading, fault, begin + every * number)
-        seen = samples.weighed(config, MAP, seen)
+        seen = samples.windowed(config, MAP, seen)
     return seen
 
 
@@ -104,7 +104,7 @@ def test_shell_temperature_is_the_mean_of_the_thermocouples_that_work(first, sec
 
 
 def test_before_the_first_sample_there_is_nothing():
-    assert samples.complaint(Samples(), 0.0, 0.1) is Reason.STALE
+    assert samples.fault(Samples(), 0.0, 0.1) is Reason.STALE
     assert (Samples().heartbeat_moved, Samples().sequence_moved) == (-inf, -inf)
     assert Samples().age(0.0) == inf
     assert not Samples().is_new
@@ -114,28 +114,28 @@ def test_before_the_first_sample_there_is_nothing():
 
 
 def test_one_sample_alone_is_none_that_could_be_used():
-    assert samples.complaint(after(FIRST), 100.0, 0.1) is Reason.STALE
+    assert samples.fault(after(FIRST), 100.0, 0.1) is Reason.STALE
 
 
 def test_a_lost_link_is_told_at_once_and_a_lost_poll_only_when_stale():
-    assert samples.complaint(after(FIRST, LATER, Reason.CONNECTION_LOST), 100.02, 0.1) is (
+    assert samples.fault(after(FIRST, LATER, Reason.CONNECTION_LOST), 100.02, 0.1) is (
         Reason.CONNECTION_LOST
     )
     lost = after(FIRST, LATER, Reason.TIMEOUT)
-    assert samples.complaint(lost, 100.105, 0.1) is None
-    assert samples.complaint(lost, 100.115, 0.1) is Reason.TIMEOUT
+    assert samples.fault(lost, 100.105, 0.1) is None
+    assert samples.fault(lost, 100.115, 0.1) is Reason.TIMEOUT
 
 
 def test_a_good_sample_forgets_the_faults_before_it():
     seen = after(FIRST, Reason.TIMEOUT, LATER)
-    assert samples.complaint(seen, 100.02, 0.1) is None
+    assert samples.fault(seen, 100.02, 0.1) is None
     assert seen.fault is None
 
 
 def test_a_torn_image_is_no_sample():
     torn = after(FIRST, replace(LATER, sequence_end=9))
     assert torn.newest == FIRST
-    assert samples.complaint(torn, 100.2, 0.1) is Reason.TORN_IMAGE
+    assert samples.fault(torn, 100.2, 0.1) is Reason.TORN_IMAGE
 
 
 @pytest.mark.parametrize(
@@ -148,16 +148,16 @@ def test_a_torn_image_is_no_sample():
 def test_it_is_told_which_of_heartbeat_and_sequence_stands_still(moving, reason):
     later = replace(FIRST, **{moving: 8})
     later = replace(later, sequence_end=later.sequence_start)
-    assert samples.complaint(after(FIRST, later), 100.105, 0.1) is reason
+    assert samples.fault(after(FIRST, later), 100.105, 0.1) is reason
 
 
 def test_a_sample_of_exactly_the_stale_age_is_still_fresh():
     seen = after(FIRST, LATER, begin=0.0, every=0.0)
-    assert samples.complaint(seen, 0.1, 0.1) is None
+    assert samples.fault(seen, 0.1, 0.1) is None
 
 
 def test_of_an_image_that_stands_still_altogether_the_heartbeat_is_named():
-    assert samples.complaint(after(FIRST), 100.2, 0.1) is Reason.HEARTBEAT_FROZEN
+    assert samples.fault(after(FIRST), 100.2, 0.1) is Reason.HEARTBEAT_FROZEN
 
 
 TORN = replace(LATER, sequence_end=9)
@@ -208,7 +208,7 @@ def test_a_window_may_differ_from_our_clock_by_half_of_the_longer_and_50_ms(
 ):
     seen = after(FIRST, later(1, duration=duration), every=every)
     assert (seen.window is None) is (reason is not None)
-    assert seen.doubt is (reason or Reason.STALE)
+    assert seen.window_fault is (reason or Reason.STALE)
 
 
 def test_a_window_exactly_as_far_from_our_clock_as_may_be_is_used():
@@ -231,7 +231,7 @@ def test_what_a_clock_is_ahead_is_forgotten_to_the_13_5_hundredths_in_a_second()
     """exp(-2) = 0.1353353."""
     begin = replace(after(FIRST), ahead=0.5)
     seen = samples.take(begin, replace(LATER, plc_time=2.0), None, 101.0)
-    assert samples.weighed(CONFIG, MAP, seen).ahead == pytest.approx(0.06766764)
+    assert samples.windowed(CONFIG, MAP, seen).ahead == pytest.approx(0.06766764)
 
 
 @pytest.mark.parametrize(("ahead", "used"), [(0.25, True), (-0.25, True), (0.251, False)])
@@ -239,7 +239,7 @@ def test_a_quarter_of_a_second_ahead_is_just_not_too_much(ahead, used):
     """No time passes for us, a quarter of a millisecond for the PLC."""
     begin = replace(after(FIRST), ahead=ahead - 2.0**-12)
     now = replace(LATER, plc_time=1.0 + 2.0**-12, shaft_torque_integral=None)
-    seen = samples.weighed(CONFIG, MAP, samples.take(begin, now, None, 100.0))
+    seen = samples.windowed(CONFIG, MAP, samples.take(begin, now, None, 100.0))
     assert seen.ahead == pytest.approx(ahead, abs=1e-12)
     assert (seen.window is not None) is used
 
@@ -247,7 +247,7 @@ def test_a_quarter_of_a_second_ahead_is_just_not_too_much(ahead, used):
 def test_a_step_of_the_clock_is_left_out_and_the_next_window_used():
     steps = [replace(later(n), plc_time=later(n).plc_time + 3600.0) for n in (2, 3)]
     first = after(FIRST, later(1), steps[0])
-    assert (first.window, first.doubt, first.used) == (None, Reason.PLC_CLOCK, 100.01)
+    assert (first.window, first.window_fault, first.used) == (None, Reason.PLC_CLOCK, 100.01)
     assert after(FIRST, later(1), *steps).window.duration == pytest.approx(0.01)
 
 
@@ -257,7 +257,7 @@ def test_a_mean_that_the_sensor_cannot_show_is_no_torque(torque, used, sign):
     """The register holds 327.67 N m either way."""
     seen = after(FIRST, later(1, torque=sign * torque, mean=None))
     assert (seen.window is not None) is used
-    assert seen.doubt is (Reason.STALE if used else Reason.TORQUE_IMPLAUSIBLE)
+    assert seen.window_fault is (Reason.STALE if used else Reason.TORQUE_IMPLAUSIBLE)
 
 
 def test_the_sensors_range_itself_is_inside():
@@ -301,10 +301,10 @@ def test_windows_that_cannot_be_used_make_stale_what_is_fresh():
     still = [replace(later(n), plc_time=1.01) for n in range(2, 13)]
     seen = after(FIRST, later(1), *still)
     assert seen.age(100.12) == 0.0
-    assert samples.complaint(seen, 100.1, 0.1) is None
-    assert samples.complaint(seen, 100.12, 0.1) is Reason.PLC_CLOCK
+    assert samples.fault(seen, 100.1, 0.1) is None
+    assert samples.fault(seen, 100.12, 0.1) is Reason.PLC_CLOCK
 
 
 def test_a_window_of_exactly_the_stale_age_is_still_of_use():
     seen = replace(after(FIRST, LATER, begin=0.0, every=0.0), heartbeat_moved=0.1)
-    assert samples.complaint(replace(seen, sequence_moved=0.1), 0.1, 0.1) is None
+    assert samples.fault(replace(seen, sequence_moved=0.1), 0.1, 0.1) is None

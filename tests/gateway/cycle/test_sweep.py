@@ -9,7 +9,7 @@ import pytest
 from gateway.configuration.config import Config, from_document
 from gateway.cycle.supervisor import State
 from gateway.errors import ConfigError
-from gateway.losses.live import Progress, swept_config
+from gateway.losses.live import Progress, sweep_config
 from gateway.reasons import Reason
 from register_maps.signals import Mode, PlcState, Status
 from tests.gateway.closed_loop import ClosedLoop
@@ -25,7 +25,7 @@ def started(config: Config) -> ClosedLoop:
 
 
 def test_each_speed_is_held_for_its_time_one_after_the_other():
-    loop = started(swept_config(Config(), SPEEDS, hold=4.0))
+    loop = started(sweep_config(Config(), SPEEDS, hold=4.0))
     loop.run(40.0)
     setpoints = np.array([one.setpoint.speed_setpoint for one in loop.outputs if one.setpoint])
     for speed in SPEEDS:
@@ -38,7 +38,7 @@ def test_each_speed_is_held_for_its_time_one_after_the_other():
 
 def test_duration_is_that_of_holds_and_ramps():
     """4 holds of 4 s; 200 + 200 + 100 + 300 + 600 rpm at 300 rpm/s."""
-    config = swept_config(Config(), SPEEDS, hold=4.0)
+    config = sweep_config(Config(), SPEEDS, hold=4.0)
     assert config.sweep.duration == pytest.approx(16.0 + 1400.0 / 300.0)
     loop, progress = started(config), Progress(config.sweep)
     before = len(loop.outputs)
@@ -49,7 +49,7 @@ def test_duration_is_that_of_holds_and_ramps():
 
 
 def test_the_plc_is_in_mode_speed_so_that_nobody_drives_the_truck():
-    loop = started(swept_config(Config(), SPEEDS, hold=4.0))
+    loop = started(sweep_config(Config(), SPEEDS, hold=4.0))
     loop.run(6.0)
     assert loop.last.setpoint.mode is Mode.SPEED
     assert loop.plc.state is PlcState.SPEED
@@ -58,7 +58,7 @@ def test_the_plc_is_in_mode_speed_so_that_nobody_drives_the_truck():
 
 
 def test_a_plc_that_goes_into_road_load_ends_the_sweep():
-    loop = started(swept_config(Config(), SPEEDS, hold=4.0))
+    loop = started(sweep_config(Config(), SPEEDS, hold=4.0))
     loop.disturb = lambda _, seen: replace(seen, status=seen.status | Status.ROAD_LOAD)
     loop.run(0.05)
     assert loop.last.state in (State.RAMPDOWN, State.SAFE)
@@ -66,7 +66,7 @@ def test_a_plc_that_goes_into_road_load_ends_the_sweep():
 
 
 def test_the_operator_ends_it_by_a_ramp_down_and_it_is_not_done():
-    config = swept_config(Config(), SPEEDS, hold=4.0)
+    config = sweep_config(Config(), SPEEDS, hold=4.0)
     loop, progress = started(config), Progress(config.sweep)
     loop.run(3.0)
     assert not progress(loop.last)
@@ -79,19 +79,19 @@ def test_the_operator_ends_it_by_a_ramp_down_and_it_is_not_done():
 
 def test_the_limits_have_the_last_word():
     limited = {"limits.rate_up_rpm_s": "100", "limits.speed_max_rpm": "600"}
-    loop = started(swept_config(Config().with_values(limited), SPEEDS, hold=4.0))
+    loop = started(sweep_config(Config().with_values(limited), SPEEDS, hold=4.0))
     loop.run(12.0)
     setpoints = np.array([one.setpoint.speed_setpoint for one in loop.outputs if one.setpoint])
     assert np.diff(setpoints).max() <= 100.0 * RPM * 0.01 * 1.01
 
 
 def test_usual_speeds_stay_under_the_limit():
-    config = swept_config(Config().with_values({"limits.speed_max_rpm": "3000"}), None, None)
+    config = sweep_config(Config().with_values({"limits.speed_max_rpm": "3000"}), None, None)
     assert [round(one / RPM) for one in config.sweep.speeds] == [200, 400, 800, 1400, 2100, 2900]
 
 
 def test_a_configuration_with_a_sweep_survives_its_document():
-    config = swept_config(Config(), SPEEDS, hold=4.0)
+    config = sweep_config(Config(), SPEEDS, hold=4.0)
     assert from_document(config.document) == config
     assert Config().sweep is None
 
@@ -111,7 +111,7 @@ def test_a_configuration_with_a_sweep_survives_its_document():
 )
 def test_a_sweep_that_tells_nothing_is_refused_before_anything_turns(speeds, hold, match):
     with pytest.raises(ConfigError, match=match):
-        swept_config(Config().with_values({"limits.speed_max_rpm": "3600"}), speeds, hold)
+        sweep_config(Config().with_values({"limits.speed_max_rpm": "3600"}), speeds, hold)
 
 
 @pytest.mark.parametrize("table", [3, {}, {"speeds_rpm": 3, "hold_s": 8, "rate_rpm_s": 300}])

@@ -4,8 +4,8 @@ import pytest
 
 import register_maps
 from gateway.errors import ConfigError
-from gateway.link.device import encoded, writable
-from gateway.link.inspection import Reading, Row, in_other_order, mbpoll, shown, verify
+from gateway.link.device import encode_scaled, writable
+from gateway.link.inspection import Reading, Row, mbpoll, value_in_other_order, value_text, verify
 from register_maps.codec import encode_measurement
 from register_maps.register_map import RegisterMap
 from register_maps.signals import SIGNALS, Measurement, Status
@@ -92,12 +92,12 @@ def test_a_zero_that_no_running_plc_has_fails() -> None:
 
 
 def test_values_are_shown_in_the_maps_unit_and_in_the_other_order() -> None:
-    assert shown(register("MOT_SPEED"), (500,)) == "100"  # 500 digits of 0.2 rpm
-    assert shown(register("FIELD_CURR"), (0x8000,)) == "not available"
-    assert shown(register("TEST_U32"), (0x1234, 0x5678)) == "305419896"
-    assert shown(register("T_PLC"), (0x0001, 0x0000)) == "6553.6"
-    assert in_other_order(register("T_PLC"), (0x0001, 0x0000)) == "0.1"
-    assert in_other_order(register("MOT_SPEED"), (500,)) == ""
+    assert value_text(register("MOT_SPEED"), (500,)) == "100"  # 500 digits of 0.2 rpm
+    assert value_text(register("FIELD_CURR"), (0x8000,)) == "not available"
+    assert value_text(register("TEST_U32"), (0x1234, 0x5678)) == "305419896"
+    assert value_text(register("T_PLC"), (0x0001, 0x0000)) == "6553.6"
+    assert value_in_other_order(register("T_PLC"), (0x0001, 0x0000)) == "0.1"
+    assert value_in_other_order(register("MOT_SPEED"), (500,)) == ""
 
 
 @pytest.mark.parametrize(
@@ -116,15 +116,15 @@ def test_the_call_of_mbpoll_is_the_one_of_its_manual(
 
 
 def test_a_value_is_encoded_from_the_maps_unit() -> None:
-    assert encoded(register("SPEED_REF"), 100.0) == (500,)
-    assert encoded(register("WD_TIMEOUT"), 200.0) == (200,)
-    assert encoded(register("SPEED_RATE"), -3.0) == (0xFFFD,)
+    assert encode_scaled(register("SPEED_REF"), 100.0) == (500,)
+    assert encode_scaled(register("WD_TIMEOUT"), 200.0) == (200,)
+    assert encode_scaled(register("SPEED_RATE"), -3.0) == (0xFFFD,)
 
 
 @pytest.mark.parametrize(("name", "value"), [("SPEED_REF", 4830.2), ("WD_TIMEOUT", 49.0)])
 def test_a_value_outside_the_maps_range_is_refused(name: str, value: float) -> None:
     with pytest.raises(ConfigError, match=name) as caught:
-        encoded(register(name), value)
+        encode_scaled(register(name), value)
     assert caught.value.exit_code == 2
 
 

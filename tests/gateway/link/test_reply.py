@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.link.reply import Asked, objection, split
+from gateway.link.reply import Request, check_reply, split
 from gateway.reasons import Reason
 
-READ_TWO = Asked(transaction=0x0107, unit=1, function=3, length=6)
+READ_TWO = Request(transaction=0x0107, unit=1, function=3, length=6)
 """FC3, two registers: a normal PDU is function code, byte count 4, four bytes."""
 
 GOOD = bytes.fromhex("0107 0000 0007 01 03 04 000A 0102")
@@ -15,7 +15,7 @@ GOOD = bytes.fromhex("0107 0000 0007 01 03 04 000A 0102")
 
 
 def test_the_specifications_reply_is_taken() -> None:
-    assert objection(GOOD, READ_TWO) is None
+    assert check_reply(GOOD, READ_TWO) is None
 
 
 @pytest.mark.parametrize(
@@ -34,35 +34,35 @@ def test_the_specifications_reply_is_taken() -> None:
     ],
 )
 def test_another_reply_is_refused_with_its_reason(received: str, reason: Reason) -> None:
-    against = objection(bytes.fromhex(received), READ_TWO)
-    assert against is not None
-    assert against.reason is reason
+    rejection = check_reply(bytes.fromhex(received), READ_TWO)
+    assert rejection is not None
+    assert rejection.reason is reason
 
 
 @pytest.mark.parametrize("code", range(1, 12))
 def test_an_exception_reply_carries_its_code(code: int) -> None:
-    against = objection(bytes.fromhex("0107 0000 0003 01 83") + bytes([code]), READ_TWO)
-    assert against is not None
-    assert against.exception == code
-    assert not against.out_of_step
+    rejection = check_reply(bytes.fromhex("0107 0000 0003 01 83") + bytes([code]), READ_TWO)
+    assert rejection is not None
+    assert rejection.exception == code
+    assert not rejection.out_of_sync
 
 
-def test_a_late_reply_to_a_request_given_up_is_passed_over() -> None:
+def test_a_late_reply_to_a_request_that_was_abandoned_is_passed_over() -> None:
     late = bytes.fromhex("0106 0000 0007 01 03 04 FFFF FFFF")
-    assert objection(late + GOOD, READ_TWO, {0x0106}) is None
+    assert check_reply(late + GOOD, READ_TWO, {0x0106}) is None
 
 
-def test_an_old_reply_that_was_not_given_up_is_refused() -> None:
+def test_an_old_reply_that_was_not_abandoned_is_refused() -> None:
     twice = bytes.fromhex("0106 0000 0007 01 03 04 FFFF FFFF") + GOOD
-    against = objection(twice, READ_TWO)
-    assert against is not None
-    assert against.out_of_step
+    rejection = check_reply(twice, READ_TWO)
+    assert rejection is not None
+    assert rejection.out_of_sync
 
 
-def test_bytes_after_the_reply_put_the_connection_out_of_step() -> None:
-    against = objection(GOOD + b"\x00", READ_TWO)
-    assert against is not None
-    assert against.out_of_step
+def test_bytes_after_the_reply_put_the_connection_out_of_sync() -> None:
+    rejection = check_reply(GOOD + b"\x00", READ_TWO)
+    assert rejection is not None
+    assert rejection.out_of_sync
 
 
 @given(st.binary(max_size=600))
@@ -74,5 +74,5 @@ def test_any_bytes_split_into_frames_and_a_rest_that_make_them_up(received: byte
 
 @given(st.binary(max_size=300))
 def test_only_the_exact_frame_is_taken(received: bytes) -> None:
-    taken = objection(received, READ_TWO) is None
+    taken = check_reply(received, READ_TWO) is None
     assert taken == (received[:8] == GOOD[:8] and len(received) == len(GOOD))
