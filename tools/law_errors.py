@@ -23,10 +23,10 @@ from threadpoolctl import threadpool_limits
 from plant_emulator import effects, logs, parameter_sets
 from plant_emulator.blind import draw, laws, score
 from plant_emulator.blind.generate import measure, simulate_truth
-from plant_emulator.diagnosis.execution.pool import Here, model_of
+from plant_emulator.diagnosis.execution.pool import InProcess, model_of
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
 from plant_emulator.diagnosis.report.ranking import rank
-from plant_emulator.diagnosis.selection.procedure import Inquiry
+from plant_emulator.diagnosis.selection.procedure import Procedure
 from plant_emulator.recordings.recording import recording
 from plant_emulator.solver.kernel import kernel, know
 from plant_emulator.workflows.workers import end_with_parent
@@ -55,11 +55,11 @@ def sizes(seed: int, only: tuple[str, ...], number: int) -> list[dict[str, Any]]
     recipe = BenchRecipe(tuple(_recordings(case, nominal)), nominal, others)
     with threadpool_limits(1):
         model, runs = model_of(recipe), tuple(range(len(case.programs)))
-        inquiry = Inquiry(pool=Here(), recipe=recipe, model=model, runs=runs)
+        inquiry = Procedure(pool=InProcess(), recipe=recipe, model=model, runs=runs)
         found, _, _ = inquiry.with_quiet_inputs().found()
     if not found.named:
         return []
-    (contender,) = found.contenders
+    (contender,) = found.hypotheses
     candidate = model.candidates[hidden.effect]
     sized = rank(contender, found, found.named, candidate).parameters
     pairs = score.sizes(case.hidden, [hidden.effect], {hidden.effect: sized}, known)

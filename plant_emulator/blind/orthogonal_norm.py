@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
+from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
 from plant_emulator.errors import UnsettledError
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
 from plant_emulator.estimation.least_squares import estimate, linearise_at
@@ -64,10 +64,10 @@ def _norm(case: Case, hidden: Hidden, logs: Sequence[Log], parameters: Parameter
     base = [simulate_run(start) for simulate_run, start in zip(without, starts, strict=True)]
     whole = [simulate_run(start) for simulate_run, start in zip(complete, starts, strict=True)]
     change = [after - before for after, before in zip(whole, base, strict=True)]
-    tangents = Tangents(
+    tangents = NuisanceSpace(
         linearise_at(wanted, [_less(p, b) for p, b in zip(without, base, strict=True)])
     )
-    norm = float(np.linalg.norm(tangents.rest(np.concatenate([c.ravel() for c in change]))))
+    norm = float(np.linalg.norm(tangents.orthogonal(np.concatenate([c.ravel() for c in change]))))
     if norm <= DETECTABLE:
         return norm
     away = [_less(p, w) for p, w in zip(without, whole, strict=True)]

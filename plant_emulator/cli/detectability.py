@@ -35,7 +35,7 @@ def command(
     for note in notes:
         click.echo(f"note: {note}", err=True)
     found = detectability(model, point, range(len(runs)))
-    rows = sorted(found, key=lambda d: -d.norm)
+    rows = sorted(found, key=lambda d: -d.orthogonal_norm)
     effects = [as_answer(d, model.candidates[d.effect]) for d in rows]
     if json_file:
         _options.write_json({"schema": "detectability/1", "effects": effects}, json_file)

@@ -9,9 +9,9 @@ from plant_emulator.diagnosis.answer import Answer, Logs
 from plant_emulator.diagnosis.calibration.confidence import confidence
 from plant_emulator.diagnosis.design.next_experiment import Advice
 from plant_emulator.diagnosis.execution.pool import model_of
-from plant_emulator.diagnosis.execution.progress import Told
+from plant_emulator.diagnosis.execution.progress import ReportingPool
 from plant_emulator.diagnosis.fitting.derived_quantities import in_terms
-from plant_emulator.diagnosis.fitting.evidence import NOISE_LEFT, THRESHOLD
+from plant_emulator.diagnosis.fitting.evidence import EVIDENCE_THRESHOLD, NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.prediction import gap
 from plant_emulator.diagnosis.prediction.held_out import NOMINAL, HeldOut
@@ -22,7 +22,7 @@ from plant_emulator.diagnosis.report.ranking import rank, ranked, undetectable, 
 from plant_emulator.diagnosis.report.shrinkage import held_out_gap, waterfall
 from plant_emulator.diagnosis.report.statement import statement, verdict
 from plant_emulator.diagnosis.selection import subsystem
-from plant_emulator.diagnosis.selection.procedure import Inquiry
+from plant_emulator.diagnosis.selection.procedure import Procedure
 from plant_emulator.diagnosis.selection.rules import SECOND
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
     from plant_emulator.diagnosis.execution.progress import Progress
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation
+    from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.prediction.gap import Gap, Prediction
     from plant_emulator.diagnosis.prediction.held_out import Plan
@@ -55,9 +55,9 @@ class Findings:
 
 # Of the contest, as the report tells them.
 THRESHOLDS = {
-    "evidence that an effect needs": f"{THRESHOLD:g}",
+    "evidence that an effect needs": f"{EVIDENCE_THRESHOLD:g}",
     "evidence that a second one needs": f"{SECOND:g}",
-    "mean square over the noise up to which a fit leaves noise": f"{NOISE_LEFT:g}",
+    "mean square over the noise up to which a fit leaves noise": f"{NOISE_MEAN_SQUARE:g}",
 }
 
 
@@ -81,7 +81,7 @@ class Diagnose:
         notes: Sequence[str] = (),
         progress: Progress | None = None,
     ) -> None:
-        self.pool = pool if progress is None else Told(pool, progress)
+        self.pool = pool if progress is None else ReportingPool(pool, progress)
         self.recipe, self.plan = recipe, plan
         self.model: Model = model_of(recipe)
         self.settings, self.notes = settings, tuple(notes)
@@ -91,7 +91,7 @@ class Diagnose:
 
     def diagnose(self) -> Findings:
         """Contest, verdict, held-out runs, place."""
-        inquiry = Inquiry(
+        inquiry = Procedure(
             pool=self.pool,
             recipe=self.recipe,
             model=self.model,
@@ -207,7 +207,7 @@ class Diagnose:
 
     def _ranked(
         self,
-        contender: Contender,
+        contender: Hypothesis,
         explained: Explanation,
         decision: Decision,
         gaps: Mapping[tuple[str, ...], Gap],
@@ -231,7 +231,7 @@ class Diagnose:
 
     def _evidence(self, explained: Explanation, decision: Decision) -> float:
         """Evidence of the weakest effect that is named; of the best one where none is."""
-        by_name = {c.effect: explained.evidence(c) for c in explained.contenders}
+        by_name = {c.effect: explained.evidence(c) for c in explained.hypotheses}
         named = [by_name[name] for name in decision.effects]
         return min(named) if named else max(by_name.values(), default=0.0)
 

@@ -13,68 +13,74 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class FitResult:
-    """Where a joint fit has come to.
+    """The result of a joint fit of parameters, states and effects, as plain data.
 
-    values : parameters, sizes and shapes by name; states : of every run of the fit, by name
-    cost : sum of squares with the priors, and what the looks cost; squares : of the residuals
-        alone; samples : counted
-    share : of the samples that are independent, from the residual's autocorrelation time
-    errors : standard errors by name of `values`
-    structure : of the residuals, beyond white noise, see `covariance.structure`
-    looks : of the cost, what the choice of the states has gained by chance, see `looks_of`
-    sizes : the largest size of every effect, in plausible sizes
-    unsure : effects with values of each run and no certain size; those can be anything that differs
-        from run to run
+    values : parameters, sizes and shapes by name
+    states : the initial states of each fitted run by name, one mapping a run
+    cost : sum of squares, plus the priors' penalty, plus the Occam penalty
+    sum_of_squares : of the whitened residuals alone
+    samples : number of samples that count
+    effective_fraction : share of the samples that are independent, from the residual's
+        autocorrelation time
+    standard_errors : of `values`, by name
+    converged : whether the fit ended before its iterations did
+    ljung_box_excess : Ljung-Box statistic of the residuals beyond its expected value, summed over
+        the channels; see `covariance.structure`
+    occam_penalty : part of the cost that charges the choice of the states
+    relative_sizes : largest size of each effect, in plausible sizes
+    insignificant : effects with states of their own and no size that differs from neutral for
+        certain; such an effect can follow anything that differs from run to run
     """
 
     effects: tuple[str, ...]
     values: Mapping[str, float]
     states: tuple[Mapping[str, float], ...]
     cost: float
-    squares: float
+    sum_of_squares: float
     samples: int
-    share: float
-    errors: Mapping[str, float]
+    effective_fraction: float
+    standard_errors: Mapping[str, float]
     converged: bool
-    structure: float = 0.0
-    looks: float = 0.0
-    sizes: Mapping[str, float] = field(default_factory=dict)
-    unsure: tuple[str, ...] = ()
+    ljung_box_excess: float = 0.0
+    occam_penalty: float = 0.0
+    relative_sizes: Mapping[str, float] = field(default_factory=dict)
+    insignificant: tuple[str, ...] = ()
 
     @property
     def key(self) -> tuple[object, ...]:
-        """The same for the same fit only."""
+        """Hashable key that only an equal fit shares."""
         return (self.effects, self.cost, *self.values.values())
 
     @property
-    def chi_squared(self) -> float:
-        """Mean square of the whitened residual; 1: only the noise is left."""
-        return self.squares / self.samples
+    def mean_square(self) -> float:
+        """Mean square of the whitened residual [1]; 1 where only the noise is left."""
+        return self.sum_of_squares / self.samples
 
 
 @dataclass(frozen=True, kw_only=True)
-class Unrest:
-    """An effect of chance course on top of a fit.
+class VarianceComponent:
+    """The result of the fit of a random effect on top of a joint fit.
 
-    size, error : a with its standard error, in the unit of `name`
+    parameter : name of the effect's size
+    size, standard_error : estimate of a in the variance 1 + a^2 v, in the parameter's unit
     shape : constants that only shape the effect, by name
     evidence : twice the rise of the log-likelihood
-    weights : 1 / sqrt(1 + a^2 v) of every run, shape (channels, samples)
-    even : whether what is left is as small as it says at every level
-    random : whether what is left is random
+    weights : 1 / sqrt(1 + a^2 v) of each run, shape (channels, samples)
+    homoscedastic : whether the weighted residual has the same variance at each level of v
+    white : whether the weighted residual is nearly white
     """
 
     effect: str
-    name: str
+    parameter: str
     size: float
-    error: float
+    standard_error: float
     shape: Mapping[str, float]
     evidence: float
     weights: tuple[Array, ...]
-    even: bool
-    random: bool
+    homoscedastic: bool
+    white: bool
 
     @property
-    def holds(self) -> bool:
-        """Whether the residual is what the effect leaves."""
-        return self.even and self.random
+    def consistent(self) -> bool:
+        """Whether the residual is what the random effect leaves."""
+        return self.homoscedastic and self.white

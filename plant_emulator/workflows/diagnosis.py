@@ -224,7 +224,7 @@ def parameter_set(
     changed = {n: v for n, v in final.values.items() if n in parameters.parameters}
     new = parameters.with_values(changed)
     kept = {
-        name: replace(p, standard_error=final.errors.get(name)) if name in changed else p
+        name: replace(p, standard_error=final.standard_errors.get(name)) if name in changed else p
         for name, p in new.parameters.items()
     }
     origin = {

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fit_result import FitResult
-from plant_emulator.diagnosis.fitting.joint_fit import null_fit
+from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.machines.bench import BenchModel, BenchRecipe
 from plant_emulator.errors import ParameterError
 from plant_emulator.model.stage import GAP_POSITION
@@ -57,7 +57,7 @@ def prepared(
     states: tuple[dict[str, float], ...] = ()
     if recordings:
         model = BenchRecipe(tuple(recordings), parameters).build()
-        fitted = null_fit(model, range(len(recordings)))
+        fitted = fit_null(model, range(len(recordings)))
         parameters = parameters.with_values(fitted.values)
         values, states = parameters.values(), tuple(dict(s) for s in fitted.states)
     planned = [name for name in names if name not in recorded]
@@ -69,10 +69,10 @@ def prepared(
         values={u.name: values[u.name] for u in model.parameters},
         states=(*states, *({GAP_POSITION: 0.0} for _ in planned)),
         cost=0.0,
-        squares=0.0,
+        sum_of_squares=0.0,
         samples=1,
-        share=1.0,
-        errors={},
+        effective_fraction=1.0,
+        standard_errors={},
         converged=True,
     )
     return model, point, tuple(notes)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from plant_emulator.diagnosis.execution.pool import Here, model_of
+from plant_emulator.diagnosis.execution.pool import InProcess, model_of
 from plant_emulator.errors import EmulatorError, InputError
 
 if TYPE_CHECKING:
@@ -155,4 +155,4 @@ def pool_of(workers: int, scheduler: str | None = None) -> Pool:
     """The pool that the options --workers and --scheduler ask for."""
     if scheduler is not None:
         return Cluster(scheduler)
-    return Processes(workers) if workers > 1 else Here()
+    return Processes(workers) if workers > 1 else InProcess()

@@ -1,11 +1,14 @@
-"""Beforehand: what a run can show of each effect, and what it cannot tell apart.
+"""What runs can show of each effect, and which effects they cannot tell apart.
 
-From the same signatures as the contest, at a run's own fit or, for a run that is only planned, at
-the nominal parameters: the drift-free signature of an effect at its plausible size, in the noise.
-An effect is detectable from the size on at which its signature reaches DETECTABLE; two effects are
-of one class where the cosine between their signatures is above ALIKE, or where the evidence that
-separates them at their plausible sizes is under MARGIN. An effect whose course in a run is chance
-has no signature that a fit could find again.
+The signatures are those of the hypothesis tests: at the fit of a recorded run, or at the nominal
+parameters for a run that is only planned. An effect is detectable from the size on at which the
+norm of its signature, orthogonal to the nuisance parameters, reaches DETECTABLE_NORM. Two effects
+are in one class where
+
+    |cos(s_1, s_2)| > ALIKE   or   |s_1|^2 (1 - cos^2) < CLASS_MARGIN
+
+s_1, s_2 : their orthogonal signatures at the plausible sizes, in the noise
+A random effect has no signature that a fit could find again.
 """
 
 from __future__ import annotations
@@ -16,9 +19,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.evidence import DETECTABLE, MARGIN
-from plant_emulator.diagnosis.fitting.joint_fit import linearised
-from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
+from plant_emulator.diagnosis.fitting.evidence import CLASS_MARGIN, DETECTABLE_NORM
+from plant_emulator.diagnosis.fitting.joint_fit import linearise
+from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
 from plant_emulator.diagnosis.fitting.signature import SIZES, bounded, signature
 
 if TYPE_CHECKING:
@@ -35,51 +38,63 @@ ALIKE = 0.95
 class Detectability:
     """What these runs can show of an effect.
 
-    norm : drift-free signature at the plausible size, in the noise; raw : without removing drift
-    smallest : size that reaches DETECTABLE, in plausible sizes; infinite: none does
-    alike : effects that they cannot tell from it, itself first
+    orthogonal_norm : norm of the signature at the plausible size, in the noise, without the part
+        that a nuisance parameter can follow
+    total_norm : norm of the whole signature
+    smallest_size : size that reaches DETECTABLE_NORM, in plausible sizes; infinite where none does
+    confounded_with : nuisance parameter that follows the signature most
+    indistinguishable : the effect, then the effects that these runs cannot tell from it
     """
 
     effect: str
-    norm: float
-    raw: float
-    smallest: float
-    imitated_by: str
-    alike: tuple[str, ...]
+    orthogonal_norm: float
+    total_norm: float
+    smallest_size: float
+    confounded_with: str
+    indistinguishable: tuple[str, ...]
 
 
 def detectability(model: Model, where: FitResult, runs: Sequence[int]) -> list[Detectability]:
     """For every effect of the library, at a fit without effects."""
-    tangents = Tangents(linearised(model, where, runs))
+    tangents = NuisanceSpace(linearise(model, where, runs))
     found = {
         name: None if candidate.untold else signature(model, name, where, runs, tangents)
         for name, candidate in model.candidates.items()
     }
     seen = {name: s for name, s in found.items() if s is not None}
     return [
-        Detectability(effect=name, norm=0.0, raw=0.0, smallest=inf, imitated_by="", alike=(name,))
+        Detectability(
+            effect=name,
+            orthogonal_norm=0.0,
+            total_norm=0.0,
+            smallest_size=inf,
+            confounded_with="",
+            indistinguishable=(name,),
+        )
         if s is None
         else Detectability(
             effect=name,
-            norm=s.norm,
-            raw=s.raw,
-            smallest=smallest([(reached(model.candidates[name], f), norm) for f, norm in s.norms]),
-            imitated_by=s.imitated_by,
-            alike=alike(name, seen),
+            orthogonal_norm=s.orthogonal_norm,
+            total_norm=s.total_norm,
+            smallest_size=smallest(
+                [(reached(model.candidates[name], f), norm) for f, norm in s.orthogonal_norms]
+            ),
+            confounded_with=s.confounded_with,
+            indistinguishable=alike(name, seen),
         )
         for name, s in found.items()
     ]
 
 
 def smallest(norms: Sequence[tuple[float, float]]) -> float:
-    """Size at which a signature reaches DETECTABLE: linear between the sizes tried, and to 0.
+    """Size at which a signature reaches DETECTABLE_NORM: linear between the sizes tried, and to 0.
 
     norms : (size, norm), ascending in size; a limit that does not yet bite has the norm 0
     """
     size_before, norm_before = 0.0, 0.0
     for size, norm in norms:
-        if norm >= DETECTABLE:
-            share = (DETECTABLE - norm_before) / (norm - norm_before)
+        if norm >= DETECTABLE_NORM:
+            share = (DETECTABLE_NORM - norm_before) / (norm - norm_before)
             return size_before + share * (size - size_before)
         size_before, norm_before = size, norm
     return inf
@@ -97,17 +112,17 @@ def reached(candidate: Candidate, factor: float) -> float:
 def alike(name: str, seen: Mapping[str, Signature]) -> tuple[str, ...]:
     """Effects whose signature is that of `name`, the most alike first."""
     own = seen[name]
-    if own.norm < DETECTABLE:
+    if own.orthogonal_norm < DETECTABLE_NORM:
         return (name,)
     cosines = {
         other: abs(float(np.dot(own.direction, s.direction)))
         for other, s in seen.items()
-        if other != name and s.norm >= DETECTABLE
+        if other != name and s.orthogonal_norm >= DETECTABLE_NORM
     }
     near = [
         other
         for other, cosine in cosines.items()
-        if cosine > ALIKE or own.norm**2 * (1.0 - cosine**2) < MARGIN
+        if cosine > ALIKE or own.orthogonal_norm**2 * (1.0 - cosine**2) < CLASS_MARGIN
     ]
     return (name, *sorted(near, key=lambda other: -cosines[other]))
 
@@ -115,10 +130,10 @@ def alike(name: str, seen: Mapping[str, Signature]) -> tuple[str, ...]:
 def as_answer(found: Detectability, candidate: Candidate) -> dict[str, Any]:
     """One entry of the answer, schema detectability/1."""
     prefix = f"{candidate.name}_"
-    seen = isfinite(found.smallest)
+    seen = isfinite(found.smallest_size)
     least = {
         u.name.removeprefix(prefix): (
-            bounded(u, candidate.neutral[u.name], found.smallest) if seen else None
+            bounded(u, candidate.neutral[u.name], found.smallest_size) if seen else None
         )
         for u in candidate.sizes
     }
@@ -128,8 +143,8 @@ def as_answer(found: Detectability, candidate: Candidate) -> dict[str, Any]:
         "smallest_size": least,
         "hidden_up_to": {} if seen else _hidden_up_to(found, candidate),
         "units": {k.removeprefix(prefix): v for k, v in candidate.units.items()},
-        "evidence_at_plausible_size": found.norm**2,
-        "class": list(found.alike),
+        "evidence_at_plausible_size": found.orthogonal_norm**2,
+        "class": list(found.indistinguishable),
         "needs": _needs(found, candidate),
     }
 
@@ -141,16 +156,16 @@ def _hidden_up_to(found: Detectability, candidate: Candidate) -> dict[str, float
     return {
         name.removeprefix(f"{candidate.name}_"): value
         for name, value in tried.items()
-        if found.raw > 0.0 and value != ends[name]
+        if found.total_norm > 0.0 and value != ends[name]
     }
 
 
 def _needs(found: Detectability, candidate: Candidate) -> str | None:
     """What is missing for an effect that does not show at its plausible size."""
-    if found.norm >= DETECTABLE:
+    if found.orthogonal_norm >= DETECTABLE_NORM:
         return None
     if candidate.needs:
         return candidate.needs
-    if found.raw >= DETECTABLE:
-        return f"a run in which drift of {found.imitated_by} does not look the same"
+    if found.total_norm >= DETECTABLE_NORM:
+        return f"a run in which drift of {found.confounded_with} does not look the same"
     return "a run that excites it"

@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.evidence import DETECTABLE
-from plant_emulator.diagnosis.fitting.joint_fit import fit, linearised
+from plant_emulator.diagnosis.fitting.evidence import DETECTABLE_NORM
+from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
 from plant_emulator.diagnosis.fitting.looks import FEW_WITH_STATES
-from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
+from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
 from plant_emulator.diagnosis.fitting.signature import bounded, signs
 
 if TYPE_CHECKING:
@@ -98,23 +98,25 @@ def apart(model: Model, asked: Asked) -> float:
     where = replace(asked.where, states=(*asked.where.states, own))
     ahead = model.residual(asked.planned, where.effects)({**where.values, **own})
     raw = float(np.linalg.norm(ahead))
-    if raw < DETECTABLE:
+    if raw < DETECTABLE_NORM:
         return raw
     runs = (*asked.runs, asked.planned)
     found = fit(model, where.effects, runs, where.values, where.states, FEW_WITH_STATES)
-    return min(raw, sqrt(max(0.0, found.cost - found.looks - where.cost + where.looks)))
+    return min(
+        raw, sqrt(max(0.0, found.cost - found.occam_penalty - where.cost + where.occam_penalty))
+    )
 
 
 def seen(model: Model, asked: Asked) -> dict[str, float]:
     """Step: norm of the drift-free signature of effects at their plausible size, by name."""
     where, runs = _as_foretold(asked)
-    tangents = Tangents(linearised(model, where, runs))
+    tangents = NuisanceSpace(linearise(model, where, runs))
     return {name: _signature_norm(model, name, where, runs, tangents) for name in asked.names}
 
 
 def informs(model: Model, asked: Asked) -> float:
     """Step: logarithm of how sharply a planned run determines, with these, all that drifts."""
-    found = linearised(model, *_as_foretold(asked))
+    found = linearise(model, *_as_foretold(asked))
     precision = np.diag([u.scaled_std**-2.0 for u in found.unknowns])
     return float(np.linalg.slogdet(found.information + precision).logabsdet)
 
@@ -126,7 +128,7 @@ def _as_foretold(asked: Asked) -> tuple[FitResult, tuple[int, ...]]:
 
 
 def _signature_norm(
-    model: Model, name: str, where: FitResult, runs: Sequence[int], tangents: Tangents
+    model: Model, name: str, where: FitResult, runs: Sequence[int], tangents: NuisanceSpace
 ) -> float:
     """Norm of the part of an effect's signature that drift cannot imitate, the larger sign."""
     candidate = model.candidates[name]
@@ -139,5 +141,5 @@ def _signature_norm(
             for k, state in zip(runs, where.states, strict=True)
         ]
         change = np.concatenate([row.ravel() for row in rows]) - tangents.residual
-        norms.append(float(np.linalg.norm(tangents.rest(change))))
+        norms.append(float(np.linalg.norm(tangents.orthogonal(change))))
     return max(norms)

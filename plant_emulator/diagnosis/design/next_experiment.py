@@ -20,7 +20,7 @@ from plant_emulator.diagnosis.design.experiment_value import (
     seen,
 )
 from plant_emulator.diagnosis.execution.pool import model_of
-from plant_emulator.diagnosis.fitting.evidence import DETECTABLE
+from plant_emulator.diagnosis.fitting.evidence import DETECTABLE_NORM
 from plant_emulator.diagnosis.wording import listed, spoken
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 # Rivals that are simulated, the nearest ones; each costs a fit a run.
 MOST_RIVALS = 2
 # A run that tells apart by so much leaves nothing to ask a dearer run for.
-CLEARLY = 2.0 * DETECTABLE
+CLEARLY = 2.0 * DETECTABLE_NORM
 # A run that shows a place less than so much better than the logs do is not worth driving for it.
 BETTER = 1.2
 # A run that shows this share of what the best one does, for less effort, is preferred to it.
@@ -85,7 +85,7 @@ class Advice:
         pairs = pairs[:MOST_RIVALS]
         if not pairs:
             return None
-        alone = {c.effect: c.point for c in explained.contenders}
+        alone = {c.effect: c.fit for c in explained.hypotheses}
         exchanges = [
             Exchange(final=explained.final, name=a, other=b, alone=alone.get(b), runs=self._runs)
             for a, b in pairs
@@ -98,7 +98,7 @@ class Advice:
             if min(tried[-1][1]) > CLEARLY:
                 break
         source, norms = max(tried, key=lambda one: told(one[1]), default=("", []))
-        if max(norms, default=0.0) < DETECTABLE:
+        if max(norms, default=0.0) < DETECTABLE_NORM:
             needs = self._needs(name for pair in pairs for name in pair)
             return undecided(pairs, needs, tried=bool(tried))
         return separated(source, pairs, norms)
@@ -108,7 +108,7 @@ class Advice:
         if not hidden:
             return None
         shown = {
-            source: [name for name, norm in found.items() if norm >= DETECTABLE]
+            source: [name for name, norm in found.items() if norm >= DETECTABLE_NORM]
             for source, found in self._seen(null, hidden)
         }
         source = max(shown, key=lambda source: len(shown[source]), default="")
@@ -123,11 +123,12 @@ class Advice:
         place, model = location.subsystem, self._model
         if place is None:
             return None
-        own = [c for c in explained.contenders if model.candidates[c.effect].subsystem == place]
+        own = [c for c in explained.hypotheses if model.candidates[c.effect].subsystem == place]
         shown = self._seen(explained.null, [c.effect for c in own])
         strength = {source: norm(found.values()) for source, found in shown}
         wanted = max(
-            NEARLY * max(strength.values(), default=0.0), BETTER * norm(c.norm for c in own)
+            NEARLY * max(strength.values(), default=0.0),
+            BETTER * norm(c.orthogonal_norm for c in own),
         )
         best = next((source for source, by in strength.items() if by > wanted), "")
         lacking = model.lacks(self._runs).get(place, ())
@@ -180,7 +181,7 @@ def norm(values: Iterable[float]) -> float:
 
 def told(norms: Sequence[float]) -> tuple[int, float]:
     """How well a run tells pairs apart: how many of them, and those by how much at least."""
-    apart_ = [value for value in norms if value >= DETECTABLE]
+    apart_ = [value for value in norms if value >= DETECTABLE_NORM]
     return len(apart_), min(apart_, default=max(norms, default=0.0))
 
 
@@ -196,7 +197,7 @@ def separated(source: str, pairs: Sequence[tuple[str, str]], norms: Sequence[flo
     clear: dict[str, list[str]] = {}
     rest = []
     for (name, other), by in zip(pairs, norms, strict=True):
-        if by < DETECTABLE:
+        if by < DETECTABLE_NORM:
             rest.append(f"{name} from {other}")
         else:
             clear.setdefault(name, []).append(f"from {other} by {by:.0f}")

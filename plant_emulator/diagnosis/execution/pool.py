@@ -53,7 +53,7 @@ class Pool(Protocol):
         """End what was started."""
 
 
-class Here:
+class InProcess:
     """One after the other in this process."""
 
     def map(

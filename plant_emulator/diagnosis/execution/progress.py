@@ -39,7 +39,7 @@ ELSEWHERE = "fits from elsewhere"
 
 
 @dataclass(frozen=True)
-class Told:
+class ReportingPool:
     """A pool; progress : told what is done and its done share, from 0 on."""
 
     pool: Pool

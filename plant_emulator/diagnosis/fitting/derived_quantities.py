@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from plant_emulator.diagnosis.answer import Quantity
-from plant_emulator.diagnosis.fitting.joint_fit import linearised
+from plant_emulator.diagnosis.fitting.joint_fit import linearise
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,7 +31,7 @@ def in_terms(
     named = {name: model.candidates[name].terms for name in found.effects}
     if not any(named.values()):
         return {}
-    where = linearised(model, found, runs)
+    where = linearise(model, found, runs)
     return {name: tuple(_quantity(term, where) for term in terms) for name, terms in named.items()}
 
 

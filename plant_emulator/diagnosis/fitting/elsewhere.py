@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.joint_fit import fit, linearised, template
-from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
+from plant_emulator.diagnosis.fitting.joint_fit import fit, joint_unknowns, linearise
+from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
 from plant_emulator.diagnosis.fitting.signature import signs, sized
 from plant_emulator.diagnosis.fitting.valleys import best_states, loss_of, whole
 from plant_emulator.estimation.robust_scan import cauchy_loss
@@ -47,7 +47,7 @@ def shaken(
     then; the others move each unknown by itself, which leads out of it. Within the bounds: with a
     friction below zero a bench shakes, in steps of microseconds.
     """
-    found = linearised(model, start, runs)
+    found = linearise(model, start, runs)
     reach = np.array([min(u.scaled_std, FARTHEST) for u in found.unknowns])
     draw = np.random.default_rng(number).standard_normal(len(reach))
     if number % 3 == 1:
@@ -56,7 +56,7 @@ def shaken(
     else:
         own = np.array([u.run is not None for u in found.unknowns])
         shift = np.where(own, 0.0, draw * np.minimum(SHAKE * found.standard_errors, reach))
-    moved, states = Tangents(found).moved(shift, len(runs))
+    moved, states = NuisanceSpace(found).shifted(shift, len(runs))
     if any(model.candidates[name].states for name in effects):
         states = [*best_states(model, effects, runs, moved, states, anew=effects)]
     return fit(model, effects, runs, moved, states, FEW_SHAKEN)
@@ -92,7 +92,7 @@ def sifted(
     values, states = dict(start.values), start.states
     for anew in (effects, ()):
         states = best_states(model, effects, runs, values, states, anew=anew)
-        for u in (u for u in template(model, effects, runs) if u.run is None):
+        for u in (u for u in joint_unknowns(model, effects, runs) if u.run is None):
             own = values[u.name]
             far = SIFT * u.std if u.std is not None else SIFT_SIZE * abs(own)
             around = np.clip(np.linspace(own - far, own + far, SIFTED), u.lower, u.upper)
@@ -102,7 +102,7 @@ def sifted(
 
 
 def in_place(
-    model: Model, effect: str, found: FitResult, runs: Sequence[int], tangents: Tangents
+    model: Model, effect: str, found: FitResult, runs: Sequence[int], tangents: NuisanceSpace
 ) -> tuple[float, FitResult]:
     """A start with an effect in the place of a fit's last, at the size that fits best there, the
     drift as it is or moved to make up for the difference; and the loss there.
@@ -119,7 +119,7 @@ def in_place(
         values = {**place.values, **sized(candidate, size)}
         there = whole(model, effects, runs, values, states)
         tries.append((cauchy_loss(there), values, states))
-        moved, after = tangents.moved(tangents.imitation(there - before), len(states))
+        moved, after = tangents.shifted(tangents.projection(there - before), len(states))
         far = {**values, **moved}, [{**s, **t} for s, t in zip(states, after, strict=True)]
         tries.append((loss_of(model, effects, runs, *far), *far))
     loss, values, states = min(tries, key=lambda one: one[0])

@@ -1,9 +1,11 @@
-"""How much a fall of the cost says: the evidence of an effect, and its thresholds.
+"""The evidence of an effect, and the thresholds that it is judged by.
 
-Evidence is the fall of the penalised sum of squares, over the mean square that the better model
-leaves (at least 1, the noise), times the share of its samples that are independent. A model that
-leaves much more than the noise leaves something correlated, which makes wrong effects count; its
-share is then taken no larger than that of the fit without effects.
+The evidence of a fall of the cost from one fit to a better one is
+
+    evidence = fall / max(1, mean square of the better fit) * effective sample fraction
+
+A fit that leaves much more than the noise leaves something correlated, which makes wrong effects
+count. Its sample fraction is then no larger than that of the fit without effects.
 """
 
 from __future__ import annotations
@@ -14,42 +16,46 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
 
 # Evidence from which on an effect counts.
-THRESHOLD = 25.0
-# Effects whose evidence differs by less cannot be told apart: odds of 150 to 1.
-MARGIN = 10.0
-# Drift-free signature at its plausible size from which on an effect is detectable, in the noise.
-DETECTABLE = 7.0
-# What the noise of a log is known to, as a part of its square.
-NOISE_KNOWN = 0.02
-# Share of the gap that may be left for the cause to be known. What a law slightly other than the
-# library's left was up to 0.17; effects that are not in it left 0.4 and more with the best that is.
-LEFT = 0.2
-# Mean square up to which a model leaves nothing but noise.
-NOISE_LEFT = 1.05
-# Structure of a residual from which on it is no noise [chi squared].
-STRUCTURED = 200.0
-# Mean square from which on a model leaves more than what the noise explains.
-MISFIT = 1.5
+EVIDENCE_THRESHOLD = 25.0
+# Two effects whose evidence differs by less cannot be told apart: odds of 150 to 1.
+CLASS_MARGIN = 10.0
+# An effect is detectable from this norm of its orthogonal signature on, at its plausible size [1].
+DETECTABLE_NORM = 7.0
+# Relative uncertainty of the noise's variance.
+NOISE_UNCERTAINTY = 0.02
+# Share of the gap that an adequate model may leave. Laws slightly other than the library's left up
+# to 0.17. Where the true effect was not in the library, the best one left 0.4 and more.
+UNEXPLAINED_SHARE = 0.2
+# Mean square up to which a fit leaves nothing but noise.
+NOISE_MEAN_SQUARE = 1.05
+# Ljung-Box excess from which on a residual is not white noise [chi squared].
+LJUNG_BOX_LIMIT = 200.0
+# Mean square from which on a fit leaves more than what the noise explains.
+MISFIT_MEAN_SQUARE = 1.5
 
 
-def weighed(fall: float, better: FitResult, null: FitResult) -> float:
-    """Evidence of a fall of the cost, see the module's text."""
-    share = better.share
-    if better.chi_squared > MISFIT:
-        share = min(share, null.share)
-    return max(0.0, fall) / max(1.0, better.chi_squared) * share
+def evidence_of(fall: float, better: FitResult, null: FitResult) -> float:
+    """Evidence of a fall of the cost [1].
+
+    fall : of the cost, down to that of the better fit
+    null : fit without effects
+    """
+    fraction = better.effective_fraction
+    if better.mean_square > MISFIT_MEAN_SQUARE:
+        fraction = min(fraction, null.effective_fraction)
+    return max(0.0, fall) / max(1.0, better.mean_square) * fraction
 
 
-def excess(point: FitResult) -> float:
-    """Sum of squares beyond what the noise explains."""
-    return max(0.0, point.squares - (1.0 + NOISE_KNOWN) * point.samples)
+def excess(found: FitResult) -> float:
+    """Sum of squares beyond what the noise explains [chi squared]."""
+    return max(0.0, found.sum_of_squares - (1.0 + NOISE_UNCERTAINTY) * found.samples)
 
 
-def evident(point: FitResult, null: FitResult) -> bool:
+def significant(found: FitResult, null: FitResult) -> bool:
     """Whether a fit with effects explains more than chance does."""
-    return weighed(null.cost - point.cost, point, null) >= THRESHOLD
+    return evidence_of(null.cost - found.cost, found, null) >= EVIDENCE_THRESHOLD
 
 
-def adequate(point: FitResult, null: FitResult) -> bool:
-    """Whether a model leaves so little of the gap that its cause is known."""
-    return excess(point) <= max(LEFT * excess(null), THRESHOLD)
+def adequate(found: FitResult, null: FitResult) -> bool:
+    """Whether a fit leaves so little of the gap that its cause is known."""
+    return excess(found) <= max(UNEXPLAINED_SHARE * excess(null), EVIDENCE_THRESHOLD)

@@ -1,84 +1,83 @@
-"""What a contest between effects came to, and how much its fits are worth.
-
-Evidence is the fall of the penalised sum of squares, over the mean square that the better model
-leaves (at least 1, the noise), times the share of its samples that are independent. A model that
-leaves much more than the noise leaves something correlated, which makes wrong effects count; its
-share is then taken no larger than that of the fit without effects.
-"""
+"""Hypotheses about the machine, and what the tests of all hypotheses found."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.evidence import MARGIN, weighed
+from plant_emulator.diagnosis.fitting.evidence import CLASS_MARGIN, evidence_of
 
 if TYPE_CHECKING:
-    from plant_emulator.diagnosis.fit_result import FitResult, Unrest
+    from plant_emulator.diagnosis.fit_result import FitResult, VarianceComponent
 
 
 @dataclass(frozen=True, kw_only=True)
-class Contender:
-    """An effect in the contest.
+class Hypothesis:
+    """The hypothesis that the machine has one effect of the library.
 
-    norm : of its drift-free signature at the plausible size; raw : without removing drift
-    point : its joint fit; None where its signature vanishes, or promises nothing beyond noise
+    total_norm : norm of the effect's signature at its plausible size
+    orthogonal_norm : norm of the part of the signature that no nuisance parameter can follow
+    confounded_with : nuisance parameter that follows the signature most
+    fit : joint fit with the effect; None where the signature vanishes, or promises nothing beyond
+        the noise
     """
 
     effect: str
-    norm: float
-    raw: float
-    imitated_by: str
-    point: FitResult | None
+    orthogonal_norm: float
+    total_norm: float
+    confounded_with: str
+    fit: FitResult | None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Explanation:
-    """What the contest came to.
+    """What the hypothesis tests found.
 
-    null : the fit without effects; final : with those accepted
-    contenders : of the first round, all effects of the library
-    rivals : for every accepted effect the costs of all that took its place
-    unconverged : why the answer cannot be trusted; empty where it can
-    chance : effects whose course is chance, beside those of `final`
-    without : of several accepted effects the least cost that a fit without it came to, by name
+    null : fit without effects
+    final : fit with the accepted effects
+    hypotheses : of the first round, one for each effect of the library
+    alternatives : for each accepted effect, the costs of the fits with another effect in its place
+    unconverged : reason why the result cannot be trusted; empty where it can
+    random_effects : accepted random effects, beside the effects of `final`
+    reduced_costs : for each of several accepted effects, the least cost of a fit without it
     """
 
     null: FitResult
     final: FitResult
-    contenders: tuple[Contender, ...]
-    rivals: dict[str, dict[str, float]]
+    hypotheses: tuple[Hypothesis, ...]
+    alternatives: dict[str, dict[str, float]]
     unconverged: str
-    chance: tuple[Unrest, ...] = ()
-    without: dict[str, float] = field(default_factory=dict)
+    random_effects: tuple[VarianceComponent, ...] = ()
+    reduced_costs: dict[str, float] = field(default_factory=dict)
 
     @property
     def named(self) -> tuple[str, ...]:
-        """All effects accepted."""
-        return (*(one.effect for one in self.chance), *self.final.effects)
+        """Names of all accepted effects, the random ones first."""
+        return (*(one.effect for one in self.random_effects), *self.final.effects)
 
-    def evidence(self, contender: Contender) -> float:
-        """Evidence of an effect alone; of one of several accepted, of it beside the others."""
-        for one in self.chance:
+    def evidence(self, contender: Hypothesis) -> float:
+        """Evidence of an effect [1]: beside the other accepted effects, or alone."""
+        for one in self.random_effects:
             if one.effect == contender.effect:
                 return one.evidence
-        if contender.effect in self.without:
-            fall = self.without[contender.effect] - self.final.cost
-            return weighed(fall, self.final, self.null)
-        if contender.point is None:
+        if contender.effect in self.reduced_costs:
+            fall = self.reduced_costs[contender.effect] - self.final.cost
+            return evidence_of(fall, self.final, self.null)
+        if contender.fit is None:
             return 0.0
-        best = min(self.final, contender.point, key=lambda p: p.chi_squared)
-        return weighed(self.null.cost - contender.point.cost, best, self.null)
+        best = min(self.final, contender.fit, key=lambda p: p.mean_square)
+        return evidence_of(self.null.cost - contender.fit.cost, best, self.null)
 
     def classes(self) -> list[list[str]]:
-        """For every accepted effect those that these logs cannot tell from it, itself first."""
-        found = [[one.effect] for one in self.chance]
+        """Classes of effects that these logs cannot tell apart, each led by an accepted effect."""
+        found = [[one.effect] for one in self.random_effects]
         for name in self.final.effects:
-            costs = sorted(self.rivals.get(name, {}).items(), key=lambda pair: pair[1])
+            costs = sorted(self.alternatives.get(name, {}).items(), key=lambda pair: pair[1])
             near = [
                 other
                 for other, cost in costs
-                if other != name and weighed(cost - self.final.cost, self.final, self.null) < MARGIN
+                if other != name
+                and evidence_of(cost - self.final.cost, self.final, self.null) < CLASS_MARGIN
             ]
             found.append([name, *near])
         return found

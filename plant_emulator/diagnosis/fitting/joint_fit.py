@@ -1,27 +1,15 @@
-"""The contest between effects: which one, fitted with everything that may drift, is needed.
+"""The joint fit of one hypothesis: nuisance parameters, effects and initial states together.
 
- 1. One converged fit without effects. Where it leaves much and some of the runs need no effect,
-    steps 2 and 3 first from the drift of those alone, which no effect has led astray; the same from
-    the fit to all only where none explains half of what the others show there.
- 2. For each effect its signature: the residual's change when the effect comes in at some size, all
-    else as fitted; and what of that the drifting parameters cannot imitate (the part orthogonal to
-    their tangents: Basseville and Nikiforov, INRIA RR-4438, 2002).
- 3. A joint fit of drift and effect, started from the size whose signature explains most, the drift
-    moved by what the linear picture says: of every effect a cheap first look, whose drift follows
-    by secants; of the best a few full steps; of the best of these to convergence.
- 4. Where none closes much, the signature and the start mislead: drift has gone far to imitate the
-    effect, and the way back is rough, since contact comes and goes. All that could close the gap
-    then start from a larger size, with slopes over wide differences first; or, where so much is
-    left that the drift says nothing, from the nominal parameters.
- 5. The best starts again from the nominal parameters and the size that fits these best, the runs
-    taken in one by one, then from the best values of each of its unknowns by a loss that forgives,
-    and from some way off, along the floor of its valley and out of it, as long as that leads down;
-    at once where none closes much, and else where a second effect beside it leaves more than noise.
- 6. The fit without effects starts again from the drift of the best joint fits: should it get as
-    low, there was no effect, only a better valley. One that has come to such is followed down it.
+The fit minimises the penalised sum of squares of the whitened residuals r of all runs,
 
-Every step is a function of a model and plain data, so that steps run side by side on other
-processes.
+    cost = sum r^2 + sum ((z - z_prior) / std)^2 + Occam penalty
+
+z are the unknowns on the scale of the estimation. The nuisance parameters are the parameters of
+the machine that may differ from their nominal values. Every effect adds its sizes and its shapes;
+every run adds its initial states. The Occam penalty charges the choice of the states
+(D. MacKay, Neural Computation 4 (1992) 415); see `occam_penalty`.
+
+The functions take a model and plain data, so that other processes can run them.
 """
 
 from __future__ import annotations
@@ -41,48 +29,50 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.machine import Candidate, Model
     from plant_emulator.estimation.unknowns import Estimate, Unknown
 
-# Relative fall of the cost that ends a fit here: a few hundredths in units of chi squared.
-SETTLED = 1e-6
-# The same of a fit whose slopes are not exact.
-GLANCE_SETTLED = 1e-4
-# Steps after which a fit shows whether it leads lower.
-ADVANCED = 10
-# A size is certain from so many of its standard errors on.
-CERTAIN = 3.0
-# Share of the largest size allowed from which on an effect does what it can for something else:
-# what imitated another law of a first effect had come to 0.99 and more.
+# Relative fall of the cost that ends a fit: a few hundredths in units of chi squared.
+COST_TOLERANCE = 1e-6
+# Relative fall of the cost that ends a fit whose slopes follow by secants.
+SECANT_COST_TOLERANCE = 1e-4
+# Iterations after which a fit shows whether it leads to a lower cost.
+TRIAL_ITERATIONS = 10
+# A size differs from neutral for certain from so many of its standard errors on.
+SIGNIFICANT_ERRORS = 3.0
+# Share of the largest size allowed from which on an effect stands for something else. An effect
+# that imitated another law of a first effect had come to 0.99 and more.
 AT_BOUND = 0.95
-# Mean square from which on a fit may lie in a wrong valley.
-ASTRAY = 1.5
-# What is known beforehand of a size that a prediction needs [plausible sizes].
-SHY = 2.0
-# A fit that is to be improved by starting again has to fall by more than this [chi squared].
-WORTH = 1.0
+# Mean square from which on a fit may lie in a local minimum.
+SUSPECT_MEAN_SQUARE = 1.5
+# Standard deviation of the shrinkage prior of a size [plausible sizes].
+SHRINKAGE = 2.0
+# A fit from another start replaces a fit where its cost is lower by more than this [chi squared].
+WORTHWHILE_FALL = 1.0
 
 
-def template(
-    model: Model, effects: Sequence[str], runs: Sequence[int], *, shy: bool = False
+def joint_unknowns(
+    model: Model, effects: Sequence[str], runs: Sequence[int], *, shrinkage: bool = False
 ) -> list[Unknown]:
-    """All unknowns of a joint fit: drift, effects, states of every run (numbered from 0).
+    """List all unknowns of a joint fit: parameters, sizes, shapes, and the states of every run.
 
-    shy : sizes are absent where these runs do not show them, not anywhere
+    runs : of the model; their states are numbered from 0
+    shrinkage : whether the sizes have a prior at neutral, so that a size that these runs do not
+        show stays near neutral
     """
     own = [model.candidates[name] for name in effects]
     states = (*model.states, *(u for c in own for u in c.states))
-    sizes = [_shy(u, c.neutral[u.name]) if shy else u for c in own for u in c.sizes]
+    sizes = [_shrunk(u, c.neutral[u.name]) if shrinkage else u for c in own for u in c.sizes]
     shared = (*model.parameters, *sizes, *(u for c in own for u in c.shapes))
     return [*shared, *(replace(u, run=k) for k in range(len(runs)) for u in states)]
 
 
-def _shy(size: Unknown, neutral: float) -> Unknown:
-    """A size near its neutral value beforehand, as far as it usually leaves it."""
-    return replace(size, prior=neutral, std=SHY * abs(size.start - neutral))
+def _shrunk(size: Unknown, neutral: float) -> Unknown:
+    """A size with a shrinkage prior around its neutral value."""
+    return replace(size, prior=neutral, std=SHRINKAGE * abs(size.start - neutral))
 
 
-def started(
+def with_starts(
     unknowns: Sequence[Unknown], values: Mapping[str, float], states: Sequence[Mapping[str, float]]
 ) -> list[Unknown]:
-    """The unknowns, starting at these values where there are such, within their bounds."""
+    """The unknowns, each starting at its value among these, within its bounds."""
     wanted = [(values if u.run is None else states[u.run]).get(u.name, u.start) for u in unknowns]
     return [
         replace(u, start=float(np.clip(value, u.lower, u.upper)))
@@ -99,34 +89,38 @@ def fit(
     iterations: int | None = None,
     near: Estimate | None = None,
     *,
-    shy: bool = False,
+    shrinkage: bool = False,
     difference: float = DIFFERENCE_NORM,
 ) -> FitResult:
-    """Joint fit of drift, states and these effects, from these values.
+    """Fit parameters, states and these effects to these runs, from these start values.
 
-    near : see `estimate`'s `follow`; a first look only
-    shy : see `template`
+    iterations : at most so many; None: as many as `estimate` allows
+    near : an estimate of the same runs; slopes of its unknowns follow by secants, see `estimate`
+    shrinkage : see `joint_unknowns`
     difference : see `estimate`
     """
-    unknowns = started(template(model, effects, runs, shy=shy), values, states)
-    residuals = [model.residual(k, effects) for k in runs]
-    settled = SETTLED if near is None else GLANCE_SETTLED
+    unknowns = with_starts(
+        joint_unknowns(model, effects, runs, shrinkage=shrinkage), values, states
+    )
     found = estimate(
         unknowns,
-        residuals,
-        settled=settled,
+        [model.residual(k, effects) for k in runs],
+        settled=COST_TOLERANCE if near is None else SECANT_COST_TOLERANCE,
         iterations=iterations,
         follow=near,
         difference=difference,
     )
-    reached = point(effects, found, len(runs))
-    sizes = {name: _largest(model.candidates[name], reached.values) for name in effects}
-    unsure = tuple(name for name in effects if not _sure(model.candidates[name], reached))
-    return replace(reached, sizes=sizes, unsure=unsure)
+    reached = to_result(effects, found, len(runs))
+    candidates = {name: model.candidates[name] for name in effects}
+    return replace(
+        reached,
+        relative_sizes={n: _relative_size(c, reached.values) for n, c in candidates.items()},
+        insignificant=tuple(n for n, c in candidates.items() if not _significant(c, reached)),
+    )
 
 
-def _largest(candidate: Candidate, values: Mapping[str, float]) -> float:
-    """The largest of an effect's sizes in plausible sizes; 0 of one that has none."""
+def _relative_size(candidate: Candidate, values: Mapping[str, float]) -> float:
+    """The largest of an effect's sizes [plausible sizes]; 0 for an effect without sizes."""
     neutral = candidate.neutral
     sizes = (
         (values[u.name] - neutral[u.name]) / (u.start - neutral[u.name]) for u in candidate.sizes
@@ -134,12 +128,13 @@ def _largest(candidate: Candidate, values: Mapping[str, float]) -> float:
     return max(map(abs, sizes), default=0.0)
 
 
-def _sure(candidate: Candidate, found: FitResult) -> bool:
-    """Whether a size of an effect is not neutral by chance, and not as large as it may be; without
-    values of each run none has to be told.
+def _significant(candidate: Candidate, found: FitResult) -> bool:
+    """Whether a size of an effect differs from neutral for certain, and is not at its bound.
+
+    An effect without states of its own needs no certain size.
     """
     return not candidate.states or any(
-        abs(size) > CERTAIN * found.errors[u.name]
+        abs(size) > SIGNIFICANT_ERRORS * found.standard_errors[u.name]
         and abs(size) < AT_BOUND * abs((u.upper if size > 0.0 else u.lower) - neutral)
         for u in candidate.sizes
         for neutral in (candidate.neutral[u.name],)
@@ -147,51 +142,55 @@ def _sure(candidate: Candidate, found: FitResult) -> bool:
     )
 
 
-def again(
+def fit_from(
     model: Model,
     effects: Sequence[str],
     runs: Sequence[int],
     start: FitResult,
     iterations: int | None = None,
 ) -> FitResult:
-    """Joint fit with these effects from where another fit has come to."""
+    """Fit these effects from the values and states of another fit."""
     return fit(model, effects, runs, start.values, start.states, iterations)
 
 
-def linearised(model: Model, where: FitResult, runs: Sequence[int]) -> Estimate:
-    """Residuals and Jacobians of a fit that has ended."""
-    unknowns = started(template(model, where.effects, runs), where.values, where.states)
-    return linearise_at(unknowns, [model.residual(k, where.effects) for k in runs])
+def linearise(model: Model, found: FitResult, runs: Sequence[int]) -> Estimate:
+    """Compute residuals, Jacobians and covariance at a fit, without fitting."""
+    unknowns = with_starts(joint_unknowns(model, found.effects, runs), found.values, found.states)
+    return linearise_at(unknowns, [model.residual(k, found.effects) for k in runs])
 
 
-def point(effects: Sequence[str], found: Estimate, runs: int) -> FitResult:
-    """An estimate as plain data."""
+def to_result(effects: Sequence[str], found: Estimate, runs: int) -> FitResult:
+    """Turn an estimate with these effects into plain data; runs : number of fitted runs."""
     errors = zip(found.unknowns, found.z, found.standard_errors, strict=True)
-    looks = sum(looks_of(found, k) for k in range(runs))
+    penalty = sum(occam_penalty(found, k) for k in range(runs))
     return FitResult(
         effects=tuple(effects),
         values=found.parameters(),
         states=tuple(found.states(k) for k in range(runs)),
-        cost=found.cost + found.penalty + looks,
-        squares=found.cost,
+        cost=found.cost + found.penalty + penalty,
+        sum_of_squares=found.cost,
         samples=found.samples,
-        share=independent_share(found),
-        errors={
+        effective_fraction=effective_fraction(found),
+        standard_errors={
             u.name: u.error(u.value(float(z)), float(e)) for u, z, e in errors if u.run is None
         },
         converged=found.converged,
-        structure=sum(structure(channel) for run in found.residuals for channel in run),
-        looks=looks,
+        ljung_box_excess=sum(structure(channel) for run in found.residuals for channel in run),
+        occam_penalty=penalty,
     )
 
 
-def looks_of(found: Estimate, run: int) -> float:
-    """What the states of a run gain by being chosen among all that could be.
+def occam_penalty(found: Estimate, run: int) -> float:
+    """Cost of the freedom to choose the states of a run [chi squared].
 
-    - log det (P C), of those with a prior: P its precision, C the covariance after the fit, so that
-    the cost falls as twice the logarithm of the probability with the states integrated out
-    (Laplace's approximation: D. MacKay, Neural Computation 4 (1992) 415, his Occam factor). A phase
-    and a frequency fit any noise a little; what they explain has to be more than that.
+    A phase and a frequency fit any noise a little. The penalty of the states with a prior is
+
+        -log det(P C)
+
+    P : precision of the prior; C : covariance after the fit
+    With the penalty the cost falls as twice the logarithm of the probability with the states
+    integrated out (Laplace's approximation; Occam factor of D. MacKay, Neural Computation 4
+    (1992) 415).
     """
     own = [j for j, u in enumerate(found.unknowns) if u.run == run and u.std is not None]
     if not own:
@@ -201,22 +200,23 @@ def looks_of(found: Estimate, run: int) -> float:
     return max(0.0, -float(np.linalg.slogdet(narrowed).logabsdet))
 
 
-def independent_share(found: Estimate) -> float:
-    """Share of the samples that are independent: the inverse of the mean autocorrelation time."""
+def effective_fraction(found: Estimate) -> float:
+    """Share of the samples that are independent [1]: one over the mean autocorrelation time."""
     channels = [channel for residual in found.residuals for channel in residual]
     weight = np.array([np.count_nonzero(channel) for channel in channels], float)
     times = np.array([correlation_time(channel) for channel in channels])
     return float(weight.sum() / (weight * times).sum())
 
 
-def null_fit(model: Model, runs: Sequence[int]) -> FitResult:
-    """The fit without effects, from the model's own search; where that leaves much, from the
-    nominal parameters as well.
+def fit_null(model: Model, runs: Sequence[int]) -> FitResult:
+    """Fit without effects from the model's own start values.
+
+    A fit that leaves much starts again from the nominal parameters; the better fit counts.
     """
     found = fit(model, (), runs, *model.search(runs))
-    if found.chi_squared <= ASTRAY:
+    if found.mean_square <= SUSPECT_MEAN_SQUARE:
         return found
     nominal = {u.name: u.prior for u in model.parameters}
     states = [model.start_states(k, (), nominal) for k in runs]
-    other = fit(model, (), runs, nominal, states, ADVANCED)
-    return found if found.cost <= other.cost else again(model, (), runs, other)
+    other = fit(model, (), runs, nominal, states, TRIAL_ITERATIONS)
+    return found if found.cost <= other.cost else fit_from(model, (), runs, other)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fitting.elsewhere import smoothed
 from plant_emulator.diagnosis.fitting.evidence import excess
-from plant_emulator.diagnosis.fitting.joint_fit import WORTH, fit
+from plant_emulator.diagnosis.fitting.joint_fit import WORTHWHILE_FALL, fit
 from plant_emulator.diagnosis.fitting.signature import FAR, signs, sized
 from plant_emulator.diagnosis.fitting.valleys import best_sizes, best_states
 
@@ -71,7 +71,7 @@ def glance_far(
 
 def _on_the_way(base: FitResult) -> float:
     """Cost from which on a fit with one more effect has stopped on its way to where it is none."""
-    return base.cost + WORTH + ON_THE_WAY * excess(base)
+    return base.cost + WORTHWHILE_FALL + ON_THE_WAY * excess(base)
 
 
 def patient(model: Model, found: Signature, base: FitResult, runs: Sequence[int]) -> FitResult:

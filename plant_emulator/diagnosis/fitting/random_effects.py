@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from plant_emulator.diagnosis.fit_result import Unrest
-from plant_emulator.diagnosis.fitting.evidence import THRESHOLD
-from plant_emulator.diagnosis.fitting.joint_fit import again
+from plant_emulator.diagnosis.fit_result import VarianceComponent
+from plant_emulator.diagnosis.fitting.evidence import EVIDENCE_THRESHOLD
+from plant_emulator.diagnosis.fitting.joint_fit import fit_from
 from plant_emulator.estimation.covariance import structure
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ LEFT_STRUCTURED = 0.01
 LITTLE_STRUCTURED, BEAT = 0.04, 350.0
 
 
-def unrest(model: Model, task: Task) -> Unrest:
+def unrest(model: Model, task: Task) -> VarianceComponent:
     """Step of a diagnosis: the unrest that `task.effect` explains of a fit's residual.
 
     Where it does not hold, once more on the fit with its weights: restless samples, taken at the
@@ -62,13 +62,13 @@ def unrest(model: Model, task: Task) -> Unrest:
     candidate = model.candidates[task.effect]
     usual = {u.name: u.start for u in candidate.shapes}
     found = _unrest(model, task, usual)
-    if found.evidence <= THRESHOLD:
+    if found.evidence <= EVIDENCE_THRESHOLD:
         return found
-    if not found.holds:
+    if not found.consistent:
         weighted = cast("Model", _Weighted(model, dict(zip(task.runs, found.weights, strict=True))))
-        task = replace(task, base=again(weighted, task.base.effects, task.runs, task.base))
+        task = replace(task, base=fit_from(weighted, task.base.effects, task.runs, task.base))
         found = _unrest(model, task, usual)
-    if not found.random:
+    if not found.white:
         return found
     others = [_unrest(model, task, usual | shape) for shape in _shapes(candidate)]
     return max([found, *others], key=lambda one: one.evidence)
@@ -84,7 +84,7 @@ def _shapes(candidate: Candidate) -> list[dict[str, float]]:
     ]
 
 
-def _unrest(model: Model, task: Task, shape: Mapping[str, float]) -> Unrest:
+def _unrest(model: Model, task: Task, shape: Mapping[str, float]) -> VarianceComponent:
     where, (size,) = task.base, model.candidates[task.effect].sizes
     residuals = [
         model.residual(run, where.effects)({**where.values, **states})
@@ -101,16 +101,16 @@ def _unrest(model: Model, task: Task, shape: Mapping[str, float]) -> Unrest:
         for residual, weight in zip(residuals, weights, strict=True)
         for channel in residual * weight
     )
-    return Unrest(
+    return VarianceComponent(
         effect=task.effect,
-        name=size.name,
+        parameter=size.name,
         size=found,
-        error=error,
+        standard_error=error,
         shape=shape,
         evidence=evidence,
         weights=weights,
-        even=_even(squares, found**2 * added),
-        random=left
+        homoscedastic=_even(squares, found**2 * added),
+        white=left
         < max(
             LEFT_STRUCTURED * evidence,
             min(LITTLE_STRUCTURED * evidence, BEAT * len(residuals)),

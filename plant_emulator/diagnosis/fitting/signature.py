@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.nuisance_space import gain_along, gain_turned
+from plant_emulator.diagnosis.fitting.nuisance_space import gain_along, gain_at_best_angle
 from plant_emulator.estimation.robust_scan import combinations
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
+    from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
     from plant_emulator.diagnosis.machine import Candidate, Model
     from plant_emulator.estimation.unknowns import Estimate, Unknown
     from plant_emulator.signals.log import Array
@@ -59,17 +59,17 @@ class Signature:
     start: Mapping[str, float]
     states: tuple[Mapping[str, float], ...]
     far: tuple[Mapping[str, float], tuple[Mapping[str, float], ...]] | None
-    norm: float
-    raw: float
+    orthogonal_norm: float
+    total_norm: float
     gain: float
     concentrated: bool
-    norms: tuple[tuple[float, float], ...]
-    imitated_by: str
+    orthogonal_norms: tuple[tuple[float, float], ...]
+    confounded_with: str
     direction: Array
 
 
 def signature(
-    model: Model, name: str, where: FitResult, runs: Sequence[int], tangents: Tangents
+    model: Model, name: str, where: FitResult, runs: Sequence[int], tangents: NuisanceSpace
 ) -> Signature | None:
     """The signature of an effect at a fit that lacks it; None: it changes nothing there."""
     own = _own_states(model, name, where, runs, tangents)
@@ -86,19 +86,21 @@ def signature(
     best = max([best, *_alone(tried, model.candidates[name])], key=lambda trial: trial.gain)
     plausible = next(t for t in trials if abs(t.size) == 1.0)
     values, states = _start(best, tangents, own)
-    names = [u.name for u in tangents.found.unknowns]
-    follows = np.abs(tangents.imitation(plausible.change)) * _lengths(tangents.found)
+    names = [u.name for u in tangents.estimate.unknowns]
+    follows = np.abs(tangents.projection(plausible.change)) * _lengths(tangents.estimate)
     return Signature(
         effect=name,
         start=values,
         states=states,
         far=None if larger is None else _start(larger, tangents, own),
-        norm=plausible.norm,
-        raw=float(np.linalg.norm(plausible.change)),
+        orthogonal_norm=plausible.norm,
+        total_norm=float(np.linalg.norm(plausible.change)),
         gain=best.gain,
         concentrated=any(_concentrated(t.rest) for t in trials if abs(t.size) == SIZES[0]),
-        norms=tuple((abs(t.size), t.norm) for t in trials if t.size * plausible.size > 0.0),
-        imitated_by=names[int(np.argmax(follows))],
+        orthogonal_norms=tuple(
+            (abs(t.size), t.norm) for t in trials if t.size * plausible.size > 0.0
+        ),
+        confounded_with=names[int(np.argmax(follows))],
         direction=plausible.rest / max(plausible.norm, 1e-12),
     )
 
@@ -115,7 +117,7 @@ def _concentrated(rest: Array) -> bool:
 
 
 def _own_states(
-    model: Model, name: str, where: FitResult, runs: Sequence[int], tangents: Tangents
+    model: Model, name: str, where: FitResult, runs: Sequence[int], tangents: NuisanceSpace
 ) -> list[dict[str, float]]:
     """An effect's states of every run: those whose small signature explains most of that run.
 
@@ -130,7 +132,7 @@ def _own_states(
     def parts(state: Mapping[str, float]) -> list[Array]:
         """What each run's small signature with this state leaves that drift cannot imitate."""
         residual = _residual(model, candidate, where, runs, [state] * len(runs), sizes)
-        return tangents.parts(residual - tangents.residual)
+        return tangents.orthogonal_by_run(residual - tangents.residual)
 
     found: list[list[tuple[float, dict[str, float]]]] = [[] for _ in runs]
     for state, angle in combinations(candidate.states):
@@ -140,7 +142,7 @@ def _own_states(
             continue
         turned = [parts({**state, angle: value}) for value in (0.0, pi / 2, pi)]
         for k, (ahead, aside, behind) in enumerate(zip(*turned, strict=True)):
-            gain, best = gain_turned(ahead, aside, behind, tangents.residual)
+            gain, best = gain_at_best_angle(ahead, aside, behind, tangents.residual)
             found[k].append((gain, {**state, angle: best}))
     return [max(trials, key=lambda one: one[0])[1] for trials in found]
 
@@ -167,10 +169,10 @@ def _size_to_find_states(
 
 
 def _start(
-    trial: _Trial, tangents: Tangents, own: Sequence[Mapping[str, float]]
+    trial: _Trial, tangents: NuisanceSpace, own: Sequence[Mapping[str, float]]
 ) -> tuple[dict[str, float], tuple[dict[str, float], ...]]:
     """Values and states with the effect at a size, and the drift moved as it would imitate it."""
-    values, states = tangents.moved(tangents.imitation(trial.change), len(own))
+    values, states = tangents.shifted(tangents.projection(trial.change), len(own))
     return {**values, **trial.sizes}, tuple(
         {**state, **more} for state, more in zip(states, own, strict=True)
     )
@@ -219,7 +221,7 @@ def _trial(
     name: str,
     where: FitResult,
     runs: Sequence[int],
-    tangents: Tangents,
+    tangents: NuisanceSpace,
     own: Sequence[Mapping[str, float]],
     size: float,
     only: str | None = None,
@@ -230,7 +232,7 @@ def _trial(
     candidate = model.candidates[name]
     sizes = sized(candidate, size, only)
     change = _residual(model, candidate, where, runs, own, sizes) - tangents.residual
-    rest = tangents.rest(change)
+    rest = tangents.orthogonal(change)
     after = tangents.residual + rest
     return _Trial(
         size=size,

@@ -13,9 +13,15 @@ from plant_emulator.diagnosis.fitting.elsewhere import (
     smoothed,
     vacated,
 )
-from plant_emulator.diagnosis.fitting.joint_fit import ADVANCED, again, linearised, null_fit, point
+from plant_emulator.diagnosis.fitting.joint_fit import (
+    TRIAL_ITERATIONS,
+    fit_from,
+    fit_null,
+    linearise,
+    to_result,
+)
 from plant_emulator.diagnosis.fitting.looks import glance, glance_far, look, patient
-from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
+from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace, nuisance_space
 from plant_emulator.diagnosis.fitting.signature import signature
 from plant_emulator.diagnosis.fitting.task import Task
 
@@ -27,7 +33,7 @@ if TYPE_CHECKING:
 
 def start(model: Model, runs: tuple[int, ...]) -> FitResult:
     """The fit without effects."""
-    return null_fit(model, runs)
+    return fit_null(model, runs)
 
 
 def spread(model: Model, task: Task) -> FitResult:
@@ -37,8 +43,8 @@ def spread(model: Model, task: Task) -> FitResult:
         known[k] if k in known else model.start_states(k, base.effects, base.values)
         for k in task.runs
     )
-    found = linearised(model, replace(base, states=states), task.runs)
-    return point(base.effects, found, len(task.runs))
+    found = linearise(model, replace(base, states=states), task.runs)
+    return to_result(base.effects, found, len(task.runs))
 
 
 def show(model: Model, task: Task) -> Signature | None:
@@ -51,14 +57,14 @@ def show(model: Model, task: Task) -> Signature | None:
 def contend(model: Model, task: Task) -> FitResult:
     """A first look at the joint fit of an effect from its signature."""
     assert task.signature is not None
-    near = _tangents(model, task).found
+    near = _tangents(model, task).estimate
     return glance(model, task.signature, task.base, task.runs, near)
 
 
 def contend_far(model: Model, task: Task) -> FitResult | None:
     """The same from a larger size."""
     assert task.signature is not None
-    near = _tangents(model, task).found
+    near = _tangents(model, task).estimate
     return glance_far(model, task.signature, task.base, task.runs, near)
 
 
@@ -98,23 +104,13 @@ def once_more(model: Model, task: Task) -> FitResult:
 
 def advance(model: Model, task: Task) -> FitResult:
     """Some steps of the fit of `task.base` from its values."""
-    return again(model, task.base.effects, task.runs, task.base, ADVANCED)
+    return fit_from(model, task.base.effects, task.runs, task.base, TRIAL_ITERATIONS)
 
 
 def refit(model: Model, task: Task) -> FitResult:
     """The fit of `task.base` with the effects named there, from its values."""
-    return again(model, task.base.effects, task.runs, task.base)
+    return fit_from(model, task.base.effects, task.runs, task.base)
 
 
-# The tangents of the fit that this process was last asked about: every effect asks for the same.
-_last: dict[tuple[int, tuple[object, ...]], Tangents] = {}
-
-
-def _tangents(model: Model, task: Task) -> Tangents:
-    key = (id(model), task.base.key)
-    tangents = _last.get(key)
-    if tangents is None:
-        tangents = Tangents(linearised(model, task.base, task.runs))
-        _last.clear()
-        _last[key] = tangents
-    return tangents  # not what stands there by now: a worker may have several threads
+def _tangents(model: Model, task: Task) -> NuisanceSpace:
+    return nuisance_space(model, task.base, task.runs)

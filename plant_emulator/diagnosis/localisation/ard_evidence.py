@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 SIZES = np.geomspace(1e-2, 30.0, 9)
 SWEEPS = 3
 # A gain of log probability that is worth another group, or another sweep.
-WORTH = 0.5
+WORTHWHILE_GAIN = 0.5
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class _Sizes:
         absent = list(range(1, len(self.counts)))
         while absent:
             gain, group, size = max(self._trial(group, SIZES) for group in absent)
-            if gain <= self.best + WORTH:
+            if gain <= self.best + WORTHWHILE_GAIN:
                 break
             self.best, self.sizes[group] = gain, size
             absent.remove(group)
@@ -145,7 +145,7 @@ class _Sizes:
                 value, group, size = self._trial(k, np.append(0.0, SIZES))
                 if value > self.best:
                     self.best, self.sizes[group] = value, size
-            if self.best - before < WORTH:
+            if self.best - before < WORTHWHILE_GAIN:
                 break
 
     def _trial(self, group: int, sizes: Array) -> tuple[float, int, float]:

@@ -52,7 +52,7 @@ BESIDE = ("drum", "speed_sensor", "backlash_shaft")
 # Variance that the draws of the smoothing's noise do not span, over what they do, next to impacts.
 UNSPANNED = 3.0
 # Deviations of a sum of squares that are no chance.
-ASTRAY = 3.0
+SURPRISING_DEVIATIONS = 3.0
 
 
 class Site:
@@ -165,7 +165,7 @@ class Site:
         return (*found, self.table.own_relations(sensor))
 
     def linear(self, fitted: Estimate) -> Linear:
-        """Data and drift, the drum's speed linearised at a fit of the drum's side."""
+        """Data and drift, the drum's speed linearise at a fit of the drum's side."""
         runs = range(len(self.signals))
         away = fitted.z - expected(fitted)
         speed = [fitted.residuals[k][0] - fitted.jacobians[k][0] @ away for k in runs]
@@ -229,13 +229,15 @@ class Site:
 
     @cached_property
     def with_torque(self) -> list[tuple[Linear, list[Array]]]:
-        """Data and laws of the drum, linearised at no torque, and at the best if that is far."""
+        """Data and laws of the drum, linearise at no torque, and at the best if that is far."""
         start = {**self.plain.parameters(), **self.side.torques(0.0)}
         gaps = [self.plain.states(k)[GAP_POSITION] for k in range(len(self.signals))]
         near = self.side.at(start, gaps)
         fits = [near]
         count = sum(len(m.time) for m in self.signals)
-        if self.data.left(slice(-count, None)) > count + ASTRAY * np.sqrt(2.0 * count):
+        if self.data.left(slice(-count, None)) > count + SURPRISING_DEVIATIONS * np.sqrt(
+            2.0 * count
+        ):
             fits.append(self.side.far(self.plain.parameters(), gaps, self._told_torque()))
         return [(self.linear(f), self._drum(f)) for f in fits]
 

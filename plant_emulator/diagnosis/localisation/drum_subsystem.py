@@ -36,8 +36,8 @@ FREE = ("backlash_half_gap", "drum_shaft_damping")
 GAPS = 17
 DRAWS = 10
 # Mean square in the noise above which the set's own values are tried as a start too.
-ASTRAY = 1.5
-SETTLED = 1e-4
+SUSPECT_MEAN_SQUARE = 1.5
+COST_TOLERANCE = 1e-4
 # Prior standard deviation of an unknown torque on the drum [10 N m].
 TORQUE = 5.0
 # Constant torques that a fit starts from [10 N m]; laws of the angle, which are the last ones.
@@ -120,7 +120,7 @@ class DrumSide:
 
     def fit(self, start: Mapping[str, float], gaps: Sequence[float]) -> Estimate:
         """Least squares from these values."""
-        return estimate(self.unknowns(start, gaps), self._functions(), settled=SETTLED)
+        return estimate(self.unknowns(start, gaps), self._functions(), settled=COST_TOLERANCE)
 
     def at(self, start: Mapping[str, float], gaps: Sequence[float]) -> Estimate:
         """The same, not fitted: residuals and Jacobians there."""
@@ -141,7 +141,7 @@ class DrumSide:
         near = {name: start.get(name, own[name]) for name in FREE}
         fits = [self.fit(near, gaps)]
         for values in (near, own):
-            if fits[-1].cost <= ASTRAY * fits[-1].samples:
+            if fits[-1].cost <= SUSPECT_MEAN_SQUARE * fits[-1].samples:
                 break
             fits.append(self.fit(values, self.scan(values)))
         return min(fits, key=lambda f: f.cost + f.penalty)

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 # Gain of log probability that is worth a block: odds of e^15 before it is believed.
-WORTH = 15.0
+WORTHWHILE_BLOCK_GAIN = 15.0
 # The laws are approximate: a difference of this share of the gain is no difference.
 APPROXIMATE = 0.02
 MOST_BLOCKS = 3
@@ -85,13 +85,13 @@ def divide(site: Site) -> tuple[dict[str, float], float]:
         gains = {name: site.log_evidence((*taken, name)) - before for name in rest}
         best = max(gains, key=gains.__getitem__)
         gain = max(gains[best], 0.0)
-        if taken and gain <= WORTH:
+        if taken and gain <= WORTHWHILE_BLOCK_GAIN:
             break
         for name, share in among(gains).items():
             credit[name] += max(gain, 1e-9) * share
         total += gain
         taken, before = (*taken, best), before + gains[best]
-        if gain <= WORTH:
+        if gain <= WORTHWHILE_BLOCK_GAIN:
             break
     whole = sum(credit.values())
     return {name: value / whole for name, value in credit.items()}, total
@@ -100,6 +100,6 @@ def divide(site: Site) -> tuple[dict[str, float], float]:
 def among(gains: Mapping[str, float]) -> dict[str, float]:
     """A gain divided among those who could have had it; equal gains, equal shares."""
     values: Array = np.array(list(gains.values()))
-    width = 0.5 * WORTH + APPROXIMATE * max(0.0, float(values.max()))
+    width = 0.5 * WORTHWHILE_BLOCK_GAIN + APPROXIMATE * max(0.0, float(values.max()))
     weight = np.exp((values - values.max()) / width)
     return dict(zip(gains, (weight / weight.sum()).tolist(), strict=True))

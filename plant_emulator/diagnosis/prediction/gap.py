@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.joint_fit import fit, linearised
-from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
+from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
+from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
 from plant_emulator.diagnosis.prediction import block_bootstrap
 from plant_emulator.estimation.least_squares import estimate
 
@@ -76,7 +76,7 @@ def refitted(model: Model, fold: Fold) -> FitResult:
     """
     point = fold.start
     for _ in range(1 + PATIENCE):
-        point = fit(model, point.effects, fold.fitted, point.values, point.states, shy=True)
+        point = fit(model, point.effects, fold.fitted, point.values, point.states, shrinkage=True)
         if point.converged:
             break
     return point
@@ -90,12 +90,12 @@ def shown(model: Model, fold: Fold) -> dict[str, float]:
 def _shown(model: Model, fold: Fold, name: str) -> float:
     start = fold.start
     without = replace(start, effects=tuple(e for e in start.effects if e != name))
-    tangents = Tangents(linearised(model, without, fold.fitted))
+    tangents = NuisanceSpace(linearise(model, without, fold.fitted))
     complete = [
         model.residual(run, start.effects)({**start.values, **states}).ravel()
         for run, states in zip(fold.fitted, start.states, strict=True)
     ]
-    return float(np.linalg.norm(tangents.rest(np.concatenate(complete) - tangents.residual)))
+    return float(np.linalg.norm(tangents.orthogonal(np.concatenate(complete) - tangents.residual)))
 
 
 def _predicted(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.evidence import DETECTABLE, THRESHOLD
+from plant_emulator.diagnosis.fitting.evidence import DETECTABLE_NORM, EVIDENCE_THRESHOLD
 from plant_emulator.diagnosis.prediction import gap
 from plant_emulator.diagnosis.prediction.gap import Fold
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation
+    from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.prediction.gap import Prediction
 
@@ -67,7 +67,7 @@ class HeldOut:
         for fold, norms in zip(
             self.plan.folds, self.pool.map(gap.shown, self.recipe, tasks), strict=True
         ):
-            hidden = [name for name, norm in norms.items() if norm < DETECTABLE]
+            hidden = [name for name, norm in norms.items() if norm < DETECTABLE_NORM]
             if not hidden:
                 usable.append(fold)
                 continue
@@ -87,8 +87,8 @@ class HeldOut:
             some = followed[:count]
             points[some] = replace(explained.final, effects=some)
         for contender in _best(explained, followed):
-            assert contender.point is not None
-            points.setdefault((contender.effect,), contender.point)
+            assert contender.fit is not None
+            points.setdefault((contender.effect,), contender.fit)
         tasks, keys = [], []
         for key, point in [(NOMINAL, explained.null), *points.items()]:
             for fitted, predicted in folds:
@@ -136,10 +136,10 @@ class HeldOut:
         )
 
 
-def _best(explained: Explanation, followed: Sequence[str]) -> list[Contender]:
+def _best(explained: Explanation, followed: Sequence[str]) -> list[Hypothesis]:
     """Those accepted, and those that count and come somewhere near the best."""
-    fitted = [c for c in explained.contenders if c.point is not None]
+    fitted = [c for c in explained.hypotheses if c.fit is not None]
     ranked = sorted(fitted, key=explained.evidence, reverse=True)
-    least = max([THRESHOLD, *(NEAR * explained.evidence(c) for c in ranked[:1])])
+    least = max([EVIDENCE_THRESHOLD, *(NEAR * explained.evidence(c) for c in ranked[:1])])
     near = [c for c in ranked[:TRIED] if explained.evidence(c) > least]
     return [c for c in ranked if c in near or c.effect in followed]

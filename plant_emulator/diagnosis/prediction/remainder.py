@@ -29,7 +29,7 @@ WIDTH = np.array([high - low for low, high in BANDS])
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rest:
+class Remainder:
     """What is left of one channel on the held-out runs.
 
     before, after : norm(e) / norm(y) without and with the effects named [1], both over the samples
@@ -52,14 +52,16 @@ class Rest:
         return BANDS[int(np.argmax(excess))]
 
 
-def rest_of(model: Model, found: FitResult, fitted: Sequence[int], traces: Sequence[Trace]) -> Rest:
+def rest_of(
+    model: Model, found: FitResult, fitted: Sequence[int], traces: Sequence[Trace]
+) -> Remainder:
     """The rest of the first channel after a fit, on the held-out runs behind the traces."""
     first = traces[0]
     same = [t for t in traces if t.channel == first.channel]
     known = {model.runs[run].source for run in fitted}
     apart = known.isdisjoint(t.source for t in same)
     own = [_residual(model, found, k, run) for k, run in enumerate(fitted)] if apart else []
-    return Rest(
+    return Remainder(
         channel=first.channel,
         unit=first.unit,
         before=_relative(same, [t.recalibrated for t in same]),
@@ -90,7 +92,7 @@ def _power(residuals: Sequence[tuple[Array, Array]]) -> Array:
     return np.average(each, axis=0, weights=[len(e) for e, _ in residuals])
 
 
-def shrinks(rest: Rest) -> str:
+def shrinks(rest: Remainder) -> str:
     """By how much the held-out error falls, as a part of a sentence."""
     return (
         f"the held-out {rest.channel} error norm(e)/norm(y) falls from {100.0 * rest.before:.2f} % "
@@ -98,7 +100,7 @@ def shrinks(rest: Rest) -> str:
     )
 
 
-def lies(rest: Rest) -> str:
+def lies(rest: Remainder) -> str:
     """Where the rest is, and what may cause it, as a part of a sentence."""
     low, high = rest.band
     cause = "elasticity, or unknown" if low >= FAST else "unknown"

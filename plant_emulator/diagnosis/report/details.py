@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from plant_emulator.diagnosis.prediction.remainder import Rest
+    from plant_emulator.diagnosis.prediction.remainder import Remainder
     from plant_emulator.diagnosis.prediction.trace import Trace
 
 
@@ -38,4 +38,4 @@ class Details:
     waterfall: tuple[Step, ...]
     settings: Mapping[str, str]
     notes: tuple[str, ...]
-    rest: Rest | None = None
+    rest: Remainder | None = None

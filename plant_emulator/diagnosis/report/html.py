@@ -37,7 +37,7 @@ if TYPE_CHECKING:
         ParameterShift,
         Undetectable,
     )
-    from plant_emulator.diagnosis.prediction.remainder import Rest
+    from plant_emulator.diagnosis.prediction.remainder import Remainder
     from plant_emulator.diagnosis.prediction.trace import Trace
     from plant_emulator.diagnosis.report.details import Details
 
@@ -144,7 +144,7 @@ def _location(location: Location, units: Mapping[str, str]) -> Markup:
     return _section("Where it lies", *(parts or [tag("p", "Nothing stands out of the noise.")]))
 
 
-def _rest(rest: Rest | None) -> Markup:
+def _rest(rest: Remainder | None) -> Markup:
     return Markup("") if rest is None else _section("What is left", rest_by_band(rest))
 
 

@@ -12,10 +12,10 @@ from plant_emulator.diagnosis.wording import number
 from plant_emulator.signals.frequency_bands import BANDS
 
 if TYPE_CHECKING:
-    from plant_emulator.diagnosis.prediction.remainder import Rest
+    from plant_emulator.diagnosis.prediction.remainder import Remainder
 
 
-def rest_by_band(rest: Rest) -> Markup:
+def rest_by_band(rest: Remainder) -> Markup:
     """How much is left, and in which band."""
     words = (
         f"Relative error norm(e)/norm(y) of the held-out {rest.channel}: "
@@ -33,7 +33,7 @@ def rest_by_band(rest: Rest) -> Markup:
     return join(tag("p", words), by_band)
 
 
-def _band(rest: Rest, k: int) -> Markup:
+def _band(rest: Remainder, k: int) -> Markup:
     low, high = BANDS[k]
     power, whole = float(rest.held_out[k]), float(rest.held_out.sum())
     compared = []

@@ -8,26 +8,26 @@ from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.answer import Quantity, RankedEffect, Undetectable
 from plant_emulator.diagnosis.calibration.model_form_error import scale
-from plant_emulator.diagnosis.fitting.evidence import DETECTABLE, THRESHOLD
+from plant_emulator.diagnosis.fitting.evidence import DETECTABLE_NORM, EVIDENCE_THRESHOLD
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation
+    from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
     from plant_emulator.diagnosis.machine import Candidate
 
 # Effects of no account that a ranking still shows.
 SHOWN = 5
 
 
-def ranked(explained: Explanation) -> list[Contender]:
+def ranked(explained: Explanation) -> list[Hypothesis]:
     """Effects with evidence or accepted, and a few of those without, the best first.
 
     What is needed beside another effect may have little evidence alone.
     """
-    order = sorted(explained.contenders, key=explained.evidence, reverse=True)
-    counting = [c for c in order if explained.evidence(c) > THRESHOLD]
+    order = sorted(explained.hypotheses, key=explained.evidence, reverse=True)
+    counting = [c for c in order if explained.evidence(c) > EVIDENCE_THRESHOLD]
     shown = max(SHOWN, len(counting))
     accepted = [c for c in order[shown:] if c.effect in explained.named]
     return [*order[:shown], *accepted]
@@ -36,15 +36,19 @@ def ranked(explained: Explanation) -> list[Contender]:
 def with_chance(explained: Explanation) -> FitResult:
     """The final fit with the sizes and shapes of effects whose course is chance."""
     values: dict[str, float] = {}
-    for one in explained.chance:
-        values |= {one.name: one.size, **one.shape}
-    errors = {one.name: one.error for one in explained.chance}
+    for one in explained.random_effects:
+        values |= {one.parameter: one.size, **one.shape}
+    errors = {one.parameter: one.standard_error for one in explained.random_effects}
     final = explained.final
-    return replace(final, values={**final.values, **values}, errors={**final.errors, **errors})
+    return replace(
+        final,
+        values={**final.values, **values},
+        standard_errors={**final.standard_errors, **errors},
+    )
 
 
 def rank(
-    contender: Contender,
+    contender: Hypothesis,
     explained: Explanation,
     accepted: Sequence[str],
     candidate: Candidate,
@@ -58,7 +62,7 @@ def rank(
     law_errors : standard errors by name that other laws of an effect make, see `law_error`
     """
     name = contender.effect
-    point = with_chance(explained) if name in accepted else contender.point
+    point = with_chance(explained) if name in accepted else contender.fit
     sizes = () if point is None else _sizes(point, candidate, law_errors or {})
     return RankedEffect(
         effect=name,
@@ -83,7 +87,7 @@ def _sizes(
         yield Quantity(
             name=name.removeprefix(f"{candidate.name}_"),
             value=value,
-            standard_error=hypot(point.errors[name], law_error),
+            standard_error=hypot(point.standard_errors[name], law_error),
             unit=candidate.units[name],
         )
 
@@ -94,19 +98,19 @@ def undetectable(
     """Effects that these logs could not show at their plausible size, with the reason."""
     return tuple(
         Undetectable(effect=c.effect, reason=hidden(c, candidates[c.effect]))
-        for c in explained.contenders
-        if c.norm < DETECTABLE
+        for c in explained.hypotheses
+        if c.orthogonal_norm < DETECTABLE_NORM
         and c.effect not in explained.named
-        and explained.evidence(c) <= THRESHOLD
+        and explained.evidence(c) <= EVIDENCE_THRESHOLD
     )
 
 
-def hidden(contender: Contender, candidate: Candidate) -> str:
+def hidden(contender: Hypothesis, candidate: Candidate) -> str:
     """Why an effect does not show."""
     if candidate.untold:
         return candidate.needs or "its course is chance, and too small here to be seen"
-    if contender.raw < DETECTABLE:
+    if contender.total_norm < DETECTABLE_NORM:
         reason = "too small in these channels and runs at its plausible size"
     else:
-        reason = f"drift of {contender.imitated_by} looks the same"
+        reason = f"drift of {contender.confounded_with} looks the same"
     return f"{reason}; {candidate.needs}" if candidate.needs else reason

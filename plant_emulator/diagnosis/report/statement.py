@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.answer import Quantity
     from plant_emulator.diagnosis.machine import Candidate
-    from plant_emulator.diagnosis.prediction.remainder import Rest
+    from plant_emulator.diagnosis.prediction.remainder import Remainder
     from plant_emulator.diagnosis.selection.verdict import Decision
 
     Terms = Mapping[str, Sequence[Quantity]]
@@ -40,7 +40,7 @@ def verdict(
                 standard_error=shift.standard_error,
                 unit=shift.unit,
             )
-            for shift in decision.shifts
+            for shift in decision.deviations
         ),
         confidence=confidence,
         statement=sentence,
@@ -55,7 +55,7 @@ def statement(
     place: str | None,
     *,
     terms: Terms | None = None,
-    rest: Rest | None = None,
+    rest: Remainder | None = None,
 ) -> str:
     """The verdict in one sentence.
 
@@ -80,7 +80,7 @@ def _effects(
     candidates: Mapping[str, Candidate],
     closed: float | None,
     terms: Terms,
-    rest: Rest | None,
+    rest: Remainder | None,
 ) -> str:
     named = [_named(name, candidates[name], terms.get(name, ())) for name in decision.effects]
     share = "" if closed is None else f"the held-out gap closes by {percent(closed)}"
@@ -100,9 +100,9 @@ def _named(name: str, candidate: Candidate, terms: Sequence[Quantity]) -> str:
 
 
 def _other_values(decision: Decision) -> str:
-    first = decision.shifts[0]
+    first = decision.deviations[0]
     change = 100.0 * (first.estimated / first.nominal - 1.0)
-    others = len(decision.shifts) - 1
+    others = len(decision.deviations) - 1
     more = "" if others == 0 else f" and {others} other parameters"
     return (
         f"The equations hold with other values: {first.name} is {change:+.1f} %{more}; "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.evidence import MARGIN, NOISE_LEFT, weighed
+from plant_emulator.diagnosis.fitting.evidence import CLASS_MARGIN, NOISE_MEAN_SQUARE, evidence_of
 from plant_emulator.diagnosis.selection.contenders import beside, best_of, costs_of, points_of
 from plant_emulator.diagnosis.selection.rules import FAINT, MOST_EFFECTS, noise_only
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.fitting.explanation import Contender
+    from plant_emulator.diagnosis.fitting.explanation import Hypothesis
     from plant_emulator.diagnosis.selection.rounds import Rounds
 
 
@@ -31,7 +31,7 @@ class Backward:
     _refits: dict[object, FitResult] = field(default_factory=dict)
 
     def stand(
-        self, final: FitResult, last: Sequence[Contender]
+        self, final: FitResult, last: Sequence[Hypothesis]
     ) -> tuple[FitResult, dict[str, dict[str, float]]]:
         """Let every effect but the last stand the contest again; take the best in its place.
 
@@ -46,7 +46,7 @@ class Backward:
             known = final if noise_only(final) else None
             found = self.rounds.contend(without, thorough=False, known=known)
             best = best_of(found)
-            if best is not None and best.cost < final.cost - MARGIN:
+            if best is not None and best.cost < final.cost - CLASS_MARGIN:
                 final, rivals = best, {best.effects[-1]: costs_of(found)}
             else:
                 rivals[waiting[0]] = costs_of(found)
@@ -70,7 +70,7 @@ class Backward:
             return final, costs
         for name in final.effects:
             without = self._without(final, name)
-            if self.counts(final, without, null) and without.chi_squared > NOISE_LEFT:
+            if self.counts(final, without, null) and without.mean_square > NOISE_MEAN_SQUARE:
                 without = self._alone(without, null)
             if not self.counts(final, without, null):
                 return without, {}
@@ -95,5 +95,5 @@ class Backward:
         of its valley.
         """
         return noise_only(final) and any(
-            weighed(cost - final.cost, final, null) < FAINT for cost in without.values()
+            evidence_of(cost - final.cost, final, null) < FAINT for cost in without.values()
         )

@@ -66,4 +66,4 @@ class Drifts:
 
 def _little(point: FitResult) -> bool:
     """Whether a fit leaves little enough to have its drift from."""
-    return point.chi_squared <= LITTLE
+    return point.mean_square <= LITTLE

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.fitting.explanation import Contender
+    from plant_emulator.diagnosis.fitting.explanation import Hypothesis
     from plant_emulator.diagnosis.selection.restarts import Restarts
 
 # Best after a few steps that are fitted to convergence.
@@ -42,7 +42,7 @@ class FromNominal:
         """Whether a fit from the nominal parameters has ended there."""
         return point.key in {p.key for p in self._near.values()}
 
-    def fitted(self, base: FitResult, contenders: Sequence[Contender]) -> list[Contender]:
+    def fitted(self, base: FitResult, contenders: Sequence[Hypothesis]) -> list[Hypothesis]:
         """The best of some effects fitted from the nominal parameters, from where a few steps come
         to and then from the best values of each unknown.
 
@@ -60,11 +60,11 @@ class FromNominal:
         tasks = [Task(base=point, runs=self.runs) for point in points]
         ended = list(self.pool.map(refit, self.recipe, tasks))
         self._near.update(zip(new, ended, strict=True))
-        return [replace(chosen[key], point=self._near[key]) for key in best]
+        return [replace(chosen[key], fit=self._near[key]) for key in best]
 
-    def surveyed(self, contenders: Sequence[Contender], base: FitResult) -> list[Contender]:
+    def surveyed(self, contenders: Sequence[Hypothesis], base: FitResult) -> list[Hypothesis]:
         """All that could close the gap, from the nominal parameters where that is better."""
-        able = [c for c in contenders if could_close(c.raw, base)]
+        able = [c for c in contenders if could_close(c.total_norm, base)]
         return better_of(contenders, self.fitted(base, able))
 
 

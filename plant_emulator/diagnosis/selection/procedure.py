@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.evidence import NOISE_LEFT, THRESHOLD, excess
+from plant_emulator.diagnosis.fitting.evidence import EVIDENCE_THRESHOLD, NOISE_MEAN_SQUARE, excess
 from plant_emulator.diagnosis.fitting.input_noise_model import quieted
 from plant_emulator.diagnosis.fitting.random_effects import Weighted, unrest
 from plant_emulator.diagnosis.fitting.steps import refit, start
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
-    from plant_emulator.diagnosis.fit_result import FitResult, Unrest
+    from plant_emulator.diagnosis.fit_result import FitResult, VarianceComponent
     from plant_emulator.diagnosis.fitting.explanation import Explanation
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.selection.verdict import Decision
@@ -30,7 +30,7 @@ RANDOM = 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
-class Inquiry:
+class Procedure:
     """One diagnosis up to its verdict.
 
     runs : that are fitted, by number; null : the fit without effects, if it has been made
@@ -42,7 +42,7 @@ class Inquiry:
     runs: tuple[int, ...]
     null: FitResult | None = None
 
-    def with_quiet_inputs(self) -> Inquiry:
+    def with_quiet_inputs(self) -> Procedure:
         """The same with the noise of fed inputs as part of the noise."""
         recipe, null = quieted(self.pool, self.recipe, self.model, self.runs)
         return replace(self, recipe=recipe, null=null)
@@ -56,7 +56,7 @@ class Inquiry:
         (null,) = [self.null] if self.null else self.pool.map(start, self.recipe, [self.runs])
         explained, recipe = self._restless(null) or (self._contest(self.recipe, null), self.recipe)
         found = verdict.decide(self.model, explained)
-        if found.kind == "unknown" and not explained.chance:
+        if found.kind == "unknown" and not explained.random_effects:
             again = self._by_chance(explained.final, explained.null)
             explained, recipe = again or (explained, recipe)
             found = verdict.decide(self.model, explained)
@@ -84,7 +84,7 @@ class Inquiry:
         """The contest with an effect of chance course, where the fit without effects leaves much,
         but next to nothing that is not random: a contest of others would be in vain.
         """
-        if null.chi_squared <= NOISE_LEFT or null.structure > RANDOM * excess(null):
+        if null.mean_square <= NOISE_MEAN_SQUARE or null.ljung_box_excess > RANDOM * excess(null):
             return None
         return self._by_chance(null, null)
 
@@ -104,9 +104,9 @@ class Inquiry:
         (null,) = self.pool.map(refit, recipe, [Task(base=null, runs=self.runs)])
         again = self._contest(recipe, null, first.evidence)
         last = self._unrest(again.final, [first.effect])
-        return (replace(again, chance=tuple(last)), recipe) if last else None
+        return (replace(again, random_effects=tuple(last)), recipe) if last else None
 
-    def _unrest(self, base: FitResult, names: Iterable[str]) -> list[Unrest]:
+    def _unrest(self, base: FitResult, names: Iterable[str]) -> list[VarianceComponent]:
         """What holds of effects of chance course on top of a fit."""
         tasks = [
             Task(base=base, runs=self.runs, effect=name)
@@ -114,7 +114,7 @@ class Inquiry:
             if self.model.candidates[name].untold
         ]
         found = self.pool.map(unrest, self.recipe, tasks)
-        return [one for one in found if one.holds and one.evidence > THRESHOLD]
+        return [one for one in found if one.consistent and one.evidence > EVIDENCE_THRESHOLD]
 
     def _between(self, explained: Explanation, found: Decision) -> Decision:
         """The verdict; unknown with that reason where runs agree each alone, but not together."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fitting.evidence import excess
-from plant_emulator.diagnosis.fitting.joint_fit import ASTRAY, WORTH
+from plant_emulator.diagnosis.fitting.joint_fit import SUSPECT_MEAN_SQUARE, WORTHWHILE_FALL
 from plant_emulator.diagnosis.fitting.steps import advance, follow, refit, shake, sift, swap
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.selection.rules import noise_only
@@ -55,7 +55,9 @@ class Restarts:
         """Fits; of those that leave much the better of itself and that from the best values of
         each of its unknowns.
         """
-        far = {k: point for k, point in enumerate(points) if point.chi_squared > ASTRAY}
+        far = {
+            k: point for k, point in enumerate(points) if point.mean_square > SUSPECT_MEAN_SQUARE
+        }
         tasks = [Task(base=point, runs=self.runs) for point in far.values()]
         found = dict(zip(far, self.pool.map(sift, self.recipe, tasks), strict=True))
         return self._ended(points, found)
@@ -105,7 +107,7 @@ class Restarts:
             numbers = range(SHAKES * k, SHAKES * (k + 1))
             off = self._off([point], numbers)[0]
             (moved,) = self._ended([point], {0: min(off, key=lambda p: p.cost)})
-            step = WORTH + SAME * excess(point)
+            step = WORTHWHILE_FALL + SAME * excess(point)
             if moved.cost < point.cost - step:
                 ahead = [further(point, moved, stride) for stride in STRIDES]
                 point, failed = self.lowest(moved, ahead), 0
@@ -124,7 +126,7 @@ class Restarts:
         self, points: Sequence[FitResult], found: Mapping[int, FitResult]
     ) -> list[FitResult]:
         """Fits, or what was found in their place where that is better, to convergence."""
-        lower = {k: new for k, new in found.items() if new.cost < points[k].cost - WORTH}
+        lower = {k: new for k, new in found.items() if new.cost < points[k].cost - WORTHWHILE_FALL}
         tasks = [Task(base=new, runs=self.runs) for new in lower.values()]
         ended = dict(zip(lower, self.pool.map(refit, self.recipe, tasks), strict=True))
         return [ended.get(k, point) for k, point in enumerate(points)]

@@ -11,8 +11,8 @@ from dataclasses import replace
 from math import inf
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.evidence import NOISE_LEFT, THRESHOLD
-from plant_emulator.diagnosis.fitting.joint_fit import ASTRAY, WORTH
+from plant_emulator.diagnosis.fitting.evidence import EVIDENCE_THRESHOLD, NOISE_MEAN_SQUARE
+from plant_emulator.diagnosis.fitting.joint_fit import SUSPECT_MEAN_SQUARE, WORTHWHILE_FALL
 from plant_emulator.diagnosis.fitting.steps import contend, contend_far, follow, plod, refit, show
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.selection.contenders import (
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.fitting.explanation import Contender
+    from plant_emulator.diagnosis.fitting.explanation import Hypothesis
     from plant_emulator.diagnosis.fitting.signature import Signature
     from plant_emulator.diagnosis.machine import Model
 
@@ -82,7 +82,7 @@ class Rounds:
             pool=pool, recipe=recipe, restarts=self.restarts, runs=self._runs
         )
 
-    def from_clear(self, base: FitResult, null: FitResult) -> list[Contender]:
+    def from_clear(self, base: FitResult, null: FitResult) -> list[Hypothesis]:
         """All effects on top of the drift of some runs, the best of them fitted.
 
         null : the fit without effects to all runs
@@ -96,7 +96,7 @@ class Rounds:
         thorough: bool,
         hasty: bool = False,
         known: FitResult | None = None,
-    ) -> list[Contender]:
+    ) -> list[Hypothesis]:
         """All effects on top of a fit: a first look at each, the best of them fitted.
 
         thorough : where none leaves little, those that could close it get a second look from a
@@ -112,54 +112,54 @@ class Rounds:
             if base.cost - least_cost(contenders) < SECOND:
                 return contenders
         contenders = self._taken_further(contenders, base, done=there, hasty=hasty)
-        if base.chi_squared <= NOISE_LEFT:
-            if not base.effects and base.cost - least_cost(contenders) < THRESHOLD:
+        if base.mean_square <= NOISE_MEAN_SQUARE:
+            if not base.effects and base.cost - least_cost(contenders) < EVIDENCE_THRESHOLD:
                 signatures = [one for one in shown.values() if one is not None]
                 contenders = self._patiently(contenders, signatures, base)
                 contenders = self._fitted(contenders, base, 1, refit)
-                nothing = base.cost - least_cost(contenders) < THRESHOLD
+                nothing = base.cost - least_cost(contenders) < EVIDENCE_THRESHOLD
                 if nothing and not noise_only(base):
                     contenders = self._from_afar(contenders, shown, base)
             return contenders
         if thorough and not explained(contenders) and not closed(contenders, base, MUCH):
-            if base.effects or base.chi_squared <= LOST:
+            if base.effects or base.mean_square <= LOST:
                 return self._from_afar(contenders, shown, base)
             contenders = self.nominal.surveyed(contenders, base)
         return contenders
 
-    def deepened(self, contenders: Sequence[Contender], base: FitResult) -> list[Contender]:
+    def deepened(self, contenders: Sequence[Hypothesis], base: FitResult) -> list[Hypothesis]:
         """The best of a round started again from elsewhere, where none leaves little and the fit
         that they are on top of may be astray.
         """
-        if base.chi_squared <= ASTRAY or explained(contenders):
+        if base.mean_square <= SUSPECT_MEAN_SQUARE or explained(contenders):
             return list(contenders)
-        ended = [c for c in with_point(contenders) if c.point and c.point.converged]
+        ended = [c for c in with_point(contenders) if c.fit and c.fit.converged]
         contenders = self._fitted(contenders, base, POLISHED, refit, ended)
         one = base.effects or closed(contenders, base, MOST)
         return self._moved(contenders, base, 1 if one else SHAKEN)
 
     def _patiently(
         self,
-        contenders: Sequence[Contender],
+        contenders: Sequence[Hypothesis],
         signatures: Sequence[Signature],
         base: FitResult,
-    ) -> list[Contender]:
+    ) -> list[Hypothesis]:
         """Effects whose signature promises nothing, but may be wrong, fitted all the same."""
         wrong = {one.effect: one for one in signatures if one.concentrated}
         tasks = [Task(base=base, runs=self._runs, signature=one) for one in wrong.values()]
         found = list(self._pool.map(plod, self._recipe, tasks))
         points = dict(zip(wrong, found, strict=True))
-        return better_of(contenders, [replace(c, point=points.get(c.effect)) for c in contenders])
+        return better_of(contenders, [replace(c, fit=points.get(c.effect)) for c in contenders])
 
     def _looked(
         self, base: FitResult, but: Sequence[str] = ()
-    ) -> tuple[dict[str, Signature | None], list[Contender]]:
+    ) -> tuple[dict[str, Signature | None], list[Hypothesis]]:
         """The signatures of all other effects on top of a fit, and these after a first look."""
         names = [name for name in self._names if name not in {*base.effects, *but}]
         tasks = [Task(base=base, runs=self._runs, effect=name) for name in names]
         found = list(self._pool.map(show, self._recipe, tasks))
         shown = dict(zip(names, found, strict=True))
-        promising = GLIMPSE if base.chi_squared <= NOISE_LEFT else -inf
+        promising = GLIMPSE if base.mean_square <= NOISE_MEAN_SQUARE else -inf
         tasks = [
             Task(base=base, runs=self._runs, effect=name, signature=one)
             for name, one in shown.items()
@@ -171,26 +171,26 @@ class Rounds:
 
     def _from_afar(
         self,
-        contenders: Sequence[Contender],
+        contenders: Sequence[Hypothesis],
         shown: Mapping[str, Signature | None],
         base: FitResult,
-    ) -> list[Contender]:
+    ) -> list[Hypothesis]:
         """Effects that could close the gap fitted from a larger size, where that is better."""
         large = [
             Task(base=base, runs=self._runs, effect=name, signature=one)
             for name, one in shown.items()
-            if one is not None and could_close(one.raw, base)
+            if one is not None and could_close(one.total_norm, base)
         ]
         found = list(self._pool.map(contend_far, self._recipe, large))
         points = dict(zip((task.effect for task in large), found, strict=True))
         again = [
-            replace(c, point=p)
+            replace(c, fit=p)
             for c in contenders
-            if (p := points.get(c.effect)) is not None and p.cost < cost_of(c) - WORTH
+            if (p := points.get(c.effect)) is not None and p.cost < cost_of(c) - WORTHWHILE_FALL
         ]
         return better_of(contenders, self._taken_further(again, base))
 
-    def _sighted(self, contenders: Sequence[Contender], base: FitResult) -> list[Contender]:
+    def _sighted(self, contenders: Sequence[Hypothesis], base: FitResult) -> list[Hypothesis]:
         """The best effect on top of noise fitted to convergence, where it is worth that."""
         found = list(contenders)
         for step in (follow, refit):
@@ -201,12 +201,12 @@ class Rounds:
 
     def _taken_further(
         self,
-        contenders: Sequence[Contender],
+        contenders: Sequence[Hypothesis],
         base: FitResult,
         *,
-        done: Sequence[Contender] = (),
+        done: Sequence[Hypothesis] = (),
         hasty: bool = False,
-    ) -> list[Contender]:
+    ) -> list[Hypothesis]:
         """The best after a first look fitted, and the best of these to convergence.
 
         done : those that have been; hasty : see `contend`
@@ -222,35 +222,37 @@ class Rounds:
         shares = {} if found is None else found.shares
         return frozenset(name for name, share in shares.items() if share >= PLACED)
 
-    def restarted(self, base: FitResult, contenders: Sequence[Contender]) -> FitResult:
+    def restarted(self, base: FitResult, contenders: Sequence[Hypothesis]) -> FitResult:
         """The best fit with the base's effects from the drift of the best contenders: a few steps
         from each, and on from where these lead lower.
         """
         most = 1 if base.effects and noise_only(base) else RESTARTS
         ranked = sorted(points_of(contenders), key=lambda p: p.cost)[:most]
-        starts = [replace(p, effects=base.effects) for p in ranked if base.cost - p.cost > WORTH]
+        starts = [
+            replace(p, effects=base.effects) for p in ranked if base.cost - p.cost > WORTHWHILE_FALL
+        ]
         return self.restarts.lowest(base, starts)
 
-    def in_place(self, contenders: Sequence[Contender], best: FitResult) -> list[Contender]:
+    def in_place(self, contenders: Sequence[Hypothesis], best: FitResult) -> list[Hypothesis]:
         """A round's effects, the likeliest in the best one's place fitted from there.
 
         Where a round's fits stop in valleys, an effect's near twin may have been left behind.
         """
         names = [c.effect for c in with_point(contenders) if c.effect != best.effects[-1]]
-        if best.chi_squared <= ASTRAY or not names:
+        if best.mean_square <= SUSPECT_MEAN_SQUARE or not names:
             return list(contenders)
         found = self.restarts.swapped(best, names)
-        again = [replace(c, point=found) for c in contenders if c.effect == found.effects[-1]]
+        again = [replace(c, fit=found) for c in contenders if c.effect == found.effects[-1]]
         return better_of(contenders, again)
 
     def _moved(
-        self, contenders: Sequence[Contender], base: FitResult, most: int
-    ) -> list[Contender]:
+        self, contenders: Sequence[Hypothesis], base: FitResult, most: int
+    ) -> list[Hypothesis]:
         """The best of a round started again from the nominal parameters and from some way off."""
         best = best_few(contenders, base, most)
         before = closed(contenders, base, MOST)
         contenders = better_of(contenders, self.nominal.fitted(base, best))
-        if not base.effects and all(p.chi_squared > LOST for p in points_of(contenders)):
+        if not base.effects and all(p.mean_square > LOST for p in points_of(contenders)):
             contenders = self.nominal.surveyed(contenders, base)
         if explained(contenders) or (closed(contenders, base, MOST) and not before):
             return list(contenders)
@@ -260,20 +262,20 @@ class Rounds:
         points = [sifted.get(p.key, p) for p in points_of(best)]
         first = [self.restarts.followed(point) for point in points[:1]]
         points = [*first, *self.restarts.shaken(points[1:])]
-        again = [replace(c, point=p) for c, p in zip(best, points, strict=True)]
+        again = [replace(c, fit=p) for c, p in zip(best, points, strict=True)]
         return better_of(contenders, again)
 
     def _fitted(
         self,
-        contenders: Sequence[Contender],
+        contenders: Sequence[Hypothesis],
         base: FitResult,
         most: int,
         step: Callable[[Model, Task], FitResult],
-        done: Sequence[Contender] = (),
-    ) -> list[Contender]:
+        done: Sequence[Hypothesis] = (),
+    ) -> list[Hypothesis]:
         """The best of a round taken a step further, but for those that are done."""
         best = [c for c in best_few(contenders, base, most) if c not in done]
-        tasks = [Task(base=c.point, runs=self._runs) for c in best if c.point is not None]
+        tasks = [Task(base=c.fit, runs=self._runs) for c in best if c.fit is not None]
         fitted = list(self._pool.map(step, self._recipe, tasks))
-        further = {c.effect: replace(c, point=p) for c, p in zip(best, fitted, strict=True)}
+        further = {c.effect: replace(c, fit=p) for c, p in zip(best, fitted, strict=True)}
         return [further.get(c.effect, c) for c in contenders]

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fitting.evidence import (
-    LEFT,
-    NOISE_LEFT,
-    STRUCTURED,
-    THRESHOLD,
+    EVIDENCE_THRESHOLD,
+    LJUNG_BOX_LIMIT,
+    NOISE_MEAN_SQUARE,
+    UNEXPLAINED_SHARE,
+    evidence_of,
     excess,
-    weighed,
 )
 
 if TYPE_CHECKING:
@@ -55,8 +55,8 @@ def enough(final: FitResult, null: FitResult, reaches_noise: bool) -> bool:
         return False
     left, gap = excess(final), excess(null)
     if reaches_noise:
-        return left > max((1.0 - PART) * gap, THRESHOLD)
-    return left <= max(LITTLE * gap, THRESHOLD)
+        return left > max((1.0 - PART) * gap, EVIDENCE_THRESHOLD)
+    return left <= max(LITTLE * gap, EVIDENCE_THRESHOLD)
 
 
 def counts(
@@ -77,35 +77,38 @@ def counts(
     exact : whether the law of what is there already can have no other form
     """
     fall = base.cost - best.cost
-    evidence = weighed(fall, best, null)
-    sizes = [best.sizes[name] for name in best.effects if name not in base.effects]
+    evidence = evidence_of(fall, best, null)
+    sizes = [best.relative_sizes[name] for name in best.effects if name not in base.effects]
     tiny = reaches_noise and base.effects and min(sizes) < TINY
     if tiny or evidence <= LAW * by_chance:
         return False
     if not reaches_noise:
-        return evidence > THRESHOLD
+        return evidence > EVIDENCE_THRESHOLD
     if not base.effects:
         # The first of several leaves a correlated rest: it is judged by the gap as well.
         gap = excess(null)
-        closes = gap > THRESHOLD and fall > max(THRESHOLD, PART_OF_GAP * gap)
-        return closes or evidence > THRESHOLD
+        closes = gap > EVIDENCE_THRESHOLD and fall > max(EVIDENCE_THRESHOLD, PART_OF_GAP * gap)
+        return closes or evidence > EVIDENCE_THRESHOLD
     small = not exact and any(size < SMALL for size in sizes)
-    if base.chi_squared <= NOISE_LEFT:
+    if base.mean_square <= NOISE_MEAN_SQUARE:
         coarse = small or evidence < FAINT
         left = 0.0 if exact else COARSE_LAW if coarse else LAW
         return evidence > SECOND and fall > left * excess(null)
     if noise_only(best):
-        return evidence > SECOND and fall > (LEFT if small else LAW) * excess(null)
+        return evidence > SECOND and fall > (UNEXPLAINED_SHARE if small else LAW) * excess(null)
     orderly = _ordered(best) <= (1.0 - REST) * _ordered(base)
-    most = fall > max(REST * (base.squares - base.samples), LEFT * excess(null) if small else 0.0)
-    return evidence > THRESHOLD and orderly and most
+    most = fall > max(
+        REST * (base.sum_of_squares - base.samples),
+        UNEXPLAINED_SHARE * excess(null) if small else 0.0,
+    )
+    return evidence > EVIDENCE_THRESHOLD and orderly and most
 
 
 def _ordered(point: FitResult) -> float:
     """Structure beyond what noise may have [chi squared]."""
-    return max(0.0, point.structure - STRUCTURED)
+    return max(0.0, point.ljung_box_excess - LJUNG_BOX_LIMIT)
 
 
 def noise_only(point: FitResult) -> bool:
     """Whether a fit leaves as little as the noise, and as random."""
-    return point.chi_squared <= NOISE_LEFT and point.structure <= STRUCTURED
+    return point.mean_square <= NOISE_MEAN_SQUARE and point.ljung_box_excess <= LJUNG_BOX_LIMIT

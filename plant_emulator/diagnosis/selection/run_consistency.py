@@ -10,8 +10,8 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.answer import Quantity
-from plant_emulator.diagnosis.fitting.evidence import LEFT
-from plant_emulator.diagnosis.fitting.joint_fit import null_fit
+from plant_emulator.diagnosis.fitting.evidence import UNEXPLAINED_SHARE
+from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.wording import size
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ CHANGES = "friction"
 
 def alone(model: Model, task: Task) -> FitResult:
     """Step of a diagnosis: the fit without effects of these runs only."""
-    return null_fit(model, task.runs)
+    return fit_null(model, task.runs)
 
 
 def between(
@@ -61,8 +61,10 @@ def between(
 def _agree(model: Model, found: Sequence[FitResult], together: FitResult) -> bool:
     """Whether each run alone agrees with the equations, in so far as the model can tell."""
     if model.reaches_noise:
-        return all(point.chi_squared <= AGREES for point in found)
-    return sum(point.squares for point in found) <= LEFT * together.squares
+        return all(point.mean_square <= AGREES for point in found)
+    return (
+        sum(point.sum_of_squares for point in found) <= UNEXPLAINED_SHARE * together.sum_of_squares
+    )
 
 
 def _apart(name: str, a: FitResult, b: FitResult) -> float:
@@ -73,7 +75,7 @@ def _apart(name: str, a: FitResult, b: FitResult) -> float:
 
 def _variance(name: str, point: FitResult) -> float:
     """Square of a standard error, by the residual and its autocorrelation."""
-    return point.errors[name] ** 2 * max(1.0, point.chi_squared) / point.share
+    return point.standard_errors[name] ** 2 * max(1.0, point.mean_square) / point.effective_fraction
 
 
 def _told(model: Model, name: str, run: int, found: FitResult) -> str:
@@ -82,7 +84,7 @@ def _told(model: Model, name: str, run: int, found: FitResult) -> str:
         Quantity(
             name=name,
             value=found.values[name],
-            standard_error=found.errors[name],
+            standard_error=found.standard_errors[name],
             unit=model.units[name],
         )
     )

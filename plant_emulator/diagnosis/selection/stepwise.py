@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.evidence import NOISE_LEFT, THRESHOLD, excess
+from plant_emulator.diagnosis.fitting.evidence import EVIDENCE_THRESHOLD, NOISE_MEAN_SQUARE, excess
 from plant_emulator.diagnosis.fitting.explanation import Explanation
 from plant_emulator.diagnosis.selection.backward import Backward
 from plant_emulator.diagnosis.selection.contenders import (
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.fitting.explanation import Contender
+    from plant_emulator.diagnosis.fitting.explanation import Hypothesis
 
 # Share of the gap that a better fit without effects closes when it has moved to another valley.
 MOVED = 0.5
@@ -73,7 +73,7 @@ class Contest:
         self._drifts = Drifts(pool=pool, recipe=recipe, runs=tuple(runs))
         self._deep, self._from_clear_only = not reaches_noise, False
         # Rounds on top of effects, by the fit: none is made twice.
-        self._on_top: dict[object, list[Contender]] = {}
+        self._on_top: dict[object, list[Hypothesis]] = {}
 
     def explain(self) -> Explanation:
         """Go through the contest."""
@@ -85,8 +85,8 @@ class Contest:
         return found
 
     def _deepened(
-        self, null: FitResult, contenders: Sequence[Contender]
-    ) -> tuple[FitResult, list[Contender]]:
+        self, null: FitResult, contenders: Sequence[Hypothesis]
+    ) -> tuple[FitResult, list[Hypothesis]]:
         """A first round in earnest: the effects of the place that the gap lies in from the nominal
         parameters; and also from the fit to all runs, where that has not been done.
         """
@@ -98,7 +98,7 @@ class Contest:
             return self._confirmed(null, better_of(found, contenders))
         return self._confirmed(null, self._rounds.deepened(contenders, null))
 
-    def _stepped(self, null: FitResult, contenders: Sequence[Contender]) -> Explanation:
+    def _stepped(self, null: FitResult, contenders: Sequence[Hypothesis]) -> Explanation:
         """Forward and backward steps from the fit without effects and the first round on it."""
         null = self._rounds.restarts.settled(null)
         final = null
@@ -128,13 +128,13 @@ class Contest:
         return Explanation(
             null=null,
             final=final,
-            contenders=tuple(contenders),
-            rivals=rivals,
+            hypotheses=tuple(contenders),
+            alternatives=rivals,
             unconverged=_unconverged(null, final),
-            without=_least(without, costs_of(contenders)),
+            reduced_costs=_least(without, costs_of(contenders)),
         )
 
-    def _first(self, null: FitResult) -> tuple[FitResult, list[Contender]]:
+    def _first(self, null: FitResult) -> tuple[FitResult, list[Hypothesis]]:
         """All effects on the fit without any, and that fit, started again from the best of them."""
         null, contenders, self._from_clear_only = self._from_clear(null)
         if not self._from_clear_only:
@@ -143,19 +143,19 @@ class Contest:
         return self._confirmed(null, contenders)
 
     def _confirmed(
-        self, null: FitResult, contenders: Sequence[Contender]
-    ) -> tuple[FitResult, list[Contender]]:
+        self, null: FitResult, contenders: Sequence[Hypothesis]
+    ) -> tuple[FitResult, list[Hypothesis]]:
         """A first round, and the fit without effects, started again from the best of it.
 
         All are tried again when the fit without effects has moved to another valley and they leave
         much, or are no better than it: in a cost of many valleys a signature is but a hint.
         """
         better = self._rounds.restarted(null, contenders)
-        moved = null.cost - better.cost > max(THRESHOLD, MOVED * excess(null))
-        if moved or (better.chi_squared <= NOISE_LEFT and not noise_only(better)):
+        moved = null.cost - better.cost > max(EVIDENCE_THRESHOLD, MOVED * excess(null))
+        if moved or (better.mean_square <= NOISE_MEAN_SQUARE and not noise_only(better)):
             better = self._rounds.restarts.followed(better)
-            moved = null.cost - better.cost > max(THRESHOLD, MOVED * excess(null))
-        stale = moved and better.cost - least_cost(contenders) < THRESHOLD
+            moved = null.cost - better.cost > max(EVIDENCE_THRESHOLD, MOVED * excess(null))
+        stale = moved and better.cost - least_cost(contenders) < EVIDENCE_THRESHOLD
         if not stale and (explained(contenders) or closed(contenders, better, MOST)):
             return better, list(contenders)
         if moved:
@@ -164,34 +164,34 @@ class Contest:
             better = self._rounds.restarted(better, contenders)
         return better, list(contenders)
 
-    def _from_clear(self, null: FitResult) -> tuple[FitResult, list[Contender], bool]:
+    def _from_clear(self, null: FitResult) -> tuple[FitResult, list[Hypothesis], bool]:
         """The fit without effects, and all effects, from the drift of the runs that need none; and
         whether one explains half of what the others show. No effects where there are no such runs.
         """
-        if null.chi_squared <= NOISE_LEFT:
+        if null.mean_square <= NOISE_MEAN_SQUARE:
             return null, [], False
         starts, clear = self._drifts.of_some(null)
         null = self._rounds.restarts.lowest(null, starts)
-        if null.chi_squared <= NOISE_LEFT or not clear:
+        if null.mean_square <= NOISE_MEAN_SQUARE or not clear:
             return null, [], False
         (base,) = starts
         contenders = self._rounds.from_clear(base, null)
         half = explained(contenders) or closed(contenders, base, MUCH)
-        return null, contenders, half and null.cost - least_cost(contenders) > THRESHOLD
+        return null, contenders, half and null.cost - least_cost(contenders) > EVIDENCE_THRESHOLD
 
-    def _from_all(self, null: FitResult) -> tuple[FitResult, list[Contender]]:
+    def _from_all(self, null: FitResult) -> tuple[FitResult, list[Hypothesis]]:
         """The same from the fit without effects to all runs, started again where it leaves much."""
-        if null.chi_squared > NOISE_LEFT:
+        if null.mean_square > NOISE_MEAN_SQUARE:
             (null,) = self._rounds.restarts.shaken([null])
         return null, self._searched(null)
 
-    def _searched(self, null: FitResult) -> list[Contender]:
+    def _searched(self, null: FitResult) -> list[Hypothesis]:
         """A first round; the best of it started again where none closes much, or in earnest."""
         found = self._rounds.contend(null, thorough=True)
         shallow = closed(found, null, MUCH) and not self._deep
         return found if shallow else self._rounds.deepened(found, null)
 
-    def _further(self, base: FitResult) -> tuple[FitResult, list[Contender]]:
+    def _further(self, base: FitResult) -> tuple[FitResult, list[Hypothesis]]:
         """A fit with effects started again from the best others on top of it, and all of these."""
         if base.key not in self._on_top:
             hasty = not self._deep
@@ -216,14 +216,14 @@ class Contest:
         )
 
 
-def _settles(found: Sequence[Contender], base: FitResult) -> bool:
+def _settles(found: Sequence[Hypothesis], base: FitResult) -> bool:
     """Whether a second effect explains so much that nothing is likely to be astray."""
     return explained(found) or closed(found, base, MOST)
 
 
 def _settled(found: Explanation) -> bool:
     """Whether a contest leaves so little that its fits are not astray."""
-    if found.final.chi_squared <= NOISE_LEFT:
+    if found.final.mean_square <= NOISE_MEAN_SQUARE:
         return True
     both = len(found.final.effects) == MOST_EFFECTS
     return both and excess(found.final) <= OTHER_LAW * excess(found.null)

@@ -21,10 +21,10 @@ def evidence_shares(
 ) -> dict[str, float]:
     """Share of each subsystem, by the best fall of the cost that one of its effects brings."""
     best: dict[str, float] = {}
-    for contender in explained.contenders:
-        if contender.point is not None:
+    for contender in explained.hypotheses:
+        if contender.fit is not None:
             place = candidates[contender.effect].subsystem
-            fall = max(0.0, explained.null.cost - contender.point.cost)
+            fall = max(0.0, explained.null.cost - contender.fit.cost)
             best[place] = max(best.get(place, 0.0), fall)
     total = sum(best.values())
     return {place: fall / total for place, fall in best.items()} if total > 0.0 else {}
@@ -41,7 +41,7 @@ def subsystem(
     if decision.kind == "none":
         return None
     if decision.kind == "parameter":
-        return decision.shifts[0].subsystem
+        return decision.deviations[0].subsystem
     if decision.kind == "effect":
         places = [candidates[name].subsystem for name in decision.effects]
         return max(places, key=lambda place: shares.get(place, 0.0))

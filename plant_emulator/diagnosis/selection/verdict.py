@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.evidence import STRUCTURED, adequate, evident
+from plant_emulator.diagnosis.fitting.evidence import LJUNG_BOX_LIMIT, adequate, significant
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.answer import Kind
@@ -22,7 +22,7 @@ NOISE_ONLY = 1.1
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shift:
+class Deviation:
     """A parameter that left its nominal value; surprise : in prior standard deviations."""
 
     name: str
@@ -34,7 +34,7 @@ class Shift:
     surprise: float
 
     @property
-    def sure(self) -> bool:
+    def significant(self) -> bool:
         """Whether chance does not explain it."""
         return abs(self.estimated - self.nominal) > SURE * self.standard_error
 
@@ -48,22 +48,22 @@ class Decision:
 
     kind: Kind
     effects: tuple[str, ...]
-    shifts: tuple[Shift, ...]
+    deviations: tuple[Deviation, ...]
     reason: str
 
 
-def shifts(model: Model, found: FitResult) -> tuple[Shift, ...]:
+def deviations(model: Model, found: FitResult) -> tuple[Deviation, ...]:
     """Parameters more than SHIFTED standard errors from nominal: those that chance does not explain
     first, of these the most surprising.
     """
     moved = []
     for unknown in model.parameters:
-        value, error = found.values[unknown.name], found.errors[unknown.name]
+        value, error = found.values[unknown.name], found.standard_errors[unknown.name]
         if abs(value - unknown.prior) <= SHIFTED * error:
             continue
         std = unknown.std if unknown.std is not None else abs(unknown.prior)
         moved.append(
-            Shift(
+            Deviation(
                 name=unknown.name,
                 nominal=unknown.prior,
                 estimated=value,
@@ -73,39 +73,39 @@ def shifts(model: Model, found: FitResult) -> tuple[Shift, ...]:
                 surprise=abs(value - unknown.prior) / std,
             )
         )
-    return tuple(sorted(moved, key=lambda shift: (not shift.sure, -shift.surprise)))
+    return tuple(sorted(moved, key=lambda shift: (not shift.significant, -shift.surprise)))
 
 
 def decide(model: Model, explained: Explanation) -> Decision:
     """The verdict of a contest."""
     found = _of_contest(model, explained)
-    if explained.chance and found.kind != "unknown":
+    if explained.random_effects and found.kind != "unknown":
         return replace(found, kind="effect", effects=explained.named)
     return found
 
 
 def _of_contest(model: Model, explained: Explanation) -> Decision:
     null, final = explained.null, explained.final
-    moved = shifts(model, final)
+    moved = deviations(model, final)
     if explained.unconverged:
-        return Decision(kind="unknown", effects=(), shifts=moved, reason=explained.unconverged)
+        return Decision(kind="unknown", effects=(), deviations=moved, reason=explained.unconverged)
     if model.reaches_noise and _structured(explained):
         reason = "what is left is as small as the noise, but not as random"
-        return Decision(kind="unknown", effects=(), shifts=moved, reason=reason)
-    if final.unsure and not (len(final.effects) == 1 and evident(final, null)):
-        name = final.unsure[0]
+        return Decision(kind="unknown", effects=(), deviations=moved, reason=reason)
+    if final.insignificant and not (len(final.effects) == 1 and significant(final, null)):
+        name = final.insignificant[0]
         reason = f"it differs between the runs; {name} would do, but no size of it is certain"
-        return Decision(kind="unknown", effects=(), shifts=moved, reason=reason)
+        return Decision(kind="unknown", effects=(), deviations=moved, reason=reason)
     if final.effects and (adequate(final, null) or not model.reaches_noise):
-        return Decision(kind="effect", effects=final.effects, shifts=moved, reason="")
-    moved = shifts(model, null)
-    if not final.effects and null.chi_squared <= NOISE_ONLY:
-        kind: Kind = "parameter" if any(shift.sure for shift in moved) else "none"
-        return Decision(kind=kind, effects=(), shifts=moved, reason="")
+        return Decision(kind="effect", effects=final.effects, deviations=moved, reason="")
+    moved = deviations(model, null)
+    if not final.effects and null.mean_square <= NOISE_ONLY:
+        kind: Kind = "parameter" if any(shift.significant for shift in moved) else "none"
+        return Decision(kind=kind, effects=(), deviations=moved, reason="")
     return Decision(
         kind="unknown",
         effects=(),
-        shifts=moved,
+        deviations=moved,
         reason="no effect of the library, alone or with others, brings the residual to the noise",
     )
 
@@ -116,6 +116,6 @@ def _structured(explained: Explanation) -> bool:
     Of a model that leaves more than the noise the squares tell.
     """
     null, final = explained.null, explained.final
-    small = adequate(final, null) if final.effects else null.chi_squared <= NOISE_ONLY
-    gained = null.cost - final.cost + sum(one.evidence for one in explained.chance)
-    return small and final.structure > max(STRUCTURED, gained)
+    small = adequate(final, null) if final.effects else null.mean_square <= NOISE_ONLY
+    gained = null.cost - final.cost + sum(one.evidence for one in explained.random_effects)
+    return small and final.ljung_box_excess > max(LJUNG_BOX_LIMIT, gained)

@@ -3,8 +3,8 @@
 from rich.progress import Progress
 
 from plant_emulator.cli._progress import reporter
-from plant_emulator.diagnosis.execution.pool import Here
-from plant_emulator.diagnosis.execution.progress import Told
+from plant_emulator.diagnosis.execution.pool import InProcess
+from plant_emulator.diagnosis.execution.progress import ReportingPool
 
 
 class Clock:
@@ -48,7 +48,7 @@ def test_every_step_of_a_pool_is_told_from_its_begin() -> None:
         def digest(self) -> str:
             return "nothing"
 
-    pool = Told(Here(), lambda step, done: told.append((step, done)))
+    pool = ReportingPool(InProcess(), lambda step, done: told.append((step, done)))
     assert list(pool.map(refit, Nothing(), [1, 2])) == [2, 4]  # type: ignore[arg-type]
     assert told == [
         ("fits to their end", 0.0),

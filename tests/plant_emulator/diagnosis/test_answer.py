@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.fit_result import FitResult
-from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation
+from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
 from plant_emulator.diagnosis.machine import Run
 from plant_emulator.diagnosis.prediction.gap import Prediction, gap
 from plant_emulator.diagnosis.prediction.trace import traces
@@ -21,26 +21,28 @@ POINT = FitResult(
     values={},
     states=({},),
     cost=1000.0,
-    squares=1000.0,
+    sum_of_squares=1000.0,
     samples=1000,
-    share=1.0,
-    errors={},
+    effective_fraction=1.0,
+    standard_errors={},
     converged=True,
 )
 
 
-def contender(effect: str, fall: float) -> Contender:
+def contender(effect: str, fall: float) -> Hypothesis:
     """An effect that alone lowers the cost by so much."""
     point = replace(POINT, effects=(effect,), cost=POINT.cost - fall)
-    return Contender(effect=effect, norm=10.0, raw=10.0, imitated_by="a", point=point)
+    return Hypothesis(
+        effect=effect, orthogonal_norm=10.0, total_norm=10.0, confounded_with="a", fit=point
+    )
 
 
 def explanation(falls: dict[str, float], accepted: tuple[str, ...]) -> Explanation:
     return Explanation(
         null=POINT,
         final=replace(POINT, effects=accepted),
-        contenders=tuple(contender(name, fall) for name, fall in falls.items()),
-        rivals={},
+        hypotheses=tuple(contender(name, fall) for name, fall in falls.items()),
+        alternatives={},
         unconverged="",
     )
 
@@ -56,9 +58,9 @@ def test_accepted_effect_without_evidence_alone_is_ranked() -> None:
 def test_standard_error_of_a_size_holds_that_of_its_law(size: float, law: float) -> None:
     """By hand: half of the estimate, or of the plausible size 1 where the estimate is smaller."""
     found = explanation({"cube": 300.0}, ("cube",))
-    sized = {"values": {"cube_size": size}, "errors": {"cube_size": 0.3}}
+    sized = {"values": {"cube_size": size}, "standard_errors": {"cube_size": 0.3}}
     found = replace(found, final=replace(found.final, **sized))
-    (one,) = found.contenders
+    (one,) = found.hypotheses
     row = rank(one, found, found.named, effect("cube"), law_errors={"cube_size": 0.5})
     (told,) = row.parameters
     assert told.standard_error == pytest.approx((0.3**2 + law**2) ** 0.5)

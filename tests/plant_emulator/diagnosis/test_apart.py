@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from plant_emulator.diagnosis.fit_result import FitResult
-from plant_emulator.diagnosis.fitting.joint_fit import null_fit
+from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.diagnosis.selection import run_consistency
 from plant_emulator.model.parameters import ParameterSet
@@ -22,7 +22,7 @@ NUMBER = r"(\d\S+) \+- (\d\S+) s in "
 def told(nominal: ParameterSet, *logs: Log) -> str:
     model = BenchModel([recording(log) for log in logs], nominal, kernel().effects)
     runs = range(len(logs))
-    found = [null_fit(model, (run,)) for run in runs]
+    found = [fit_null(model, (run,)) for run in runs]
     return run_consistency.between(model, runs, found, found[0])
 
 
@@ -39,10 +39,10 @@ def fitted(a: float, squares: float) -> FitResult:
         values={"a": a, "b": 0.0},
         states=({},),
         cost=squares,
-        squares=squares,
+        sum_of_squares=squares,
         samples=100,
-        share=1.0,
-        errors={"a": 0.1, "b": 0.1},
+        effective_fraction=1.0,
+        standard_errors={"a": 0.1, "b": 0.1},
         converged=True,
     )
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.diagnose import Diagnose
-from plant_emulator.diagnosis.execution.pool import Here
+from plant_emulator.diagnosis.execution.pool import InProcess
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.explanation import Explanation
-from plant_emulator.diagnosis.fitting.joint_fit import linearised, null_fit
+from plant_emulator.diagnosis.fitting.joint_fit import fit_null, linearise
 from plant_emulator.diagnosis.fitting.looks import glance, look
-from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
+from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
 from plant_emulator.diagnosis.fitting.signature import signature
 from plant_emulator.diagnosis.machines.axis import AxisModel, AxisRecipe
 from plant_emulator.diagnosis.machines.axis_effects import EFFECTS
@@ -44,11 +44,11 @@ PLANTED: dict[str, tuple[Callable[..., np.ndarray], str, float]] = {
 
 def contest(model: AxisModel, runs: tuple[int, ...]) -> tuple[FitResult, dict[str, FitResult]]:
     """The fit without effects, and the joint fit of every effect that shows at all."""
-    null = null_fit(model, runs)
-    tangents = Tangents(linearised(model, null, runs))
+    null = fit_null(model, runs)
+    tangents = NuisanceSpace(linearise(model, null, runs))
     found = {name: signature(model, name, null, runs, tangents) for name in model.candidates}
     return null, {
-        name: look(model, (name,), runs, glance(model, one, null, runs, tangents.found))
+        name: look(model, (name,), runs, glance(model, one, null, runs, tangents.estimate))
         for name, one in found.items()
         if one is not None
     }
@@ -62,7 +62,7 @@ def nominal() -> AxisModel:
 def test_an_axis_without_effects_gives_its_parameters_and_white_residuals(
     nominal: AxisModel,
 ) -> None:
-    found = null_fit(nominal, (0,))
+    found = fit_null(nominal, (0,))
     expected = {
         "inertia": truth.MASS,
         "viscous_friction": truth.VISCOUS,
@@ -71,9 +71,9 @@ def test_an_axis_without_effects_gives_its_parameters_and_white_residuals(
     }
     for name, value in expected.items():
         assert found.values[name] == pytest.approx(value, rel=0.01)
-        assert abs(found.values[name] - value) < 4.0 * found.errors[name]
-    assert found.chi_squared == pytest.approx(1.0, abs=0.1)
-    assert found.share > 0.7
+        assert abs(found.values[name] - value) < 4.0 * found.standard_errors[name]
+    assert found.mean_square == pytest.approx(1.0, abs=0.1)
+    assert found.effective_fraction > 0.7
 
 
 def test_an_axis_without_effects_gives_none_of_them_any_evidence(nominal: AxisModel) -> None:
@@ -95,7 +95,7 @@ def test_a_planted_effect_is_first_and_has_its_size(name: str) -> None:
     _, found = contest(model, (0, 1))
     assert min(found, key=lambda effect: found[effect].cost) == name
     assert found[name].values[f"{name}_{key}"] == pytest.approx(size, rel=0.05)
-    assert found[name].chi_squared == pytest.approx(1.0, abs=0.1)
+    assert found[name].mean_square == pytest.approx(1.0, abs=0.1)
 
 
 def test_directions_differ_by_what_the_ratio_says() -> None:
@@ -111,12 +111,12 @@ def test_directions_differ_by_what_the_ratio_says() -> None:
 def test_coulomb_friction_by_direction_cannot_be_told_from_the_offset() -> None:
     extra = lambda q, v, a: 0.3 * truth.COULOMB * np.abs(np.sign(v))  # noqa: E731
     model = AxisModel([truth.log(extra)])
-    null = null_fit(model, (0,))
+    null = fit_null(model, (0,))
     found = signature(
-        model, "coulomb_asymmetry", null, (0,), Tangents(linearised(model, null, (0,)))
+        model, "coulomb_asymmetry", null, (0,), NuisanceSpace(linearise(model, null, (0,)))
     )
     assert null.values["offset"] == pytest.approx(truth.OFFSET + 0.3 * truth.COULOMB, rel=0.05)
-    assert found is None or found.norm < 1e-3 * found.raw
+    assert found is None or found.orthogonal_norm < 1e-3 * found.total_norm
 
 
 def test_a_delay_beyond_a_sample_is_first_and_has_its_length() -> None:
@@ -176,7 +176,7 @@ def test_a_force_that_holds_a_resting_axis_does_not_count() -> None:
     force[rests] = 15.0
     halted = AxisLog(time=t, position=q, force=force, rotary=False, source="halted")
     model = AxisModel([halted])
-    residual = model.residual(0, ())(null_fit(model, (0,)).values)[0]
+    residual = model.residual(0, ())(fit_null(model, (0,)).values)[0]
     late = model.runs[0].time > 13.2
     assert not residual[late].any()
     assert residual[~late & (model.runs[0].time < 12.8)].all()
@@ -291,10 +291,10 @@ def test_nominal_axis_of_a_held_out_run_is_that_of_the_other_runs() -> None:
     recipe = AxisRecipe((truth.log(seed=1), raised))
     model = recipe.build()
     plan = Plan(fitted=(0, 1), folds=(((1,), (0,)), ((0,), (1,))))
-    null = null_fit(model, (0, 1))
-    nothing = Explanation(null=null, final=null, contenders=(), rivals={}, unconverged="")
+    null = fit_null(model, (0, 1))
+    nothing = Explanation(null=null, final=null, hypotheses=(), alternatives={}, unconverged="")
 
-    held_out = HeldOut(pool=Here(), recipe=recipe, model=model, plan=plan)
+    held_out = HeldOut(pool=InProcess(), recipe=recipe, model=model, plan=plan)
     found = held_out.predictions(nothing, (), plan.folds)[NOMINAL]
     left = [one.residuals[0][0] * model.runs[k].noise[0] for k, one in enumerate(found)]
     assert [float(e[e != 0.0].mean()) for e in left] == pytest.approx([-20.0, 20.0], abs=1.0)
@@ -304,7 +304,7 @@ def test_two_machines_are_told_and_no_effect_is_named() -> None:
     """80 kg, and 20 kg of which each log alone agrees with the equations."""
     lighter = truth.log(lambda _q, _v, a: -60.0 * a, phase=0.7, seed=2)
     recipe = AxisRecipe((truth.log(), lighter), fitted=(0, 1))
-    found = Diagnose(Here(), recipe, plan_of(2, 2), settings={}).diagnose().answer.verdict
+    found = Diagnose(InProcess(), recipe, plan_of(2, 2), settings={}).diagnose().answer.verdict
     assert (found.kind, found.effects) == ("unknown", ())
     masses = r"inertia is (\S+) .* kg in axis 1 and (\S+) .* kg in axis 2"
     told = re.search(masses, found.statement)

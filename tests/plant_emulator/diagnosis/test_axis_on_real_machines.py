@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.fit_result import FitResult
-from plant_emulator.diagnosis.fitting.joint_fit import linearised, null_fit
+from plant_emulator.diagnosis.fitting.joint_fit import fit_null, linearise
 from plant_emulator.diagnosis.fitting.looks import glance, look
-from plant_emulator.diagnosis.fitting.nuisance_space import Tangents
+from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
 from plant_emulator.diagnosis.fitting.signature import signature
 from plant_emulator.diagnosis.machines.axis import AxisModel
 from plant_emulator.estimation.least_squares import estimate
@@ -37,13 +37,13 @@ Contest = tuple[FitResult, dict[str, FitResult]]
 
 def contest(model: AxisModel, runs: tuple[int, ...], base: FitResult | None = None) -> Contest:
     """A fit, and the joint fits of every further effect that shows at all."""
-    base = base or null_fit(model, runs)
-    tangents = Tangents(linearised(model, base, runs))
+    base = base or fit_null(model, runs)
+    tangents = NuisanceSpace(linearise(model, base, runs))
     others = (name for name in model.candidates if name not in base.effects)
     found = {name: signature(model, name, base, runs, tangents) for name in others}
     return base, {
         name: look(
-            model, (*base.effects, name), runs, glance(model, one, base, runs, tangents.found)
+            model, (*base.effects, name), runs, glance(model, one, base, runs, tangents.estimate)
         )
         for name, one in found.items()
         if one is not None
@@ -52,7 +52,7 @@ def contest(model: AxisModel, runs: tuple[int, ...], base: FitResult | None = No
 
 def evidence(base: FitResult, found: dict[str, FitResult], share: float) -> dict[str, float]:
     """Fall of the cost in units of what the best model leaves, in independent samples."""
-    left = max(1.0, min(point.chi_squared for point in (base, *found.values())))
+    left = max(1.0, min(point.mean_square for point in (base, *found.values())))
     return {name: (base.cost - point.cost) / left * share for name, point in found.items()}
 
 
@@ -118,7 +118,7 @@ def test_emps_asks_for_viscous_friction_by_direction_and_nothing_else(
     emps_contest: Contest,
 ) -> None:
     null, found = emps_contest
-    evident = evidence(null, found, null.share)
+    evident = evidence(null, found, null.effective_fraction)
     assert [name for name in evident if evident[name] > COUNTS] == ["viscous_asymmetry"]
     assert (
         evident["viscous_asymmetry"]
@@ -133,7 +133,7 @@ def test_a_second_effect_of_emps_does_not_count_with_the_memory_of_the_first_fit
 ) -> None:
     null, found = emps_contest
     base, more = contest(emps, (FIRST,), found["viscous_asymmetry"])
-    evident = evidence(base, more, min(null.share, base.share))
+    evident = evidence(base, more, min(null.effective_fraction, base.effective_fraction))
     assert max(evident.values()) < COUNTS
     gains = {
         name: 1.0 - relative_error(emps, PULSES, point) / relative_error(emps, PULSES, base)
@@ -175,8 +175,8 @@ def test_repeats_of_hsm150_differ_by_friction_and_leave_nothing_but_noise(
     hsm150: AxisModel, hsm150_contest: Contest
 ) -> None:
     null, found = hsm150_contest
-    assert null.chi_squared < 1.1
-    assert max(evidence(null, found, null.share).values()) < COUNTS
+    assert null.mean_square < 1.1
+    assert max(evidence(null, found, null.effective_fraction).values()) < COUNTS
     levels = [state["friction_level"] for state in null.states]
     assert max(levels) - min(levels) > 0.05
     for run in range(8, 12):

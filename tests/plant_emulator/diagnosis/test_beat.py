@@ -7,9 +7,9 @@ from math import pi
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.fitting.joint_fit import fit, linearised, null_fit
+from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null, linearise
 from plant_emulator.diagnosis.fitting.looks import look
-from plant_emulator.diagnosis.fitting.nuisance_space import Tangents, gain_turned
+from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace, gain_at_best_angle
 from plant_emulator.diagnosis.fitting.signature import signature
 from plant_emulator.diagnosis.machine import Candidate
 from plant_emulator.diagnosis.prediction.gap import Fold, refitted
@@ -84,8 +84,10 @@ RUNS = ((3.37, 2.0), (-1.62, -0.7), (4.81, 0.4))
 
 def test_size_that_the_runs_lack_does_not_hide_the_one_that_they_show() -> None:
     model = Loaded([noisy(2.0 + wave(0.5, *own), seed) for seed, own in enumerate(RUNS)])
-    base = null_fit(model, range(3))
-    found = signature(model, "beat", base, range(3), Tangents(linearised(model, base, range(3))))
+    base = fit_null(model, range(3))
+    found = signature(
+        model, "beat", base, range(3), NuisanceSpace(linearise(model, base, range(3)))
+    )
     assert found is not None
     assert found.start["beat_load"] == 0.0
     assert abs(found.start["beat_size"]) == pytest.approx(0.3)  # of those tried the nearest to 0.5
@@ -109,9 +111,9 @@ def test_beat_that_noise_alone_shows_is_not_named() -> None:
     """The best of some 20 frequencies takes 2 (1 + 1/2 + ... + 1/20) = 7 from a run's squares."""
     model = Beating([noisy(np.full_like(TIME, 2.0), seed) for seed in range(8)])
     found = explained(model)
-    (beat,) = found.contenders
-    assert beat.point is not None
-    assert found.null.squares - beat.point.squares > 30.0
+    (beat,) = found.hypotheses
+    assert beat.fit is not None
+    assert found.null.sum_of_squares - beat.fit.sum_of_squares > 30.0
     assert found.final.effects == ()
 
 
@@ -130,7 +132,7 @@ def test_looks_make_the_cost_the_probability_of_the_data() -> None:
     covariance = np.eye(len(TIME)) + 0.4**2 * np.outer(TIME, TIME)
     y = model.measured[0]
     expected = y @ np.linalg.solve(covariance, y) + np.linalg.slogdet(covariance).logabsdet
-    assert found.looks == pytest.approx(np.log1p(0.4**2 * np.sum(TIME**2)), abs=0.2)
+    assert found.occam_penalty == pytest.approx(np.log1p(0.4**2 * np.sum(TIME**2)), abs=0.2)
     assert found.cost == pytest.approx(expected, abs=0.2)
 
 
@@ -178,7 +180,7 @@ def test_what_has_many_valleys_is_looked_for_step_by_step(
     if kind == "shapes":
         unknowns |= {"sizes": (size,), "shapes": (at,)}
     model = Spike([noisy(2.0 + spike(time))], **unknowns)
-    base = null_fit(model, [0])
+    base = fit_null(model, [0])
     sizes = {"cube_size": 40.0, "cube_time": 0.3}
     start = replace(base, values={**base.values, **sizes}, states=({u.name: 0.0 for u in states},))
     where = look(model, ("cube",), [0], start).values["cube_time"]
@@ -189,7 +191,7 @@ def test_angle_of_a_signature_that_is_more_than_a_cosine() -> None:
     """By hand: 2 times mean, cosine and sine of 1 rad along three axes fit a residual in full."""
     mean, cosine, sine = np.eye(3)
     residual = -2.0 * (mean + np.cos(1.0) * cosine + np.sin(1.0) * sine)
-    gain, angle = gain_turned(mean + cosine, mean + sine, mean - cosine, residual)
+    gain, angle = gain_at_best_angle(mean + cosine, mean + sine, mean - cosine, residual)
     assert angle == pytest.approx(1.0, abs=pi / 24.0)
     assert gain == pytest.approx(8.0, rel=0.01)
 

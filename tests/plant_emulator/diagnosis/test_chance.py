@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.execution.pool import Here
-from plant_emulator.diagnosis.fitting.joint_fit import fit, null_fit
+from plant_emulator.diagnosis.execution.pool import InProcess
+from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
 from plant_emulator.diagnosis.fitting.random_effects import Weighted, unrest
 from plant_emulator.diagnosis.fitting.steps import show
 from plant_emulator.diagnosis.fitting.task import Task
-from plant_emulator.diagnosis.selection.procedure import Inquiry
+from plant_emulator.diagnosis.selection.procedure import Procedure
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, effect, linear, noisy
 
@@ -51,16 +51,16 @@ def shaken(size: float, seed: int = 5) -> Array:
 def found(y: Array):  # type: ignore[no-untyped-def]
     """The unrest of the shake on the line's fit."""
     model = Shaken([y])
-    return unrest(model, Task(base=null_fit(model, [0]), runs=(0,), effect="shake"))
+    return unrest(model, Task(base=fit_null(model, [0]), runs=(0,), effect="shake"))
 
 
 def test_size_and_evidence_of_an_unrest() -> None:
     """By hand: evidence is the sum of a^2 v - log(1 + a^2 v) over the samples, on average."""
     line = 2.0 + 3.0 * TIME
     one = found(noisy(line) + shaken(0.8))
-    assert one.holds
+    assert one.consistent
     assert one.size == pytest.approx(0.8, rel=0.15)
-    assert one.size == pytest.approx(0.8, abs=4.0 * one.error)
+    assert one.size == pytest.approx(0.8, abs=4.0 * one.standard_error)
     added = (0.8 * SLOPE) ** 2
     assert one.evidence == pytest.approx(float(np.sum(added - np.log1p(added))), rel=0.3)
     (weights,) = one.weights
@@ -77,7 +77,7 @@ def test_gap_that_is_as_large_but_not_random_is_no_unrest() -> None:
     ordered = 0.8 * SLOPE * np.sign(np.sin(40.0 * TIME))
     one = found(noisy(2.0 + 3.0 * TIME) + ordered)
     assert one.evidence > 1000.0
-    assert not one.holds
+    assert not one.consistent
 
 
 def test_gap_that_is_random_elsewhere_is_no_unrest() -> None:
@@ -85,14 +85,14 @@ def test_gap_that_is_random_elsewhere_is_no_unrest() -> None:
     drawn = np.random.default_rng(3).standard_normal(len(TIME))
     one = found(noisy(2.0 + 3.0 * TIME) + 3.0 * (TIME > 0.0) * drawn)
     assert one.evidence > 1000.0
-    assert not one.holds
+    assert not one.consistent
 
 
 def test_unrest_that_draws_the_fit_to_its_course_is_told_all_the_same() -> None:
     """All shakes of the last eighth go one way, and the line follows them until they weigh less."""
     course = np.where(TIME > 0.75, 8.0 * SLOPE, shaken(8.0))
     one = found(noisy(2.0 + 3.0 * TIME) + course)
-    assert one.holds
+    assert one.consistent
     assert one.size == pytest.approx(8.0, rel=0.05)
 
 
@@ -119,21 +119,23 @@ def test_unrest_of_a_shape_that_is_not_the_usual_one() -> None:
 
     y = noisy(2.0 + 3.0 * TIME) + shaken(8.0)
     model = Shaped([y])
-    one = unrest(model, Task(base=null_fit(model, [0]), runs=(0,), effect="shake"))
-    assert one.holds
+    one = unrest(model, Task(base=fit_null(model, [0]), runs=(0,), effect="shake"))
+    assert one.consistent
     assert one.shape == {"shake_power": 1.0}
     assert one.size == pytest.approx(8.0, rel=0.1)
     # Neither does the usual one hold nor one of a higher power.
     model.candidates["shake"] = replace(
         model.candidates["shake"], shapes=(linear("shake_power", 2.0),)
     )
-    assert not unrest(model, Task(base=null_fit(model, [0]), runs=(0,), effect="shake")).even
+    assert not unrest(
+        model, Task(base=fit_null(model, [0]), runs=(0,), effect="shake")
+    ).homoscedastic
 
 
 def test_effect_beside_an_unrest_is_named_with_it() -> None:
     y = noisy(2.0 + 3.0 * TIME + 0.5 * np.sin(20.0 * TIME)) + shaken(0.8)
     model = Shaken([y])
-    inquiry = Inquiry(pool=Here(), recipe=Given(model), model=model, runs=(0,))
+    inquiry = Procedure(pool=InProcess(), recipe=Given(model), model=model, runs=(0,))
     explained, verdict, recipe = inquiry.found()
     assert (verdict.kind, verdict.effects) == ("effect", ("shake", "wave"))
     assert explained.classes() == [["shake"], ["wave"]]
@@ -147,14 +149,14 @@ def test_no_other_effect_is_sought_where_all_is_chance() -> None:
     """Every first look at one counts the unrest as noise already."""
     looked = []
 
-    class Watched(Here):
+    class Watched(InProcess):
         def map(self, function, recipe, tasks):  # type: ignore[no-untyped-def]
             if function is show and tasks:
                 looked.append(recipe)
             return super().map(function, recipe, tasks)
 
     model = Shaken([noisy(2.0 + 3.0 * TIME) + shaken(0.8)])
-    inquiry = Inquiry(pool=Watched(), recipe=Given(model), model=model, runs=(0,))
+    inquiry = Procedure(pool=Watched(), recipe=Given(model), model=model, runs=(0,))
     assert inquiry.found()[1].effects == ("shake",)
     assert looked
     assert all(isinstance(recipe, Weighted) for recipe in looked)
@@ -166,13 +168,13 @@ def test_what_is_little_beside_a_great_unrest_may_be_its_law() -> None:
     """
     y = noisy(2.0 + 3.0 * TIME + 0.5 * np.sin(20.0 * TIME)) + shaken(8.0)
     model = Shaken([y])
-    inquiry = Inquiry(pool=Here(), recipe=Given(model), model=model, runs=(0,))
+    inquiry = Procedure(pool=InProcess(), recipe=Given(model), model=model, runs=(0,))
     assert inquiry.found()[1].effects == ("shake",)
 
 
 def test_unrest_alone_is_an_effect() -> None:
     model = Shaken([noisy(2.0 + 3.0 * TIME) + shaken(0.8)])
-    inquiry = Inquiry(pool=Here(), recipe=Given(model), model=model, runs=(0,))
+    inquiry = Procedure(pool=InProcess(), recipe=Given(model), model=model, runs=(0,))
     assert inquiry.found()[1].effects == ("shake",)
 
 

@@ -47,7 +47,12 @@ def test_size_beyond_its_bound_was_not_tried(name: str, factor: float, left: flo
 
 def answer_of(name: str, smallest_: float, raw: float = 5.0) -> dict[str, Any]:
     found = Detectability(
-        effect=name, norm=0.0, raw=raw, smallest=smallest_, imitated_by="", alike=(name,)
+        effect=name,
+        orthogonal_norm=0.0,
+        total_norm=raw,
+        smallest_size=smallest_,
+        confounded_with="",
+        indistinguishable=(name,),
     )
     return as_answer(found, candidate(effects.load(name)))
 

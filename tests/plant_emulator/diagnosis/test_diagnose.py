@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.diagnose import Diagnose, Findings
-from plant_emulator.diagnosis.execution.pool import Here
+from plant_emulator.diagnosis.execution.pool import InProcess
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.prediction.gap import Fold, predict
@@ -41,7 +41,7 @@ class Unplanned(Line):
 
 
 def diagnosed(model: Line) -> Findings:
-    return Diagnose(Here(), Given(model), EACH_IN_TURN, settings={}).diagnose()
+    return Diagnose(InProcess(), Given(model), EACH_IN_TURN, settings={}).diagnose()
 
 
 def test_run_that_alone_shows_the_effect_is_not_predicted_and_named() -> None:
@@ -97,7 +97,7 @@ def test_nothing_is_said_to_close_where_every_run_lacks_an_effect_of_another() -
     runs = [noisy(line + 4.0 * np.abs(TIME), 1), noisy(line + 4.0 * np.sin(20.0 * TIME), 2)]
     plan = Plan(fitted=(0, 1), folds=(((1,), (0,)), ((0,), (1,))))
     model = EachOwnEffect(runs, ["kink", "wave"])
-    found = Diagnose(Here(), Given(model), plan, settings={}).diagnose()
+    found = Diagnose(InProcess(), Given(model), plan, settings={}).diagnose()
     assert set(found.answer.verdict.effects) == {"kink", "wave"}
     assert found.answer.logs.held_out == ("run 0", "run 1")
     assert found.answer.gap.closed_fraction is None
@@ -153,7 +153,7 @@ def test_prediction_by_a_fit_that_does_not_end_is_told(monkeypatch: pytest.Monke
     found = {(): [predict(model, fold)], ("kink",): [predict(model, fold)]}
     folds = (((0,), (1,)),)
     held_out = HeldOut(
-        pool=Here(), recipe=Given(model), model=model, plan=Plan(fitted=(0,), folds=folds)
+        pool=InProcess(), recipe=Given(model), model=model, plan=Plan(fitted=(0,), folds=folds)
     )
     assert held_out.unsettled(folds, found) == (
         "run 1: predicted by a fit with no effect that did not end",

@@ -7,8 +7,8 @@ import pytest
 
 from plant_emulator import parameter_sets
 from plant_emulator.diagnosis.answer import Location
-from plant_emulator.diagnosis.fitting.joint_fit import null_fit
-from plant_emulator.diagnosis.localisation.locate import WORTH, among, locate
+from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.localisation.locate import WORTHWHILE_BLOCK_GAIN, among, locate
 from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
@@ -26,7 +26,7 @@ SUBSYSTEMS = {
 def located(*logs: Log) -> Location:
     recordings = [recording(log) for log in logs]
     model = BenchModel(recordings, PARAMETERS, kernel().effects)
-    return locate(recordings, PARAMETERS, null_fit(model, range(len(recordings))))
+    return locate(recordings, PARAMETERS, fit_null(model, range(len(recordings))))
 
 
 def with_effect(inputs: Log, effects: Mapping[str, Mapping[str, float]]) -> Log:
@@ -49,7 +49,7 @@ def test_a_bench_without_an_effect_has_no_place_to_name(
     bench_log: Callable[[str], Log], case: str
 ) -> None:
     found = located(*(bench_log(f"bench_practice/{case}/program{k}") for k in (1, 2)))
-    assert found.gain <= WORTH
+    assert found.gain <= WORTHWHILE_BLOCK_GAIN
     assert max(found.shares.values()) < 0.5
 
 
@@ -87,5 +87,5 @@ def test_an_effect_is_placed_without_knowing_of_it(
         for k in (1, 2)
     ]
     found = located(*logs)
-    assert found.gain > WORTH
+    assert found.gain > WORTHWHILE_BLOCK_GAIN
     assert found.subsystem == subsystem

@@ -1,5 +1,6 @@
 """The next experiment, on machines of which the answer is known beforehand."""
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -10,10 +11,10 @@ import pytest
 from plant_emulator import parameter_sets
 from plant_emulator.diagnosis.answer import Location
 from plant_emulator.diagnosis.design.next_experiment import Advice
-from plant_emulator.diagnosis.execution.pool import Here
+from plant_emulator.diagnosis.execution.pool import InProcess
 from plant_emulator.diagnosis.fit_result import FitResult
-from plant_emulator.diagnosis.fitting.explanation import Contender, Explanation
-from plant_emulator.diagnosis.fitting.joint_fit import fit, null_fit
+from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
+from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
 from plant_emulator.diagnosis.machine import Candidate, Run
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
 from plant_emulator.diagnosis.selection.verdict import Decision
@@ -127,17 +128,21 @@ class Slope:
         return {"road": ("a hill",)}
 
 
+# Identities are used again once a model is gone; numbers are not.
+NUMBERS = itertools.count()
+
+
 class Given:
     """A recipe of a model that is there already."""
 
     def __init__(self, model: Slope) -> None:
-        self.model = model
+        self.model, self.number = model, next(NUMBERS)
 
     def build(self) -> Slope:
         return self.model
 
     def digest(self) -> str:
-        return str(id(self.model))
+        return str(self.number)
 
 
 def measured(x: Array, y: Array) -> Array:
@@ -151,20 +156,20 @@ def machine(**plans: Array) -> Slope:
 
 def explanation(model: Slope) -> Explanation:
     """`square` is accepted, `straight` cannot be told from it."""
-    null = null_fit(model, (0,))
+    null = fit_null(model, (0,))
     points = {
         name: fit(model, (name,), (0,), null.values, null.states) for name in ("square", "straight")
     }
     contenders = [
-        Contender(effect=name, norm=0.0, raw=0.0, imitated_by="b", point=point)
+        Hypothesis(effect=name, orthogonal_norm=0.0, total_norm=0.0, confounded_with="b", fit=point)
         for name, point in points.items()
     ]
     costs = {name: points[name].cost for name in ("square", "straight")}
     return Explanation(
         null=null,
         final=points["square"],
-        contenders=tuple(contenders),
-        rivals={"square": costs},
+        hypotheses=tuple(contenders),
+        alternatives={"square": costs},
         unconverged="",
     )
 
@@ -173,8 +178,8 @@ ROAD = Location(subsystem="road", channel=None, phase="deceleration", shares={},
 
 
 def advice(model: Slope, explained: Explanation, kind: Any, hidden: Sequence[str] = ()) -> Any:
-    found = Decision(kind=kind, effects=explained.final.effects, shifts=(), reason="")
-    asked = Advice(Here(), Given(model), model, (0,))
+    found = Decision(kind=kind, effects=explained.final.effects, deviations=(), reason="")
+    asked = Advice(InProcess(), Given(model), model, (0,))
     return asked.next_experiment(explained, found, ROAD, hidden)
 
 
@@ -216,7 +221,7 @@ def test_machine_without_planned_runs_tells_what_the_effects_need():
 
 def test_effect_that_stands_alone_asks_for_nothing():
     model = machine(fast=FAST)
-    alone = replace(explanation(model), rivals={"square": {"square": 0.0}})
+    alone = replace(explanation(model), alternatives={"square": {"square": 0.0}})
     assert advice(model, alone, "effect") is None
 
 
@@ -278,15 +283,15 @@ def test_bench_names_the_program_that_has_what_an_effect_needs():
         values={u.name: u.prior for u in model.parameters},
         states=({GAP_POSITION: 0.0},) * 3,
         cost=0.0,
-        squares=0.0,
+        sum_of_squares=0.0,
         samples=1,
-        share=1.0,
-        errors={},
+        effective_fraction=1.0,
+        standard_errors={},
         converged=True,
     )
-    explained = Explanation(null=null, final=null, contenders=(), rivals={}, unconverged="")
-    nothing = Decision(kind="none", effects=(), shifts=(), reason="")
-    asked = Advice(Here(), recipe, model, (0, 1, 2))
+    explained = Explanation(null=null, final=null, hypotheses=(), alternatives={}, unconverged="")
+    nothing = Decision(kind="none", effects=(), deviations=(), reason="")
+    asked = Advice(InProcess(), recipe, model, (0, 1, 2))
     for hidden, program in (("wheel_slip", "program6"), ("integrator_windup", "program4 (60 s")):
         told = asked.next_experiment(explained, nothing, ROAD, [hidden])
         assert told is not None

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from plant_emulator.diagnosis.execution.pool import Here
+from plant_emulator.diagnosis.execution.pool import InProcess
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.input_noise_model import Quieted, quieted
-from plant_emulator.diagnosis.fitting.joint_fit import null_fit
-from plant_emulator.diagnosis.selection.procedure import Inquiry
+from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.selection.procedure import Procedure
 from plant_emulator.recordings.input_noise import Loud
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, noisy
@@ -37,16 +37,16 @@ def test_fits_do_not_follow_the_noise_of_a_fed_input() -> None:
     """By hand: without the fed samples a and b are those of the line, within their errors."""
     y = noisy(2.0 + 3.0 * TIME) + FED
     model = Fed([y])
-    recipe, _ = quieted(Here(), Given(model), model, (0,))
-    there, plain = null_fit(recipe.build(), [0]), null_fit(model, [0])
+    recipe, _ = quieted(InProcess(), Given(model), model, (0,))
+    there, plain = fit_null(recipe.build(), [0]), fit_null(model, [0])
     for name, value in (("a", 2.0), ("b", 3.0)):
-        assert abs(there.values[name] - value) < 3.0 * there.errors[name]
+        assert abs(there.values[name] - value) < 3.0 * there.standard_errors[name]
     assert plain.values["b"] > 4.0
 
 
 def test_inquiry_with_quiet_inputs_finds_no_gap_in_their_noise() -> None:
     model = Fed([noisy(2.0 + 3.0 * TIME) + FED])
-    inquiry = Inquiry(pool=Here(), recipe=Given(model), model=model, runs=(0,))
+    inquiry = Procedure(pool=InProcess(), recipe=Given(model), model=model, runs=(0,))
     assert inquiry.found()[1].kind == "unknown"
     assert inquiry.with_quiet_inputs().found()[1].kind == "parameter"
 
@@ -63,21 +63,21 @@ def test_contest_starts_from_the_fit_that_told_the_noise() -> None:
             return super().search(runs)
 
     model = Once([noisy(2.0 + 3.0 * TIME) + FED])
-    inquiry = Inquiry(pool=Here(), recipe=Given(model), model=model, runs=(0,))
+    inquiry = Procedure(pool=InProcess(), recipe=Given(model), model=model, runs=(0,))
     explained, _, _ = inquiry.with_quiet_inputs().found()
     for name, value in (("a", 2.0), ("b", 3.0)):
-        assert abs(explained.null.values[name] - value) < 3.0 * explained.null.errors[name]
+        assert abs(explained.null.values[name] - value) < 3.0 * explained.null.standard_errors[name]
 
 
 def test_machine_that_is_fed_nothing_keeps_its_recipe() -> None:
     model = Line([noisy(2.0 + 3.0 * TIME)])
     recipe = Given(model)
-    assert quieted(Here(), recipe, model, (0,)) == (recipe, None)
+    assert quieted(InProcess(), recipe, model, (0,)) == (recipe, None)
 
 
 def test_quieted_model_is_another_recipe() -> None:
     model = Fed([noisy(2.0 + 3.0 * TIME)])
-    one = model.loud(0, null_fit(model, [0]), {})
+    one = model.loud(0, fit_null(model, [0]), {})
     louder = replace(one, deviations=2.0 * one.deviations)
     digests = {Quieted(Given(model), {0: loud}).digest() for loud in (one, louder)}
     assert len({*digests, Given(model).digest()}) == 3

@@ -114,7 +114,10 @@ def test_coefficients_by_direction_are_those_of_a_fit_of_both() -> None:
         assert value == pytest.approx(truth * axis_truth.VISCOUS, rel=0.01)
         assert abs(value - truth * axis_truth.VISCOUS) < 4.0 * error
         # Of the mean of both and of half their difference, neither alone.
-        both = found.errors["viscous_friction"], found.errors["viscous_asymmetry_ratio"]
+        both = (
+            found.standard_errors["viscous_friction"],
+            found.standard_errors["viscous_asymmetry_ratio"],
+        )
         rough = float(np.hypot(both[0] * truth, both[1] * axis_truth.VISCOUS))
         assert 0.3 * rough < error < 1.5 * rough
 

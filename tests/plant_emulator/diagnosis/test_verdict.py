@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.joint_fit import null_fit
-from plant_emulator.diagnosis.selection.verdict import Decision, decide, shifts
+from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.selection.verdict import Decision, decide, deviations
 from tests.plant_emulator.diagnosis.test_contest import TIME, Line, explained, linear, noisy
 
 LINE = 2.0 + 3.0 * TIME
@@ -51,5 +51,8 @@ def test_shift_that_chance_may_explain_does_not_come_first() -> None:
     model = Line([noisy(LINE)])
     model.parameters = (linear("a", 0.0, prior=0.0, std=10.0), linear("b", 0.0, prior=0.0, std=0.1))
     values, errors = {"a": 5.0, "b": 0.35}, {"a": 1.0, "b": 0.1}
-    point = replace(null_fit(model, [0]), values=values, errors=errors)
-    assert [(s.name, s.sure) for s in shifts(model, point)] == [("a", True), ("b", False)]
+    point = replace(fit_null(model, [0]), values=values, standard_errors=errors)
+    assert [(s.name, s.significant) for s in deviations(model, point)] == [
+        ("a", True),
+        ("b", False),
+    ]

@@ -11,7 +11,7 @@ import pytest
 from plant_emulator import effects
 from plant_emulator.diagnosis.diagnose import Findings
 from plant_emulator.diagnosis.fit_result import FitResult
-from plant_emulator.diagnosis.fitting.joint_fit import null_fit
+from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
 from plant_emulator.diagnosis.report.document import from_json
 from plant_emulator.model.parameters import ParameterSet
@@ -32,7 +32,8 @@ def diagnosis(name: str, **states: tuple[float, ...]) -> Findings:
     final = FitResult(
         effects=(name,), values={},
         states=tuple({f"{name}_{k}": v for k, v in zip(states, run, strict=True)} for run in runs),
-        cost=0.0, squares=0.0, samples=1, share=1.0, errors={}, converged=True,
+        cost=0.0, sum_of_squares=0.0, samples=1, effective_fraction=1.0,
+        standard_errors={}, converged=True,
     )  # fmt: skip
     answer = from_json(answers.effect())
     return Findings(
@@ -93,8 +94,8 @@ def test_diagnosis_finds_each_runs_own_start_of_the_sets_effects(nominal: Parame
         )
     model = BenchRecipe(tuple(runs), bench).build()
     assert "gear_eccentricity" not in model.candidates
-    found = null_fit(model, (0, 1))
-    assert found.chi_squared < 1.1
+    found = fit_null(model, (0, 1))
+    assert found.mean_square < 1.1
     for state, phase in zip(found.states, (1.0, 4.0), strict=True):
         assert np.cos(state["gear_eccentricity_phase"] - phase) > 0.95
     assert model.located(found, (0, 1)) is None

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.design.detectability import as_answer, detectability
-from plant_emulator.diagnosis.fitting.evidence import STRUCTURED
-from plant_emulator.diagnosis.fitting.joint_fit import null_fit
+from plant_emulator.diagnosis.fitting.evidence import LJUNG_BOX_LIMIT
+from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.localisation.block_basis import inside
-from plant_emulator.diagnosis.localisation.locate import WORTH, locate
+from plant_emulator.diagnosis.localisation.locate import WORTHWHILE_BLOCK_GAIN, locate
 from plant_emulator.diagnosis.localisation.parameter_sensitivities import slopes
 from plant_emulator.diagnosis.localisation.parity_covariance import relations
 from plant_emulator.diagnosis.localisation.parity_relations import (
@@ -158,10 +158,10 @@ def test_sensor_that_is_a_little_off_is_no_gap(
         recording(with_voltage(r.log, gain * r.log[VOLTAGE] + offset))
         for r in runs_of(bench_log, nominal)
     ]
-    found = null_fit(BenchModel(runs, nominal, {}), range(2))
-    assert found.chi_squared == pytest.approx(1.0, abs=0.03)
-    assert found.structure < STRUCTURED
-    assert locate(runs, nominal, found).gain < WORTH
+    found = fit_null(BenchModel(runs, nominal, {}), range(2))
+    assert found.mean_square == pytest.approx(1.0, abs=0.03)
+    assert found.ljung_box_excess < LJUNG_BOX_LIMIT
+    assert locate(runs, nominal, found).gain < WORTHWHILE_BLOCK_GAIN
 
 
 def test_derivatives_of_the_relations_are_those_of_finite_differences(
@@ -218,11 +218,11 @@ def test_resistance_is_free_where_the_voltage_shows_it(
     bench_log: Reader, nominal: ParameterSet
 ) -> None:
     runs = runs_of(bench_log, nominal, armature_resistance=1.2 * 0.424)
-    found = null_fit(BenchModel(runs, nominal, {}), range(2))
-    error = found.errors["armature_resistance"]
+    found = fit_null(BenchModel(runs, nominal, {}), range(2))
+    error = found.standard_errors["armature_resistance"]
     assert found.values["armature_resistance"] == pytest.approx(1.2 * 0.424, abs=4.0 * error)
     assert error < 0.01
-    assert found.chi_squared == pytest.approx(1.0, abs=0.05)
+    assert found.mean_square == pytest.approx(1.0, abs=0.05)
 
 
 @pytest.mark.slow
@@ -235,13 +235,13 @@ def test_warm_armature_shows_in_the_voltage_and_only_there(
     if not logged:
         runs = [recording(without_voltage(r.log)) for r in runs]
     model = BenchModel(runs, nominal, effects)
-    (found,) = detectability(model, null_fit(model, range(3)), range(3))
+    (found,) = detectability(model, fit_null(model, range(3)), range(3))
     entry = as_answer(found, model.candidates[HEATING])
     if logged:
-        assert found.norm > 7.0
+        assert found.orthogonal_norm > 7.0
         assert entry["needs"] is None
     else:
-        assert found.norm < 7.0
+        assert found.orthogonal_norm < 7.0
         assert "armature_voltage_V" in str(entry["needs"])
 
 
@@ -263,8 +263,8 @@ def test_place_of_what_the_voltage_shows(
 ) -> None:
     own = {**kernel().effects[effect].plausible(), **sizes}
     runs = runs_of(bench_log, nominal, {effect: own}, (1, 2, 3))
-    found = locate(runs, nominal, null_fit(BenchModel(runs, nominal, {}), range(3)))
-    assert found.gain > WORTH
+    found = locate(runs, nominal, fit_null(BenchModel(runs, nominal, {}), range(3)))
+    assert found.gain > WORTHWHILE_BLOCK_GAIN
     assert found.subsystem == subsystem
 
 

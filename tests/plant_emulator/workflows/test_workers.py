@@ -15,6 +15,7 @@ from click.testing import CliRunner
 from plant_emulator.cli import main
 from plant_emulator.diagnosis.execution import pool
 from plant_emulator.diagnosis.fitting import steps
+from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.machine import Model
 from plant_emulator.errors import EmulatorError, InputError
 from plant_emulator.workflows.workers import Cluster, Processes
@@ -124,14 +125,14 @@ def test_tangents_are_returned_though_another_thread_lets_them_go(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     line = Line([noisy(2.0 + 3.0 * TIME + np.abs(TIME), 1)], ["kink"])
-    task = steps.Task(base=steps.start(line, (0,)), runs=(0,), effect="kink")
+    task = Task(base=steps.start(line, (0,)), runs=(0,), effect="kink")
     undisturbed = steps.show(line, task)
     monkeypatch.setattr(steps, "_last", Cleared())
     shown = steps.show(line, task)
     assert shown is not None
     assert undisturbed is not None
     assert shown.start == undisturbed.start
-    assert shown.norm == undisturbed.norm > 10.0
+    assert shown.orthogonal_norm == undisturbed.orthogonal_norm > 10.0
 
 
 @pytest.mark.parametrize("address", ["nonsense", "foo://host:1", "tcp://127.0.0.1:x", "tcp://"])
