@@ -1,9 +1,9 @@
 """The contest on a machine so small that it can be checked by hand."""
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -360,69 +360,39 @@ def test_drift_of_every_run_where_they_leave_much_less_alone() -> None:
     assert starts[0].sum_of_squares - starts[0].samples == pytest.approx(len(TIME) * 20.0, rel=0.05)
 
 
-class Watched(InProcess):
-    """A pool that notes its steps: the function, the effects there, and the effect looked at."""
-
-    def __init__(self) -> None:
-        self.steps: list[tuple[str, tuple[str, ...], str]] = []
-
-    def map(self, function: Any, recipe: Any, items: Sequence[Any]) -> Iterator[Any]:
-        """See `Pool`."""
-        for item in items:
-            base = getattr(item, "base", None)
-            effects = base.effects if base is not None else ()
-            self.steps.append((function.__name__, effects, getattr(item, "effect", "")))
-        return super().map(function, recipe, items)
-
-    def names(self) -> set[str]:
-        """Of all steps of fits with effects."""
-        return {name for name, effects, _ in self.steps if effects}
-
-
 # A cube that closes 0.8 of the gap, and what else there is.
 CUBE = 40.0 * SHAPES["cube"](TIME)
-ELSEWHERE = {"shake", "once_more", "sift", "swap", "contend_far"}
+KINK = SHAPES["kink"](TIME)
+RIPPLE = np.sin(7.0 * TIME)
+NAMES = ("cube", "wave", "kink")
 
 
-def test_second_effect_is_looked_for_before_the_first_starts_again_from_elsewhere() -> None:
-    """The cube's fit leaves 9 times the noise: not since it is astray, but for the kink."""
-    model = Line([noisy(CUBE + 10.0 * SHAPES["kink"](TIME))], ("cube", "wave", "kink"))
-    pool = Watched()
-    found = Contest(pool, Given(model), tuple(model.candidates), (0,)).explain()
+def test_second_effect_that_the_first_leaves_is_named_with_both_sizes() -> None:
+    """By hand: alone, the cube leaves the kink's n 10^2 / 12 beside the noise."""
+    found = explained(Line([noisy(CUBE + 10.0 * KINK)], NAMES))
     assert set(found.final.effects) == {"cube", "kink"}
-    both = next(k for k, (_, effects, _) in enumerate(pool.steps) if len(effects) == 2)
-    assert not {name for name, effects, _ in pool.steps[:both] if effects} & ELSEWHERE
+    assert found.final.values["cube_size"] == pytest.approx(40.0, rel=0.02)
+    assert found.final.values["kink_size"] == pytest.approx(10.0, rel=0.02)
+    alone = {one.effect: one.fit for one in found.hypotheses}
+    assert alone["cube"] is not None
+    assert alone["cube"].cost == pytest.approx(2000 * (1.0 + 100.0 / 12.0), rel=0.02)
+    assert found.alternatives["cube"]["cube"] == found.final.cost
 
 
-def test_each_of_two_effects_is_fitted_alone_from_the_nominal_parameters() -> None:
-    """One of them may have come in for the fit of the other, which had gone astray."""
-    model = Line([noisy(CUBE + 10.0 * SHAPES["kink"](TIME))], ("cube", "wave", "kink"))
-    pool = Watched()
-    Contest(pool, Given(model), tuple(model.candidates), (0,)).explain()
-    alone = [effect for name, base, effect in pool.steps if name == "once_more" and not base]
-    assert sorted(alone) == ["cube", "kink"]
-
-
-def test_faint_second_effect_is_followed_beyond_the_noise() -> None:
-    """Its evidence, about 100, may be depth of a hollow that the first has stopped in."""
-    model = Line([noisy(CUBE + 0.8 * SHAPES["kink"](TIME))], ("cube", "wave", "kink"))
-    pool = Watched()
-    found = Contest(pool, Given(model), tuple(model.candidates), (0,), exact=("cube",)).explain()
+def test_faint_second_effect_beside_an_exact_one_is_named() -> None:
+    """Its evidence is about 100, and what both leave is noise."""
+    model = Line([noisy(CUBE + 0.8 * KINK)], NAMES)
+    found = Contest(InProcess(), Given(model), NAMES, (0,), exact=("cube",)).explain()
     assert set(found.final.effects) == {"cube", "kink"}
     assert noise_only(found.final)
-    assert any(name == "shake" and len(effects) == 2 for name, effects, _ in pool.steps)
 
 
-def test_far_from_the_cause_all_start_from_the_nominal_parameters() -> None:
-    """A ripple whose mean square is 18: no effect closes half of it, and none is tried twice."""
-    model = Line([noisy(6.0 * np.sin(7.0 * TIME))], ("cube", "wave", "kink"))
-    pool = Watched()
-    found = Contest(pool, Given(model), tuple(model.candidates), (0,)).explain()
-    assert 15.0 < found.null.mean_square < 20.0
-    assert ("contend_far", ()) not in {(name, base) for name, base, _ in pool.steps}
-    tried = [effect for name, base, effect in pool.steps if name == "once_more" and not base]
-    assert sorted(tried) == sorted(set(tried))
-    assert set(tried) >= {"cube", "kink"}
+@pytest.mark.parametrize("measured", [6.0 * RIPPLE, CUBE + 10.0 * KINK + 5.0 * RIPPLE])
+def test_ripple_that_no_effect_explains_is_unknown(measured: Array) -> None:
+    """Its mean square is 18 alone, and 12.5 beside two effects; the noise has 1."""
+    model = Line([noisy(measured)], NAMES)
+    found = decide(model, explained(model))
+    assert (found.kind, found.effects) == ("unknown", ())
 
 
 class Placed(Line):
@@ -434,35 +404,14 @@ class Placed(Line):
         return Location(subsystem="here", channel=None, phase=None, shares=shares, cells=())
 
 
-def test_effects_of_the_gaps_place_start_from_the_nominal_parameters_before_others() -> None:
-    """The cube closes most, and would be the first without the place."""
-    measured = 0.2 * CUBE + 2.0 * SHAPES["kink"](TIME) + 1.5 * np.sin(7.0 * TIME)
-    model = Placed([noisy(measured)], ("cube", "wave", "kink"))
+def test_place_of_the_gap_overrules_no_fit() -> None:
+    """The cube closes most, wherever the gap is said to lie."""
+    measured = noisy(0.2 * CUBE + 2.0 * KINK + 1.5 * RIPPLE)
     places = {"cube": "there", "wave": "there", "kink": "here"}
-    pool = Watched()
-    Contest(pool, Given(model), tuple(places), (0,), subsystems=places).explain()
-    tried = [effect for name, base, effect in pool.steps if name == "once_more" and not base]
-    assert tried[0] == "kink"
-
-
-def test_effect_that_stands_again_in_noise_is_not_looked_at_once_more() -> None:
-    """Its fit is known: the last one of all."""
-    model = Line([noisy(CUBE + 10.0 * SHAPES["kink"](TIME))], ("cube", "wave", "kink"))
-    pool = Watched()
-    found = Contest(pool, Given(model), tuple(model.candidates), (0,)).explain()
-    looked = {(base, effect) for name, base, effect in pool.steps if name == "show"}
-    assert (("kink",), "wave") in looked
-    assert (("kink",), "cube") not in looked
-    assert found.alternatives["cube"]["cube"] == found.final.cost
-
-
-def test_where_two_leave_more_than_noise_the_best_start_again_from_elsewhere() -> None:
-    """A ripple that no effect explains: nothing says that the fits are not astray."""
-    ripple = 5.0 * np.sin(7.0 * TIME)
-    model = Line([noisy(CUBE + 10.0 * SHAPES["kink"](TIME) + ripple)], ("cube", "wave", "kink"))
-    pool = Watched()
-    Contest(pool, Given(model), tuple(model.candidates), (0,)).explain()
-    assert pool.names() >= {"once_more", "sift", "shake"}
+    placed = Contest(InProcess(), Given(Placed([measured], NAMES)), NAMES, (0,), subsystems=places)
+    found, plain = placed.explain().final, explained(Line([measured], NAMES)).final
+    assert found.effects == plain.effects == ("cube",)
+    assert found.cost == pytest.approx(plain.cost, rel=1e-6)
 
 
 def test_signature_of_an_effect_below_zero_begins_below_zero() -> None:
