@@ -6,12 +6,16 @@ import os
 import shlex
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
 import click
 from click.core import ParameterSource
 
 from plant_emulator.cli import _options
 from register_maps.command_line.parameters import Command, OutputFile
+
+if TYPE_CHECKING:
+    from plant_emulator.workflows.diagnosis.diagnose import Diagnosis
 
 EXAMPLE = """
 \b
@@ -68,10 +72,10 @@ def command(
     logs: tuple[str, ...],
     held_out: tuple[str, ...],
     parameters: str,
-    model: str,
+    model: Literal["bench", "axis"],
     without: tuple[str, ...],
     own: tuple[str, ...],
-    reference: str | None,
+    reference: Literal["linear", "staircase"] | None,
     workers: int,
     scheduler: str | None,
     save: str | None,
@@ -83,68 +87,39 @@ def command(
     The verdict is an effect, a class of effects that these logs cannot tell apart, other
     parameters, nothing, or unknown; how far the gap shrinks is measured on runs not fitted.
     """
-    from threadpoolctl import threadpool_limits
-
-    from plant_emulator import parameter_sets
     from plant_emulator.cli._progress import progress
-    from plant_emulator.diagnosis.diagnose import Diagnose
-    from plant_emulator.diagnosis.report.document import to_json
-    from plant_emulator.diagnosis.report.terminal import lines
-    from plant_emulator.parameter_sets import with_effects
-    from plant_emulator.workflows.diagnosis import (
-        axis_loaded,
-        calibration,
-        laws_apart,
-        loaded,
-        parameter_set,
-    )
-    from plant_emulator.workflows.workers import pool_of
+    from plant_emulator.workflows.diagnosis.diagnose import diagnose
 
-    given = with_effects.load(parameters, own)
     if model == "axis":
-        _only_of_the_bench()
-        run = axis_loaded(logs, held_out, without=without)
-    else:
-        run = loaded(logs, held_out, given, without=without, own=own, hold=reference)
-    settings = {"command": f"plant-emulator {shlex.join(sys.argv[1:])}", **run.settings}
-    pool = pool_of(workers, scheduler)
-    try:
-        with progress() as tell, threadpool_limits(1):
-            found = Diagnose(
-                pool,
-                run.recipe,
-                run.plan,
-                settings=settings,
-                cases=None if model == "axis" else calibration(),
-                law_errors=None if model == "axis" else laws_apart(),
-                notes=run.notes,
-                progress=tell,
-            ).diagnose()
-    finally:
-        pool.close()
-    for note in found.details.notes:
+        _refuse_options_of_the_bench()
+    with progress() as tell:
+        found = diagnose(
+            logs,
+            hold_out=held_out,
+            parameters=parameters,
+            model=model,
+            without=without,
+            effects=own,
+            reference=reference,
+            workers=workers,
+            scheduler=scheduler,
+            progress=tell,
+            settings={"command": f"plant-emulator {shlex.join(sys.argv[1:])}"},
+        )
+    for note in found.notes:
         click.echo(f"note: {note}", err=True)
     if save:
-        parameter_sets.save(parameter_set(found, given, run.fitted), save)
-        _own_in(save, own, found.answer.verdict.effects)
-        if found.answer.verdict.kind == "unknown":
-            click.echo(
-                f"note: {save}: the cause is unknown: no effect is in it, and its parameters may "
-                "have moved to imitate one",
-                err=True,
-            )
+        _save(found, save, own)
     if report:
-        from plant_emulator.diagnosis.report.html import html
-
-        Path(report).write_text(html(found.answer, found.details), encoding="utf-8")
+        found.write_report(report)
     if json_file:
-        _options.write_json(to_json(found.answer), json_file)
+        _options.write_json(found.to_json(), json_file)
     if json_file != "-":
-        click.echo("\n".join(lines(found.answer)))
+        click.echo(found.to_text())
 
 
-def _only_of_the_bench() -> None:
-    """Refuse options that would be ignored with a single axis."""
+def _refuse_options_of_the_bench() -> None:
+    """Refuse options that a single axis would ignore."""
     given = click.get_current_context().get_parameter_source
     options = {"save": "--save", "own": "--effects"}
     options |= {"parameters": "--parameters", "reference": "--reference"}
@@ -153,12 +128,22 @@ def _only_of_the_bench() -> None:
             raise click.UsageError(f"{option} belongs to --model bench")
 
 
-def _own_in(saved: str, own: tuple[str, ...], named: tuple[str, ...]) -> None:
-    """Tell of effects in a saved set that the other commands do not know."""
+def _save(found: Diagnosis, path: str, own: tuple[str, ...]) -> None:
+    """Write the parameter set, and note what its user has to know."""
+    from plant_emulator import parameter_sets
+
+    parameter_sets.save(found.parameter_set, path)
+    verdict = found.answer.verdict
     for file in own:
-        if Path(file).stem in named:
+        if (name := Path(file).stem) in verdict.effects:
             click.echo(
-                f"note: {saved}: serve, simulate and validate know {Path(file).stem} once {file} "
-                "lies in plant_emulator/effects",
+                f"note: {path}: serve, simulate and validate know {name} once {file} lies in "
+                "plant_emulator/effects",
                 err=True,
             )
+    if verdict.kind == "unknown":
+        click.echo(
+            f"note: {path}: the cause is unknown: no effect is in it, and its parameters may "
+            "have moved to imitate one",
+            err=True,
+        )

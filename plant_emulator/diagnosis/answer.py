@@ -140,7 +140,7 @@ class HeldOutGap:
 class RankedEffect:
     """An effect that was tested.
 
-    evidence : evidence_of fall of the cost that it brings
+    evidence : weighed fall of the cost that it brings
     held_out_gain : closed fraction with this effect alone; None: not predicted
     parameters : its sizes and shapes
     accepted : whether the verdict names it

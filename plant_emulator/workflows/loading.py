@@ -13,17 +13,18 @@ from plant_emulator.errors import DiagnosisError
 from plant_emulator.recordings.preflight import NAMES, preflight
 from plant_emulator.recordings.recording import recording
 from plant_emulator.recordings.same_bench import one_bench
-from plant_emulator.signals.log import VOLTAGE
+from plant_emulator.signals.log import VOLTAGE, Log
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
     from plant_emulator.signals.axis_log import AxisLog
-    from plant_emulator.signals.log import Array, Log
+    from plant_emulator.signals.log import Array
     from plant_emulator.simulation.simulate import Hold
 
     Used = Mapping[str, NDArray[np.bool_]]
@@ -41,17 +42,19 @@ NEEDED = ("speed_reference", "motor_speed", "drum_speed", "shaft_torque")
 
 
 def admitted(
-    paths: Sequence[str], parameters: ParameterSet, hold: str | None
+    sources: Sequence[str | Path | Log], parameters: ParameterSet, hold: str | None
 ) -> tuple[list[Recording], list[str]]:
     """The logs of one bench ready to be fitted, and what the user should know of them.
+
+    sources : logs, or the paths of their files
 
     DiagnosisError or LogError says what cannot be used.
     """
     taken: list[Log] = []
     uses: list[Used] = []
     notes: list[str] = []
-    for path in paths:
-        log = logs.read(path)
+    for source in sources:
+        log = source if isinstance(source, Log) else logs.read(source)
         unlabelled(log)
         checked = preflight(log, parameters.value("gear_ratio"))
         taken.append(log)

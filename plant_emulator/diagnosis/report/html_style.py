@@ -35,7 +35,7 @@ code, .hash { font: .875em/1.45 ui-monospace, "DejaVu Sans Mono", Consolas, mono
 .verdict .statement { font-size: 1.35rem; line-height: 1.35; font-weight: 600;
   margin: .25rem 0 0; }
 .next { border-left: .4rem solid var(--line); padding: .25rem 1rem; }
-dl { display: grid; grid-joint_unknowns-columns: minmax(8rem, max-content) 1fr; gap: .3rem 1.25rem;
+dl { display: grid; grid-template-columns: minmax(8rem, max-content) 1fr; gap: .3rem 1.25rem;
   margin: .5rem 0; }
 dt { color: var(--soft); overflow-wrap: anywhere; max-width: 18rem; }
 dd { margin: 0; min-width: 0; overflow-wrap: anywhere; }
@@ -89,7 +89,7 @@ svg path { fill: none; stroke-linejoin: round; }
 @media (max-width: 40rem) {
   body { padding: 1rem .75rem 3rem; }
   .verdict .statement { font-size: 1.15rem; }
-  dl { grid-joint_unknowns-columns: 1fr; gap: 0; } dd { margin-bottom: .5rem; }
+  dl { grid-template-columns: 1fr; gap: 0; } dd { margin-bottom: .5rem; }
   th, td { padding: .3rem .5rem; } }
 @page { size: A4; margin: 15mm; }
 @media print {

@@ -24,7 +24,7 @@ from plant_emulator.diagnosis.prediction.held_out import NOMINAL, HeldOut, Plan
 from plant_emulator.errors import LogError
 from plant_emulator.signals.axis_log import AxisLog
 from plant_emulator.signals.frequency_bands import power
-from plant_emulator.workflows.diagnosis import plan_of
+from plant_emulator.workflows.diagnosis.plan import plan_of
 
 spec = importlib.util.spec_from_file_location(
     "axis_truth", Path(__file__).with_name("axis_truth.py")

@@ -289,7 +289,7 @@ def test_temperature_at_the_start_belongs_to_its_run(nominal: ParameterSet) -> N
 
 
 def test_held_channel_has_its_own_noise(nominal: ParameterSet, bench_log: Reader) -> None:
-    """A torque that comes at 20 Hz and is held: left out where stale, evidence_of by its noise."""
+    """A torque that comes at 20 Hz and is held: left out where stale, weighed by its noise."""
     log = bench_log("bench_practice/practice_002/program1")
     held = log["shaft_torque"][np.arange(len(log.time)) // 5 * 5]
     slow = Log(log.time, {**log.signals, "shaft_torque": held}, log.source)

@@ -18,7 +18,7 @@ from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation.sensor_noise import SENSORS, noisy
-from plant_emulator.workflows.diagnosis import parameter_set
+from plant_emulator.workflows.diagnosis.saved_set import parameter_set
 from plant_emulator.workflows.simulation import followed, simulated
 from tests.plant_emulator.diagnosis import answers
 

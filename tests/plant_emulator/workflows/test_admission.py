@@ -15,7 +15,7 @@ from plant_emulator.errors import DiagnosisError
 from plant_emulator.recordings.preflight import preflight
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
-from plant_emulator.workflows.diagnosis import planned
+from plant_emulator.workflows.diagnosis.plan import planned
 from plant_emulator.workflows.loading import unlabelled
 from register_maps.signals import LOG_COLUMNS
 

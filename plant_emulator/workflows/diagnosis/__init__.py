@@ -1,0 +1,1 @@
+"""A whole diagnosis: its runs, what the blind trials taught, its library call, the set to save."""

@@ -1,0 +1,150 @@
+"""The diagnosis as a library call: logs in, answer, report and parameter set out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from threadpoolctl import threadpool_limits
+
+from plant_emulator.diagnosis.diagnose import Diagnose
+from plant_emulator.diagnosis.report.document import to_json
+from plant_emulator.diagnosis.report.html import html
+from plant_emulator.diagnosis.report.terminal import lines
+from plant_emulator.diagnosis.wording import KINDS, percent
+from plant_emulator.errors import DiagnosisError
+from plant_emulator.model.parameters import ParameterSet
+from plant_emulator.parameter_sets import DEFAULT, with_effects
+from plant_emulator.workflows.diagnosis.calibration import relative_law_errors, trial_cases
+from plant_emulator.workflows.diagnosis.runs import axis_runs, bench_runs
+from plant_emulator.workflows.diagnosis.saved_set import parameter_set
+from plant_emulator.workflows.workers import pool_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.diagnosis.answer import Answer
+    from plant_emulator.diagnosis.diagnose import Findings
+    from plant_emulator.diagnosis.execution.progress import Progress
+    from plant_emulator.recordings.recording import Recording
+    from plant_emulator.workflows.diagnosis.runs import Source
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Diagnosis:
+    """The result of a diagnosis; `print` shows it as the command `diagnose` does.
+
+    given : the parameter set that was diagnosed; None: the machine is a single axis
+    fitted : the runs of the bench that were not held out
+    """
+
+    findings: Findings
+    given: ParameterSet | None
+    fitted: tuple[Recording, ...]
+
+    @property
+    def answer(self) -> Answer:
+        """Verdict, location, held-out gap, ranking, and what these logs cannot show."""
+        return self.findings.answer
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was noticed about the logs, a sentence each."""
+        return self.findings.details.notes
+
+    @property
+    def parameter_set(self) -> ParameterSet:
+        """The given set with the fitted values and the accepted effects.
+
+        Raises DiagnosisError for a single axis, which has no parameter set.
+        """
+        if self.given is None:
+            raise DiagnosisError("a single axis has no parameter set")
+        return parameter_set(self.findings, self.given, self.fitted)
+
+    def to_json(self) -> dict[str, Any]:
+        """The answer as the document `gap-diagnosis/1`."""
+        return to_json(self.answer)
+
+    def to_html(self) -> str:
+        """The report as one HTML document that needs no network."""
+        return html(self.answer, self.findings.details)
+
+    def to_text(self, width: int = 80) -> str:
+        """The answer on one screen of 24 lines, each at most `width` characters."""
+        return "\n".join(lines(self.answer, width))
+
+    def write_report(self, path: str | Path) -> None:
+        """Write the report to an HTML file."""
+        Path(path).write_text(self.to_html(), encoding="utf-8")
+
+    def __str__(self) -> str:
+        return self.to_text()
+
+    def __repr__(self) -> str:
+        verdict, closed = self.answer.verdict, self.answer.gap.closed_fraction
+        words = ", ".join([KINDS[verdict.kind], *verdict.effects])
+        share = "" if closed is None else f"; {percent(closed)} of the held-out gap closed"
+        return f"<Diagnosis: {words}{share}>"
+
+
+def diagnose(
+    logs: Sequence[Source],
+    *,
+    hold_out: Sequence[Source] = (),
+    parameters: ParameterSet | str = DEFAULT,
+    model: Literal["bench", "axis"] = "bench",
+    without: Sequence[str] = (),
+    effects: Sequence[str | Path] = (),
+    reference: Literal["linear", "staircase"] | None = None,
+    workers: int = 1,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+    settings: Mapping[str, str] | None = None,
+) -> Diagnosis:
+    """Diagnose the gap between the model and the machine that the logs were recorded on.
+
+    logs : paths of log files, or logs that were read, all of one machine
+    hold_out : logs to predict; without any, every log is held out in turn
+    parameters : a parameter set, the name of a shipped one, or the path of its file
+    model : the roller bench, or a single motor-driven axis
+    without : names of effects to take out of the library
+    effects : files of your own effects beside the library
+    reference : what holds between samples of the speed reference; None: as the log says
+    workers : processes that fit side by side; more than one needs `if __name__ == "__main__":`
+        in a script, because every process imports it
+    scheduler : address of a Dask scheduler to use in their place, tcp://host:port
+    progress : function that is called with a step's name and its done share, 0 to 1
+    settings : lines for the report, by name, on how to repeat the diagnosis
+    Raises InputError for a log, a set or an option that cannot be used, and EmulatorError where
+    a worker is lost.
+    """
+    axis = model == "axis"
+    given = None if axis else _set(parameters, effects)
+    if given is None:
+        runs = axis_runs(logs, hold_out, without=without)
+    else:
+        runs = bench_runs(logs, hold_out, given, without=without, own=effects, reference=reference)
+    pool = pool_of(workers, scheduler)
+    try:
+        with threadpool_limits(1):
+            findings = Diagnose(
+                pool,
+                runs.recipe,
+                runs.plan,
+                settings={**(settings or {}), **runs.settings},
+                cases=None if axis else trial_cases(),
+                law_errors=None if axis else relative_law_errors(),
+                notes=runs.notes,
+                progress=progress,
+            ).diagnose()
+    finally:
+        pool.close()
+    return Diagnosis(findings=findings, given=given, fitted=runs.fitted)
+
+
+def _set(parameters: ParameterSet | str, own: Sequence[str | Path]) -> ParameterSet:
+    if isinstance(parameters, ParameterSet):
+        return parameters
+    return with_effects.load(parameters, [str(file) for file in own])

@@ -1,0 +1,141 @@
+"""From logs to the runs of a diagnosis: reading, preflight, and which runs are held out."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator import effects
+from plant_emulator.diagnosis.machines.axis import AxisRecipe
+from plant_emulator.diagnosis.machines.axis_effects import EFFECTS as AXIS_EFFECTS
+from plant_emulator.diagnosis.machines.bench import BenchRecipe
+from plant_emulator.errors import DiagnosisError
+from plant_emulator.signals.axis_log import AxisLog
+from plant_emulator.signals.log import Log
+from plant_emulator.workflows import axis_reader
+from plant_emulator.workflows.diagnosis.plan import plan_of, planned
+from plant_emulator.workflows.loading import admitted, distinct, unlabelled
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping, Sequence
+
+    from plant_emulator.diagnosis.execution.pool import Recipe
+    from plant_emulator.diagnosis.prediction.held_out import Plan
+    from plant_emulator.model.parameters import ParameterSet
+    from plant_emulator.recordings.recording import Recording
+
+    # A log, or the path of its file.
+    Source = str | Path | Log | AxisLog
+
+
+@dataclass(frozen=True, kw_only=True)
+class Runs:
+    """The runs of a diagnosis.
+
+    notes : what the preflight noticed about the logs
+    settings : what a report shows to repeat the diagnosis, by name
+    fitted : recordings of the bench that are not held out; empty for another machine
+    """
+
+    recipe: Recipe
+    plan: Plan
+    notes: tuple[str, ...]
+    settings: Mapping[str, str]
+    fitted: tuple[Recording, ...] = ()
+
+
+def bench_runs(
+    logs: Sequence[Source],
+    held_out: Sequence[Source],
+    parameters: ParameterSet,
+    *,
+    without: Sequence[str] = (),
+    own: Sequence[str | Path] = (),
+    reference: str | None = None,
+) -> Runs:
+    """The runs of logs of the bench.
+
+    without : effects that are taken out of the library; own : files of effects beside it
+    reference : what holds between samples of the reference; None: as the log says
+    Raises InputError for a log that cannot be used.
+    """
+    files = tuple(Path(file).absolute() for file in own)
+    named = [effect.name for effect in effects.from_files(files)]
+    _check_names(without, [*effects.names(), *named])
+    recordings, notes = admitted(
+        [_bench_source(one) for one in (*logs, *held_out)], parameters, reference
+    )
+    recordings, plan = planned(recordings, len(logs))
+    settings = {
+        "parameters": parameters.name,
+        "without": ", ".join(without) or "-",
+        "own effects": ", ".join(map(str, own)) or "-",
+    }
+    return Runs(
+        recipe=BenchRecipe(tuple(recordings), parameters, tuple(without), files),
+        plan=plan,
+        notes=tuple(notes),
+        settings=_settings(settings, [*logs, *held_out, parameters.name, *own]),
+        fitted=tuple(recordings[k] for k in plan.fitted),
+    )
+
+
+def axis_runs(
+    logs: Sequence[Source], held_out: Sequence[Source], *, without: Sequence[str] = ()
+) -> Runs:
+    """The runs of logs of a single axis; arguments and errors as those of `bench_runs`."""
+    given = (*logs, *held_out)
+    read = [_axis_log(one) for one in given]
+    for log in read:
+        unlabelled(log)
+    distinct([(log.source, np.stack([log.time, log.position, log.force])) for log in read])
+    if len(read) < 2:
+        raise DiagnosisError(
+            f"{read[0].source}: one run of an axis cannot be held out; give another with --hold-out"
+        )
+    _check_names(without, AXIS_EFFECTS)
+    plan = plan_of(len(read), len(logs))
+    return Runs(
+        recipe=AxisRecipe(tuple(read), fitted=plan.fitted, without=tuple(without)),
+        plan=plan,
+        notes=(),
+        settings=_settings({"model": "axis", "without": ", ".join(without) or "-"}, given),
+    )
+
+
+def _bench_source(source: Source) -> str | Path | Log:
+    if isinstance(source, AxisLog):
+        raise DiagnosisError(f"{source.source}: a log of a single axis needs the model axis")
+    return source
+
+
+def _axis_log(source: Source) -> AxisLog:
+    if isinstance(source, Log):
+        raise DiagnosisError(f"{source.source}: a log of the bench needs the model bench")
+    return source if isinstance(source, AxisLog) else axis_reader.read(source)
+
+
+def _check_names(without: Sequence[str], library: Collection[str]) -> None:
+    """Refuse to take out an effect that is not there: a misspelt name would leave it in."""
+    for name in without:
+        if name not in library:
+            known = ", ".join(sorted(library))
+            raise DiagnosisError(f"--without {name}: no effect of that name; known: {known}")
+
+
+def _settings(own: Mapping[str, str], sources: Sequence[object]) -> dict[str, str]:
+    """Date, version, these settings, and the SHA-256 of every source that is a file."""
+    files = [str(one) for one in sources if isinstance(one, str | Path) and Path(one).is_file()]
+    hashes = {file: hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in files}
+    return {
+        "date": datetime.now(UTC).date().isoformat(),
+        "version": version("road-load-bench"),
+        **own,
+        **{f"sha256 of {file}": digest for file, digest in hashes.items()},
+    }

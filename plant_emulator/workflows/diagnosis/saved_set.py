@@ -1,0 +1,74 @@
+"""The parameter set that a diagnosis leaves: fitted parameters, and the accepted effects."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from importlib.metadata import version
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.estimation.initial_states import with_own
+from plant_emulator.solver.kernel import kernel
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.diagnosis.diagnose import Findings
+    from plant_emulator.effects import Effect
+    from plant_emulator.model.parameters import ParameterSet
+    from plant_emulator.recordings.recording import Recording
+
+
+def parameter_set(
+    findings: Findings, parameters: ParameterSet, recordings: Sequence[Recording]
+) -> ParameterSet:
+    """The given set with the fitted values and the accepted effects.
+
+    A value that every run has of its own becomes the mean of the runs.
+    parameters : the set as given; recordings : the runs that were fitted
+    """
+    final, named = findings.final, findings.answer.verdict.effects
+    own = {name: dict(findings.fixed[name]) for name in named}
+    for name in named:
+        effect = kernel().effects[name]
+        fitted = {key: final.values.get(f"{name}_{key}") for key in effect.parameters}
+        own[name] |= {key: value for key, value in fitted.items() if value is not None}
+        own[name] |= _of_runs(effect, final.states, recordings)
+    changed = {n: v for n, v in final.values.items() if n in parameters.parameters}
+    new = parameters.with_values(changed)
+    kept = {
+        name: replace(p, standard_error=final.standard_errors.get(name)) if name in changed else p
+        for name, p in new.parameters.items()
+    }
+    origin = {
+        "date": datetime.now(UTC).date().isoformat(),
+        "version": version("road-load-bench"),
+        "before": parameters.name,
+        "logs": list(findings.answer.logs.estimation),
+        "verdict": findings.answer.verdict.statement,
+    }
+    return replace(new, parameters=kept, origin=origin, effects={**parameters.effects, **own})
+
+
+def _of_runs(
+    effect: Effect, states: Sequence[Mapping[str, float]], recordings: Sequence[Recording]
+) -> dict[str, float]:
+    """Means over the runs of what every run has of its own of an effect, fitted or measured."""
+    own = {effect.name: effect.plausible()}
+    told = [*states, *(with_own(r, own).own for r in recordings)]
+    values = {
+        key: [run[name] for run in told if (name := f"{effect.name}_{key}") in run]
+        for key in effect.parameters
+    }
+    return {
+        key: _mean(found, effect.parameters[key].unit) for key, found in values.items() if found
+    }
+
+
+def _mean(values: Sequence[float], unit: str) -> float:
+    """Mean of values; for angles, the direction of the sum of their unit vectors [rad]."""
+    if unit == "rad":
+        return float(np.angle(np.mean(np.exp(1j * np.asarray(values)))))
+    return float(np.mean(values))
