@@ -28,7 +28,7 @@ from plant_emulator.diagnosis.machines.bench import BenchRecipe
 from plant_emulator.diagnosis.report.ranking import rank
 from plant_emulator.diagnosis.selection.procedure import Procedure
 from plant_emulator.recordings.recording import recording
-from plant_emulator.solver.kernel import kernel, know
+from plant_emulator.solver.kernel import kernel, use_own_effects
 from plant_emulator.workflows.workers import end_with_parent
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def sizes(seed: int, only: tuple[str, ...], number: int) -> list[dict[str, Any]]
     """True and estimated sizes of a case's effect; none of a case without one of another law."""
     if draw.kinds(seed, number + 1)[-1] != "effect":
         return []
-    know(*(laws.load(name) for name in laws.names()))
+    use_own_effects(*(laws.load(name) for name in laws.names()))
     known, nominal = kernel().effects, parameter_sets.load()
     case = draw.draw(seed, number, nominal, known)
     (hidden,) = case.hidden

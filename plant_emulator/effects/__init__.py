@@ -125,7 +125,7 @@ def _parse_one(text: str) -> tuple[str, dict[str, float]]:
     return name, effect.checked(values)
 
 
-def neutral(effects: Mapping[str, Effect]) -> dict[str, float]:
+def neutral_values(effects: Mapping[str, Effect]) -> dict[str, float]:
     """The values at which none of the effects is there, by their names in the parameter record."""
     return {
         f"{name}_{key}": parameter.neutral

@@ -1,1 +1,1 @@
-"""The thesis's equations of the bench: laws, drive, gear, drum, one implicit stage, parameters."""
+"""The bench's equations after the thesis; README.md beside this file is their nomenclature."""

@@ -1,9 +1,9 @@
-"""The drive: cascade of two PI controllers with limits, and the armature they feed.
+"""The drive: two PI controllers in cascade, their limits, and the armature circuit that they feed.
 
-Everything the drive does within one implicit stage of size a is a function of the motor speed at
-the end of that stage, piecewise linear but for the back-EMF, which is linearised. `armature` finds
-current, voltage and integrators there and the slope of the current; the stage in `plant` needs no
-more. Thesis, eq. 3.1-3.6, 3.8, 3.12.
+The drive is solved within one implicit stage of size a. Its current is then a function of the motor
+speed at the end of that stage. This function is piecewise linear except for the back-EMF, which is
+linearised. `solve_drive` finds current, voltage and integrators at one motor speed, and the slope
+of the current with it. `implicit_stage` needs no more. Source: thesis, eq. 3.1-3.6, 3.8, 3.12.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from plant_emulator.model.laws import converter_voltage_drop
 if TYPE_CHECKING:
     from plant_emulator.model.records import Record, State
 
-# Step of the current over which a law's slope with it is taken [A].
+# Change of the current over which the slope of the converter's voltage drop is taken [A].
 SHORT_OF_CURRENT = 1e-4
 
 SPEED_INTEGRAL, CURRENT_INTEGRAL, ARMATURE_CURRENT = 0, 1, 2
 
 
-def limited(value: float, limit: float) -> float:
-    """Value held to +-limit [unit of both]."""
+def clamp(value: float, limit: float) -> float:
+    """Clamp a value to the range from -limit to +limit [unit of both]."""
     return max(-limit, min(limit, value))
 
 
 def flux_slope(k_phi: float, s: Record, p: Record) -> float:
     """Slope of the flux with the motor speed [N m s/(A rad)]: 0 below base speed (eq. 3.18).
 
-    Base speed is that of the nominal field: an effect that weakens the flux does not move it.
+    Base speed is that of the nominal field. An effect that weakens the flux does not move it.
     """
     divisor = p.flux_constant_2 + abs(s.motor_speed)
     if p.flux_constant_1 / divisor >= p.flux_constant:
@@ -39,9 +39,10 @@ def flux_slope(k_phi: float, s: Record, p: Record) -> float:
 
 
 def linearise_drop(s: Record, p: Record) -> None:
-    """The converter's voltage drop [V] as offset + slope i, about the present estimate of i [A].
+    """Linearise the converter's voltage drop about the current: offset [V] + slope [ohm] i [A].
 
-    A drop that is steep at small currents would otherwise take a pass of the stage for every digit.
+    A drop can be steep at small currents. Without this line the stage would need one pass for each
+    digit of the current.
     """
     current, drop = s.armature_current, converter_voltage_drop(s, p)
     s.converter_drop_offset, s.converter_drop_slope = drop, 0.0
@@ -52,17 +53,20 @@ def linearise_drop(s: Record, p: Record) -> None:
         s.converter_drop_offset, s.converter_drop_slope = drop - slope * current, slope
 
 
-def speed_controller(base: State, a: float, s: Record, p: Record) -> None:
-    """Current reference and its slope with the motor speed, at s.motor_speed (eq. 3.2, 3.5, 3.6).
+def solve_speed_loop(base: State, a: float, s: Record, p: Record) -> None:
+    """Write the current reference at s.motor_speed, and its slope with it (eq. 3.2, 3.5, 3.6).
 
-    Conditional integration: at the limit the integrator takes in only error that leads back.
+    Anti-windup by conditional integration: while the current reference is limited, the integrator
+    takes in only an error that leads away from the limit.
+
+    base : states that the stage starts from; a : implicit step [s]
     """
-    reference = limited(s.reference, s.speed_limit)
+    reference = clamp(s.reference, s.speed_limit)
     error = reference - s.tachometer_gain * s.motor_speed
     gain = p.speed_gain * (1.0 + a / p.speed_integral_time)
     integral = base[SPEED_INTEGRAL]
     wanted = p.speed_gain / p.speed_integral_time * integral + gain * error
-    s.current_reference = limited(wanted, s.current_limit)
+    s.current_reference = clamp(wanted, s.current_limit)
     s.wanted_current = wanted
     s.wanted_current_slope = -gain * s.tachometer_gain
     s.current_reference_slope = s.wanted_current_slope
@@ -75,11 +79,15 @@ def speed_controller(base: State, a: float, s: Record, p: Record) -> None:
     s.speed_integral = integral + a * share * error
 
 
-def current_controller(base: State, a: float, s: Record, p: Record) -> None:
-    """Armature current, voltage and the current's slope with the motor speed (eq. 3.3, 3.4, 3.8).
+def solve_current_loop(base: State, a: float, s: Record, p: Record) -> None:
+    """Write armature current, voltage and the current's slope with the motor speed.
 
-    L_a di/dt = u - R_a i - k Phi omega_m - drop, taken implicitly together with the PI controller;
-    the drop of an effect's converter as `linearise_drop` left it.
+    L_a di/dt = u - R_a i - k Phi omega_m - drop                    (thesis, eq. 3.3, 3.4, 3.8)
+
+    This equation and the PI controller are solved together, implicitly. The drop is the converter's
+    voltage drop as `linearise_drop` left it.
+
+    base : states that the stage starts from; a : implicit step [s]
     """
     b = a / p.armature_inductance
     integral = base[CURRENT_INTEGRAL]
@@ -93,7 +101,7 @@ def current_controller(base: State, a: float, s: Record, p: Record) -> None:
     current = (start + b * (offset + gain * s.current_reference - back_emf)) * divisor
     slope = b * (gain * s.current_reference_slope - back_emf_slope) * divisor
     wanted = offset + gain * (s.current_reference - current)
-    voltage = limited(wanted, s.voltage_limit)
+    voltage = clamp(wanted, s.voltage_limit)
     s.wanted_voltage = wanted
     s.wanted_voltage_slope = gain * (s.current_reference_slope - slope)
     share = 1.0
@@ -110,14 +118,14 @@ def current_controller(base: State, a: float, s: Record, p: Record) -> None:
     s.current_integral = integral + a * share * (s.current_reference - current)
 
 
-def armature(base: State, a: float, s: Record, p: Record) -> None:
-    """Solve the drive at the motor speed s.motor_speed; everything it finds is written to s."""
-    speed_controller(base, a, s, p)
-    current_controller(base, a, s, p)
+def solve_drive(base: State, a: float, s: Record, p: Record) -> None:
+    """Solve the drive at the motor speed s.motor_speed and write the result to s."""
+    solve_speed_loop(base, a, s, p)
+    solve_current_loop(base, a, s, p)
 
 
-def same_limits(change: float, s: Record) -> bool:
-    """Whether the drive is at the same limits when the motor speed changes by `change` [rad/s]."""
+def keeps_limits(change: float, s: Record) -> bool:
+    """Whether the drive keeps its limits when the motor speed changes by `change` [rad/s]."""
     current = s.wanted_current + s.wanted_current_slope * change
     voltage = s.wanted_voltage + s.wanted_voltage_slope * change
     return (abs(current) > s.current_limit) == (abs(s.wanted_current) > s.current_limit) and (
@@ -126,7 +134,7 @@ def same_limits(change: float, s: Record) -> bool:
 
 
 def move_drive(change: float, s: Record) -> None:
-    """Follow the linearisation to a motor speed that is higher by `change` [rad/s]."""
+    """Move the drive along its linearisation by a change of the motor speed [rad/s]."""
     s.current_reference += s.current_reference_slope * change
     s.speed_integral += s.speed_integral_slope * change
     s.armature_current += s.current_slope * change

@@ -1,17 +1,20 @@
-"""Constitutive laws of the bench, one function each, and the places where an effect can act.
+"""Constitutive laws of the bench, one function each. An effect acts by changing laws.
 
-Every law is called as `law(s, p)`: s is the record of the implicit stage being solved (the present
-estimate of all speeds, torques and currents, see `stage.STAGE`), p the flat record of parameter
-values. An effect changes a law by a function of the same name, `law(value, s, p)`, that takes the
-value so far and returns the changed one (see `effects`); the kernel chains them. A law whose
-nominal value is 0 or 1 marks a term that the thesis neglects.
+Every law is called as `law(s, p)`. s is the record of the implicit stage that is being solved; it
+holds the present estimate of all speeds, torques and currents (`stage.STAGE`). p is the flat record
+of the parameter values.
 
-The functions are plain scalar arithmetic, so that they run compiled and uncompiled alike.
-Angles and speeds: index m motor side, g gear output, d drum. All values SI.
+An effect changes a law by a function of the same name, `law(value, s, p)` (see `effects`). `value`
+is the result of the nominal law and of all effects before. The kernel chains these functions. A law
+whose nominal value is 0 or 1 stands for a term that the thesis neglects.
+
+All laws are plain scalar arithmetic, so that they run compiled and uncompiled alike. Indices of
+angles and speeds: m motor side, g gear output, d drum. All values are SI.
 """
 
 from __future__ import annotations
 
+from types import FunctionType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -25,7 +28,7 @@ NOMINAL_SHELL_TEMPERATURE = 305.15
 
 
 def dead_time(s: Record, p: Record) -> float:
-    """Dead time between the PLC's reference and the drive [s] (thesis, eq. 3.7)."""
+    """Dead time from the reference of the PLC to that of the drive [s] (thesis, eq. 3.7)."""
     return p.dead_time
 
 
@@ -50,20 +53,20 @@ def voltage_limit(s: Record, p: Record) -> float:
 
 
 def integration_at_limit(s: Record, p: Record) -> float:
-    """Share of its error that an integrator takes in while its output is limited, outwards [1].
+    """Share of an error that an integrator takes in although it leads further into the limit [1].
 
-    0: conditional integration. The thesis does not state its anti-windup; this is the usual one.
+    0 is conditional integration. The thesis does not state its anti-windup; this is the usual one.
     """
     return 0.0
 
 
 def converter_voltage_drop(s: Record, p: Record) -> float:
-    """What the converter loses between the demanded and the armature voltage [V]."""
+    """Voltage that the converter loses between the voltage demand and the armature [V]."""
     return 0.0
 
 
 def tachometer_gain(s: Record, p: Record) -> float:
-    """Motor speed that drive and log read, over the true one [1]."""
+    """Ratio of the measured to the true motor speed [1]; drive and log read the measured one."""
     return 1.0
 
 
@@ -80,8 +83,8 @@ def flux(s: Record, p: Record) -> float:
 
     k Phi = min(K_m, K_1 / (K_2 + |omega_m|))                       (thesis, eq. 3.16-3.18)
 
-    Written with min and |omega_m| because the text asks for the constant flux "until" the weakened
-    one is lower, and for both directions of rotation.
+    The thesis asks for the constant flux "until" the weakened flux is lower: hence the minimum. The
+    law holds for both directions of rotation: hence |omega_m|.
     """
     weakened = p.flux_constant_1 / (p.flux_constant_2 + abs(s.motor_speed))
     return min(p.flux_constant, weakened)
@@ -93,7 +96,7 @@ def motor_coulomb_friction(s: Record, p: Record) -> float:
 
 
 def motor_viscous_friction(s: Record, p: Record) -> float:
-    """Speed-proportional friction of the motor [N m s/rad], >= 0; neglected by the thesis."""
+    """Viscous friction coefficient of the motor [N m s/rad], >= 0; neglected by the thesis."""
     return 0.0
 
 
@@ -106,44 +109,44 @@ def motor_shaft_damping(s: Record, p: Record) -> float:
 
 
 def gear_coulomb_friction(s: Record, p: Record) -> float:
-    """Level of the gear's Coulomb friction [N m], gear output, >= 0 (thesis, eq. 3.27)."""
+    """Coulomb friction of the gear at its output [N m], >= 0 (thesis, eq. 3.27)."""
     return p.gear_coulomb_friction
 
 
 def gear_viscous_friction(s: Record, p: Record) -> float:
-    """Factor f_g of the gear's viscous friction [N m (s/rad)^delta_g] (thesis, eq. 3.27)."""
+    """Coefficient f_g of the gear's viscous friction [N m (s/rad)^delta_g] (thesis, eq. 3.27)."""
     return p.gear_viscous_friction
 
 
 def gear_direction_factor(s: Record, p: Record) -> float:
-    """Gear friction of eq. 3.27 in this direction, s.gear_direction, over that of the table [1].
+    """Factor on the gear friction of eq. 3.27 in the direction s.gear_direction [1].
 
-    This law and the next two are evaluated at direction, speed and torques of the solution itself,
-    see `friction`: here an effect may depend on them.
+    This law and the next two are evaluated at direction, speed and torques of the solution itself
+    (see `gear`). An effect on these three laws may depend on them.
     """
     return 1.0
 
 
 def gear_speed_friction(s: Record, p: Record) -> float:
-    """Further friction of the gear [N m] by its speed s.gear_speed; may fall with it."""
+    """Further friction of the gear [N m], by its speed s.gear_speed; it may fall with the speed."""
     return 0.0
 
 
 def gear_load_friction(s: Record, p: Record) -> float:
-    """Further friction of the gear [N m] by its load, s.motor_shaft_torque, s.drum_shaft_torque.
+    """Further friction of the gear [N m], by its load s.motor_shaft_torque, s.drum_shaft_torque.
 
-    It may change by less than the load itself does.
+    Its change must stay below the change of the load itself.
     """
     return 0.0
 
 
 def gear_torque(s: Record, p: Record) -> float:
-    """Further torque against the motion of the gear output [N m]."""
+    """Further torque that acts against positive speed of the gear output [N m]."""
     return 0.0
 
 
 def backlash_half_gap(s: Record, p: Record) -> float:
-    """Half of the gap, gear output [rad] (thesis, eq. 3.31)."""
+    """Half of the backlash gap, at the gear output [rad] (thesis, eq. 3.31)."""
     return p.backlash_half_gap
 
 
@@ -156,12 +159,12 @@ def drum_coulomb_friction(s: Record, p: Record) -> float:
 
 
 def drum_viscous_friction(s: Record, p: Record) -> float:
-    """Speed-proportional friction of the drum bearings [N m s/rad], >= 0; neglected (eq. 3.34)."""
+    """Viscous friction coefficient of the drum bearings [N m s/rad], >= 0; neglected (eq. 3.34)."""
     return 0.0
 
 
 def drum_torque(s: Record, p: Record) -> float:
-    """Torque of the truck on the drum [N m]: (r_d / r_w) T_w (thesis, eq. 4.5)."""
+    """Torque of the truck on the drum [N m], (r_d / r_w) T_w (thesis, eq. 4.5)."""
     return p.drum_radius / p.wheel_radius * s.wheel_torque
 
 
@@ -169,51 +172,28 @@ def drum_torque(s: Record, p: Record) -> float:
 
 
 def measured_drum_speed(s: Record, p: Record) -> float:
-    """What the measuring wheel shows [rad/s]."""
+    """Drum speed that the measuring wheel shows [rad/s]."""
     return s.drum_speed
 
 
 def measured_armature_current(s: Record, p: Record) -> float:
-    """What the current sensor shows [A]."""
+    """Armature current that the sensor shows [A]."""
     return s.armature_current
 
 
 def measured_shaft_torque(s: Record, p: Record) -> float:
-    """What the torque sensor shows [N m]: -T_mg, negative while the motor drives (eq. 3.26)."""
+    """Shaft torque that the sensor shows [N m], -T_mg, negative while the motor drives (3.26)."""
     return -s.motor_shaft_torque
 
 
 def shell_temperature(s: Record, p: Record) -> float:
-    """What the thermocouples on the gearbox's shell show [K]; the nominal bench is warm."""
+    """Shell temperature that the thermocouples show [K]; the nominal bench is warm."""
     return NOMINAL_SHELL_TEMPERATURE
 
 
-LAWS = (
-    dead_time,
-    reference,
-    speed_limit,
-    current_limit,
-    voltage_limit,
-    integration_at_limit,
-    converter_voltage_drop,
-    tachometer_gain,
-    resistance,
-    flux,
-    motor_coulomb_friction,
-    motor_viscous_friction,
-    motor_shaft_damping,
-    gear_coulomb_friction,
-    gear_viscous_friction,
-    gear_direction_factor,
-    gear_speed_friction,
-    gear_load_friction,
-    gear_torque,
-    backlash_half_gap,
-    drum_coulomb_friction,
-    drum_viscous_friction,
-    drum_torque,
-    measured_drum_speed,
-    measured_armature_current,
-    measured_shaft_torque,
-    shell_temperature,
+# Every law above, in the order of this file: the one list of all laws.
+LAWS = tuple(
+    law
+    for law in list(vars().values())
+    if isinstance(law, FunctionType) and law.__module__ == __name__
 )

@@ -1,8 +1,8 @@
-"""Parameters of the bench: value, unit, symbol, source and kind, and the sets they come in.
+"""Parameters of the bench, and parameter sets.
 
-A parameter set is data (TOML, one table a parameter); this file knows what such data must hold and
-computes the `calculated` parameters from the `given` ones. Reading files is left to
-`parameter_sets`. Source of the nominal set: the thesis, Table 3.1 (LiTH-ISY-EX--17/5092--SE).
+A parameter set is data: TOML with one table for each parameter. This file checks such data and
+computes the `calculated` parameters from the `given` ones. `parameter_sets` reads and writes the
+files. Source of the nominal set: the thesis, Table 3.1 (LiTH-ISY-EX--17/5092--SE).
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ KINDS: tuple[Kind, ...] = ("given", "estimated", "calculated")
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
-    """One constant of the model, SI, with where it comes from.
+    """One constant of the model [SI], with its symbol, unit, kind and source.
 
-    std : prior standard deviation [unit of the value]; None where the value is not estimated
-    standard_error : of a value that was identified from logs [unit of the value]
+    std : prior standard deviation [unit of the value]; None for a value that is not estimated
+    standard_error : standard error of a value identified from logs [unit of the value]
     """
 
     name: str
@@ -37,7 +37,7 @@ class Parameter:
 
 
 def torsional_stiffness(shear_modulus: float, radius: float, length: float) -> float:
-    """Stiffness of a round steel shaft [N m/rad].
+    """Torsional stiffness of a round shaft [N m/rad].
 
     k = G J_p / l,  J_p = pi r^4 / 2                       (thesis, eq. 3.24, 3.25, 3.32, 3.33)
 
@@ -46,7 +46,7 @@ def torsional_stiffness(shear_modulus: float, radius: float, length: float) -> f
     return shear_modulus * pi / 2 * radius**4 / length
 
 
-# name -> (formula, the parameters it takes): the thesis's "calculated" rows
+# The "calculated" rows of the thesis's table: name -> (formula, parameters that it takes).
 CALCULATED: dict[str, tuple[Callable[..., float], tuple[str, ...]]] = {
     "motor_shaft_stiffness": (
         torsional_stiffness,
@@ -58,7 +58,7 @@ CALCULATED: dict[str, tuple[Callable[..., float], tuple[str, ...]]] = {
     ),
 }
 
-# name -> SI unit: every parameter that the model needs, none that it does not
+# All parameters of the model: name -> SI unit.
 UNITS: dict[str, str] = {
     "armature_resistance": "ohm",
     "armature_inductance": "H",
@@ -93,9 +93,9 @@ UNITS: dict[str, str] = {
     "wheel_radius": "m",
 }
 
-# Tables of a set's file that are no parameters.
+# Tables of a parameter file that are not parameters.
 ORIGIN, EFFECTS = "origin", "effects"
-# Zero is a meaningful value only where a term may be absent from the model.
+# Parameters that may be zero: their term is then absent from the model.
 MAY_BE_ZERO = frozenset(
     {
         "gear_inertia",
@@ -110,10 +110,11 @@ MAY_BE_ZERO = frozenset(
 
 @dataclass(frozen=True)
 class ParameterSet:
-    """The constants of one bench; `parameters[name]` for every name of `UNITS`.
+    """The constants of one bench: one `Parameter` for each name of `UNITS`.
 
-    origin : how they were identified (logs with hashes, date, version); None: from a publication
-    effects : effects that this bench has beside the nominal model, by effect and parameter [SI]
+    origin : how the values were identified (hashes of the logs, date, version); None for a set from
+        a publication
+    effects : effects of this bench beyond the nominal model: effect -> parameter -> value [SI]
     """
 
     name: str
@@ -136,7 +137,11 @@ class ParameterSet:
         return {p.name: p.value for p in self}
 
     def with_values(self, changes: Mapping[str, float]) -> ParameterSet:
-        """A copy with other values; what is calculated follows unless it is itself changed."""
+        """A copy with other values [SI].
+
+        Calculated parameters are computed again, except those that are in `changes`. Raises
+        ParameterError for an unknown name and for a value that the model cannot run with.
+        """
         for name in changes:
             if name not in self.parameters:
                 raise ParameterError(
@@ -153,7 +158,7 @@ class ParameterSet:
 
 
 def check_value(place: str, parameter: Parameter) -> None:
-    """Refuse what the model cannot run with: not finite, negative, or zero where it divides."""
+    """Raise ParameterError for a value that is not finite, negative, or zero where it divides."""
     value, name = parameter.value, parameter.name
     if not isfinite(value) or value < 0 or (value == 0 and name not in MAY_BE_ZERO):
         floor = "at least 0" if name in MAY_BE_ZERO else "above 0"
@@ -161,7 +166,7 @@ def check_value(place: str, parameter: Parameter) -> None:
 
 
 def parameter_set(name: str, table: Mapping[str, Any]) -> ParameterSet:
-    """A parameter set from the tables of its file; raises ParameterError naming file and key."""
+    """The parameter set that the tables of a file hold; ParameterError names file and key."""
     unknown = sorted(set(table) - set(UNITS) - {ORIGIN, EFFECTS})
     if unknown:
         raise ParameterError(f"{name}: {unknown[0]} is no parameter; known: {', '.join(UNITS)}")
@@ -177,7 +182,7 @@ def parameter_set(name: str, table: Mapping[str, Any]) -> ParameterSet:
 
 
 def _effects(place: str, table: object) -> dict[str, dict[str, float]]:
-    """The tables [effects.NAME]; whether there are such effects, the kernel knows."""
+    """Values of the tables [effects.NAME]; whether such an effect exists is checked elsewhere."""
     if not isinstance(table, Mapping) or not all(isinstance(t, Mapping) for t in table.values()):
         raise ParameterError(f"{place}: {EFFECTS}: one table an effect, [{EFFECTS}.NAME]")
     return {
@@ -190,7 +195,7 @@ KEYS = {"symbol", "value", "unit", "kind", "source", "std", "standard_error"}
 
 
 def _parameter(place: str, name: str, entry: object) -> Parameter:
-    """One table of the file as a Parameter."""
+    """The Parameter that one table of the file holds."""
     if not isinstance(entry, Mapping):
         raise ParameterError(f"{place}: {name}: a table with value, unit, symbol, source, kind")
     unknown = sorted(set(entry) - KEYS)
@@ -222,7 +227,7 @@ def _optional(place: str, name: str, entry: Mapping[str, Any], key: str) -> floa
 
 
 def _value(place: str, name: str, entry: Mapping[str, Any], kind: Kind) -> float:
-    """The value as given; 1.0 stands in for a calculated one until `with_values` computes it."""
+    """Value of a table; 1.0 for a calculated parameter, until `with_values` computes it."""
     if kind != "calculated":
         return _number(place, f"{name}.value", entry.get("value"))
     if name not in CALCULATED:

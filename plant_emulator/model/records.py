@@ -1,9 +1,9 @@
-"""Types of what the kernel's functions share.
+"""Types of the arguments that the functions of the kernel share.
 
-A Record is read and written by attribute, all floats; which attributes it has is data
-(`stage.STAGE`, the parameter names), laid out when the kernel is built: a NumPy structured scalar
-for the compiled kernel, a plain namespace for the uncompiled one. A State is a vector or table of
-floats: a NumPy array, or (nested) lists.
+A Record holds named floats that are read and written by attribute. Its names are data:
+`stage.STAGE`, or the names of the parameters. A kernel lays its records out when it is built: as
+NumPy structured scalars if it is compiled, else as plain namespaces. A State is a vector or a table
+of floats: a NumPy array, or nested lists.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from typing import Any, Protocol
 
 
 class Record(Protocol):
-    """A set of named floats."""
+    """A record of named floats."""
 
     def __getattr__(self, name: str) -> float:
-        """Value of one name."""
+        """Value of one field."""
 
     def __setattr__(self, name: str, value: float) -> None:
-        """Set the value of one name."""
+        """Set the value of one field."""
 
 
 State = Any

@@ -1,4 +1,4 @@
-"""What the state vector and the record of one implicit stage hold, by name."""
+"""Names of the states, and of all fields of the record that one implicit stage works on."""
 
 from __future__ import annotations
 
@@ -24,17 +24,18 @@ FIRST_MEMORY = 8
 # flank is in contact.
 GAP_POSITION = "gap_position"
 
-# Everything that a stage reads and finds; the memories of the effects are added behind.
+# All fields that a stage reads or writes. The kernel adds the memories of the effects at the end.
+# README.md beside this file gives letter, unit and meaning of each.
 STAGE = (
     *STATES,
-    # what acts from outside, and when
+    # inputs, and their time
     "time",
     "delayed_reference",
     "wheel_torque",
     "brake_torque",
     "parked",
     "truck",
-    # the laws at the present estimate
+    # laws at the present estimate
     "reference",
     "speed_limit",
     "current_limit",
@@ -56,7 +57,7 @@ STAGE = (
     "drum_coulomb_friction",
     "drum_viscous_friction",
     "drum_torque",
-    # the drive, found by `drive.armature`
+    # the drive, written by `drive.solve_drive`
     "current_reference",
     "current_reference_slope",
     "wanted_current",
@@ -71,7 +72,7 @@ STAGE = (
     "power_found",
     "power_per_speed",
     "newton_failed",
-    # the gear's friction, found by `friction.gear_speed_of`
+    # the gear's friction, written by `gear.solve_gear_speed`
     "gear_direction",
     "gear_direction_factor",
     "gear_further_friction",
@@ -80,14 +81,15 @@ STAGE = (
     "gear_friction_torque",
     "drum_shaft_torque",
     "drum_friction_torque",
-    # coefficients of the stage's two linear elements, see motor_side and drum_side
+    # coefficients of the linear elements, written by `implicit_stage.prepare_motor`
     "motor_compliance",
     "motor_offset",
     "motor_coupling",
     "twist_torque",
     "next_motor_speed",
-    "gear_inertia",
-    "gear_momentum",
+    # and by `drum.prepare_drum`
+    "gear_inertia_over_step",
+    "gear_offset",
     "drum_compliance",
     "drum_offset",
     "contact_offset",

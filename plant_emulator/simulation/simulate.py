@@ -17,7 +17,7 @@ from plant_emulator.errors import UnsettledError
 from plant_emulator.signals.log import COMPARED, Array, Log
 from plant_emulator.simulation.sensor_noise import SENSORS
 from plant_emulator.solver.kernel import kernel_for
-from plant_emulator.solver.stepper import CHANNELS
+from plant_emulator.solver.stepper import CHANNELS, Inputs
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -123,12 +123,7 @@ def simulate(
     stage = model.stage_record()
     stage.truck = float(run.truck)
     model.run(
-        run.time,
-        run.reference,
-        run.slope,
-        run.corners,
-        run.wheel_torque,
-        run.parked,
+        Inputs(run.time, run.reference, run.slope, run.corners, run.wheel_torque, run.parked),
         settings,
         x,
         model.work(),

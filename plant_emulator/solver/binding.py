@@ -1,4 +1,4 @@
-"""Rebinds functions to their compiled callees: a whole model of ordinary Python is compiled."""
+"""Rebinds functions to their compiled callees, so that a model of ordinary Python is compiled."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Function = Callable[..., Any]
 
 
 def own_functions(module: ModuleType) -> list[Function]:
-    """Functions that a module defines, in the order of its text: callees stand before callers."""
+    """Functions that a module itself defines, in the order of its text: callees before callers."""
     return [
         f
         for f in vars(module).values()
@@ -26,7 +26,12 @@ def own_functions(module: ModuleType) -> list[Function]:
 def bind(
     function: Function, compiled: dict[Function, Function], callers: tuple[Function, ...] = ()
 ) -> Function:
-    """Compile a function whose callees are those already compiled; compiled once."""
+    """Compile a function and, before it, all its callees; each function is compiled once.
+
+    compiled : the functions that are compiled already; it is extended
+    callers : the functions whose compilation led here
+    Raises ParameterError, with file and line, for a function that calls itself.
+    """
     if function in compiled:
         return compiled[function]
     assert isinstance(function, FunctionType)
@@ -40,15 +45,15 @@ def bind(
         if isinstance(callee := function.__globals__.get(name), FunctionType):
             names[name] = bind(callee, compiled, (*callers, function))
     bound = FunctionType(code, names, function.__name__)
-    # numba's cache imports the module by its name; that of a user's effect file has none.
+    # numba's cache imports a module by its name. The module of a user's effect has no name.
     bound.__module__ = function.__module__ if function.__module__ in sys.modules else __name__
     cached = function in (stepper.run, stepper.advance)
-    compiled[function] = compiler.compiled(bound, on_disk=cached)
+    compiled[function] = compiler.compile_function(bound, on_disk=cached)
     return compiled[function]
 
 
 def global_names(code: CodeType) -> Iterator[str]:
-    """Names that a function looks up in its module, but not those of attributes."""
+    """Names that a function looks up in its module, without names of attributes."""
     for instruction in dis.get_instructions(code):
         if instruction.opname == "LOAD_GLOBAL":
             yield instruction.argval

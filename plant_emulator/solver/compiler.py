@@ -1,8 +1,8 @@
-"""numba, or nothing: compiles the kernel's functions and keeps the result in a cache on disk.
+"""Compiles functions with numba, or leaves them as they are, and caches kernels on disk.
 
-numba's cache knows the file of the function it compiled, not those of its callees, and would run
-an old drive under a new integrator. Hence a cache folder of its own for each state of all the
-sources.
+numba's cache notices a change in the file of a compiled function, but not in the files of its
+callees. It would run an old drive under a new integrator. Therefore each state of all source files
+has a cache folder of its own.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 ENABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 
-# error_model: a division by zero gives infinity instead of a check at every division; the divisors
-# of the model are sums of positive terms. nogil: simulations run side by side. forceinline: one
-# function in the end, so that a stage lives in registers.
+# error_model: a division by zero gives infinity, without a check at every division; the divisors of
+# the model are sums of positive terms. nogil: threads simulate side by side. forceinline: the
+# kernel becomes one function, so that the stage record lives in registers.
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "forceinline": True}
 
 
@@ -35,7 +35,7 @@ def cache_root() -> Path:
 
 
 def use_cache(sources: Sequence[str], names: Sequence[str]) -> None:
-    """Let numba keep what it compiles from now on in the folder of these sources."""
+    """Set the folder of numba's cache by the content of these files and the effects' names."""
     if not ENABLED:
         return
     import numba
@@ -47,8 +47,8 @@ def use_cache(sources: Sequence[str], names: Sequence[str]) -> None:
     numba.config.__dict__["CACHE_DIR"] = str(folder)
 
 
-def compiled(function: Callable[..., Any], *, on_disk: bool = False) -> Callable[..., Any]:
-    """The function, compiled at its first call; without compiler the function itself."""
+def compile_function(function: Callable[..., Any], *, on_disk: bool = False) -> Callable[..., Any]:
+    """A function that is compiled at its first call; without compiler the function itself."""
     if not ENABLED:
         return function
     import numba
@@ -80,11 +80,11 @@ def one_at_a_time(action: Callable[..., Any], folder: str) -> Callable[..., Any]
     return alone
 
 
-def private_copy() -> Callable[..., Any]:
-    """A compiled function that copies the record in an array to where no other pointer leads.
+def make_private_copy() -> Callable[..., Any]:
+    """Make a compiled function that copies the record in an array to private memory.
 
-    With everything inlined around it such a copy dissolves into registers; what is only written
-    is not computed. Written back by `write_back`.
+    No other pointer leads to the copy. Once everything is inlined around it, the compiler keeps the
+    copy in registers and omits fields that are only written. `make_write_back` makes the way back.
     """
     from numba.core import cgutils
     from numba.extending import intrinsic
@@ -92,7 +92,7 @@ def private_copy() -> Callable[..., Any]:
     llvm: Any = cgutils  # has no types
 
     @intrinsic
-    def private(_typing: Any, array: Any) -> Any:
+    def private_copy(_typing: Any, array: Any) -> Any:
         def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
             found = context.make_array(array)(context, builder, arguments[0]).data
             place = llvm.alloca_once(builder, found.type.pointee)
@@ -101,19 +101,19 @@ def private_copy() -> Callable[..., Any]:
 
         return array.dtype(array), generate
 
-    found: Callable[..., Any] = private
+    found: Callable[..., Any] = private_copy
     return found
 
 
-def write_back() -> Callable[..., Any]:
-    """A compiled function (copy, array) that brings a private copy back to its array."""
+def make_write_back() -> Callable[..., Any]:
+    """Make a compiled function (copy, array) that copies a private record back to its array."""
     from numba.core import cgutils, types
     from numba.extending import intrinsic
 
     llvm: Any = cgutils  # has no types
 
     @intrinsic
-    def publish(_typing: Any, record: Any, array: Any) -> Any:
+    def write_back(_typing: Any, record: Any, array: Any) -> Any:
         def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
             target = context.make_array(array)(context, builder, arguments[1]).data
             llvm.raw_memcpy(builder, target, arguments[0], llvm.intp_t(record.size), 1)
@@ -121,5 +121,5 @@ def write_back() -> Callable[..., Any]:
 
         return types.none(record, array), generate
 
-    found: Callable[..., Any] = publish
+    found: Callable[..., Any] = write_back
     return found

@@ -1,6 +1,6 @@
-"""The reference as it comes out of the drive's dead time b, at the stages of a step.
+"""The delayed reference: the reference after the drive's dead time b, at the stages of a step.
 
-From the samples of a log, linear on the segment behind each, or from a ring of past references.
+It is read from the samples of a log, linear between them, or from a ring of past references.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def segment_at(tau: float, k: int, time: State) -> int:
-    """Segment of the samples that tau lies in, looked for from segment k on."""
+    """Index of the segment between samples that holds the time tau; the search begins at k."""
     while k + 1 < len(time) and time[k + 1] <= tau:
         k += 1
     while k > 0 and time[k] > tau:
@@ -22,29 +22,32 @@ def segment_at(tau: float, k: int, time: State) -> int:
     return k
 
 
-def delayed(tau: float, k: int, time: State, value: State, slope: State) -> float:
-    """Reference of segment k at the time tau, before the first sample its value [rad/s]."""
+def reference_at(tau: float, k: int, time: State, value: State, slope: State) -> float:
+    """Reference of segment k at the time tau [rad/s]; before the first sample, that sample's."""
     reference: float = value[k] + slope[k] * (max(tau, time[0]) - time[k])
     return reference
 
 
-def ahead(
+def stage_references(
     t: float, length: float, b: float, segment: int, time: State, value: State, slope: State
 ) -> tuple[int, tuple[float, float]]:
-    """Segment that the step ends in, and the delayed reference at its stages [rad/s].
+    """Segment at the end of a step, and the delayed reference at its two stages [rad/s].
 
-    Corners nearer than the smallest step to an end of the step lie at that end.
+    A corner that is closer than the smallest step to an end of the step is taken to lie there.
+
+    t, length : begin and length of the step [s]; b : dead time [s]
+    segment : where the search for the segment begins
     """
     early = segment_at(t + max(GAMMA * length, SMALLEST_STEP) - b, segment, time)
     segment = segment_at(t + max(length - SMALLEST_STEP, SMALLEST_STEP) - b, early, time)
     return segment, (
-        delayed(t + GAMMA * length - b, early, time, value, slope),
-        delayed(t + length - b, segment, time, value, slope),
+        reference_at(t + GAMMA * length - b, early, time, value, slope),
+        reference_at(t + length - b, segment, time, value, slope),
     )
 
 
-def past(lag: float, newest: int, history: State) -> float:
-    """Reference that many steps ago, linear between the steps [rad/s]."""
+def past_reference(lag: float, newest: int, history: State) -> float:
+    """Reference `lag` steps before the newest one [rad/s], linear between the steps."""
     length = len(history)
     whole = int(lag)
     part = lag - whole

@@ -1,4 +1,4 @@
-"""Finds the faults of a user's own effect, and says where in his file they are."""
+"""Finds faults in a user's own effect and names the line of the file."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ if TYPE_CHECKING:
     from plant_emulator.effects import Effect
     from plant_emulator.model.records import Record
 
-# Size of the implicit stage that a memory is tried with [s].
+# Implicit step that the memories are called with [s].
 SHORT = 1e-3
 
 
 class Stage(SimpleNamespace):
-    """A plain stage record; the name is what an error shows."""
+    """A plain stage record; errors show the name of this class."""
 
 
 class Parameters(SimpleNamespace):
-    """A plain parameter record."""
+    """A plain parameter record; errors show the name of this class."""
 
 
 def memory_names(known: Mapping[str, Effect]) -> list[str]:
@@ -33,18 +33,18 @@ def memory_names(known: Mapping[str, Effect]) -> list[str]:
     return [f"{effect.name}_{memory}" for effect in known.values() for memory in effect.memories]
 
 
-def try_out(known: Mapping[str, Effect]) -> None:
-    """Call the functions of each effect that is not shipped once, at rest, at its plausible size.
+def check_effects(known: Mapping[str, Effect]) -> None:
+    """Call each function of a user's own effects once, at rest, at the effect's plausible size.
 
-    Uncompiled, since the compiler says of a misspelt name only that it is missing, not where. A
-    division by zero is no fault here: compiled it gives infinity, and the simulation refuses what
-    is not finite.
+    Raises ParameterError with file and line for a fault. The functions run uncompiled, because the
+    compiler would not name the line of a misspelt name. A division by zero is not a fault here:
+    compiled it gives infinity, and the simulation refuses a result that is not finite.
     """
     for name in known.keys() - effects.names():
-        _try_one(known[name], known)
+        _check_one(known[name], known)
 
 
-def _try_one(effect: Effect, known: Mapping[str, Effect]) -> None:
+def _check_one(effect: Effect, known: Mapping[str, Effect]) -> None:
     for function, arguments in _calls(effect, known):
         try:
             float(function(*arguments))
@@ -62,7 +62,8 @@ def _calls(
     effect: Effect, known: Mapping[str, Effect]
 ) -> Iterator[tuple[Callable[..., Any], tuple[Any, ...]]]:
     own = {f"{effect.name}_{key}": value for key, value in effect.plausible().items()}
-    p = cast("Record", Parameters(**dict.fromkeys(UNITS, 1.0) | effects.neutral(known) | own))
+    neutral = effects.neutral_values(known)
+    p = cast("Record", Parameters(**dict.fromkeys(UNITS, 1.0) | neutral | own))
     s = cast("Record", Stage(**dict.fromkeys((*stage.STAGE, *memory_names(known)), 0.0)))
     for law in effect.laws.values():
         yield law, (0.0, s, p)
@@ -74,7 +75,7 @@ def _calls(
 
 
 def raise_in_effects(error: Exception, known: Mapping[str, Effect]) -> None:
-    """Raise ParameterError, if the fault lies in the file of an effect."""
+    """Raise ParameterError with file and line if an error arose in the file of an effect."""
     place = place_in((effect.file for effect in known.values()), error)
     if place is not None:
         raise ParameterError(place) from error

@@ -1,4 +1,4 @@
-"""One step of SDIRK2: its two stages, its error, and the states in between.
+"""One step of SDIRK2: its two stages, its local error, and the states within the step.
 
 Two-stage, singly diagonally implicit Runge-Kutta method of order 2, L-stable and stiffly accurate
 (Alexander, SIAM J. Numer. Anal. 14 (1977) 1006):
@@ -6,12 +6,12 @@ Two-stage, singly diagonally implicit Runge-Kutta method of order 2, L-stable an
     X1 = x + gamma h f(X1)
     X2 = x + (1 - gamma) h f(X1) + gamma h f(X2),   x(t + h) = X2,   gamma = 1 - 1/sqrt(2)
 
-Each stage is X = base + a f(X) with a = gamma h; f(X1) = (X1 - x) / a, so the second base is
-x + (1 - gamma)/gamma (X1 - x) and f itself is never evaluated.
+Each stage is X = base + a f(X) with a = gamma h. Since f(X1) = (X1 - x) / a, the second base is
+x + (1 - gamma)/gamma (X1 - x), and f itself is never evaluated.
 
-Error estimate: the slopes at t, t + gamma h and t + h give a quadrature of order 3; its difference
-from the method's is the local error. Where a contact closes or a limit is reached the slopes jump,
-and the step shrinks.
+Error estimate: the slopes at t, t + gamma h and t + h give a quadrature of order 3. The local error
+is its difference from the method's own quadrature. Where a contact closes or a limit is reached,
+the slopes jump and the step shrinks.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ if TYPE_CHECKING:
     from plant_emulator.model.records import Record, State
 
 GAMMA = 1.0 - 1.0 / sqrt(2.0)
-# Weights of the error estimate: order-3 quadrature at 0, gamma, 1 minus the method's.
+# Weights of the error estimate: quadrature of order 3 at 0, gamma and 1, minus the method's own.
 _W1 = 1.0 / (6.0 * GAMMA * (1.0 - GAMMA))
 _W2 = 0.5 - _W1 * GAMMA
 ERROR_0, ERROR_1, ERROR_2 = 1.0 - _W1 - _W2, _W1 - (1.0 - GAMMA), _W2 - GAMMA
 
-# States whose error is controlled, over the size that counts as 1: the range of a full-speed run.
+# States whose error is controlled, and one over the range of each in a run at full speed.
 CONTROLLED = (2, 3, 4, 7)
 WEIGHT = (1.0 / 70.0, 1.0 / 400.0, 1.0 / 1.2e-3, 1.0 / 6.5)
 
 SHRINK, GROW, SAFETY = 0.2, 5.0, 0.9
 SMALLEST_STEP = 1e-6
-# Error that a step with an unsettled stage counts as, in tolerances.
+# Error that is assigned to a step with an unsolved stage, in tolerances [1].
 UNSETTLED = 1e6
-# Below this share of the tolerance a step grows by GROW, above by the root.
+# Below this error, in tolerances, the next step grows by GROW; above, by the cubic root.
 EASY = (SAFETY / GROW) ** 3
 
 # Rows of the work space.
@@ -49,9 +49,10 @@ FIRST, BASE, LAST, SLOPE = 0, 1, 2, 3
 def step(
     h: float, t: float, r: tuple[float, float], x: State, w: State, s: Record, p: Record
 ) -> None:
-    """One step from x at t; its result goes to w[LAST], x stays as it is.
+    """Take one step from the state x at time t. The result goes to w[LAST]; x is not changed.
 
-    r : delayed reference at t + gamma h and at t + h [rad/s]
+    h : length of the step [s]; r : delayed reference at t + gamma h and at t + h [rad/s]
+    w : work space, four state vectors
     """
     first, base, last, slope = w[FIRST], w[BASE], w[LAST], w[SLOPE]
     load(x, s)
@@ -70,7 +71,7 @@ def step(
 
 
 def local_error(h: float, x: State, w: State) -> float:
-    """Largest local error of the controlled states, each over its scale [1]; a NaN is infinite."""
+    """Largest local error of the controlled states, each over its range [1]; inf for a NaN."""
     first, base, last, slope = w[FIRST], w[BASE], w[LAST], w[SLOPE]
     per_stage, error = 1.0 / (GAMMA * h), 0.0
     for j in range(len(CONTROLLED)):
@@ -84,7 +85,7 @@ def local_error(h: float, x: State, w: State) -> float:
 
 
 def growth(error: float) -> float:
-    """Factor to the next step after one of that error, in units of the tolerance [1]."""
+    """Factor from a step with that error, in tolerances, to the next step [1]."""
     if error <= EASY:
         return GROW
     factor: float = SAFETY * error ** (-1.0 / 3.0)
@@ -92,7 +93,7 @@ def growth(error: float) -> float:
 
 
 def accept(h: float, x: State, w: State) -> None:
-    """Make the step's result the state, and keep its last slope."""
+    """Copy the result of the step to the state x, and keep the slope at its end."""
     base, last, slope = w[BASE], w[LAST], w[SLOPE]
     per_stage = 1.0 / (GAMMA * h)
     for k in range(len(x)):
@@ -101,9 +102,9 @@ def accept(h: float, x: State, w: State) -> None:
 
 
 def interpolate(since: float, h: float, x: State, w: State) -> State:
-    """State a time `since` after the begin of the step: the cubic through both ends and slopes.
+    """State at the time `since` after the begin of a step [s], by cubic Hermite interpolation.
 
-    It takes the place of the first stage, which is of no more use.
+    The result overwrites the first stage in w, which is not needed any more.
     """
     first, base, last, slope = w[FIRST], w[BASE], w[LAST], w[SLOPE]
     u = since / h

@@ -1,13 +1,13 @@
-"""The stepper: SDIRK2 over a log, with fixed or adapted steps. It knows steps, not motors.
+"""The stepper: SDIRK2 over a whole log, with fixed or adapted steps. `sdirk` is one step.
 
-Steps end on samples and on every corner of the delayed reference. A step may pass samples as long
-as the truck's torque stays; these lie on the cubic through both ends. What one step is: `sdirk`.
+Steps end on samples and on every corner of the delayed reference. A step may pass samples while the
+truck's torque does not change. The states at these samples come from cubic interpolation.
 """
 
 from __future__ import annotations
 
 from math import ceil, inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from plant_emulator.model.implicit_stage import acting_wheel_torque, evaluate_laws, load, show
 from plant_emulator.model.laws import (
@@ -17,7 +17,12 @@ from plant_emulator.model.laws import (
     measured_shaft_torque,
     shell_temperature,
 )
-from plant_emulator.solver.dead_time import ahead, delayed, past, segment_at
+from plant_emulator.solver.dead_time import (
+    past_reference,
+    reference_at,
+    segment_at,
+    stage_references,
+)
 from plant_emulator.solver.sdirk import (
     GAMMA,
     SMALLEST_STEP,
@@ -32,7 +37,7 @@ from plant_emulator.solver.sdirk import (
 if TYPE_CHECKING:
     from plant_emulator.model.records import Record, State
 
-# Channels of a log in the order of `observe`.
+# Channels of a simulated log, in the order that `observe` writes them.
 CHANNELS = (
     "motor_speed",
     "drum_speed",
@@ -44,8 +49,25 @@ CHANNELS = (
 )
 
 
+class Inputs(NamedTuple):
+    """The inputs of a log: one value a sample, but for the corners.
+
+    reference, slope : reference of the PLC [rad/s], and its slope until the next sample [rad/s^2]
+    corners : times of the corners of the reference, before the dead time, ascending [s]
+    wheel_torque : torque of the truck at its wheel in the interval that ends at the sample [N m]
+    parked : 1 for an interval in which the truck is parked, else 0
+    """
+
+    time: State
+    reference: State
+    slope: State
+    corners: State
+    wheel_torque: State
+    parked: State
+
+
 def observe(row: int, out: State, s: Record, p: Record) -> None:
-    """Write what the sensors show into one row of the log (CHANNELS)."""
+    """Write the values that the sensors show into one row of the log (CHANNELS)."""
     out[row, 0] = s.tachometer_gain * s.motor_speed
     out[row, 1] = measured_drum_speed(s, p)
     out[row, 2] = measured_armature_current(s, p)
@@ -56,7 +78,7 @@ def observe(row: int, out: State, s: Record, p: Record) -> None:
 
 
 def landing_sample(row: int, reach: float, time: State, wheel_torque: State, parked: State) -> int:
-    """The last sample within reach, from `row` on, up to which the truck's torque stays."""
+    """Last sample before the time `reach` [s], from `row` on, with the truck's torque unchanged."""
     while (
         row + 1 < len(time)
         and time[row + 1] <= reach * (1.0 + 1e-12)
@@ -67,36 +89,31 @@ def landing_sample(row: int, reach: float, time: State, wheel_torque: State, par
     return row
 
 
-def private(stage: Record) -> Record:
-    """The record to work on: compiled, a copy that the compiler may keep in registers."""
+def private_copy(stage: Record) -> Record:
+    """The record to work on; compiled, it is a copy that may live in registers."""
     return stage
 
 
-def publish(s: Record, stage: Record) -> None:
-    """Bring the record worked on back to the caller's: nothing to do where it is the same."""
+def write_back(s: Record, stage: Record) -> None:
+    """Copy the record worked on back to the caller's; uncompiled, both are the same record."""
 
 
-def pending(edge: int, now: float, edges: State) -> int:
-    """The first corner after the time `now` of the reference, from that corner on."""
+def next_corner(edge: int, now: float, edges: State) -> int:
+    """Index of the first corner after the time `now` [s]; the search begins at `edge`."""
     while edge < len(edges) and edges[edge] <= now + SMALLEST_STEP:
         edge += 1
     return edge
 
 
-def error_of(length: float, tolerance: float, unsettled: bool, x: State, w: State) -> float:
-    """Error of a step in tolerances; one that did not settle is to be shortened."""
-    if unsettled:  # a shorter step is nearer to where it was linearised
+def step_error(length: float, tolerance: float, unsettled: bool, x: State, w: State) -> float:
+    """Error of a step, in tolerances [1]; an unsolved stage counts as UNSETTLED."""
+    if unsettled:  # in a shorter step the linearisations hold better
         return UNSETTLED
     return min(local_error(length, x, w) / tolerance, UNSETTLED)
 
 
 def run(
-    time: State,
-    value: State,
-    slope: State,
-    edges: State,
-    wheel_torque: State,
-    parked: State,
+    inputs: Inputs,
     settings: tuple[float, float],
     x: State,
     w: State,
@@ -104,17 +121,15 @@ def run(
     p: Record,
     out: State,
 ) -> int:
-    """Simulate a whole log; returns the number of steps.
+    """Simulate a whole log and return the number of steps.
 
-    time, value, slope : samples of the reference and its slope behind each [s, rad/s, rad/s^2]
-    edges : corners of the reference before the dead time, ascending [s]
-    wheel_torque, parked : in force during the interval that ends at the sample [N m, 0 or 1]
-    settings : tolerance [1] (infinite: fixed steps) and largest step [s]
-    x, w, stage, p : state at time[0], work space, stage and parameter records
-    out : (samples, channels), filled
+    settings : tolerance [1], infinite for fixed steps; largest step [s]
+    x, w : state at the first sample, work space; stage, p : stage record and parameter record
+    out : the channels at every sample, shape (samples, channels); it is filled
     """
+    time, value, slope, edges, wheel_torque, parked = inputs
     tolerance, largest = settings
-    s, p = private(stage), private(p)
+    s, p = private_copy(stage), private_copy(p)
     load(x, s)
     s.time, s.delayed_reference = time[0], value[0]
     evaluate_laws(s, p)
@@ -123,27 +138,27 @@ def run(
     while row < len(time):
         s.time, s.wheel_torque, s.parked = t, wheel_torque[row], parked[row]
         b = dead_time(s, p)
-        edge = pending(edge, t - b, edges)
+        edge = next_corner(edge, t - b, edges)
         h = min(h, largest)
-        # Four lines that as a function of all these arrays would cost a twelfth of a run.
+        # These lines are no function: a call with all these arrays costs a twelfth of a run.
         corner = edges[edge] + b if edge < len(edges) else inf
         reach = min(t + h, corner + SMALLEST_STEP)
         landing = landing_sample(row, reach, time, wheel_torque, parked)
         end = corner if corner < time[landing] - SMALLEST_STEP else time[landing]
         pieces = 1 if landing > row else ceil((end - t) / h - 1e-9)
         length = (end - t) / pieces
-        segment, r = ahead(t, length, b, segment, time, value, slope)
+        segment, r = stage_references(t, length, b, segment, time, value, slope)
         unsettled = s.unsettled
         step(length, t, r, x, w, s, p)
         steps += 1
         if tolerance < 1e9:
-            error = error_of(length, tolerance, s.unsettled > unsettled, x, w)
+            error = step_error(length, tolerance, s.unsettled > unsettled, x, w)
             h = length * growth(error)
             if error > 1.0 and length > SMALLEST_STEP:
                 s.unsettled = unsettled
                 continue
             if s.unsettled > unsettled:
-                break  # no step is short enough: the caller refuses the result
+                break  # even the smallest step is not solved: the caller refuses the result
         if pieces == 1 and end == time[landing]:
             observe(landing, out, s, p)
             early = segment
@@ -151,14 +166,14 @@ def run(
                 early = segment_at(time[k] - b, early, time)
                 s.time, s.delayed_reference = (
                     time[k],
-                    delayed(time[k] - b, early, time, value, slope),
+                    reference_at(time[k] - b, early, time, value, slope),
                 )
                 show(interpolate(time[k] - t, length, x, w), s, p)
                 observe(k, out, s, p)
             row = landing + 1
         accept(length, x, w)
         t = end if pieces == 1 else t + length
-    publish(s, stage)
+    write_back(s, stage)
     return steps
 
 
@@ -173,15 +188,18 @@ def advance(
     p: Record,
     out: State,
 ) -> int:
-    """Advance the running bench by one fixed step for each reference; returns the new `newest`.
+    """Advance the running bench by one fixed step for each reference; return the new `newest`.
 
-    -1 where the dead time is negative or longer than the history: the bench stops before that step.
+    The result is -1 if the dead time is negative or longer than the history. The bench then stops
+    before that step.
 
-    references : what the PLC asks at the end of each step [rad/s]
-    history : ring of past references one step apart, at least dead time / h + 2 long
-    out : (steps, channels), filled
+    references : reference of the PLC at the end of each step [rad/s]
+    history : ring of past references one step apart, at least dead time / h + 2 long [rad/s]
+    newest : index of the latest reference in the ring; h : length of a step [s]
+    x, w : state, work space; stage, p : stage record and parameter record
+    out : the channels after every step, shape (steps, channels); it is filled
     """
-    s, p = private(stage), private(p)
+    s, p = private_copy(stage), private_copy(p)
     length = len(history)
     for row in range(len(references)):
         newest = (newest + 1) % length
@@ -191,11 +209,11 @@ def advance(
             newest = -1
             break
         r = (
-            past(lag + 1.0 - GAMMA, newest, history),
-            past(lag, newest, history),
+            past_reference(lag + 1.0 - GAMMA, newest, history),
+            past_reference(lag, newest, history),
         )
         step(h, s.time, r, x, w, s, p)
         accept(h, x, w)
         observe(row, out, s, p)
-    publish(s, stage)
+    write_back(s, stage)
     return newest

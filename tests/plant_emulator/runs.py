@@ -14,6 +14,7 @@ from plant_emulator.simulation.simulate import run_of
 from plant_emulator.simulation.simulate import simulate as simulate_run
 from plant_emulator.solver import compiler
 from plant_emulator.solver.kernel import Kernel, kernel
+from plant_emulator.solver.stepper import Inputs
 
 needs_compiler = pytest.mark.skipif(
     not compiler.ENABLED, reason="is about the compiler, which NUMBA_DISABLE_JIT switches off"
@@ -70,10 +71,8 @@ class Piecewise:
         torque = np.full(pieces + 1, wheel_torque)
         free = np.zeros(pieces + 1)
         work, stage = self.model.work(), self.model.stage_record()
-        self.model.run(
-            times, references, slope, np.array([]), torque, free,
-            settings, self.x, work, stage, self.p, out,
-        )  # fmt: skip
+        inputs = Inputs(times, references, slope, np.array([]), torque, free)
+        self.model.run(inputs, settings, self.x, work, stage, self.p, out)
         self.time, self.reference = time, reference
         return out
 

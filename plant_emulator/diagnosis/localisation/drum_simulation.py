@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     """The loop, compiled at its first call."""
     compiler.use_cache([__file__, str(compiler.__file__)], ["driven drum"])
-    return compiler.compiled(function, on_disk=True)
+    return compiler.compile_function(function, on_disk=True)
 
 
 def drum_speed(

@@ -26,7 +26,7 @@ from plant_emulator.recordings.input_noise import loud
 from plant_emulator.recordings.preflight import NAMES
 from plant_emulator.signals.log import VOLTAGE
 from plant_emulator.simulation.simulate import TOLERANCE, values_of
-from plant_emulator.solver.kernel import kernel, know
+from plant_emulator.solver.kernel import kernel, use_own_effects
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -275,7 +275,7 @@ class BenchRecipe:
 
     def build(self) -> BenchModel:
         """The model; this process then knows the user's own effects."""
-        know(*(from_file(path) for path in self.own))
+        use_own_effects(*(from_file(path) for path in self.own))
         return BenchModel(self.recordings, self.parameters, self.contestants())
 
     def digest(self) -> str:

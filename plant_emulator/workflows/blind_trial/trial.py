@@ -20,7 +20,7 @@ from plant_emulator.blind.score import Unsealed, score
 from plant_emulator.blind.summary import TrialAnswer
 from plant_emulator.diagnosis.report import document
 from plant_emulator.errors import EmulatorError
-from plant_emulator.solver.kernel import kernel, know
+from plant_emulator.solver.kernel import kernel, use_own_effects
 from plant_emulator.workflows.blind_trial.examiner import Examiner
 from plant_emulator.workflows.blind_trial.folder import Folder, program_hash, write
 
@@ -41,7 +41,7 @@ class Trial:
     def __init__(self, path: Path, seed: int, count: int) -> None:
         self.seed, self.count, self.program = seed, count, program_hash()
         self.folder = Folder(path, seed, self.program)
-        know(*(laws.load(name) for name in laws.names()))
+        use_own_effects(*(laws.load(name) for name in laws.names()))
         self.nominal = parameter_sets.load()
         self._examiner = Examiner()
 

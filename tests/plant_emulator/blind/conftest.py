@@ -15,9 +15,9 @@ from plant_emulator.solver import kernel as kernels
 @pytest.fixture(scope="package", autouse=True)
 def all_effects() -> Iterator[dict[str, Effect]]:
     """Effects of the library and laws of the trial, registered in this process meanwhile."""
-    kernels.know(*(laws.load(name) for name in laws.names()))
+    kernels.use_own_effects(*(laws.load(name) for name in laws.names()))
     yield dict(kernels.kernel().effects)
-    kernels.know()
+    kernels.use_own_effects()
 
 
 def case_with(*hidden: Hidden, kind: str = "effect", runs: int = 1) -> Case:

@@ -14,7 +14,7 @@ from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import COMPARED, Array
 from plant_emulator.simulation.sensor_noise import SENSORS
 from plant_emulator.simulation.simulate import run_of, simulate
-from plant_emulator.solver.kernel import kernel, know
+from plant_emulator.solver.kernel import kernel, use_own_effects
 from tests.plant_emulator.blind.conftest import case_with, hidden
 
 
@@ -32,7 +32,7 @@ def test_truth_that_does_not_converge_is_simulated_with_a_smaller_step(
     nominal: ParameterSet,
 ) -> None:
     """With steps of 0.2 ms one stage of program 3 does not converge in this case of presliding."""
-    know(*(laws.load(name) for name in laws.names()))
+    use_own_effects(*(laws.load(name) for name in laws.names()))
     case = draw(86028, 32, nominal, kernel().effects)
     assert [h.law for h in case.hidden] == ["elastoplastic_presliding"]
     found = simulate_truth(case, nominal)

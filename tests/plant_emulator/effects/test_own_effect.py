@@ -75,10 +75,10 @@ SIMULATED = """
 import sys
 from pathlib import Path
 from plant_emulator import effects, parameter_sets
-from plant_emulator.solver.kernel import kernel, know
+from plant_emulator.solver.kernel import kernel, use_own_effects
 from tests.plant_emulator.runs import linear, simulate
 
-know(effects.from_file(Path(sys.argv[1])))
+use_own_effects(effects.from_file(Path(sys.argv[1])))
 model = kernel()
 values = {**parameter_sets.load().values(), "oil_drag_factor": 20.0}
 inputs = linear((0.5, 0.0), (3.0, 180.0), duration=30.0)

@@ -30,7 +30,7 @@ def state(*, integral: float = 0.0, current_integral: float = 0.0, current: floa
 
 def test_current_reference_is_gain_times_error_plus_integral(p: SimpleNamespace) -> None:
     s = stage(p, reference=101.0, motor_speed=100.0)
-    drive.speed_controller(state(integral=2.0), 0.0, s, p)
+    drive.solve_speed_loop(state(integral=2.0), 0.0, s, p)
     assert s.current_reference == pytest.approx(15.0 * 1.0 + 15.0 / 1.0 * 2.0)
 
 
@@ -54,26 +54,26 @@ def test_drop_of_the_converter_is_linear_about_the_current(
 
 def test_integral_grows_by_the_error(p: SimpleNamespace) -> None:
     s = stage(p, reference=101.0, motor_speed=100.0)
-    drive.speed_controller(state(integral=2.0), A, s, p)
+    drive.solve_speed_loop(state(integral=2.0), A, s, p)
     assert s.speed_integral == pytest.approx(2.0 + A * 1.0)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_current_reference_is_held_to_72_ampere(p: SimpleNamespace, sign: float) -> None:
     s = stage(p, reference=sign * 100.0, motor_speed=0.0)
-    drive.speed_controller(state(), A, s, p)
+    drive.solve_speed_loop(state(), A, s, p)
     assert s.current_reference == sign * 72.0
 
 
 def test_limited_integrator_does_not_grow(p: SimpleNamespace) -> None:
     s = stage(p, reference=100.0, motor_speed=0.0)
-    drive.speed_controller(state(integral=3.0), A, s, p)
+    drive.solve_speed_loop(state(integral=3.0), A, s, p)
     assert s.speed_integral == 3.0
 
 
 def test_limited_integrator_takes_in_what_leads_back(p: SimpleNamespace) -> None:
     s = stage(p, reference=99.0, motor_speed=100.0)
-    drive.speed_controller(state(integral=20.0), A, s, p)  # wants 15 * 20 - 15 = 285 A
+    drive.solve_speed_loop(state(integral=20.0), A, s, p)  # wants 15 * 20 - 15 = 285 A
     assert s.current_reference == 72.0
     assert s.speed_integral == pytest.approx(20.0 - A * 1.0)
 
@@ -81,13 +81,13 @@ def test_limited_integrator_takes_in_what_leads_back(p: SimpleNamespace) -> None
 def test_current_leaves_its_limit_at_once_when_the_error_changes_sign(p: SimpleNamespace) -> None:
     just_limited = 72.0 / 15.0
     s = stage(p, reference=99.9, motor_speed=100.0)
-    drive.speed_controller(state(integral=just_limited), A, s, p)
+    drive.solve_speed_loop(state(integral=just_limited), A, s, p)
     assert s.current_reference == pytest.approx(72.0 - 15.0 * 0.1, rel=1e-3)
 
 
 def test_reference_is_held_to_4830_rpm(p: SimpleNamespace) -> None:
     s = stage(p, reference=600.0, motor_speed=505.0)
-    drive.speed_controller(state(), 0.0, s, p)
+    drive.solve_speed_loop(state(), 0.0, s, p)
     assert s.current_reference == pytest.approx(15.0 * (505.796417 - 505.0))
 
 
@@ -95,7 +95,7 @@ def test_armature_solves_its_own_equation(p: SimpleNamespace) -> None:
     """L_a di/dt = u - R_a i - k Phi omega with u = 30 (i_ref - i) + 30/3 (integral at the end)."""
     s = stage(p, reference=100.5, motor_speed=100.0)
     base = state(integral=0.1, current_integral=18.0, current=8.0)
-    drive.armature(base, A, s, p)
+    drive.solve_drive(base, A, s, p)
     assert abs(s.armature_voltage) < 400.0
     rate = (s.armature_current - 8.0) / A
     assert 0.004 * rate == pytest.approx(
@@ -108,7 +108,7 @@ def test_armature_solves_its_own_equation(p: SimpleNamespace) -> None:
 
 def test_voltage_is_held_to_400_volt_and_its_integrator_waits(p: SimpleNamespace) -> None:
     s = stage(p, reference=100.0, motor_speed=0.0)
-    drive.armature(state(current_integral=0.5), A, s, p)  # asks for 72 A at once: 2160 V
+    drive.solve_drive(state(current_integral=0.5), A, s, p)  # asks for 72 A at once: 2160 V
     assert s.armature_voltage == 400.0
     assert s.current_integral == 0.5
     assert 0.004 * s.armature_current / A == pytest.approx(400.0 - 0.424 * s.armature_current)
@@ -118,10 +118,10 @@ def test_voltage_is_held_to_400_volt_and_its_integrator_waits(p: SimpleNamespace
 def test_slopes_are_difference_quotients(p: SimpleNamespace, motor_speed: float) -> None:
     base = state(integral=0.3, current_integral=0.1 * motor_speed, current=5.0)
     s = stage(p, reference=motor_speed + 1.0, motor_speed=motor_speed)
-    drive.armature(base, A, s, p)
+    drive.solve_drive(base, A, s, p)
     other = stage(p, reference=motor_speed + 1.0, motor_speed=motor_speed + 1e-3)
     other.flux = laws.flux(other, p)
-    drive.armature(base, A, other, p)
+    drive.solve_drive(base, A, other, p)
     drive.move_drive(1e-3, s)
     for name in ("current_reference", "speed_integral", "armature_current", "current_integral"):
         assert getattr(s, name) == pytest.approx(getattr(other, name), rel=1e-6), name
@@ -130,6 +130,6 @@ def test_slopes_are_difference_quotients(p: SimpleNamespace, motor_speed: float)
 
 def test_change_of_limits_is_seen(p: SimpleNamespace) -> None:
     s = stage(p, reference=104.0, motor_speed=100.0)  # wants 60 A
-    drive.armature(state(current_integral=18.5, current=60.0), A, s, p)
-    assert drive.same_limits(0.5, s)
-    assert not drive.same_limits(-1.0, s)  # would want 75 A
+    drive.solve_drive(state(current_integral=18.5, current=60.0), A, s, p)
+    assert drive.keeps_limits(0.5, s)
+    assert not drive.keeps_limits(-1.0, s)  # would want 75 A

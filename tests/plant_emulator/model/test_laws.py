@@ -1,11 +1,13 @@
 """Constitutive laws against the thesis's numbers."""
 
+from collections.abc import Callable
 from types import SimpleNamespace
 
 import pytest
 
-from plant_emulator.model import drive, laws
+from plant_emulator.model import drive, implicit_stage, laws
 from plant_emulator.model.parameters import ParameterSet
+from plant_emulator.model.stage import STAGE
 
 RPM = 2 * 3.141592653589793 / 60
 
@@ -90,6 +92,42 @@ NEGLECTED = [
 def test_what_the_thesis_neglects_is_zero(law: object, p: SimpleNamespace) -> None:
     assert callable(law)
     assert law(SimpleNamespace(motor_speed=1.0, gear_speed=1.0, drum_speed=1.0), p) == 0.0
+
+
+# Laws that act outside of the stage: on the reference before it, and on the log after it.
+OUTSIDE = {"dead_time", "shell_temperature"}
+OUTSIDE |= {f.__name__ for f in laws.LAWS if f.__name__.startswith("measured")}
+
+
+@pytest.fixture
+def s() -> SimpleNamespace:
+    """A stage on the move, its laws evaluated by the test."""
+    stage = SimpleNamespace(**dict.fromkeys(STAGE, 0.0))
+    vars(stage).update(motor_speed=250.0, gear_speed=4.0, drum_speed=4.0, armature_current=10.0)
+    vars(stage).update(gear_direction=1.0, delayed_reference=250.0, wheel_torque=10.0)
+    return stage
+
+
+@pytest.mark.parametrize("name", [law.__name__ for law in laws.LAWS if law.__name__ in STAGE])
+def test_stage_holds_each_law_as_evaluated(
+    name: str, s: SimpleNamespace, p: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(implicit_stage, name, lambda s, p: 0.125)
+    implicit_stage.evaluate_laws(s, p)
+    assert getattr(s, name) == 0.125
+
+
+@pytest.mark.parametrize("law", [f for f in laws.LAWS if f.__name__ not in OUTSIDE])
+def test_stage_is_solved_anew_whichever_law_has_moved(
+    law: Callable[..., float],
+    s: SimpleNamespace,
+    p: SimpleNamespace,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    implicit_stage.evaluate_laws(s, p)
+    assert not implicit_stage.laws_have_moved(0.0, s, p)
+    monkeypatch.setattr(implicit_stage, law.__name__, lambda s, p: law(s, p) + 0.125)
+    assert implicit_stage.laws_have_moved(0.0, s, p)
 
 
 def test_every_law_is_listed_once_and_has_unit_or_dimension_in_its_docstring() -> None:

@@ -50,9 +50,8 @@ def test_dead_zone_is_odd_and_rises_by_no_more_than_its_argument(
 
 
 def test_friction_takes_up_to_its_level_and_leaves_the_rest() -> None:
-    assert [drum_equation.slipping(torque, 2.0) for torque in (5.0, 2.0, -1.0, -2.0, -5.0)] == [
-        3.0, 0.0, 0.0, 0.0, -3.0,
-    ]  # fmt: skip
+    beyond = [drum_equation.torque_beyond_friction(t, 2.0) for t in (5.0, 2.0, -1.0, -2.0, -5.0)]
+    assert beyond == [3.0, 0.0, 0.0, 0.0, -3.0]
 
 
 # --- one stage --------------------------------------------------------------------------------

@@ -19,10 +19,10 @@ from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import COMPARED
 from plant_emulator.simulation.simulate import values_of
 from plant_emulator.solver import compiler
+from plant_emulator.solver.glue import glue
 from plant_emulator.solver.kernel import (
     Kernel,
     build,
-    glue,
     kernel,
     kernel_for,
     partial_kernel,
@@ -228,7 +228,7 @@ compiler.use_cache([], ["square"])
 def square(x):
     return x * x
 
-function = compiler.compiled(square, on_disk=True)
+function = compiler.compile_function(square, on_disk=True)
 assert function(3.0) == 9.0
 print(sum(function.stats.cache_hits.values()))
 """
