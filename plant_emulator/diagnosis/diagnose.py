@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from plant_emulator.diagnosis.answer import Answer, Logs
 from plant_emulator.diagnosis.calibration.confidence import confidence
 from plant_emulator.diagnosis.design.next_experiment import Advice
-from plant_emulator.diagnosis.execution.pool import model_of
+from plant_emulator.diagnosis.execution.pool import build_model
 from plant_emulator.diagnosis.execution.progress import ReportingPool
 from plant_emulator.diagnosis.fitting.derived_quantities import in_terms
 from plant_emulator.diagnosis.fitting.evidence import EVIDENCE_THRESHOLD, NOISE_MEAN_SQUARE
@@ -83,7 +83,7 @@ class Diagnose:
     ) -> None:
         self.pool = pool if progress is None else ReportingPool(pool, progress)
         self.recipe, self.plan = recipe, plan
-        self.model: Model = model_of(recipe)
+        self.model: Model = build_model(recipe)
         self.settings, self.notes = settings, tuple(notes)
         self.cases = None if cases is None else tuple(cases)
         self.law_errors = law_errors or {}

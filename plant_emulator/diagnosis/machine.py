@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.answer import Location
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.estimation.unknowns import Residual, Unknown
-    from plant_emulator.recordings.input_noise import Loud
+    from plant_emulator.recordings.input_noise import NoiseDirections
     from plant_emulator.signals.log import Array
 
 
 @dataclass(frozen=True, kw_only=True)
-class Term:
+class DerivedQuantity:
     """A quantity that the field knows an effect by, such as a coefficient of either direction.
 
     of : its value [unit] from the values of a fit by name
@@ -41,9 +41,9 @@ class Candidate:
     fixed : values of the rest while the effect is there
     units : of all its parameters, by name
     title : what it is, in one line; needs : what a log must have to show it, empty: nothing special
-    untold : its unknowns of one run that no fit and no measurement tells: its course is chance
-    terms : what else it is known by, made of its own values and the machine's
-    exact : its law can have no other form, so that it leaves nothing where it is the cause
+    stochastic : its unknowns of one run that no fit and no measurement tells: its course is chance
+    derived : what else it is known by, made of its own values and the machine's
+    exact_form : its law can have no other form, so that it leaves nothing where it is the cause
     """
 
     name: str
@@ -56,18 +56,18 @@ class Candidate:
     units: Mapping[str, str]
     title: str
     needs: str = ""
-    untold: tuple[Unknown, ...] = ()
-    terms: tuple[Term, ...] = ()
-    exact: bool = False
+    stochastic: tuple[Unknown, ...] = ()
+    derived: tuple[DerivedQuantity, ...] = ()
+    exact_form: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class MeasuredRun:
     """A measured run.
 
     time : of its samples [s], shape (n,); measured : shape (channels, n) [units]
     noise : standard deviation of each channel's noise, shape (channels,) [units]
-    fed : whether an input of its simulation is a measurement with noise of its own
+    measured_input : whether an input of its simulation is a measurement with noise of its own
     """
 
     source: str
@@ -76,14 +76,14 @@ class Run:
     time: Array
     measured: Array
     noise: Array
-    fed: bool = False
+    measured_input: bool = False
 
 
 class Model(Protocol):
     """A machine that can be simulated, and the runs that it was given."""
 
     @property
-    def runs(self) -> Sequence[Run]:
+    def runs(self) -> Sequence[MeasuredRun]:
         """The measured runs."""
 
     @property
@@ -120,32 +120,34 @@ class Model(Protocol):
         Measured minus simulated over the noise, shape (channels, samples); 0: does not count.
         """
 
-    def loud(self, run: int, where: FitResult, state: Mapping[str, float]) -> Loud | None:
+    def input_noise(
+        self, run: int, where: FitResult, state: Mapping[str, float]
+    ) -> NoiseDirections | None:
         """What the noise of the run's fed inputs does to it at a fit; see `fed_noise`."""
 
     def nominal(self, runs: Sequence[int]) -> Mapping[str, float]:
         """The parameters as given; of a machine without such, what these runs tell of them."""
 
-    def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
+    def start_values(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
         """Parameters, and the states of each of these runs, near the best fit without effects."""
 
-    def start_states(
+    def initial_states(
         self, run: int, effects: Sequence[str], values: Mapping[str, float]
     ) -> dict[str, float]:
         """States of a run near the best at these values of everything else."""
 
-    def located(self, where: FitResult, runs: Sequence[int]) -> Location | None:
+    def locate(self, where: FitResult, runs: Sequence[int]) -> Location | None:
         """Where the gap of a fit without effects lies, without any hypothesis of its cause.
 
         None: this machine has no blocks to tell apart.
         """
 
-    def with_planned(self, where: FitResult, runs: Sequence[int]) -> Model:
+    def with_planned_runs(self, where: FitResult, runs: Sequence[int]) -> Model:
         """The machine with runs that it has not shown yet behind its own, the least effort first.
 
         As the fit of these runs predicts them, without noise, judged by its own runs' noise; their
         source tells a person what to do. A machine that plans no runs has its own only.
         """
 
-    def lacks(self, runs: Sequence[int]) -> Mapping[str, Sequence[str]]:
+    def missing_experiments(self, runs: Sequence[int]) -> Mapping[str, Sequence[str]]:
         """By subsystem: what would tell more of it and is in none of these runs."""

@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from plant_emulator.model.stage import split_gap_position
-from plant_emulator.recordings.input_noise import loud
+from plant_emulator.recordings.input_noise import noise_directions
 from plant_emulator.simulation.simulate import TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.estimation.unknowns import Estimate, Residual
-    from plant_emulator.recordings.input_noise import Loud
+    from plant_emulator.recordings.input_noise import NoiseDirections
     from plant_emulator.recordings.recording import Recording
     from plant_emulator.signals.log import Array
 
@@ -36,25 +36,25 @@ def residual_functions(
     return [of(recording) for recording in recordings]
 
 
-def quieted_functions(
+def whitened_functions(
     recordings: Sequence[Recording],
     values: Mapping[str, float],
     free: Sequence[str],
     near: Estimate,
 ) -> list[Residual] | None:
     """The same with the noise of what is fed as it is near a fit; None: it changes no run's."""
-    louds = []
+    directions = []
     for k, recording in enumerate(recordings):
         there = {**values, **recording.own, **near.parameters(), **near.states(k)}
-        louds.append(loud(recording, *split_gap_position(there)))
-    if not any(louds):
+        directions.append(noise_directions(recording, *split_gap_position(there)))
+    if not any(directions):
         return None
     plain = residual_functions(recordings, values, free)
     return [
-        simple if found is None else _quieted(found, simple)
-        for found, simple in zip(louds, plain, strict=True)
+        simple if found is None else _whitened(found, simple)
+        for found, simple in zip(directions, plain, strict=True)
     ]
 
 
-def _quieted(found: Loud, residual: Residual) -> Residual:
-    return lambda trial: found.quieted(residual(trial))
+def _whitened(found: NoiseDirections, residual: Residual) -> Residual:
+    return lambda trial: found.whitened(residual(trial))

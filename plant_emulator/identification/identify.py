@@ -23,7 +23,7 @@ from plant_emulator.estimation import least_squares
 from plant_emulator.estimation.equation_error import start_values
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
 from plant_emulator.estimation.initial_states import GAP, states_of, with_own
-from plant_emulator.estimation.residuals import quieted_functions, residual_functions
+from plant_emulator.estimation.residuals import residual_functions, whitened_functions
 from plant_emulator.estimation.start_search import FINE_SCANS, Search
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.signals.log import VOLTAGE
@@ -167,7 +167,7 @@ def _with_fed_noise(
 
     wanted : the unknowns with all priors, which the data outdo less easily then
     """
-    residuals = quieted_functions(recordings, values, free, best)
+    residuals = whitened_functions(recordings, values, free, best)
     if residuals is None:
         return best
     tell = _telling(recordings, progress)

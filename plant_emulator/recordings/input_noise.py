@@ -41,13 +41,13 @@ WINDOW = 0.25
 # one twice as long takes twice as long, not four times [s].
 STRETCH, MEMORY = 10.0, 5.0
 # Standard deviation along a direction from which on it counts, in the noise of the sensors.
-LOUD = 1.0
+COUNTED_DEVIATION = 1.0
 # Of the simulations: a direction need not be known better.
 TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Loud:
+class NoiseDirections:
     """Directions of a run's whitened residual in which a fed input is louder than the sensors.
 
     directions : orthonormal, 0 where a sample does not count, shape (k, samples * channels), the
@@ -62,14 +62,16 @@ class Loud:
         """Components of a residual, shape (channels, samples), along the directions, shape (k,)."""
         return np.asarray(self.directions @ residual.T.ravel())
 
-    def quieted(self, residual: Array) -> Array:
+    def whitened(self, residual: Array) -> Array:
         """The residual with noise of variance 1 in every direction, shape (channels, samples)."""
         taken = 1.0 - 1.0 / np.sqrt(1.0 + self.deviations**2)
         much = self.directions.T @ (taken * self.along(residual))
         return np.asarray(residual - much.reshape(residual.shape[::-1]).T)
 
 
-def loud(recording: Recording, values: Mapping[str, float], gap_position: float) -> Loud | None:
+def noise_directions(
+    recording: Recording, values: Mapping[str, float], gap_position: float
+) -> NoiseDirections | None:
     """What the noise of the wheel torque does to a run at these values; None: nothing that counts.
 
     The slopes are differences over one standard deviation: contact makes them uneven. Windows too
@@ -96,7 +98,7 @@ def loud(recording: Recording, values: Mapping[str, float], gap_position: float)
     ]
     if not any(len(deviations) for _, deviations in parts):
         return None
-    return Loud(
+    return NoiseDirections(
         directions=csr_array(block_diag([directions for directions, _ in parts])),
         deviations=np.concatenate([deviations for _, deviations in parts]),
     )
@@ -132,6 +134,6 @@ def _loudest(answers: Sequence[Array]) -> tuple[Array, Array]:
     """Directions in which answers, each of shape (channels, n), are louder than the sensors."""
     columns = np.stack([answer.T.ravel() for answer in answers], axis=1)
     _, deviations, windows = np.linalg.svd(columns, full_matrices=False)
-    counted = deviations > LOUD
+    counted = deviations > COUNTED_DEVIATION
     # Not the decomposition's own left vectors: a sample that does not count stays exactly 0.
     return (columns @ windows[counted].T / deviations[counted]).T, deviations[counted]

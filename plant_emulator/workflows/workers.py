@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from plant_emulator.diagnosis.execution.pool import InProcess, model_of
+from plant_emulator.diagnosis.execution.pool import InProcess, build_model
 from plant_emulator.errors import EmulatorError, InputError
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ Answer = TypeVar("Answer")
 
 def _step(function: Callable[[Model, Any], Any], recipe: Recipe, item: Any) -> Any:
     with threadpool_limits(1):  # side by side, threads of one wait for those of the others
-        return function(model_of(recipe), item)
+        return function(build_model(recipe), item)
 
 
 @contextmanager

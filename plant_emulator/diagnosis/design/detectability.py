@@ -58,7 +58,7 @@ def detectability(model: Model, where: FitResult, runs: Sequence[int]) -> list[D
     """For every effect of the library, at a fit without effects."""
     tangents = NuisanceSpace(linearise(model, where, runs))
     found = {
-        name: None if candidate.untold else signature(model, name, where, runs, tangents)
+        name: None if candidate.stochastic else signature(model, name, where, runs, tangents)
         for name, candidate in model.candidates.items()
     }
     seen = {name: s for name, s in found.items() if s is not None}

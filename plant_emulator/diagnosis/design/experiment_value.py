@@ -1,14 +1,20 @@
-"""What a run that was not driven yet would show, next to the logs at hand.
+"""What a planned run would add to the logs at hand.
 
-A machine foretells such runs at a fit to its logs (`Model.with_planned`). Whether one tells two
-explanations apart is asked as the contest would ask: the rival is fitted again to the logs and to
-the run that the accepted explanation foretells, everything free that may drift, and what it cannot
-follow is the rise of its cost, in the noise. The linear picture will not do: the spikes of a
-backlash move with every parameter, and two fits seem far apart that a refit brings together.
-What a run shows of an effect that is not there is the norm of its drift-free signature, as in
-`detect`, over the logs and the run together.
+The machine simulates planned runs at a fit to its logs (`Model.with_planned_runs`).
 
-Every step is a function of the extended machine and plain data, for a pool.
+Discriminability of two hypotheses: the alternative is fitted again, with all its parameters, to
+the logs and to the planned run as the accepted hypothesis simulates it. What it cannot follow is
+
+    sqrt(rise of the alternative's cost)   [1], in the noise
+
+A linear prediction does not do. The spikes of a backlash move with every parameter, so that two
+hypotheses seem far apart that a fit brings together.
+
+Visibility of an absent effect: the norm of its orthogonal signature over the logs and the planned
+run together, as in `detectability`.
+
+Information gain of a run: the log determinant of the information matrix (D-optimality;
+A. Atkinson, A. Donev, Optimum Experimental Designs, 1992).
 """
 
 from __future__ import annotations
@@ -47,7 +53,7 @@ class PlannedRecipe:
 
     def build(self) -> Model:
         """The extended machine."""
-        return self.recipe.build().with_planned(self.where, self.runs)
+        return self.recipe.build().with_planned_runs(self.where, self.runs)
 
     def digest(self) -> str:
         """The same for the same machine, fit and runs only."""
@@ -94,7 +100,7 @@ def rival(model: Model, asked: Exchange) -> FitResult:
 
 def apart(model: Model, asked: Asked) -> float:
     """Step: what of a planned run the rival cannot follow, norm in the noise."""
-    own = model.start_states(asked.planned, asked.where.effects, asked.where.values)
+    own = model.initial_states(asked.planned, asked.where.effects, asked.where.values)
     where = replace(asked.where, states=(*asked.where.states, own))
     ahead = model.residual(asked.planned, where.effects)({**where.values, **own})
     raw = float(np.linalg.norm(ahead))

@@ -19,7 +19,7 @@ from plant_emulator.diagnosis.design.experiment_value import (
     rival,
     seen,
 )
-from plant_emulator.diagnosis.execution.pool import model_of
+from plant_emulator.diagnosis.execution.pool import build_model
 from plant_emulator.diagnosis.fitting.evidence import DETECTABLE_NORM
 from plant_emulator.diagnosis.wording import listed, spoken
 
@@ -131,7 +131,7 @@ class Advice:
             BETTER * norm(c.orthogonal_norm for c in own),
         )
         best = next((source for source, by in strength.items() if by > wanted), "")
-        lacking = model.lacks(self._runs).get(place, ())
+        lacking = model.missing_experiments(self._runs).get(place, ())
         parts = (
             f"drive {best}" if best else "",
             MORE_OF.get(location.phase or "", ""),
@@ -153,7 +153,7 @@ class Advice:
     def _planned(self, where: FitResult) -> list[tuple[str, int, Recipe]]:
         """Runs that were not driven: what to do, number, and the machine that has them."""
         recipe = PlannedRecipe(self._recipe, where, self._runs)
-        runs = model_of(recipe).runs
+        runs = build_model(recipe).runs
         return [(runs[k].source, k, recipe) for k in range(len(self._model.runs), len(runs))]
 
     def _asked(self, where: FitResult, planned: int, names: Sequence[str] = ()) -> Asked:

@@ -30,7 +30,7 @@ class Recipe(Protocol):
 _MODELS: dict[str, Model] = {}
 
 
-def model_of(recipe: Recipe) -> Model:
+def build_model(recipe: Recipe) -> Model:
     """The recipe's model, built once in this process; older ones are let go."""
     key = recipe.digest()
     model = _MODELS.get(key)
@@ -60,7 +60,7 @@ class InProcess:
         self, function: Callable[[Model, Item], Answer], recipe: Recipe, items: Sequence[Item]
     ) -> Iterator[Answer]:
         """See `Pool`."""
-        return (function(model_of(recipe), item) for item in items)
+        return (function(build_model(recipe), item) for item in items)
 
     def close(self) -> None:
         """Nothing was started."""

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.machine import Model, Term
+    from plant_emulator.diagnosis.machine import DerivedQuantity, Model
     from plant_emulator.estimation.unknowns import Estimate
 
 # Half step of a central difference on the scale of the estimation.
@@ -28,14 +28,14 @@ def in_terms(
     The variance of a term t is g' C g, C the covariance of the fit and g the slope of t by it
     (propagation of errors: JCGM 100:2008, eq. 13).
     """
-    named = {name: model.candidates[name].terms for name in found.effects}
+    named = {name: model.candidates[name].derived for name in found.effects}
     if not any(named.values()):
         return {}
     where = linearise(model, found, runs)
     return {name: tuple(_quantity(term, where) for term in terms) for name, terms in named.items()}
 
 
-def _quantity(term: Term, where: Estimate) -> Quantity:
+def _quantity(term: DerivedQuantity, where: Estimate) -> Quantity:
     shared = [k for k, u in enumerate(where.unknowns) if u.run is None]
     slope = np.zeros(len(where.z))
     for k in shared:
@@ -50,6 +50,8 @@ def _quantity(term: Term, where: Estimate) -> Quantity:
     )
 
 
-def _at(term: Term, where: Estimate, step: np.ndarray[Any, np.dtype[np.float64]]) -> float:
+def _at(
+    term: DerivedQuantity, where: Estimate, step: np.ndarray[Any, np.dtype[np.float64]]
+) -> float:
     pairs = zip(where.unknowns, where.z + step, strict=True)
     return term.of({u.name: u.value(float(z)) for u, z in pairs if u.run is None})

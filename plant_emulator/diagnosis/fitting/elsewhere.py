@@ -169,7 +169,7 @@ def run_by_run(
     """
     found: dict[int, Mapping[str, float]] = {}
     while True:
-        waiting = {k: model.start_states(k, effects, values) for k in runs if k not in found}
+        waiting = {k: model.initial_states(k, effects, values) for k in runs if k not in found}
         losses = {k: loss_of(model, effects, [k], values, [one]) for k, one in waiting.items()}
         nearest = min(waiting, key=lambda k: losses[k])
         found[nearest] = waiting[nearest]

@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.estimation.unknowns import Residual
-    from plant_emulator.recordings.input_noise import Loud
+    from plant_emulator.recordings.input_noise import NoiseDirections
     from plant_emulator.signals.log import Array
 
 
-def quieted(
+def whiten_inputs(
     pool: Pool, recipe: Recipe, model: Model, runs: tuple[int, ...]
 ) -> tuple[Recipe, FitResult | None]:
     """The recipe of a model whose residuals have white noise also where inputs are fed.
@@ -32,67 +32,69 @@ def quieted(
     The recipe itself where these runs feed none, or none that counts; and the fit without effects
     by it, None where none was needed.
     """
-    if not any(model.runs[run].fed for run in runs):
+    if not any(model.runs[run].measured_input for run in runs):
         return recipe, None
     (null,) = pool.map(start, recipe, [runs])
-    (found,) = pool.map(louds, recipe, [Task(base=null, runs=runs)])
+    (found,) = pool.map(find_input_noise, recipe, [Task(base=null, runs=runs)])
     if not found:
         return recipe, null
-    quiet = Quieted(recipe, found)
+    quiet = InputNoiseRecipe(recipe, found)
     (null,) = pool.map(refit, quiet, [Task(base=null, runs=runs)])
     return quiet, null
 
 
-def louds(model: Model, task: Task) -> dict[int, Loud]:
+def find_input_noise(model: Model, task: Task) -> dict[int, NoiseDirections]:
     """Step of a diagnosis: what the noise of fed inputs does to the runs of a fit, by run."""
     fed = [
-        (run, model.loud(run, task.base, state))
+        (run, model.input_noise(run, task.base, state))
         for run, state in zip(task.runs, task.base.states, strict=True)
-        if model.runs[run].fed
+        if model.runs[run].measured_input
     ]
     return {run: found for run, found in fed if found is not None}
 
 
-class _Quieted:
-    """A model whose residuals are quieted; all else as it is."""
+class _InputNoiseModel:
+    """A model whose residuals are whitened; all else as it is."""
 
-    def __init__(self, model: Model, louds: Mapping[int, Loud]) -> None:
-        self._model, self._louds = model, louds
+    def __init__(self, model: Model, noise: Mapping[int, NoiseDirections]) -> None:
+        self._model, self._noise = model, noise
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._model, name)
 
-    def with_planned(self, where: FitResult, runs: Sequence[int]) -> Model:
+    def with_planned_runs(self, where: FitResult, runs: Sequence[int]) -> Model:
         """See `Model`; the planned runs come behind its own, whose noise stays as it is."""
-        return cast("Model", _Quieted(self._model.with_planned(where, runs), self._louds))
+        return cast(
+            "Model", _InputNoiseModel(self._model.with_planned_runs(where, runs), self._noise)
+        )
 
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
         """See `Model`."""
-        plain, found = self._model.residual(run, effects), self._louds.get(run)
+        plain, found = self._model.residual(run, effects), self._noise.get(run)
         if found is None:
             return plain
 
         def residual(values: Mapping[str, float]) -> Array:
-            return found.quieted(plain(values))
+            return found.whitened(plain(values))
 
         return residual
 
 
 @dataclass(frozen=True)
-class Quieted:
-    """What builds a model whose residuals are quieted; louds : by run."""
+class InputNoiseRecipe:
+    """What builds a model whose residuals are whitened; noise : by run."""
 
     recipe: Recipe
-    louds: Mapping[int, Loud]
+    noise: Mapping[int, NoiseDirections]
 
     def build(self) -> Model:
         """The model."""
-        return cast("Model", _Quieted(self.recipe.build(), self.louds))
+        return cast("Model", _InputNoiseModel(self.recipe.build(), self.noise))
 
     def digest(self) -> str:
         """The same for the same model only."""
         own = hashlib.sha256(self.recipe.digest().encode())
-        for run, found in sorted(self.louds.items()):
+        for run, found in sorted(self.noise.items()):
             sparse = found.directions
             own.update(f"{run} {sparse.shape}".encode())
             for part in (sparse.data, sparse.indices, sparse.indptr, found.deviations):

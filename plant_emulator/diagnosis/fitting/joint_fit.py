@@ -213,10 +213,10 @@ def fit_null(model: Model, runs: Sequence[int]) -> FitResult:
 
     A fit that leaves much starts again from the nominal parameters; the better fit counts.
     """
-    found = fit(model, (), runs, *model.search(runs))
+    found = fit(model, (), runs, *model.start_values(runs))
     if found.mean_square <= SUSPECT_MEAN_SQUARE:
         return found
     nominal = {u.name: u.prior for u in model.parameters}
-    states = [model.start_states(k, (), nominal) for k in runs]
+    states = [model.initial_states(k, (), nominal) for k in runs]
     other = fit(model, (), runs, nominal, states, TRIAL_ITERATIONS)
     return found if found.cost <= other.cost else fit_from(model, (), runs, other)

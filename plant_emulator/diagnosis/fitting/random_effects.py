@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 # Courses that are drawn: their variance is known to 30 %.
-COURSES = 24
+REALISATIONS = 24
 # Added variance from which on a sample is restless; quantiles that part these into levels.
 RESTLESS, LEVELS = 0.05, (0.0, 0.25, 0.5, 0.75, 1.0)
 # Mean square that is left at a level: known no better, for the courses are few and the scans of the
@@ -51,7 +51,7 @@ LEFT_STRUCTURED = 0.01
 LITTLE_STRUCTURED, BEAT = 0.04, 350.0
 
 
-def unrest(model: Model, task: Task) -> VarianceComponent:
+def fit_random_effect(model: Model, task: Task) -> VarianceComponent:
     """Step of a diagnosis: the unrest that `task.effect` explains of a fit's residual.
 
     Where it does not hold, once more on the fit with its weights: restless samples, taken at the
@@ -61,16 +61,18 @@ def unrest(model: Model, task: Task) -> VarianceComponent:
     """
     candidate = model.candidates[task.effect]
     usual = {u.name: u.start for u in candidate.shapes}
-    found = _unrest(model, task, usual)
+    found = _variance_component(model, task, usual)
     if found.evidence <= EVIDENCE_THRESHOLD:
         return found
     if not found.consistent:
-        weighted = cast("Model", _Weighted(model, dict(zip(task.runs, found.weights, strict=True))))
+        weighted = cast(
+            "Model", _WeightedModel(model, dict(zip(task.runs, found.weights, strict=True)))
+        )
         task = replace(task, base=fit_from(weighted, task.base.effects, task.runs, task.base))
-        found = _unrest(model, task, usual)
+        found = _variance_component(model, task, usual)
     if not found.white:
         return found
-    others = [_unrest(model, task, usual | shape) for shape in _shapes(candidate)]
+    others = [_variance_component(model, task, usual | shape) for shape in _shapes(candidate)]
     return max([found, *others], key=lambda one: one.evidence)
 
 
@@ -84,7 +86,7 @@ def _shapes(candidate: Candidate) -> list[dict[str, float]]:
     ]
 
 
-def _unrest(model: Model, task: Task, shape: Mapping[str, float]) -> VarianceComponent:
+def _variance_component(model: Model, task: Task, shape: Mapping[str, float]) -> VarianceComponent:
     where, (size,) = task.base, model.candidates[task.effect].sizes
     residuals = [
         model.residual(run, where.effects)({**where.values, **states})
@@ -127,8 +129,8 @@ def _variances(model: Model, task: Task, shape: Mapping[str, float], size: float
         residual = model.residual(run, (*where.effects, task.effect))
         plain = {**where.values, **states, **shape, candidate.sizes[0].name: size}
         courses = [
-            residual({**plain, **{u.name: _drawn(u, random) for u in candidate.untold}})
-            for _ in range(COURSES)
+            residual({**plain, **{u.name: _drawn(u, random) for u in candidate.stochastic}})
+            for _ in range(REALISATIONS)
         ]
         found.append(np.var(np.stack(courses), axis=0, ddof=1) / size**2)
     return found
@@ -166,7 +168,7 @@ def _even(squares: Array, added: Array) -> bool:
     return bool(min(means) > LEAST_LEFT and max(means) < MOST_LEFT)
 
 
-class _Weighted:
+class _WeightedModel:
     """A model whose residuals are weighted; all else as it is."""
 
     def __init__(self, model: Model, weights: Mapping[int, Array]) -> None:
@@ -175,9 +177,11 @@ class _Weighted:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._model, name)
 
-    def with_planned(self, where: FitResult, runs: Sequence[int]) -> Model:
+    def with_planned_runs(self, where: FitResult, runs: Sequence[int]) -> Model:
         """See `Model`; the planned runs come behind its own, without unrest."""
-        return cast("Model", _Weighted(self._model.with_planned(where, runs), self._weights))
+        return cast(
+            "Model", _WeightedModel(self._model.with_planned_runs(where, runs), self._weights)
+        )
 
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
         """See `Model`."""
@@ -190,7 +194,7 @@ class _Weighted:
 
 
 @dataclass(frozen=True)
-class Weighted:
+class WeightedRecipe:
     """What builds a model whose noise is larger by an unrest; weights : of the model's runs."""
 
     recipe: Recipe
@@ -198,7 +202,7 @@ class Weighted:
 
     def build(self) -> Model:
         """The model."""
-        return cast("Model", _Weighted(self.recipe.build(), dict(enumerate(self.weights))))
+        return cast("Model", _WeightedModel(self.recipe.build(), dict(enumerate(self.weights))))
 
     def digest(self) -> str:
         """The same for the same model only."""

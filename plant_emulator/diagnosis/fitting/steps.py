@@ -40,7 +40,7 @@ def spread(model: Model, task: Task) -> FitResult:
     """A fit of some runs as it is on all, their states looked for."""
     base, known = task.base, dict(zip(task.known, task.base.states, strict=True))
     states = tuple(
-        known[k] if k in known else model.start_states(k, base.effects, base.values)
+        known[k] if k in known else model.initial_states(k, base.effects, base.values)
         for k in task.runs
     )
     found = linearise(model, replace(base, states=states), task.runs)
@@ -49,7 +49,7 @@ def spread(model: Model, task: Task) -> FitResult:
 
 def show(model: Model, task: Task) -> Signature | None:
     """The signature of an effect; None where it changes nothing, or nothing that a fit can tell."""
-    if model.candidates[task.effect].untold:
+    if model.candidates[task.effect].stochastic:
         return None
     return signature(model, task.effect, task.base, task.runs, _tangents(model, task))
 

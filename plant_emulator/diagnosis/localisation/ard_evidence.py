@@ -171,7 +171,7 @@ class _Sizes:
         return float(others + values[k]), group, float(sizes[k])
 
 
-def unrest(left: Array, weight: Array) -> float:
+def variance_gain(left: Array, weight: Array) -> float:
     """Gain of log probability if what is left has the variance 1 + (s weight)^2, at the best s.
 
     For what varies from sample to sample, which no smooth law follows.

@@ -12,7 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.localisation import block_basis, drum_basis, parameter_sensitivities
-from plant_emulator.diagnosis.localisation.ard_evidence import Evidence, Linear, Products, unrest
+from plant_emulator.diagnosis.localisation.ard_evidence import (
+    Evidence,
+    Linear,
+    Products,
+    variance_gain,
+)
 from plant_emulator.diagnosis.localisation.drum_subsystem import (
     TORQUE,
     DrumSide,
@@ -273,4 +278,4 @@ class Site:
             for part, r in zip(np.split(found.left, ends)[:-1], self.relations, strict=True)
         ]
         slope = np.concatenate([q.demand_rate for q in self.inside])
-        return found.log + unrest(np.concatenate(own), slope)
+        return found.log + variance_gain(np.concatenate(own), slope)

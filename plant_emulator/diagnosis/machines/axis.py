@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.machine import Run
+from plant_emulator.diagnosis.machine import MeasuredRun
 from plant_emulator.diagnosis.machines.axis_candidates import NAMES, UNITS, candidate, scale_of
 from plant_emulator.diagnosis.machines.axis_effects import EFFECTS
 from plant_emulator.diagnosis.machines.axis_signals import SAMPLES, AxisRun, prepared, told
@@ -84,7 +84,7 @@ class AxisModel:
             else ()
         )
         self.runs = [
-            Run(
+            MeasuredRun(
                 source=r.source,
                 channels=("torque" if rotary else "force",),
                 units=(self.units["offset"],),
@@ -111,7 +111,7 @@ class AxisModel:
 
         return residual
 
-    def loud(self, run: int, where: FitResult, state: Mapping[str, float]) -> None:  # noqa: ARG002 - `Model`'s signature
+    def input_noise(self, run: int, where: FitResult, state: Mapping[str, float]) -> None:  # noqa: ARG002 - `Model`'s signature
         """See `Model`: the motion is fed, but smoothed."""
         return
 
@@ -119,11 +119,11 @@ class AxisModel:
         """See `Model`: an axis has no data sheet; least squares of these runs."""
         return self._least_squares(runs, self.parameters)
 
-    def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
+    def start_values(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
         """See `Model`: least squares, for which the axis without effects is linear."""
         return self.nominal(runs), [self._level() for _ in runs]
 
-    def start_states(
+    def initial_states(
         self,
         run: int,  # noqa: ARG002 - `Model`'s signature
         effects: Sequence[str],  # noqa: ARG002 - `Model`'s signature
@@ -132,15 +132,15 @@ class AxisModel:
         """See `Model`."""
         return self._level()
 
-    def located(self, where: FitResult, runs: Sequence[int]) -> None:  # noqa: ARG002 - `Model`'s signature
+    def locate(self, where: FitResult, runs: Sequence[int]) -> None:  # noqa: ARG002 - `Model`'s signature
         """See `Model`: one channel has no blocks to tell apart."""
         return
 
-    def with_planned(self, where: FitResult, runs: Sequence[int]) -> AxisModel:  # noqa: ARG002 - `Model`'s signature
+    def with_planned_runs(self, where: FitResult, runs: Sequence[int]) -> AxisModel:  # noqa: ARG002 - `Model`'s signature
         """See `Model`: an axis has no drive programs."""
         return self
 
-    def lacks(self, runs: Sequence[int]) -> dict[str, tuple[str, ...]]:  # noqa: ARG002 - `Model`'s signature
+    def missing_experiments(self, runs: Sequence[int]) -> dict[str, tuple[str, ...]]:  # noqa: ARG002 - `Model`'s signature
         """See `Model`: what an effect needs is told with the effect."""
         return {}
 

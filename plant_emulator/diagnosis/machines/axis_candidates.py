@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.machine import Candidate, Term
+from plant_emulator.diagnosis.machine import Candidate, DerivedQuantity
 from plant_emulator.diagnosis.machines.axis_effects import Scale
 from plant_emulator.estimation.unknowns import Unknown
 
@@ -63,20 +63,20 @@ def candidate(name: str, effect: AxisEffect, scale: Scale, *, rotary: bool) -> C
             f"{name}_{key}": OF_UNITS[rotary].get(constant.of, constant.unit)
             for key, constant in effect.constants.items()
         },
-        terms=tuple(
+        derived=tuple(
             _one_way(name, effect.by_direction, way, UNITS[rotary][effect.by_direction])
             for way in (DIRECTIONS if effect.by_direction else ())
         ),
     )
 
 
-def _one_way(effect: str, friction: str, way: str, unit: str) -> Term:
+def _one_way(effect: str, friction: str, way: str, unit: str) -> DerivedQuantity:
     """The coefficient of one direction, (1 + a) F forwards and (1 - a) F backwards [unit]."""
 
     def of(p: Mapping[str, float]) -> float:
         return p[friction] * (1.0 + DIRECTIONS[way] * p[f"{effect}_ratio"])
 
-    return Term(name=way, unit=unit, of=of)
+    return DerivedQuantity(name=way, unit=unit, of=of)
 
 
 def measure(constant: Constant, scale: Scale) -> float:

@@ -11,8 +11,12 @@ import numpy as np
 
 from plant_emulator.diagnosis.localisation.locate import locate
 from plant_emulator.diagnosis.localisation.parity_relations import base_speed
-from plant_emulator.diagnosis.machine import Candidate, Run
-from plant_emulator.diagnosis.machines.bench_programs import COLD_SHELL, lacks, planned
+from plant_emulator.diagnosis.machine import Candidate, MeasuredRun
+from plant_emulator.diagnosis.machines.bench_programs import (
+    COLD_SHELL,
+    missing_experiments,
+    planned,
+)
 from plant_emulator.effects import from_file
 from plant_emulator.estimation.equation_error import start_values
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
@@ -22,7 +26,7 @@ from plant_emulator.estimation.start_search import Search
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.model.parameters import UNITS
 from plant_emulator.model.stage import GAP_POSITION, split_gap_position
-from plant_emulator.recordings.input_noise import loud
+from plant_emulator.recordings.input_noise import noise_directions
 from plant_emulator.recordings.preflight import NAMES
 from plant_emulator.signals.log import VOLTAGE
 from plant_emulator.simulation.simulate import TOLERANCE, values_of
@@ -37,7 +41,7 @@ if TYPE_CHECKING:
     from plant_emulator.effects import Effect
     from plant_emulator.estimation.unknowns import Residual
     from plant_emulator.model.parameters import ParameterSet
-    from plant_emulator.recordings.input_noise import Loud
+    from plant_emulator.recordings.input_noise import NoiseDirections
     from plant_emulator.recordings.recording import Recording
     from plant_emulator.signals.log import Array
 
@@ -89,8 +93,8 @@ def candidate(effect: Effect, *, voltage: bool = False) -> Candidate:
         units={f"{effect.name}_{key}": d.unit for key, d in effect.parameters.items()},
         title=effect.description.partition("\n")[0].rstrip("."),
         needs="" if voltage and effect.needs.startswith(LOG_VOLTAGE) else effect.needs,
-        untold=tuple(untold),
-        exact=effect.exact,
+        stochastic=tuple(untold),
+        exact_form=effect.exact,
     )
 
 
@@ -160,14 +164,14 @@ class BenchModel:
         self.units = {name: UNITS[name] for name in self._free}
         self.subsystems = {name: SUBSYSTEM_OF.get(name, "drive") for name in self._free}
         self.runs = [
-            Run(
+            MeasuredRun(
                 source=r.log.source,
                 channels=r.channels,
                 units=tuple(CHANNEL_UNITS[name] for name in r.channels),
                 time=r.log.time,
                 measured=np.stack([r.log[name] for name in r.channels]),
                 noise=r.noise,
-                fed=r.run.truck,
+                measured_input=r.run.truck,
             )
             for r in recordings
         ]
@@ -189,16 +193,18 @@ class BenchModel:
 
         return residual
 
-    def loud(self, run: int, where: FitResult, state: Mapping[str, float]) -> Loud | None:
+    def input_noise(
+        self, run: int, where: FitResult, state: Mapping[str, float]
+    ) -> NoiseDirections | None:
         """See `Model`."""
         values = {**self._fixed(run, where.effects), **where.values, **state}
-        return loud(self._recordings[run], *split_gap_position(values))
+        return noise_directions(self._recordings[run], *split_gap_position(values))
 
     def nominal(self, runs: Sequence[int]) -> dict[str, float]:  # noqa: ARG002 - `Model`'s signature
         """See `Model`: the parameter set's."""
         return {u.name: u.prior for u in self.parameters}
 
-    def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
+    def start_values(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
         """See `Model`."""
         recordings = [self._recordings[k] for k in runs]
         search = Search(recordings, self._values, self._free)
@@ -206,10 +212,10 @@ class BenchModel:
         search.scan()
         found = {name: search.values[name] for name in self._free}
         if self._given:
-            return found, [self.start_states(k, (), found) for k in runs]
+            return found, [self.initial_states(k, (), found) for k in runs]
         return found, [{GAP_POSITION: gap} for gap in search.gaps]
 
-    def start_states(
+    def initial_states(
         self, run: int, effects: Sequence[str], values: Mapping[str, float]
     ) -> dict[str, float]:
         """See `Model`."""
@@ -226,22 +232,24 @@ class BenchModel:
             found = scanned(lambda trial: residual({**values, **trial}), found, states)
         return found
 
-    def located(self, where: FitResult, runs: Sequence[int]) -> Location | None:
+    def locate(self, where: FitResult, runs: Sequence[int]) -> Location | None:
         """See `Model`."""
         if self._given:
             return None
         return locate([self._recordings[k] for k in runs], self._set, where)
 
-    def with_planned(self, where: FitResult, runs: Sequence[int]) -> BenchModel:
+    def with_planned_runs(self, where: FitResult, runs: Sequence[int]) -> BenchModel:
         """See `Model`: drive programs that no log shows, starting as the last run did."""
         warm = {**self._fixed(runs[-1], where.effects), **where.values, **where.states[-1]}
         fitted = self._set.with_values({name: where.values[name] for name in self._free})
         more = planned(self._recordings, fitted, warm, {**warm, **self._cold(where.effects)})
         return BenchModel([*self._recordings, *more], self._set, self._effects, self._free)
 
-    def lacks(self, runs: Sequence[int]) -> dict[str, tuple[str, ...]]:
+    def missing_experiments(self, runs: Sequence[int]) -> dict[str, tuple[str, ...]]:
         """See `Model`."""
-        return lacks([self._recordings[k].log for k in runs], base_speed(self._values))
+        return missing_experiments(
+            [self._recordings[k].log for k in runs], base_speed(self._values)
+        )
 
     def _cold(self, effects: Sequence[str]) -> dict[str, float]:
         """What of these effects is of another value where the gear starts cold."""

@@ -117,7 +117,7 @@ def _recorded(
         )
 
 
-def lacks(logs: Sequence[Log], base_speed: float) -> dict[str, tuple[str, ...]]:
+def missing_experiments(logs: Sequence[Log], base_speed: float) -> dict[str, tuple[str, ...]]:
     """By subsystem: what would tell more of it and is in none of these logs.
 
     base_speed : above which the field is weakened [rad/s]

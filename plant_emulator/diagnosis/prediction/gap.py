@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.machine import Model, Run
+    from plant_emulator.diagnosis.machine import MeasuredRun, Model
     from plant_emulator.signals.log import Array
 
 # A channel counts in the closed fraction from this gap on, in the noise.
@@ -111,7 +111,7 @@ def _predicted(
     own = (*model.states, *(u for name in effects for u in model.candidates[name].states))
     if known is not None or not own:
         return of(known or {}), True
-    start = model.start_states(run, effects, point.values)
+    start = model.initial_states(run, effects, point.values)
     states = [replace(u, run=0, start=float(np.clip(start[u.name], u.lower, u.upper))) for u in own]
     found = estimate(states, [of])
     return found.residuals[0], found.converged
@@ -152,7 +152,9 @@ class Gap:
         )
 
 
-def gap(runs: Sequence[Run], predictions: Sequence[Prediction], blocks: Sequence[int]) -> Gap:
+def gap(
+    runs: Sequence[MeasuredRun], predictions: Sequence[Prediction], blocks: Sequence[int]
+) -> Gap:
     """The gap from the predictions of all folds; runs, blocks : of every predicted run."""
     residuals = [r for prediction in predictions for r in prediction.residuals]
     pairs = list(zip(runs, residuals, strict=True))
@@ -174,7 +176,7 @@ def gap(runs: Sequence[Run], predictions: Sequence[Prediction], blocks: Sequence
     )
 
 
-def _rows(names: Sequence[str], run: Run, values: Array) -> Array:
+def _rows(names: Sequence[str], run: MeasuredRun, values: Array) -> Array:
     """A run's rows in the order of these channels; 0 of those that it has not."""
     nothing = np.zeros(values.shape[1])
     own = dict(zip(run.channels, values, strict=True))

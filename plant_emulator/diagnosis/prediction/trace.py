@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from plant_emulator.diagnosis.machine import Run
+    from plant_emulator.diagnosis.machine import MeasuredRun
     from plant_emulator.diagnosis.prediction.gap import Prediction
     from plant_emulator.signals.log import Array
 
@@ -35,7 +35,7 @@ class Trace:
 
 
 def traces(
-    runs: Sequence[Run], before: Sequence[Prediction], after: Sequence[Prediction]
+    runs: Sequence[MeasuredRun], before: Sequence[Prediction], after: Sequence[Prediction]
 ) -> tuple[Trace, ...]:
     """Measured and predicted channels of all held-out runs, those with samples that count."""
     pairs = zip(
@@ -61,7 +61,7 @@ def traces(
     )
 
 
-def _simulated(run: Run, channel: int, residual: Array) -> Array:
+def _simulated(run: MeasuredRun, channel: int, residual: Array) -> Array:
     """The prediction behind a whitened residual; NaN where a sample does not count.
 
     Of a voltage it holds what its sensor is off by.

@@ -80,7 +80,7 @@ def _sizes(
     """Sizes and shapes of an effect in a fit; their errors hold those of the effect's law."""
     usual = {u.name: abs(u.start - candidate.neutral[u.name]) for u in candidate.sizes}
     # Of an effect of chance course the size is all that is estimated.
-    shapes = () if candidate.untold else candidate.shapes
+    shapes = () if candidate.stochastic else candidate.shapes
     for name in (u.name for u in (*candidate.sizes, *shapes)):
         value = point.values[name]
         law_error = law_errors.get(name, 0.0) * scale(value, usual.get(name, 0.0))
@@ -107,7 +107,7 @@ def undetectable(
 
 def hidden(contender: Hypothesis, candidate: Candidate) -> str:
     """Why an effect does not show."""
-    if candidate.untold:
+    if candidate.stochastic:
         return candidate.needs or "its course is chance, and too small here to be seen"
     if contender.total_norm < DETECTABLE_NORM:
         reason = "too small in these channels and runs at its plausible size"

@@ -14,7 +14,7 @@ from plant_emulator.diagnosis.report.details import Step
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.machine import Run
+    from plant_emulator.diagnosis.machine import MeasuredRun
     from plant_emulator.diagnosis.prediction.gap import Gap
     from plant_emulator.signals.log import Array
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def held_out_gap(
-    gaps: Gaps, runs: Sequence[Run], effects: tuple[str, ...], reference: Gap | None
+    gaps: Gaps, runs: Sequence[MeasuredRun], effects: tuple[str, ...], reference: Gap | None
 ) -> HeldOutGap:
     """The gap of every channel with these effects, and the share that they close.
 
@@ -41,17 +41,17 @@ def held_out_gap(
     )
 
 
-def ranged(gap: Gap, runs: Sequence[Run]) -> dict[str, float]:
+def ranged(gap: Gap, runs: Sequence[MeasuredRun]) -> dict[str, float]:
     """NRMSD of every channel: its rms over its measured range, held-out samples of all runs."""
     return dict(zip(gap.channels, _shares(gap, runs, gap.by_channel), strict=True))
 
 
-def noise_floor(gap: Gap, runs: Sequence[Run]) -> dict[str, float]:
+def noise_floor(gap: Gap, runs: Sequence[MeasuredRun]) -> dict[str, float]:
     """The noise of every channel over its measured range, as `ranged`."""
     return dict(zip(gap.channels, _shares(gap, runs, np.ones(len(gap.channels))), strict=True))
 
 
-def _shares(gap: Gap, runs: Sequence[Run], times: Array) -> list[float]:
+def _shares(gap: Gap, runs: Sequence[MeasuredRun], times: Array) -> list[float]:
     """So many times the noise of each channel over the range of its samples that count."""
     found = []
     for k, name in enumerate(gap.channels):

@@ -95,7 +95,7 @@ def _named(name: str, candidate: Candidate, terms: Sequence[Quantity]) -> str:
     """An effect, what it is, and its terms."""
     title = f"{candidate.title[:1].lower()}{candidate.title[1:]}"
     values = ", ".join(f"{number(t.value, 4)} {t.unit} {t.name}" for t in terms)
-    chance = ", by chance, so that no simulation follows it" if candidate.untold else ""
+    chance = ", by chance, so that no simulation follows it" if candidate.stochastic else ""
     return f"{name} ({title}{chance}{': ' if values else ''}{values})"
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fitting.evidence import EVIDENCE_THRESHOLD, NOISE_MEAN_SQUARE, excess
-from plant_emulator.diagnosis.fitting.input_noise_model import quieted
-from plant_emulator.diagnosis.fitting.random_effects import Weighted, unrest
+from plant_emulator.diagnosis.fitting.input_noise_model import whiten_inputs
+from plant_emulator.diagnosis.fitting.random_effects import WeightedRecipe, fit_random_effect
 from plant_emulator.diagnosis.fitting.steps import refit, start
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.selection import run_consistency, verdict
@@ -44,7 +44,7 @@ class Procedure:
 
     def with_quiet_inputs(self) -> Procedure:
         """The same with the noise of fed inputs as part of the noise."""
-        recipe, null = quieted(self.pool, self.recipe, self.model, self.runs)
+        recipe, null = whiten_inputs(self.pool, self.recipe, self.model, self.runs)
         return replace(self, recipe=recipe, null=null)
 
     def found(self) -> tuple[Explanation, Decision, Recipe]:
@@ -75,7 +75,7 @@ class Procedure:
             reaches_noise=self.model.reaches_noise,
             by_chance=by_chance,
             null=null,
-            exact=[name for name, one in self.model.candidates.items() if one.exact],
+            exact=[name for name, one in self.model.candidates.items() if one.exact_form],
             subsystems={name: one.subsystem for name, one in self.model.candidates.items()},
         )
         return contest.explain()
@@ -94,26 +94,26 @@ class Procedure:
 
         null : the fit without effects
         """
-        found = self._unrest(base, self.model.candidates)
+        found = self._random_effects(base, self.model.candidates)
         first = max(found, key=lambda one: one.evidence, default=None)
         if first is None:
             return None
         weights = dict(zip(self.runs, first.weights, strict=True))
         every = tuple(weights.get(k, np.ones(1)) for k in range(len(self.model.runs)))
-        recipe = Weighted(self.recipe, every)
+        recipe = WeightedRecipe(self.recipe, every)
         (null,) = self.pool.map(refit, recipe, [Task(base=null, runs=self.runs)])
         again = self._contest(recipe, null, first.evidence)
-        last = self._unrest(again.final, [first.effect])
+        last = self._random_effects(again.final, [first.effect])
         return (replace(again, random_effects=tuple(last)), recipe) if last else None
 
-    def _unrest(self, base: FitResult, names: Iterable[str]) -> list[VarianceComponent]:
+    def _random_effects(self, base: FitResult, names: Iterable[str]) -> list[VarianceComponent]:
         """What holds of effects of chance course on top of a fit."""
         tasks = [
             Task(base=base, runs=self.runs, effect=name)
             for name in names
-            if self.model.candidates[name].untold
+            if self.model.candidates[name].stochastic
         ]
-        found = self.pool.map(unrest, self.recipe, tasks)
+        found = self.pool.map(fit_random_effect, self.recipe, tasks)
         return [one for one in found if one.consistent and one.evidence > EVIDENCE_THRESHOLD]
 
     def _between(self, explained: Explanation, found: Decision) -> Decision:

@@ -50,7 +50,7 @@ def subsystem(
 
 def site(model: Model, task: Task) -> Location | None:
     """Step of a diagnosis: the block that the gap of a fit lies in."""
-    return model.located(task.base, task.runs)
+    return model.locate(task.base, task.runs)
 
 
 def location(place: str | None, shares: Mapping[str, float], located: Location | None) -> Location:

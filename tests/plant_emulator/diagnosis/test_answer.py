@@ -7,7 +7,7 @@ import pytest
 
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
-from plant_emulator.diagnosis.machine import Run
+from plant_emulator.diagnosis.machine import MeasuredRun
 from plant_emulator.diagnosis.prediction.gap import Prediction, gap
 from plant_emulator.diagnosis.prediction.trace import traces
 from plant_emulator.diagnosis.report.html_traces import path, rms
@@ -72,8 +72,8 @@ def test_effects_of_no_account_beyond_a_few_are_not_ranked() -> None:
     assert names == ["a", "b", "c", "d", "e"]
 
 
-def run(measured: Array, noise: float) -> Run:
-    return Run(
+def run(measured: Array, noise: float) -> MeasuredRun:
+    return MeasuredRun(
         source="run",
         channels=("y",),
         units=("A",),
@@ -83,7 +83,7 @@ def run(measured: Array, noise: float) -> Run:
     )
 
 
-def halves() -> tuple[list[Run], list[Prediction]]:
+def halves() -> tuple[list[MeasuredRun], list[Prediction]]:
     """Two runs; of the first, from 0 to 990 A, only the second half is held out."""
     early = run(10.0 * np.arange(100.0), noise=2.0)
     late = run(np.linspace(400.0, 700.0, 50), noise=1.0)

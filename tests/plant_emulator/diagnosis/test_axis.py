@@ -184,7 +184,7 @@ def test_a_force_that_holds_a_resting_axis_does_not_count() -> None:
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_every_effect_is_absent_at_its_neutral_sizes(name: str, nominal: AxisModel) -> None:
-    values, _ = nominal.search((0,))
+    values, _ = nominal.start_values((0,))
     candidate = nominal.candidates[name]
     shapes = {u.name: u.start for u in candidate.shapes}
     there = nominal.residual(0, (name,))({**values, **shapes, **candidate.neutral})

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from plant_emulator.diagnosis.machines.bench_programs import lacks, shows, undriven
+from plant_emulator.diagnosis.machines.bench_programs import missing_experiments, shows, undriven
 from plant_emulator.signals.log import Array, Log
 from plant_emulator.simulation.programs import PROGRAMS, in_words
 
@@ -25,15 +25,18 @@ def test_log_shows_the_program_whose_reference_it_has():
 
 def test_what_logs_lack_is_told_of_the_blocks_that_it_tells_of():
     slow = driven("program1", 0.3)
-    assert "a run above 190 rad/s, where the field is weakened" in lacks([slow], 190.0)["motor"]
+    assert (
+        "a run above 190 rad/s, where the field is weakened"
+        in missing_experiments([slow], 190.0)["motor"]
+    )
     everything = driven(
         "program1",
         wheel_torque=np.zeros(1851),
         armature_voltage=np.linspace(0.0, 300.0, 1851),
         shell_temperature=np.full(1851, 288.0),
     )
-    assert lacks([everything], 190.0) == {"gear": ("a run in the other direction",)}
-    assert lacks([slow], 190.0)["drum"] == ("a run with a truck on the drum",)
+    assert missing_experiments([everything], 190.0) == {"gear": ("a run in the other direction",)}
+    assert missing_experiments([slow], 190.0)["drum"] == ("a run with a truck on the drum",)
 
 
 def test_program_is_told_as_one_plans_it():

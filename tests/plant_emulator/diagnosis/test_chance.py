@@ -8,7 +8,7 @@ import pytest
 
 from plant_emulator.diagnosis.execution.pool import InProcess
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
-from plant_emulator.diagnosis.fitting.random_effects import Weighted, unrest
+from plant_emulator.diagnosis.fitting.random_effects import WeightedRecipe, fit_random_effect
 from plant_emulator.diagnosis.fitting.steps import show
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.selection.procedure import Procedure
@@ -27,7 +27,7 @@ class Shaken(Line):
         course = replace(linear("shake_sequence", 0.0), lower=0.0, upper=1e6)
         shaking = effect("shake")
         sizes = tuple(replace(u, lower=0.0) for u in shaking.sizes)
-        self.candidates["shake"] = replace(shaking, sizes=sizes, untold=(course,))
+        self.candidates["shake"] = replace(shaking, sizes=sizes, stochastic=(course,))
 
     def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
         """See `Model`."""
@@ -51,7 +51,7 @@ def shaken(size: float, seed: int = 5) -> Array:
 def found(y: Array):  # type: ignore[no-untyped-def]
     """The unrest of the shake on the line's fit."""
     model = Shaken([y])
-    return unrest(model, Task(base=fit_null(model, [0]), runs=(0,), effect="shake"))
+    return fit_random_effect(model, Task(base=fit_null(model, [0]), runs=(0,), effect="shake"))
 
 
 def test_size_and_evidence_of_an_unrest() -> None:
@@ -119,7 +119,7 @@ def test_unrest_of_a_shape_that_is_not_the_usual_one() -> None:
 
     y = noisy(2.0 + 3.0 * TIME) + shaken(8.0)
     model = Shaped([y])
-    one = unrest(model, Task(base=fit_null(model, [0]), runs=(0,), effect="shake"))
+    one = fit_random_effect(model, Task(base=fit_null(model, [0]), runs=(0,), effect="shake"))
     assert one.consistent
     assert one.shape == {"shake_power": 1.0}
     assert one.size == pytest.approx(8.0, rel=0.1)
@@ -127,7 +127,7 @@ def test_unrest_of_a_shape_that_is_not_the_usual_one() -> None:
     model.candidates["shake"] = replace(
         model.candidates["shake"], shapes=(linear("shake_power", 2.0),)
     )
-    assert not unrest(
+    assert not fit_random_effect(
         model, Task(base=fit_null(model, [0]), runs=(0,), effect="shake")
     ).homoscedastic
 
@@ -159,7 +159,7 @@ def test_no_other_effect_is_sought_where_all_is_chance() -> None:
     inquiry = Procedure(pool=Watched(), recipe=Given(model), model=model, runs=(0,))
     assert inquiry.found()[1].effects == ("shake",)
     assert looked
-    assert all(isinstance(recipe, Weighted) for recipe in looked)
+    assert all(isinstance(recipe, WeightedRecipe) for recipe in looked)
 
 
 def test_what_is_little_beside_a_great_unrest_may_be_its_law() -> None:
@@ -180,7 +180,7 @@ def test_unrest_alone_is_an_effect() -> None:
 
 def test_weighted_model_is_another_recipe() -> None:
     model = Shaken([noisy(2.0 + 3.0 * TIME)])
-    halves = Weighted(Given(model), (np.full((1, len(TIME)), 0.5),))
+    halves = WeightedRecipe(Given(model), (np.full((1, len(TIME)), 0.5),))
     values = {"a": 0.0, "b": 0.0}
     plain = model.residual(0, ())(values)
     assert halves.build().residual(0, ())(values) == pytest.approx(0.5 * plain)
@@ -188,6 +188,6 @@ def test_weighted_model_is_another_recipe() -> None:
     others = {
         halves.digest(),
         Given(model).digest(),
-        Weighted(Given(model), (np.ones(1),)).digest(),
+        WeightedRecipe(Given(model), (np.ones(1),)).digest(),
     }
     assert len(others) == 3

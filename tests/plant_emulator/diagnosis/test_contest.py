@@ -25,7 +25,7 @@ from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null, linearise
 from plant_emulator.diagnosis.fitting.looks import glance, glance_far, look
 from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
 from plant_emulator.diagnosis.fitting.signature import signature
-from plant_emulator.diagnosis.machine import Candidate, Run
+from plant_emulator.diagnosis.machine import Candidate, MeasuredRun
 from plant_emulator.diagnosis.report.ranking import undetectable
 from plant_emulator.diagnosis.selection import rounds as engine
 from plant_emulator.diagnosis.selection.contenders import best_of
@@ -36,7 +36,7 @@ from plant_emulator.diagnosis.selection.stepwise import Contest
 from plant_emulator.diagnosis.selection.subsystem import subsystem
 from plant_emulator.diagnosis.selection.verdict import decide
 from plant_emulator.estimation.unknowns import Unknown
-from plant_emulator.recordings.input_noise import Loud
+from plant_emulator.recordings.input_noise import NoiseDirections
 from plant_emulator.signals.log import Array
 
 TIME = np.linspace(-1.0, 1.0, 2000)
@@ -83,7 +83,7 @@ class Line:
         self.measured = list(measured)
         self.candidates = {name: effect(name) for name in names}
         self.runs = [
-            Run(
+            MeasuredRun(
                 source=f"run {k}",
                 channels=("y",),
                 units=("1",),
@@ -105,7 +105,9 @@ class Line:
 
         return residual
 
-    def loud(self, run: int, where: FitResult, state: Mapping[str, float]) -> Loud | None:
+    def input_noise(
+        self, run: int, where: FitResult, state: Mapping[str, float]
+    ) -> NoiseDirections | None:
         """See `Model`: nothing is fed."""
         return None
 
@@ -113,17 +115,17 @@ class Line:
         """See `Model`."""
         return {u.name: u.prior for u in self.parameters}
 
-    def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
+    def start_values(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
         """See `Model`."""
         return {"a": 0.0, "b": 0.0}, [{} for _ in runs]
 
-    def start_states(
+    def initial_states(
         self, run: int, effects: Sequence[str], values: Mapping[str, float]
     ) -> dict[str, float]:
         """See `Model`."""
         return {}
 
-    def located(self, where: FitResult, runs: Sequence[int]) -> None:
+    def locate(self, where: FitResult, runs: Sequence[int]) -> None:
         """See `Model`."""
 
 
@@ -153,7 +155,7 @@ def noisy(y: Array, seed: int = 0) -> Array:
 
 def explained(model: Line) -> Explanation:
     """The contest over all runs."""
-    exact = [name for name, one in model.candidates.items() if one.exact]
+    exact = [name for name, one in model.candidates.items() if one.exact_form]
     runs = range(len(model.runs))
     return Contest(InProcess(), Given(model), tuple(model.candidates), runs, exact=exact).explain()
 
@@ -398,7 +400,7 @@ def test_ripple_that_no_effect_explains_is_unknown(measured: Array) -> None:
 class Placed(Line):
     """The gap is known to lie where the kink belongs."""
 
-    def located(self, where: FitResult, runs: Sequence[int]) -> Location:  # type: ignore[override]
+    def locate(self, where: FitResult, runs: Sequence[int]) -> Location:  # type: ignore[override]
         """See `Model`."""
         shares = {"here": 0.8, "there": 0.2}
         return Location(subsystem="here", channel=None, phase=None, shares=shares, cells=())
@@ -430,7 +432,7 @@ def test_signature_of_an_effect_below_zero_begins_below_zero() -> None:
 def test_effect_of_chance_course_is_not_tried() -> None:
     model = Line([noisy(2.0 + 3.0 * TIME + 0.8 * np.sin(20.0 * TIME))], ["wave"])
     model.candidates["wave"] = replace(
-        model.candidates["wave"], untold=(linear("course"),), needs="its course"
+        model.candidates["wave"], stochastic=(linear("course"),), needs="its course"
     )
     found = explained(model)
     assert found.final.effects == ()
@@ -529,14 +531,14 @@ class Wave(Line):
         others = super().residual(run, effects)
         return lambda v: others({**v, "b": 0.0}) - 8.0 * np.sin(v["b"] * TIME)
 
-    def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
+    def start_values(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
         """See `Model`."""
         return {"a": 0.0, "b": 19.0}, [{} for _ in runs]
 
 
 def test_effect_behind_a_fit_in_a_wrong_valley_is_found_from_the_nominal_parameters() -> None:
     model = Wave([noisy(8.0 * np.sin(5.3 * TIME) + 2.0 * np.abs(TIME))], ["kink"])
-    wrong = fit(model, (), [0], *model.search([0]))
+    wrong = fit(model, (), [0], *model.start_values([0]))
     assert wrong.mean_square > 10.0
     near = linearise(model, wrong, [0])
     found = signature(model, "kink", wrong, [0], NuisanceSpace(near))
@@ -572,7 +574,7 @@ def test_run_of_many_valleys_comes_in_when_the_others_have_brought_the_values_ne
 
 def test_fit_without_effects_in_a_wrong_valley_is_left_for_a_better_one() -> None:
     model = Wave([noisy(8.0 * np.sin(5.3 * TIME))], [])
-    assert fit(model, (), [0], *model.search([0])).mean_square > 10.0
+    assert fit(model, (), [0], *model.start_values([0])).mean_square > 10.0
     assert fit_null(model, [0]).mean_square < 1.1
 
 
@@ -591,7 +593,7 @@ class Hollow(Line):
 
         return residual
 
-    def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
+    def start_values(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
         """See `Model`."""
         return {"a": 0.0, "b": 2.0}, [{} for _ in runs]
 
@@ -650,7 +652,7 @@ class Contact(Line):
 
         return residual
 
-    def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
+    def start_values(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
         """See `Model`."""
         return {"a": 0.0, "b": 0.0, "c": 0.5}, [{} for _ in runs]
 
@@ -742,7 +744,7 @@ def test_beside_an_exact_effect_the_share_of_the_gap_says_nothing(
     2000 30^2 / 12.
     """
     model = rippled(30.0, 0.25 * np.sin(20.0 * TIME))
-    model.candidates["kink"] = replace(model.candidates["kink"], exact=exact)
+    model.candidates["kink"] = replace(model.candidates["kink"], exact_form=exact)
     assert set(explained(model).final.effects) == named
 
 
@@ -794,7 +796,7 @@ def test_small_second_of_what_is_no_noise_closes_much_of_the_gap(
     exact leaves nothing.
     """
     model = rippled(3.0, 0.5 * np.sin(20.0 * TIME), plausible)
-    model.candidates["kink"] = replace(model.candidates["kink"], exact=exact)
+    model.candidates["kink"] = replace(model.candidates["kink"], exact_form=exact)
     assert set(explained(model).final.effects) == named
 
 

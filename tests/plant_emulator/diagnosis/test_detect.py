@@ -71,7 +71,7 @@ def test_effect_that_might_show_in_a_size_not_tried_is_not_said_to_be_hidden() -
 
 
 def test_chance_is_told_of_jitter_and_of_nothing_else() -> None:
-    untold = [name for name in effects.names() if candidate(effects.load(name)).untold]
+    untold = [name for name in effects.names() if candidate(effects.load(name)).stochastic]
     assert untold == ["delay_jitter"]
 
 

@@ -31,11 +31,11 @@ class OnlyInTheFirst(Line):
 class Unplanned(Line):
     """Knows no further run that would tell more."""
 
-    def with_planned(self, where: FitResult, runs: Sequence[int]) -> Line:
+    def with_planned_runs(self, where: FitResult, runs: Sequence[int]) -> Line:
         """See `Model`."""
         return self
 
-    def lacks(self, runs: Sequence[int]) -> dict[str, tuple[str, ...]]:
+    def missing_experiments(self, runs: Sequence[int]) -> dict[str, tuple[str, ...]]:
         """See `Model`."""
         return {}
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from plant_emulator.diagnosis.localisation.ard_evidence import Linear, log_evidence, unrest
+from plant_emulator.diagnosis.localisation.ard_evidence import Linear, log_evidence, variance_gain
 
 RANDOM = np.random.default_rng(3)
 NUISANCE, LAW = RANDOM.standard_normal((40, 2)), RANDOM.standard_normal((40, 3))
@@ -40,5 +40,5 @@ def test_unrest_is_seen_where_its_weight_lies_and_nowhere_in_white_noise() -> No
     weight = np.where(np.arange(4000) < 1000, 1.0, 0.0)
     restless = white * np.sqrt(1.0 + 9.0 * weight)
     # 1000 samples of variance 10: (10 (1 - 1/10) - log 10) / 2 each at the best size
-    assert unrest(restless, weight) == pytest.approx(1000 * 3.35, rel=0.1)
-    assert unrest(white, weight) < 1.0
+    assert variance_gain(restless, weight) == pytest.approx(1000 * 3.35, rel=0.1)
+    assert variance_gain(white, weight) < 1.0

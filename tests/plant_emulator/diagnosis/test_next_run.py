@@ -15,12 +15,12 @@ from plant_emulator.diagnosis.execution.pool import InProcess
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
-from plant_emulator.diagnosis.machine import Candidate, Run
+from plant_emulator.diagnosis.machine import Candidate, MeasuredRun
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
 from plant_emulator.diagnosis.selection.verdict import Decision
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.model.stage import GAP_POSITION
-from plant_emulator.recordings.input_noise import Loud
+from plant_emulator.recordings.input_noise import NoiseDirections
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Array
 from plant_emulator.simulation.sensor_noise import noisy
@@ -82,7 +82,7 @@ class Slope:
         self.candidates = {name: effect(name) for name in LAWS}
         sources = sources or [f"run {k}" for k in range(len(speeds))]
         self.runs = [
-            Run(
+            MeasuredRun(
                 source=source,
                 channels=("y",),
                 units=("1",),
@@ -100,22 +100,24 @@ class Slope:
         x, y = self.speeds[run], self.measured[run]
         return lambda v: ((y - self.foretold(x, effects, v)) / 0.01)[None, :]
 
-    def loud(self, run: int, where: FitResult, state: Mapping[str, float]) -> Loud | None:
+    def input_noise(
+        self, run: int, where: FitResult, state: Mapping[str, float]
+    ) -> NoiseDirections | None:
         return None
 
     def nominal(self, runs: Sequence[int]) -> dict[str, float]:
         return {u.name: u.prior for u in self.parameters}
 
-    def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
+    def start_values(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
         return {"b": 0.0}, [{} for _ in runs]
 
-    def start_states(self, run: int, effects: Sequence[str], values: Any) -> dict[str, float]:
+    def initial_states(self, run: int, effects: Sequence[str], values: Any) -> dict[str, float]:
         return {}
 
-    def located(self, where: FitResult, runs: Sequence[int]) -> None:
+    def locate(self, where: FitResult, runs: Sequence[int]) -> None:
         """See `Model`."""
 
-    def with_planned(self, where: FitResult, runs: Sequence[int]) -> "Slope":
+    def with_planned_runs(self, where: FitResult, runs: Sequence[int]) -> "Slope":
         more = [self.foretold(x, where.effects, where.values) for x in self.plans.values()]
         return Slope(
             [*self.speeds, *self.plans.values()],
@@ -124,7 +126,7 @@ class Slope:
             [*(run.source for run in self.runs), *self.plans],
         )
 
-    def lacks(self, runs: Sequence[int]) -> dict[str, tuple[str, ...]]:
+    def missing_experiments(self, runs: Sequence[int]) -> dict[str, tuple[str, ...]]:
         return {"road": ("a hill",)}
 
 

@@ -9,10 +9,10 @@ from scipy.sparse import csr_array
 
 from plant_emulator.diagnosis.execution.pool import InProcess
 from plant_emulator.diagnosis.fit_result import FitResult
-from plant_emulator.diagnosis.fitting.input_noise_model import Quieted, quieted
+from plant_emulator.diagnosis.fitting.input_noise_model import InputNoiseRecipe, whiten_inputs
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.selection.procedure import Procedure
-from plant_emulator.recordings.input_noise import Loud
+from plant_emulator.recordings.input_noise import NoiseDirections
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, noisy
 
@@ -26,18 +26,20 @@ class Fed(Line):
 
     def __init__(self, measured: Sequence[Array]) -> None:
         super().__init__(measured)
-        self.runs = [replace(run, fed=True) for run in self.runs]
+        self.runs = [replace(run, measured_input=True) for run in self.runs]
 
-    def loud(self, run: int, where: FitResult, state: Mapping[str, float]) -> Loud:
+    def input_noise(
+        self, run: int, where: FitResult, state: Mapping[str, float]
+    ) -> NoiseDirections:
         """See `Model`."""
-        return Loud(directions=csr_array(FED[None] / NORM), deviations=np.array([NORM]))
+        return NoiseDirections(directions=csr_array(FED[None] / NORM), deviations=np.array([NORM]))
 
 
 def test_fits_do_not_follow_the_noise_of_a_fed_input() -> None:
     """By hand: without the fed samples a and b are those of the line, within their errors."""
     y = noisy(2.0 + 3.0 * TIME) + FED
     model = Fed([y])
-    recipe, _ = quieted(InProcess(), Given(model), model, (0,))
+    recipe, _ = whiten_inputs(InProcess(), Given(model), model, (0,))
     there, plain = fit_null(recipe.build(), [0]), fit_null(model, [0])
     for name, value in (("a", 2.0), ("b", 3.0)):
         assert abs(there.values[name] - value) < 3.0 * there.standard_errors[name]
@@ -57,10 +59,12 @@ def test_contest_starts_from_the_fit_that_told_the_noise() -> None:
     class Once(Fed):
         searched = False
 
-        def search(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
+        def start_values(
+            self, runs: Sequence[int]
+        ) -> tuple[dict[str, float], list[dict[str, float]]]:
             assert not self.searched
             self.searched = True
-            return super().search(runs)
+            return super().start_values(runs)
 
     model = Once([noisy(2.0 + 3.0 * TIME) + FED])
     inquiry = Procedure(pool=InProcess(), recipe=Given(model), model=model, runs=(0,))
@@ -72,17 +76,17 @@ def test_contest_starts_from_the_fit_that_told_the_noise() -> None:
 def test_machine_that_is_fed_nothing_keeps_its_recipe() -> None:
     model = Line([noisy(2.0 + 3.0 * TIME)])
     recipe = Given(model)
-    assert quieted(InProcess(), recipe, model, (0,)) == (recipe, None)
+    assert whiten_inputs(InProcess(), recipe, model, (0,)) == (recipe, None)
 
 
 def test_quieted_model_is_another_recipe() -> None:
     model = Fed([noisy(2.0 + 3.0 * TIME)])
-    one = model.loud(0, fit_null(model, [0]), {})
+    one = model.input_noise(0, fit_null(model, [0]), {})
     louder = replace(one, deviations=2.0 * one.deviations)
-    digests = {Quieted(Given(model), {0: loud}).digest() for loud in (one, louder)}
+    digests = {InputNoiseRecipe(Given(model), {0: one_of}).digest() for one_of in (one, louder)}
     assert len({*digests, Given(model).digest()}) == 3
     values = {"a": 0.0, "b": 0.0}
-    built = Quieted(Given(model), {0: one}).build()
+    built = InputNoiseRecipe(Given(model), {0: one}).build()
     assert built.runs is model.runs
     assert built.residual(0, ())(values)[0, TIME <= 0.95] == pytest.approx(
         model.residual(0, ())(values)[0, TIME <= 0.95]

@@ -26,7 +26,7 @@ def axis() -> AxisModel:
 
 @pytest.fixture(scope="module")
 def nominal(axis: AxisModel) -> FitResult:
-    return fit(axis, (), (0,), axis.search((0,))[0], [{}])
+    return fit(axis, (), (0,), axis.start_values((0,))[0], [{}])
 
 
 def trace(before: Array, after: Array, source: str = "held out") -> Trace:
@@ -106,7 +106,7 @@ def test_runs_held_out_in_turn_are_compared_with_nothing(
 def test_coefficients_by_direction_are_those_of_a_fit_of_both() -> None:
     log = axis_truth.log(lambda _q, v, _a: 0.2 * axis_truth.VISCOUS * np.abs(v))
     model = AxisModel([log, axis_truth.log(phase=1.0, seed=2)], fitted=(0,))
-    start = {**model.search((0,))[0], "viscous_asymmetry_ratio": 0.1}
+    start = {**model.start_values((0,))[0], "viscous_asymmetry_ratio": 0.1}
     found = fit(model, ("viscous_asymmetry",), (0,), start, [{}])
     terms = {t.name: t for t in in_terms(model, found, (0,))["viscous_asymmetry"]}
     for name, truth in {"forwards": 1.2, "backwards": 0.8}.items():

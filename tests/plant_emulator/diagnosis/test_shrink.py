@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from plant_emulator.diagnosis.machine import Run
+from plant_emulator.diagnosis.machine import MeasuredRun
 from plant_emulator.diagnosis.prediction.gap import (
     Prediction,
     block_lengths,
@@ -26,9 +26,9 @@ def constant(*levels: float) -> Prediction:
     return prediction(*(np.full(100, level) for level in levels))
 
 
-def run_of(*channels: str, samples: int = 100, noise: float = 1.0) -> Run:
+def run_of(*channels: str, samples: int = 100, noise: float = 1.0) -> MeasuredRun:
     """A run with these channels, each with the same noise."""
-    return Run(
+    return MeasuredRun(
         source="run",
         channels=channels,
         units=("1",) * len(channels),

@@ -98,7 +98,7 @@ def test_diagnosis_finds_each_runs_own_start_of_the_sets_effects(nominal: Parame
     assert found.mean_square < 1.1
     for state, phase in zip(found.states, (1.0, 4.0), strict=True):
         assert np.cos(state["gear_eccentricity_phase"] - phase) > 0.95
-    assert model.located(found, (0, 1)) is None
+    assert model.locate(found, (0, 1)) is None
 
 
 def rms(log: Log, simulation: Log) -> float:

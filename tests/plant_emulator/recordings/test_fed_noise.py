@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 from plant_emulator.errors import UnsettledError
 from plant_emulator.identification.identify import identify
 from plant_emulator.model.parameters import ParameterSet
-from plant_emulator.recordings.input_noise import Loud, loud
+from plant_emulator.recordings.input_noise import NoiseDirections, noise_directions
 from plant_emulator.recordings.recording import Recording, recording
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation.programs import TravelProgram, program
@@ -41,10 +41,12 @@ def test_direction_of_deviation_three_comes_out_with_variance_one() -> None:
         random.standard_normal((2, 50)) + 3.0 * random.standard_normal() * direction
         for _ in range(4000)
     ]
-    one = Loud(directions=csr_array(direction.T.reshape(1, -1)), deviations=np.array([3.0]))
-    along = [float(np.sum(direction * one.quieted(r))) for r in draws]
+    one = NoiseDirections(
+        directions=csr_array(direction.T.reshape(1, -1)), deviations=np.array([3.0])
+    )
+    along = [float(np.sum(direction * one.whitened(r))) for r in draws]
     assert np.var(along) == pytest.approx(1.0, abs=0.1)
-    across = one.quieted(draws[0]) - draws[0]
+    across = one.whitened(draws[0]) - draws[0]
     assert np.count_nonzero(across) == 2, "all else stays"
 
 
@@ -52,7 +54,7 @@ def test_directions_hold_what_drawn_noise_of_the_wheel_torque_does(
     measured: Recording, true_log: Log, nominal: ParameterSet
 ) -> None:
     """Two gaps close while the truck drives: at its start, and when it brakes."""
-    found = loud(measured, nominal.values(), GAP)
+    found = noise_directions(measured, nominal.values(), GAP)
     assert found is not None
     shape = (-1, len(true_log.time), len(measured.channels))
     spikes = np.abs(found.directions.toarray().reshape(shape)).max(axis=2).argmax(axis=1)
@@ -65,7 +67,7 @@ def test_directions_hold_what_drawn_noise_of_the_wheel_torque_does(
         fed = measured.fed(torque + deviation * random.standard_normal(len(torque)))
         change = fed.residual(nominal.values(), GAP) - base
         raw.append(found.along(change))
-        quiet.append(found.along(found.quieted(change)))
+        quiet.append(found.along(found.whitened(change)))
     assert np.mean(np.square(raw)) > 20.0
     assert np.mean(np.square(quiet)) < 2.0
 
@@ -74,17 +76,17 @@ def test_samples_that_do_not_count_stay_zero(true_log: Log, nominal: ParameterSe
     counted = true_log.time < 22.55
     log = noisy(true_log, 1)
     part = recording(log, use={"armature_current": counted})
-    found = loud(part, nominal.values(), GAP)
+    found = noise_directions(part, nominal.values(), GAP)
     assert found is not None
     row = part.channels.index("armature_current")
-    quiet = found.quieted(part.residual(nominal.values(), GAP))
+    quiet = found.whitened(part.residual(nominal.values(), GAP))
     assert not quiet[row, ~counted].any()
 
 
 def test_log_without_a_truck_feeds_nothing(nominal: ParameterSet, true_log: Log) -> None:
     signals = {k: v for k, v in noisy(true_log, 1).signals.items() if k != "wheel_torque"}
     alone = recording(Log(true_log.time, signals, true_log.source))
-    assert loud(alone, nominal.values(), GAP) is None
+    assert noise_directions(alone, nominal.values(), GAP) is None
 
 
 def test_drum_inertia_of_a_noisy_log_lies_within_its_standard_error(
@@ -99,7 +101,11 @@ def test_drum_inertia_of_a_noisy_log_lies_within_its_standard_error(
 def test_window_whose_simulation_does_not_settle_tells_nothing(
     measured: Recording, nominal: ParameterSet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    plain, settled, calls = loud(measured, nominal.values(), GAP), Recording.settled, count()
+    plain, settled, calls = (
+        noise_directions(measured, nominal.values(), GAP),
+        Recording.settled,
+        count(),
+    )
 
     def unsettled(self: Recording, *values: Any) -> Any:
         if next(calls) == 5:
@@ -107,7 +113,7 @@ def test_window_whose_simulation_does_not_settle_tells_nothing(
         return settled(self, *values)
 
     monkeypatch.setattr(Recording, "settled", unsettled)
-    found = loud(measured, nominal.values(), GAP)
+    found = noise_directions(measured, nominal.values(), GAP)
     assert plain is not None
     assert found is not None
     np.testing.assert_allclose(found.deviations, plain.deviations, rtol=0.05)
@@ -124,7 +130,7 @@ def test_long_log_needs_no_more_simulations_than_a_short_one(
         return settled(self, *values)
 
     monkeypatch.setattr(Recording, "settled", counting)
-    assert loud(recording(noisy(true_log, 1)), nominal.values(), GAP) is not None
+    assert noise_directions(recording(noisy(true_log, 1)), nominal.values(), GAP) is not None
     assert next(calls) == 61
 
 
@@ -135,4 +141,4 @@ def test_run_that_cannot_be_simulated_has_no_directions(
         raise UnsettledError("does not settle")
 
     monkeypatch.setattr(Recording, "settled", unsettled)
-    assert loud(measured, nominal.values(), GAP) is None
+    assert noise_directions(measured, nominal.values(), GAP) is None

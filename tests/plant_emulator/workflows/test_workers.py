@@ -117,7 +117,7 @@ def test_model_is_returned_though_another_thread_lets_it_go(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(pool, "_MODELS", Cleared())
-    model: Any = pool.model_of(Number(3))
+    model: Any = pool.build_model(Number(3))
     assert model == 3
 
 
