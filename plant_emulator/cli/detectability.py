@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import click
 
 from plant_emulator.cli import _options
@@ -21,47 +23,22 @@ Examples:
 @_options.reference
 @_options.json_file
 def command(
-    runs: tuple[str, ...], parameters: str, reference: str | None, json_file: str | None
+    runs: tuple[str, ...],
+    parameters: str,
+    reference: Literal["linear", "staircase"] | None,
+    json_file: str | None,
 ) -> None:
-    """Smallest size of every effect that recorded or planned RUNS show together.
+    """Tell the smallest size of every effect that recorded or planned RUNS show together.
 
-    And which effects they cannot tell apart, and what they lack for the rest.
+    The table also names the effects that the RUNS cannot tell apart, and what they lack to show an
+    effect at all.
     """
-    from plant_emulator.diagnosis.design.detectability import as_answer, detectability
-    from plant_emulator.parameter_sets import with_effects
-    from plant_emulator.workflows.planned_runs import prepared
+    from plant_emulator.workflows.detectability import detectability
 
-    model, point, notes = prepared(runs, with_effects.load(parameters), reference)
-    for note in notes:
+    found = detectability(runs, parameters=parameters, reference=reference)
+    for note in found.notes:
         click.echo(f"note: {note}", err=True)
-    found = detectability(model, point, range(len(runs)))
-    rows = sorted(found, key=lambda d: -d.orthogonal_norm)
-    effects = [as_answer(d, model.candidates[d.effect]) for d in rows]
     if json_file:
-        _options.write_json({"schema": "detectability/1", "effects": effects}, json_file)
+        _options.write_json(found.to_json(), json_file)
     if json_file != "-":
-        click.echo("\n".join(_table(effects)))
-
-
-def _table(effects: list[dict[str, object]]) -> list[str]:
-    lines = [f"{'effect':28}{'smallest size that shows':42}cannot be told from, or needs"]
-    for entry in effects:
-        sizes = entry["smallest_size"]
-        units = entry["units"]
-        assert isinstance(sizes, dict)
-        assert isinstance(units, dict)
-        hidden = entry["hidden_up_to"]
-        assert isinstance(hidden, dict)
-        shown = ", ".join(
-            f"{name} {value:.2g} {units[name]}".removesuffix(" 1")
-            if value is not None
-            else f"{name} > {hidden[name]:.2g} {units[name]}".removesuffix(" 1")
-            if name in hidden
-            else f"{name}: none"
-            for name, value in sizes.items()
-        )
-        same = entry["class"]
-        assert isinstance(same, list)
-        remark = ", ".join(same[1:]) or entry["needs"] or ""
-        lines.append(f"{entry['effect']!s:28}{shown:42}{remark}".rstrip())
-    return lines
+        click.echo(found.to_text())

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.fit_result import FitResult
-from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.fitting.joint_fit import (
+    fit_null,
+    joint_unknowns,
+    to_result,
+    with_starts,
+)
 from plant_emulator.diagnosis.machines.bench import BenchModel, BenchRecipe
 from plant_emulator.errors import ParameterError
+from plant_emulator.estimation.least_squares import linearise_at
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import Recording
-from plant_emulator.signals.log import COMPARED
+from plant_emulator.signals.log import COMPARED, Log
 from plant_emulator.simulation.programs import PROGRAMS
 from plant_emulator.simulation.sensor_noise import SENSORS
 from plant_emulator.simulation.simulate import run_of
@@ -21,8 +27,9 @@ from plant_emulator.workflows.loading import admitted
 from plant_emulator.workflows.simulation import simulated
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.model.parameters import ParameterSet
 
 
@@ -40,39 +47,45 @@ def planned_run(
     )
 
 
-def prepared(
-    names: Sequence[str], parameters: ParameterSet, hold: str | None = None
+def prepare(
+    runs: Sequence[str | Path | Log], parameters: ParameterSet, reference: str | None = None
 ) -> tuple[BenchModel, FitResult, tuple[str, ...]]:
-    """A model of these logs and programs, the fit at which they are judged, and what was noted.
+    """A model of logs and planned programs, the fit at which they are judged, and notes.
 
-    Logs are fitted; programs are simulated at what the logs say, or at the set as given.
+    Logs are fitted. Programs are simulated at what the logs say, or at the set as given.
+    reference : what holds between samples of the reference; None: as the log says
+    Raises ParameterError for a name that is neither a log file nor a program.
     """
-    recorded = [name for name in names if name not in PROGRAMS or Path(name).is_file()]
-    for name in recorded:
-        if not Path(name).exists():
-            known = ", ".join(PROGRAMS)
-            raise ParameterError(f"{name}: neither a log file nor a program; known: {known}")
-    recordings, notes = admitted(recorded, parameters, hold)
-    values = parameters.values()
-    states: tuple[dict[str, float], ...] = ()
+    recorded = [run for run in runs if not _is_program(run)]
+    recordings, notes = admitted(recorded, parameters, reference)
+    states: tuple[Mapping[str, float], ...] = ()
     if recordings:
-        model = BenchRecipe(tuple(recordings), parameters).build()
-        fitted = fit_null(model, range(len(recordings)))
-        parameters = parameters.with_values(fitted.values)
-        values, states = parameters.values(), tuple(dict(s) for s in fitted.states)
-    planned = [name for name in names if name not in recorded]
+        fitted = fit_null(
+            BenchRecipe(tuple(recordings), parameters).build(), range(len(recordings))
+        )
+        parameters, states = parameters.with_values(fitted.values), fitted.states
+    programs = [str(run) for run in runs if _is_program(run)]
     channels = max((r.channels for r in recordings), key=len, default=COMPARED)
-    recordings += [planned_run(name, parameters, channels) for name in planned]
+    recordings += [planned_run(name, parameters, channels) for name in programs]
     model = BenchRecipe(tuple(recordings), parameters).build()
-    point = FitResult(
-        effects=(),
-        values={u.name: values[u.name] for u in model.parameters},
-        states=(*states, *({GAP_POSITION: 0.0} for _ in planned)),
-        cost=0.0,
-        sum_of_squares=0.0,
-        samples=1,
-        effective_fraction=1.0,
-        standard_errors={},
-        converged=True,
-    )
-    return model, point, tuple(notes)
+    states = (*states, *({GAP_POSITION: 0.0} for _ in programs))
+    return model, _result_at(model, parameters.values(), states), tuple(notes)
+
+
+def _is_program(run: str | Path | Log) -> bool:
+    if isinstance(run, Log) or Path(run).is_file():
+        return False
+    if run not in PROGRAMS and not Path(run).exists():
+        known = ", ".join(PROGRAMS)
+        raise ParameterError(f"{run}: neither a log file nor a program; known: {known}")
+    return run in PROGRAMS
+
+
+def _result_at(
+    model: BenchModel, values: Mapping[str, float], states: tuple[Mapping[str, float], ...]
+) -> FitResult:
+    """The result of a fit without effects that stays at these values and states."""
+    runs = range(len(states))
+    unknowns = with_starts(joint_unknowns(model, (), runs), values, states)
+    found = to_result((), linearise_at(unknowns, [model.residual(k, ()) for k in runs]), len(runs))
+    return replace(found, values={u.name: values[u.name] for u in model.parameters}, states=states)

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf, isfinite
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -31,12 +31,14 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fitting.signature import Signature
     from plant_emulator.diagnosis.machine import Candidate, Model
 
+Value = TypeVar("Value")
+
 ALIKE = 0.95
 
 
 @dataclass(frozen=True, kw_only=True)
-class Detectability:
-    """What these runs can show of an effect.
+class DetectionLimit:
+    """What some runs can show of an effect.
 
     orthogonal_norm : norm of the signature at the plausible size, in the noise, without the part
         that a nuisance parameter can follow
@@ -54,8 +56,42 @@ class Detectability:
     indistinguishable: tuple[str, ...]
 
 
-def detectability(model: Model, where: FitResult, runs: Sequence[int]) -> list[Detectability]:
-    """For every effect of the library, at a fit without effects."""
+@dataclass(frozen=True, kw_only=True)
+class EffectDetectability:
+    """What some runs can show of an effect, its parameters by their names in the effect.
+
+    smallest_size : sizes from which on the effect shows [`units`]; None: no size that was tried
+    hidden_up_to : largest sizes that were tried and did not show, where larger ones are possible
+    evidence_at_plausible_size : fall of chi squared that the effect would bring
+    indistinguishable : the effect, then the effects that these runs cannot tell from it
+    needs : what the runs lack to show the effect at its plausible size; None: nothing
+    """
+
+    effect: str
+    subsystem: str
+    smallest_size: Mapping[str, float | None]
+    hidden_up_to: Mapping[str, float]
+    units: Mapping[str, str]
+    evidence_at_plausible_size: float
+    indistinguishable: tuple[str, ...]
+    needs: str | None
+
+    def to_json(self) -> dict[str, Any]:
+        """Write an entry of the document `detectability/1`."""
+        return {
+            "effect": self.effect,
+            "subsystem": self.subsystem,
+            "smallest_size": dict(self.smallest_size),
+            "hidden_up_to": dict(self.hidden_up_to),
+            "units": dict(self.units),
+            "evidence_at_plausible_size": self.evidence_at_plausible_size,
+            "class": list(self.indistinguishable),
+            "needs": self.needs,
+        }
+
+
+def detection_limits(model: Model, where: FitResult, runs: Sequence[int]) -> list[DetectionLimit]:
+    """Find what these runs can show of every effect, at a fit without effects."""
     tangents = NuisanceSpace(linearise(model, where, runs))
     found = {
         name: None if candidate.stochastic else signature(model, name, where, runs, tangents)
@@ -63,7 +99,7 @@ def detectability(model: Model, where: FitResult, runs: Sequence[int]) -> list[D
     }
     seen = {name: s for name, s in found.items() if s is not None}
     return [
-        Detectability(
+        DetectionLimit(
             effect=name,
             orthogonal_norm=0.0,
             total_norm=0.0,
@@ -72,7 +108,7 @@ def detectability(model: Model, where: FitResult, runs: Sequence[int]) -> list[D
             indistinguishable=(name,),
         )
         if s is None
-        else Detectability(
+        else DetectionLimit(
             effect=name,
             orthogonal_norm=s.orthogonal_norm,
             total_norm=s.total_norm,
@@ -127,40 +163,42 @@ def alike(name: str, seen: Mapping[str, Signature]) -> tuple[str, ...]:
     return (name, *sorted(near, key=lambda other: -cosines[other]))
 
 
-def as_answer(found: Detectability, candidate: Candidate) -> dict[str, Any]:
-    """One entry of the answer, schema detectability/1."""
-    prefix = f"{candidate.name}_"
+def effect_detectability(found: DetectionLimit, candidate: Candidate) -> EffectDetectability:
+    """Turn the limits of an effect into its own units."""
     seen = isfinite(found.smallest_size)
     least = {
-        u.name.removeprefix(prefix): (
-            bounded(u, candidate.neutral[u.name], found.smallest_size) if seen else None
-        )
+        u.name: bounded(u, candidate.neutral[u.name], found.smallest_size) if seen else None
         for u in candidate.sizes
     }
-    return {
-        "effect": found.effect,
-        "subsystem": candidate.subsystem,
-        "smallest_size": least,
-        "hidden_up_to": {} if seen else _hidden_up_to(found, candidate),
-        "units": {k.removeprefix(prefix): v for k, v in candidate.units.items()},
-        "evidence_at_plausible_size": found.orthogonal_norm**2,
-        "class": list(found.indistinguishable),
-        "needs": _needs(found, candidate),
-    }
+    return EffectDetectability(
+        effect=found.effect,
+        subsystem=candidate.subsystem,
+        smallest_size=_own_names(least, candidate),
+        hidden_up_to={} if seen else _own_names(_hidden_up_to(found, candidate), candidate),
+        units=_own_names(candidate.units, candidate),
+        evidence_at_plausible_size=found.orthogonal_norm**2,
+        indistinguishable=found.indistinguishable,
+        needs=_needs(found, candidate),
+    )
 
 
-def _hidden_up_to(found: Detectability, candidate: Candidate) -> dict[str, float]:
+def _own_names(values: Mapping[str, Value], candidate: Candidate) -> dict[str, Value]:
+    """Values by the names that the parameters have in their effect."""
+    return {name.removeprefix(f"{candidate.name}_"): value for name, value in values.items()}
+
+
+def _hidden_up_to(found: DetectionLimit, candidate: Candidate) -> dict[str, float]:
     """The largest sizes that were tried of an effect that acts, where its bounds allow more."""
     tried = {u.name: bounded(u, candidate.neutral[u.name], SIZES[-1]) for u in candidate.sizes}
     ends = {u.name: bounded(u, candidate.neutral[u.name], inf) for u in candidate.sizes}
     return {
-        name.removeprefix(f"{candidate.name}_"): value
+        name: value
         for name, value in tried.items()
         if found.total_norm > 0.0 and value != ends[name]
     }
 
 
-def _needs(found: Detectability, candidate: Candidate) -> str | None:
+def _needs(found: DetectionLimit, candidate: Candidate) -> str | None:
     """What is missing for an effect that does not show at its plausible size."""
     if found.orthogonal_norm >= DETECTABLE_NORM:
         return None

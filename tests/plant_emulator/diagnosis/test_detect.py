@@ -3,7 +3,6 @@
 import json
 from collections.abc import Callable
 from math import inf
-from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
@@ -11,12 +10,14 @@ from click.testing import CliRunner, Result
 from plant_emulator import effects
 from plant_emulator.cli import main
 from plant_emulator.diagnosis.design.detectability import (
-    Detectability,
-    as_answer,
+    DetectionLimit,
+    EffectDetectability,
+    effect_detectability,
     reached,
     smallest,
 )
 from plant_emulator.diagnosis.machines.bench import candidate
+from plant_emulator.workflows.detectability import Detectability
 
 
 def test_smallest_size_lies_where_the_signature_reaches_seven_times_the_noise() -> None:
@@ -45,8 +46,8 @@ def test_size_beyond_its_bound_was_not_tried(name: str, factor: float, left: flo
     assert reached(candidate(effects.load(name)), factor) == pytest.approx(left)
 
 
-def answer_of(name: str, smallest_: float, raw: float = 5.0) -> dict[str, Any]:
-    found = Detectability(
+def answer_of(name: str, smallest_: float, raw: float = 5.0) -> EffectDetectability:
+    found = DetectionLimit(
         effect=name,
         orthogonal_norm=0.0,
         total_norm=raw,
@@ -54,20 +55,32 @@ def answer_of(name: str, smallest_: float, raw: float = 5.0) -> dict[str, Any]:
         confounded_with="",
         indistinguishable=(name,),
     )
-    return as_answer(found, candidate(effects.load(name)))
+    return effect_detectability(found, candidate(effects.load(name)))
 
 
 def test_no_size_beyond_the_bounds_is_promised() -> None:
-    assert answer_of("current_limit", 1.8)["smallest_size"] == {"reduction": 71.0}
+    assert answer_of("current_limit", 1.8).smallest_size == {"reduction": 71.0}
 
 
 def test_effect_that_might_show_in_a_size_not_tried_is_not_said_to_be_hidden() -> None:
     """10 N m s/rad is plausible and 1000 the bound; twice the plausible size is tried."""
     entry = answer_of("shaft_damping", inf)
-    assert entry["smallest_size"] == {"damping": None}
-    assert entry["hidden_up_to"] == {"damping": 20.0}
-    assert answer_of("integrator_windup", inf)["hidden_up_to"] == {}
-    assert answer_of("wheel_slip", inf, raw=0.0)["hidden_up_to"] == {}
+    assert entry.smallest_size == {"damping": None}
+    assert entry.hidden_up_to == {"damping": 20.0}
+    assert answer_of("integrator_windup", inf).hidden_up_to == {}
+    assert answer_of("wheel_slip", inf, raw=0.0).hidden_up_to == {}
+
+
+def test_line_of_the_table_says_what_shows_what_was_tried_and_what_is_missing() -> None:
+    found = [
+        answer_of("current_limit", 1.8),
+        answer_of("shaft_damping", inf),
+        answer_of("integrator_windup", inf),
+    ]
+    _, *rows = Detectability(effects=tuple(found), notes=()).to_text().splitlines()
+    sizes = ["reduction 71 A", "damping > 20 N m s/rad", "share: none"]
+    assert [row[28:70].rstrip() for row in rows] == sizes
+    assert all(row[70:] == entry.needs for row, entry in zip(rows, found, strict=True))
 
 
 def test_chance_is_told_of_jitter_and_of_nothing_else() -> None:

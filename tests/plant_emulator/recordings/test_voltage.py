@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.design.detectability import as_answer, detectability
+from plant_emulator.diagnosis.design.detectability import detection_limits, effect_detectability
 from plant_emulator.diagnosis.fitting.evidence import LJUNG_BOX_LIMIT
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.localisation.block_basis import inside
@@ -235,14 +235,14 @@ def test_warm_armature_shows_in_the_voltage_and_only_there(
     if not logged:
         runs = [recording(without_voltage(r.log)) for r in runs]
     model = BenchModel(runs, nominal, effects)
-    (found,) = detectability(model, fit_null(model, range(3)), range(3))
-    entry = as_answer(found, model.candidates[HEATING])
+    (found,) = detection_limits(model, fit_null(model, range(3)), range(3))
+    entry = effect_detectability(found, model.candidates[HEATING])
     if logged:
         assert found.orthogonal_norm > 7.0
-        assert entry["needs"] is None
+        assert entry.needs is None
     else:
         assert found.orthogonal_norm < 7.0
-        assert "armature_voltage_V" in str(entry["needs"])
+        assert "armature_voltage_V" in str(entry.needs)
 
 
 @pytest.mark.slow
