@@ -25,7 +25,7 @@ def load(path: str | Path) -> Config:
     return _refuse_unknown_regulator(from_document(document, place=place), place)
 
 
-def with_values(config: Config, values: Mapping[str, str]) -> Config:
+def with_values(config: Config, values: Mapping[str, object]) -> Config:
     """`Config.with_values` where `regulator.friction` may also be the path of a friction file."""
     try:
         document = merge(config.document, values)

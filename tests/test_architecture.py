@@ -19,6 +19,7 @@ SHELL = {
     "gateway.recordings": "files, processes, terminal",
     "gateway.reports": "files",
     "gateway.runtime": "clock, processes, operating system",
+    "gateway.workflows": "files, processes",
     "plant_emulator.effects": "files: it finds its effects by their names",
     "plant_emulator.emulator": "clock, network, processes",
     "plant_emulator.logs": "files",

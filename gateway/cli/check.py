@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 import register_maps
-from gateway.cli._settings import assignments
+from gateway.cli._options import assignments
 from gateway.config_file import load, with_values
 from gateway.configuration.config import Config
 from gateway.link import device, inspection

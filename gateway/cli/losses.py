@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gateway.cli._settings import assignments
+from gateway.cli._options import assignments
 from register_maps.command_line.parameters import PICTURES, Command, Number, OutputFile
 
 if TYPE_CHECKING:

@@ -61,25 +61,25 @@ class Config:
     sweep: Sweep | None = None
     document: Document = field(default_factory=_defaults)
 
-    def with_values(self, values: Mapping[str, str]) -> "Config":
-        """The same with `{"section.key": "value as in TOML"}` instead."""
+    def with_values(self, values: Mapping[str, object]) -> "Config":
+        """Configuration with some values changed, `{"truck.load_kg": 1600}`; see `merge`."""
         return from_document(merge(self.document, values), place=_set_place)
 
 
-def merge(document: Document, values: Mapping[str, str]) -> Document:
-    """A document with `{"section.key": "value as in TOML"}` put in."""
+def merge(document: Document, values: Mapping[str, object]) -> Document:
+    """Put values into a copy of a document, `{"truck.load_kg": 1600}`; a text is read as TOML."""
     result = {section: dict(entries) for section, entries in document.items()}
-    for name, text in values.items():
+    for name, value in values.items():
         section, _, key = name.partition(".")
-        result.setdefault(section, {})[key] = _parsed(text)
+        result.setdefault(section, {})[key] = _parse(value) if isinstance(value, str) else value
     return result
 
 
-def _parsed(text: str) -> Any:
+def _parse(text: str) -> Any:
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
-        return text  # a bare word, as one types it on a command line
+        return text  # a bare word, typed without quotes on a command line
 
 
 def _set_place(section: str, key: str) -> str:

@@ -1,100 +1,77 @@
-"""What a replay has to say: figures, table, picture. It compares two setpoints of the motor speed.
+"""The report of a replay: lines for the operator, a table, a picture.
 
-matplotlib is imported only when a picture is drawn.
+It compares two setpoints of the motor speed. matplotlib is imported only when a picture is drawn.
 """
 
 import csv
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gateway.arrays import Array
-from gateway.offline.evaluation import Agreement, agreement
+from gateway.offline.comparison import Comparison
+from gateway.offline.recording_replay import Difference
 from register_maps.units import RPM
 
 GREY, BLUE, RED = "#999999", "#0072B2", "#D55E00"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Compared:
-    """Two setpoints of the motor speed over time, SI.
-
-    wanted : what was asked for then: the recorded setpoint or the logged reference, see `title`
-    found : what the replay asks for; demand : what its regulator wants, before the limits
-    """
-
-    title: str
-    time: Array
-    wanted: Array
-    found: Array
-    demand: Array
-    states: list[str]
-    reasons: list[str]
-
-    @property
-    def both(self) -> NDArray[np.bool_]:
-        """Where there is something to compare."""
-        there: NDArray[np.bool_] = np.isfinite(self.wanted) & np.isfinite(self.found)
-        return there
-
-    @property
-    def error(self) -> Array:
-        """Wanted minus found, where there are both [rad/s]."""
-        difference: Array = (self.wanted - self.found)[self.both]
-        return difference
-
-    def agreement(self) -> Agreement | None:
-        """Val1 and Val2; None where the wanted one does not move."""
-        wanted = self.wanted[self.both]
-        if not len(wanted) or np.ptp(wanted) == 0.0:
-            return None
-        return agreement(wanted, self.found[self.both])
-
-    def summary(self) -> str:
-        """The comparison in a few lines for the operator."""
-        error, close = self.error, self.agreement()
-        if not len(error):
-            return f"{self.title}: the replay asks for no speed (last state {self.states[-1]})"
-        worst = int(np.argmax(np.abs(error)))
-        when = self.time[self.both][worst]
-        val = f"; Val1 {close.val1:.2f}, Val2 {close.val2:.2f}" if close else ""
-        return (
-            f"{self.title}: {len(error)} of {len(self.time)} samples compared\n"
-            f"difference rms {np.sqrt(np.mean(error**2)) / RPM:.3f} rpm, "
-            f"max {abs(error[worst]) / RPM:.3f} rpm at {when:.2f} s{val}"
-        )
+def describe_differences(path: Path, differences: Sequence[Difference], ticks: int) -> str:
+    """Line that says how many ticks of a recording came out differently, and the first of them."""
+    if not differences:
+        return f"{path}: {ticks} ticks, equal bit for bit"
+    first = differences[0]
+    return (
+        f"{path}: {len(differences)} of {ticks} ticks differ, the first is tick {first.tick} at "
+        f"{first.time:.3f} s: {first.what} recorded {first.recorded}, replayed {first.replayed}"
+    )
 
 
-def write_csv(path: Path, compared: Compared) -> None:
-    """Write both setpoints sample by sample; what there is not is left empty."""
+def describe_comparison(comparison: Comparison) -> str:
+    """Lines that say how far two setpoints are apart, in rpm."""
+    error, close = comparison.error, comparison.agreement()
+    if not len(error):
+        state = comparison.states[-1]
+        return f"{comparison.title}: the replay asks for no speed (last state {state})"
+    worst = int(np.argmax(np.abs(error)))
+    when = comparison.time[comparison.both][worst]
+    val = f"; Val1 {close.val1:.2f}, Val2 {close.val2:.2f}" if close else ""
+    return (
+        f"{comparison.title}: {len(error)} of {len(comparison.time)} samples compared\n"
+        f"difference rms {np.sqrt(np.mean(error**2)) / RPM:.3f} rpm, "
+        f"max {abs(error[worst]) / RPM:.3f} rpm at {when:.2f} s{val}"
+    )
+
+
+def write_csv(path: Path, comparison: Comparison) -> None:
+    """Write both setpoints sample by sample; a value that does not exist stays empty."""
     columns = {
-        "time_s": compared.time,
-        "wanted_motor_speed_rad_s": compared.wanted,
-        "setpoint_motor_speed_rad_s": compared.found,
-        "demand_motor_speed_rad_s": compared.demand,
+        "time_s": comparison.time,
+        "wanted_motor_speed_rad_s": comparison.wanted,
+        "setpoint_motor_speed_rad_s": comparison.found,
+        "demand_motor_speed_rad_s": comparison.demand,
     }
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([*columns, "state", "reason"])
         numbers = zip(*(values.tolist() for values in columns.values()), strict=True)
-        for row, state, reason in zip(numbers, compared.states, compared.reasons, strict=True):
+        for row, state, reason in zip(numbers, comparison.states, comparison.reasons, strict=True):
             writer.writerow([*("" if np.isnan(one) else one for one in row), state, reason])
 
 
-def draw(path: Path, compared: Compared) -> None:
+def draw(path: Path, comparison: Comparison) -> None:
     """Draw both setpoints and their difference."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 6.0), layout="constrained", facecolor="white")
     speed, error = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1.2])
-    speed.set_title(compared.title, loc="left")
-    speed.plot(compared.time, compared.wanted / RPM, color=GREY, linewidth=3.5, label="then")
-    speed.plot(compared.time, compared.found / RPM, color=BLUE, linewidth=1.3, label="replay")
+    speed.set_title(comparison.title, loc="left")
+    speed.plot(comparison.time, comparison.wanted / RPM, color=GREY, linewidth=3.5, label="then")
+    speed.plot(comparison.time, comparison.found / RPM, color=BLUE, linewidth=1.3, label="replay")
     speed.set_ylabel("motor setpoint [rpm]")
     speed.legend(frameon=False)
-    error.plot(compared.time, (compared.wanted - compared.found) / RPM, color=RED, linewidth=0.9)
+    apart = (comparison.wanted - comparison.found) / RPM
+    error.plot(comparison.time, apart, color=RED, linewidth=0.9)
     error.set_ylabel("then - replay [rpm]")
     error.set_xlabel("time [s]")
     for axes in (speed, error):

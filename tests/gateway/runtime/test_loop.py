@@ -12,7 +12,7 @@ from gateway.configuration.config import Config
 from gateway.cycle.supervisor import State
 from gateway.errors import BugError
 from gateway.link.plc import LinkError, TcpLink
-from gateway.offline import replay
+from gateway.offline import recording_replay
 from gateway.reasons import Reason
 from gateway.recordings import export, log
 from gateway.recordings.header import config_of, header, map_of
@@ -222,12 +222,20 @@ def test_a_replay_is_equal_bit_for_bit(run: Run) -> None:
     recorded = run.recording
     again = map_of(recorded.header)
     config = config_of(recorded.header)
-    outputs = list(replay.outputs(config, again, replay.observations(recorded.rows(), again)))
+    outputs = list(
+        recording_replay.outputs(
+            config, again, recording_replay.observations(recorded.rows(), again)
+        )
+    )
     assert len(outputs) == len(recorded) > 320
-    assert list(replay.differences(recorded.rows(), outputs, again)) == []
+    assert list(recording_replay.differences(recorded.rows(), outputs, again)) == []
     other = config.with_values({"truck.mass_kg": "5240"})
-    outputs = list(replay.outputs(other, again, replay.observations(recorded.rows(), again)))
-    assert list(replay.differences(recorded.rows(), outputs, again)) != []
+    outputs = list(
+        recording_replay.outputs(
+            other, again, recording_replay.observations(recorded.rows(), again)
+        )
+    )
+    assert list(recording_replay.differences(recorded.rows(), outputs, again)) != []
 
 
 def test_an_exported_recording_is_a_log(run: Run, tmp_path: Path) -> None:
@@ -235,7 +243,7 @@ def test_an_exported_recording_is_a_log(run: Run, tmp_path: Path) -> None:
     recorded = run.recording
     path = tmp_path / "run.csv"
     columns = export.columns(recorded, map_of(recorded.header))
-    export.write(path, columns, export.began(recorded))
+    export.write(path, columns, export.start_date(recorded))
     exported = log.read(path)
     assert exported.time[0] == 0.0
     assert np.diff(exported.time) == pytest.approx(0.01)
