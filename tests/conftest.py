@@ -7,6 +7,16 @@ from collections.abc import Callable
 import pytest
 
 
+def pytest_report_header() -> str:
+    """The processor whose code computes: the last bits of every figure depend on it."""
+    import numpy as np  # noqa: F401  # loads the library
+    from threadpoolctl import threadpool_info
+
+    algebra = {one.get("architecture", one["internal_api"]) for one in threadpool_info()}
+    compiled = os.environ.get("NUMBA_CPU_NAME", "this processor")
+    return f"linear algebra of {', '.join(sorted(algebra))}; compiled for {compiled}"
+
+
 def missing(reason: str) -> None:
     """Skip the test for this reason; where every peer has to be there (CI), fail it."""
     if os.environ.get("ROADLOAD_REQUIRE_PEERS") == "1":

@@ -145,9 +145,11 @@ def test_command_shows_the_table_and_writes_the_answer(
 
 def diagnoses_of(process: int) -> list[str]:
     """Ids of the child processes that run a diagnosis."""
-    listed = subprocess.run(["ps", "--ppid", str(process), "-o", "pid=,args="], text=True,
-                            capture_output=True, check=False)  # fmt: skip
-    return [line.split()[0] for line in listed.stdout.splitlines() if " diagnose " in line]
+    of_threads = Path(f"/proc/{process}/task").glob("*/children")
+    children = [child for listed in of_threads for child in listed.read_text().split()]
+    return [
+        child for child in children if "\0diagnose\0" in Path(f"/proc/{child}/cmdline").read_text()
+    ]
 
 
 @pytest.mark.slow
