@@ -1,1 +1,1 @@
-"""The identification of a truck and its road load from logs of a road."""
+"""Identification of a truck's road load and gear efficiency from logs of a road."""

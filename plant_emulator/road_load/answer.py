@@ -1,7 +1,7 @@
-"""What a fit of road logs says: values with standard errors, what they cannot tell, doubts (pure).
+"""The answer of a fit of road logs: estimates, what the logs cannot separate, and problems (pure).
 
-Mass and load-cell gain enter only as gain times mass. C_rr needs neither; the forces F0 and F1 are
-as good as the mass is, which is taken as exact.
+The logs show only the product of mass and load-cell gain. C_rr needs neither. The forces F0 and F1
+are proportional to the given mass, which counts as exact.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 NORMAL_95 = 1.959964
 COLLINEAR = 0.95
 CONTRADICTION = 4.0
-"""Standard deviations from what was known of the gain, from which mass or gearing must be wrong."""
+"""Distance of the gain from its prior [standard deviations] that a wrong mass or ratio explains."""
 EXPLAINED = 98.0
-"""Val1 of the velocity [percent] below which the model is not what happened."""
+"""Val1 of the velocity [percent] below which the model does not describe the run."""
 EXCELLENT, NOISE = 99.8, 3.5
-"""Val1 [percent] below which the residual has to be noise, and the long-run variance of the white
-residual from which it is none."""
+"""Below this Val1 [percent] the whitened residual must be noise, with at most this long-run
+variance."""
 MASS = (
     "mass from torque_gain: only their product is seen; the given mass is taken as exact, f0 and "
     "f1 are proportional to it"
@@ -50,23 +50,27 @@ UNITS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate:
-    """A value, its standard error, and its 95 % interval."""
+    """An estimated value with its standard error."""
 
     value: float
     standard_error: float
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Bounds between which the truth lies in 95 of 100 cases."""
+        """The 95 % confidence interval."""
         half = NORMAL_95 * self.standard_error
         return self.value - half, self.value + half
 
 
 @dataclass(frozen=True, kw_only=True)
 class RoadAnswer:
-    """Estimates by the names of the answer file, fit of the velocity, limits and doubts.
+    """The answer of a fit of road logs.
 
-    problems : why the numbers must not be used; empty where they may
+    estimates : by their names in the answer file, in the units of UNITS
+    velocity : Val1 and Val2 of the simulated velocity
+    not_separable : what the logs cannot separate, one sentence each
+    problems : reasons against a use of the estimates; empty if there are none
+    starts : number of starts that reached this optimum, number of all starts
     """
 
     estimates: dict[str, Estimate]
@@ -77,11 +81,11 @@ class RoadAnswer:
 
     @property
     def converged(self) -> bool:
-        """Whether the numbers may be used."""
+        """Whether the estimates may be used."""
         return not self.problems
 
-    def as_json(self) -> dict[str, Any]:
-        """The machine-readable answer."""
+    def to_json(self) -> dict[str, Any]:
+        """The answer as JSON types, schema truck/1."""
         values = {
             name: {
                 "value": estimate.value,
@@ -101,9 +105,24 @@ class RoadAnswer:
             "converged": self.converged,
         }
 
+    def __str__(self) -> str:
+        """The answer as a table for the terminal."""
+        lines = [f"{'':24}{'value':>13}{'std. error':>12}{'95 % interval':>28}"]
+        for name, estimate in self.estimates.items():
+            low, high = estimate.interval
+            numbers = f"{estimate.value:13.6g}{estimate.standard_error:12.2g}"
+            lines.append(f"{name:24}{numbers}{low:14.6g}{high:14.6g}  {UNITS[name]}")
+        reached, tried = self.starts
+        lines += [
+            f"velocity: Val1 {self.velocity.val1:.2f} %, Val2 {self.velocity.val2:.2f} %",
+            f"{reached} of {tried} starts reached this optimum",
+            *(f"not separable: {text}" for text in self.not_separable),
+        ]
+        return "\n".join(lines)
 
-def answer(fit: RoadFit) -> RoadAnswer:
-    """What the fit says."""
+
+def answer_of(fit: RoadFit) -> RoadAnswer:
+    """Answer of a fit."""
     covariance = covariance_of(fit)
     errors = dict(zip((NAMES[i] for i in fit.free), np.sqrt(np.diag(covariance)), strict=True))
     quality = velocity_fit(fit)
@@ -118,16 +137,16 @@ def answer(fit: RoadFit) -> RoadAnswer:
 
 
 def velocity_fit(fit: RoadFit) -> Fit:
-    """Val1 and Val2 of the velocity, over every measured sample that both logs cover."""
+    """Val1 and Val2 of the velocity, over all measured samples that both logs cover."""
     run = fit.run
     covered = (run.velocity.time >= run.time[0]) & (run.velocity.time <= run.time[-1])
-    covered &= run.velocity.known
+    covered &= run.velocity.valid
     simulated = run.compared(fit.values, run.velocity.time[covered])
     return measures(run.velocity.values[covered], simulated, run.velocity.source)
 
 
 def estimates_of(fit: RoadFit, errors: dict[str, Any]) -> dict[str, Estimate]:
-    """The estimates by the names and in the units of the answer.
+    """Estimates by the names and in the units of the answer.
 
     F0 = m g C_rr    F1 = m g C_rr,v / r_d
     """
@@ -154,17 +173,17 @@ def estimates_of(fit: RoadFit, errors: dict[str, Any]) -> dict[str, Estimate]:
 def not_separable(
     fit: RoadFit, covariance: Array, estimates: dict[str, Estimate]
 ) -> tuple[str, ...]:
-    """What these logs cannot tell apart, one sentence each."""
+    """What the logs cannot separate, one sentence each."""
     found = [MASS]
     low, high = estimates["crr_v"].interval
     if low <= 0.0 <= high:
         found.append(f"crr_v from 0: its 95 % interval is {low:.2g} .. {high:.2g} s")
     gain = NAMES.index("torque_gain")
-    share = np.sqrt(covariance[gain, gain]) / fit.prior.deviation[gain]
-    if share > 0.5:
+    ratio = np.sqrt(covariance[gain, gain]) / fit.prior.deviation[gain]
+    if ratio > 0.5:
         found.append(
-            "efficiency from torque_gain: driving and braking are both needed; the gain is what "
-            "was known of it beforehand"
+            "efficiency from torque_gain: driving and braking are both needed; the gain comes from "
+            "its prior"
         )
     deviations = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(deviations, deviations)
@@ -175,13 +194,13 @@ def not_separable(
     return tuple(found)
 
 
-# Zero of the load cell that differs so much between standstills [N m] is 2 % of the road load.
+# Change of the load cell's zero between standstills [N m] that is 2 % of the road load.
 ZERO_MOVED = 0.1
 
 
 def problems(fit: RoadFit, quality: Fit) -> list[str]:
-    """Reasons why the numbers must not be used."""
-    found = [] if fit.settled else ["the search ended before it settled"]
+    """Reasons against a use of the estimates."""
+    found = [] if fit.settled else ["the search ended before it converged"]
     values = vector(fit.values)
     for index in fit.free:
         edge = 1e-6 * (UPPER[index] - LOWER[index])
@@ -194,13 +213,13 @@ def problems(fit: RoadFit, quality: Fit) -> list[str]:
         )
     elif quality.val1 < EXCELLENT and (variance := residual_variance(fit)) > NOISE:
         found.append(
-            f"the residual is no noise, its long-run variance is {variance:.1f} times what noise "
-            "leaves: level road, no foot brake, both logs of one run?"
+            f"the residual is not noise, its long-run variance is {variance:.1f} times that of "
+            "noise: level road, no foot brake, both logs of one run?"
         )
-    drift = float(fit.prior.deviation[NAMES.index("torque_offset")])
-    if ZERO_MOVED < drift < OFFSET:
+    spread = float(fit.prior.deviation[NAMES.index("torque_offset")])
+    if ZERO_MOVED < spread < OFFSET:
         found.append(
-            f"the load cell's zero moves from standstill to standstill, by {drift:.2f} N m "
+            f"the load cell's zero moves from standstill to standstill, by {spread:.2f} N m "
             "(standard deviation): cut the log where it moved"
         )
     gain = NAMES.index("torque_gain")
@@ -208,6 +227,6 @@ def problems(fit: RoadFit, quality: Fit) -> list[str]:
     if distance > CONTRADICTION:
         found.append(
             f"the load cell's gain would be {values[gain]:.3f}, {distance:.1f} standard deviations "
-            "from 1: is the mass, the gear ratio or the wheel radius another one?"
+            "from 1: are mass, gear ratio and wheel radius right?"
         )
     return found

@@ -1,8 +1,8 @@
-"""How far the two loggers' clocks are apart, to start from, and whether the two logs fit (pure).
+"""First estimate of the offset between two loggers' clocks, and checks of the two logs (pure).
 
-A motor's torque and the truck's acceleration have nearly the same shape. Their cross-correlation
-has its peak where one clock is shifted onto the other; what the logs are of (another run, a wrong
-sign, a constant speed) shows in the peak, before anything is fitted.
+The motor's torque and the truck's acceleration have nearly the same shape. The lag of the largest
+cross-correlation is the offset between the clocks. The height of this peak shows logs of different
+runs, a wrong sign or a constant speed before any fit.
 """
 
 from __future__ import annotations
@@ -19,41 +19,44 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 PERIOD = 0.01
+"""Time step of the correlation [s]."""
 CUTOFF = 4.0
+"""Cutoff of both signals before the correlation [Hz]."""
 FARTHEST = 10.0
-"""[s] by which the clocks may be apart."""
+"""Largest offset between the clocks [s]."""
 LEAST_OVERLAP = 5.0
-"""[s] of common time without which nothing is estimated."""
+"""Shortest common time of both logs [s]."""
 STEEPEST = 30.0
-"""[m/s^2] that no truck has."""
+"""Acceleration that no truck reaches [m/s^2]."""
 LEAST_ACCELERATION = 0.1
-"""[m/s^2] in the liveliest part, below which a run says nothing about mass against road load."""
+"""Smallest peak acceleration [m/s^2] that separates mass from road load."""
 LEAST_SPEED = 0.3
-"""[m/s] below which a truck has not travelled."""
+"""Smallest peak speed of a truck that travelled [m/s]."""
 LEAST_CORRELATION = 0.7
+"""Smallest correlation of torque and acceleration in one run [1]."""
 
 
 def clock_ahead(torque: Signal, velocity: Signal) -> float:
-    """Time of the torque's clock minus that of the velocity's at the same moment [s].
+    """Time on the torque's clock minus time on the velocity's clock at the same moment [s].
 
-    Raises LogError where the two logs do not belong together or do not move enough.
+    Raises LogError if the logs do not belong together, or if the truck moves too little.
     """
     _check_overlap(torque, velocity)
     _check_jumps(velocity)
     _check_motion(velocity)
-    grid = even(velocity.start, velocity.end)
-    wide = even(velocity.start - FARTHEST, velocity.end + FARTHEST)
-    drive = low_pass(on(torque, wide), PERIOD, CUTOFF)
-    there = (wide >= torque.start) & (wide <= torque.end)
-    acceleration = np.gradient(low_pass(on(velocity, grid), PERIOD, CUTOFF), PERIOD)
-    lags, correlation = correlated(drive - drive[there].mean(), there, acceleration)
+    grid = even_times(velocity.start, velocity.end)
+    wide = even_times(velocity.start - FARTHEST, velocity.end + FARTHEST)
+    drive = low_pass(resample(torque, wide), PERIOD, CUTOFF)
+    measured = (wide >= torque.start) & (wide <= torque.end)
+    acceleration = np.gradient(low_pass(resample(velocity, grid), PERIOD, CUTOFF), PERIOD)
+    lags, correlation = correlate(drive - drive[measured].mean(), measured, acceleration)
     best, worst = int(np.argmax(correlation)), int(np.argmin(correlation))
     names = f"{torque.source}, {velocity.source}"
     if -correlation[worst] > max(correlation[best], LEAST_CORRELATION):
         raise LogError(
             f"{names}: torque and acceleration have opposite signs (correlation "
             f"{correlation[worst]:.2f}), one of the two logs has the wrong sign; a positive torque "
-            "has to drive the truck forwards, to positive velocity"
+            "has to drive the truck forwards, with a positive velocity"
         )
     if correlation[best] < LEAST_CORRELATION:
         raise LogError(
@@ -61,45 +64,45 @@ def clock_ahead(torque: Signal, velocity: Signal) -> float:
             f"{correlation[best]:.2f}, at least {LEAST_CORRELATION} expected); two logs of the "
             f"same run, clocks at most {FARTHEST:g} s apart, are needed"
         )
-    return float(lags[best]) + _peak(correlation, best)
+    return float(lags[best]) + _refine_peak(correlation, best)
 
 
-def even(first: float, last: float) -> Array:
-    """Times from `first` to `last`, PERIOD apart [s]."""
+def even_times(first: float, last: float) -> Array:
+    """Times from `first` to `last` in steps of PERIOD [s]."""
     return first + PERIOD * np.arange(round((last - first) / PERIOD) + 1, dtype=np.float64)
 
 
-def on(channel: Signal, grid: Array) -> Array:
-    """A channel at the times `grid` [s], without what its own rate holds above it."""
+def resample(channel: Signal, grid: Array) -> Array:
+    """Values of a channel at the times `grid` [s], after a low pass against aliasing."""
     smooth = low_pass(channel.values, channel.period, 0.4 / PERIOD)
     return np.interp(grid, channel.time, smooth)
 
 
-def correlated(drive: Array, there: Mask, acceleration: Array) -> tuple[Array, Array]:
-    """Lags [s], and the correlation of drive(t + lag) with acceleration(t), shape (lags,) each.
+def correlate(drive: Array, measured: Mask, acceleration: Array) -> tuple[Array, Array]:
+    """Lags [s] and correlation of drive(t + lag) with acceleration(t) [1], shape (lags,) each.
 
-    there : where drive was measured; lags at which less than half of what there is to compare
-    would be compared have none
+    measured : where drive was measured
+    The correlation is 0 at lags with less than half of the largest number of compared samples.
     """
-    from scipy.signal import correlate
+    from scipy import signal
 
     acceleration = acceleration - float(acceleration.mean())
-    drive = np.where(there, drive, 0.0)
+    drive = np.where(measured, drive, 0.0)
 
-    def summed(left: Array, right: Array) -> Array:
-        found: Array = correlate(left, right, mode="valid")
+    def sums(left: Array, right: Array) -> Array:
+        found: Array = signal.correlate(left, right, mode="valid")
         return found
 
-    measured, all_of_it = there.astype(np.float64), np.ones(len(acceleration))
-    count = summed(measured, all_of_it)
-    power = summed(drive**2, all_of_it) * summed(measured, acceleration**2)
-    found = summed(drive, acceleration) / np.sqrt(np.maximum(power, 1e-9 * power.max()))
+    weight, ones = measured.astype(np.float64), np.ones(len(acceleration))
+    count = sums(weight, ones)
+    power = sums(drive**2, ones) * sums(weight, acceleration**2)
+    found = sums(drive, acceleration) / np.sqrt(np.maximum(power, 1e-9 * power.max()))
     lags = PERIOD * np.arange(len(found), dtype=np.float64) - FARTHEST
     return lags, np.where(count > 0.5 * count.max(), found, 0.0)
 
 
-def _peak(correlation: Array, best: int) -> float:
-    """Top of the parabola through the largest value and its neighbours, from there [s]."""
+def _refine_peak(correlation: Array, best: int) -> float:
+    """Distance of the parabola's vertex through the peak and its neighbours from the peak [s]."""
     if not 0 < best < len(correlation) - 1:
         return 0.0
     left, top, right = correlation[best - 1 : best + 2]
@@ -118,12 +121,12 @@ def _check_overlap(torque: Signal, velocity: Signal) -> None:
 
 def _check_jumps(velocity: Signal) -> None:
     step = np.abs(np.diff(velocity.values))
-    step[~(velocity.known[1:] & velocity.known[:-1])] = 0.0
+    step[~(velocity.valid[1:] & velocity.valid[:-1])] = 0.0
     worst = int(np.argmax(step))
     if step[worst] > 15.0 * noise(velocity.values) + STEEPEST * velocity.period:
         raise LogError(
             f"{velocity.source}: the velocity jumps by {step[worst]:.3g} m/s at "
-            f"{velocity.time[worst + 1]:.4g} s; no truck does, use the part before or after it"
+            f"{velocity.time[worst + 1]:.4g} s; no truck can; use the part before or after it"
         )
 
 
@@ -135,9 +138,9 @@ def _check_motion(velocity: Signal) -> None:
             f"{velocity.source}: the truck stands, at most {fastest:.2g} m/s; a run with starts "
             "and braking is needed"
         )
-    liveliest = float(np.abs(np.diff(smooth)).max() / velocity.period)
-    if liveliest < LEAST_ACCELERATION:
+    largest = float(np.abs(np.diff(smooth)).max() / velocity.period)
+    if largest < LEAST_ACCELERATION:
         raise LogError(
-            f"{velocity.source}: too little excitation, at most {liveliest:.2g} m/s^2; a run with "
+            f"{velocity.source}: too little excitation, at most {largest:.2g} m/s^2; a run with "
             f"starts and braking of {LEAST_ACCELERATION:g} m/s^2 and more is needed"
         )

@@ -1,10 +1,10 @@
-"""How sure a fit of road logs is of its values (pure).
+"""Covariance of the estimates of a fit of road logs (pure).
 
     cov = H^-1 (L J'J + P'P) H^-1,   H = J'J + P'P
 
-J, P: derivatives of the whitened residual and of the prior. L is the long-run variance of the
-whitened residual (Bartlett's weights): 1 where it is white, more where neighbours are alike, so
-that a thousand samples of one and the same misfit do not count as a thousand.
+J, P: derivatives of the whitened residual and of the prior. L: long-run variance of the whitened
+residual with Bartlett's weights (Newey and West, Econometrica 55 (1987) 703). L is 1 for a white
+residual. It is larger for correlated samples, which carry less information.
 """
 
 from __future__ import annotations
@@ -18,32 +18,31 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 LAGS = 1.5
-"""[s] over which neighbours of the residual are compared."""
+"""Longest lag of the long-run variance [s]."""
 
 
 def covariance_of(fit: RoadFit) -> Array:
     """Covariance of the free parameters, shape (free, free)."""
     rows = len(fit.residual) - len(fit.prior.rows)
-    data, known = fit.jacobian[:rows], fit.jacobian[rows:]
     scale = np.sqrt(np.sum(fit.jacobian**2, axis=0))
-    data, known = data / scale, known / scale
-    information, prior = data.T @ data, known.T @ known
-    inverse = np.linalg.inv(information + prior)
-    spread = residual_variance(fit) * information + prior
-    found: Array = inverse @ spread @ inverse / np.outer(scale, scale)
+    of_data, of_prior = fit.jacobian[:rows] / scale, fit.jacobian[rows:] / scale
+    information, precision = of_data.T @ of_data, of_prior.T @ of_prior
+    inverse = np.linalg.inv(information + precision)
+    middle = residual_variance(fit) * information + precision
+    found: Array = inverse @ middle @ inverse / np.outer(scale, scale)
     return found
 
 
 def residual_variance(fit: RoadFit) -> float:
-    """Long-run variance of the whitened residual of the data."""
+    """Long-run variance of the whitened residual, without the rows of the prior [1]."""
     rows = len(fit.residual) - len(fit.prior.rows)
     return long_run_variance(fit.residual[:rows], round(LAGS / fit.run.spacing))
 
 
 def long_run_variance(white: Array, lags: int) -> float:
-    """Variance of a sum of neighbours, per sample; white noise has its variance.
+    """Variance of the sum of consecutive samples, per sample [1].
 
-    At least 1, what the noise of the sensors themselves makes: less is chance.
+    The result is at least 1, the variance of whitened sensor noise. A smaller value is chance.
     """
     total = float(np.mean(white**2))
     for lag in range(1, lags):

@@ -1,10 +1,9 @@
-"""Estimates a truck's road load, gear and load cell from its two road logs (pure).
+"""Estimates a truck's road load, gear efficiency and load cell from its two road logs (pure).
 
-Several starts, because a simulated truck that stops where the real one crept on (or the other way
-round) can make valleys of its own. From each a bounded nonlinear least-squares fit of the whitened
-residual, beside which what is known beforehand stands as residuals of its own; the best is kept.
-The share of the random walk in the noise (see `road_whiten`) is at least what the load cell's own
-noise makes, and as much as the residual asks for: roads are not even.
+A bounded nonlinear least-squares fit minimises the whitened residual and the residual of the prior.
+It begins from several starts and keeps the best optimum: a simulated truck that stops where the
+real truck crept on can make a local minimum. A last fit uses the likeliest random walk of the noise
+(see `random_walk_filter`). The load cell's noise makes the least walk, an uneven road makes more.
 """
 
 from __future__ import annotations
@@ -33,19 +32,25 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 STEPS = np.array([1e-5, 5e-5, 1e-3, 1e-3, 0.02, 1e-3, 2e-5, 1e-3])
-"""A small change of each parameter: scale of the search, and step of the differences."""
+"""Scale of each parameter in the search, and step of its central differences, in order of NAMES."""
 LOWER = np.array([0.0, -0.01, 0.3, 0.5, -30.0, -20.0, -0.01, -10.0])
 UPPER = np.array([0.2, 0.01, 1.0, 2.0, 30.0, 20.0, 0.01, 10.0])
 EVALUATIONS = 60
+"""Largest number of simulations per start, without those of the derivatives."""
 WALKS = np.geomspace(1.0, 100.0, 13)
+"""Candidates for the random walk, over the walk that the load cell's noise makes [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RoadFit:
-    """An optimum: values, whitened residual and its derivatives, of data and of the prior.
+    """An optimum of the fit.
 
-    free : indices of the fitted parameters; cost : sum of squares; settled : the solver's word
-    jacobian, shape (rows, free), per unit of each parameter; reached : starts that came here
+    free : indices of the fitted parameters
+    residual : whitened residual of the data, then that of the prior, shape (rows,)
+    jacobian : derivatives of the residual per unit of each parameter, shape (rows, free)
+    cost : sum of squares; settled : whether the solver converged
+    walk : random walk of the noise, over the walk that the load cell's noise makes [1]
+    reached : number of starts that reached this optimum, number of all starts
     """
 
     run: RoadRun
@@ -62,57 +67,63 @@ class RoadFit:
 
 
 def fit(run: RoadRun, gain_deviation: float) -> RoadFit:
-    """The best fit of all starts. gain_deviation : of the load cell's gain beforehand [1]"""
+    """Fit the parameters from all starts and return the best optimum.
+
+    gain_deviation : prior standard deviation of the load cell's gain from 1 [1]
+    """
     prior = prior_of(run, gain_deviation)
     free = np.arange(len(NAMES) - (0 if run.moving_start else 1), dtype=np.int64)
     filters = filter_of(run, regression(run, prior), 1.0)
-    found = [descended(run, start, free, prior, filters) for start in starts(run, prior)]
+    found = [fit_from(run, start, free, prior, filters) for start in starts(run, prior)]
     best = min(found, key=lambda one: one.cost)
     reached = sum(one.cost < best.cost + 1.0 for one in found)
     walk = likeliest_walk(run, best.values)
-    final = descended(run, best.values, free, prior, filter_of(run, best.values, walk))
+    final = fit_from(run, best.values, free, prior, filter_of(run, best.values, walk))
     return replace(final, walk=walk, reached=(reached, len(found)))
 
 
 def likeliest_walk(run: RoadRun, values: RoadParameters) -> float:
-    """How many times the load cell's noise the random walk of this residual needs; at least 1.
+    """Likeliest random walk of the residual, over the walk that the load cell's noise makes [1].
 
-    Judged by means over 0.1 s, in which the low pass leaves no trace.
+    The likelihood uses means over 0.1 s, on which the low pass has no influence.
     """
     count = max(1, round(0.1 / run.spacing))
 
     def blocks(values: Array | Mask) -> Any:
         return values[: len(values) // count * count].reshape(-1, count)
 
-    known, rests, moves = (blocks(mask).all(axis=1) for mask in run.masks)
+    valid, rests, moves = (blocks(mask).all(axis=1) for mask in run.masks)
     mean = blocks(run.residual(values)).mean(axis=1)
     white, step = noises(run, values)
     scale = float(np.sqrt(count))
 
     def misfit(walk: float) -> float:
-        return whitener(white / scale, walk * step * scale, known, rests, moves).misfit(mean)
+        return whitener(white / scale, walk * step * scale, valid, rests, moves).misfit(mean)
 
     return float(min(WALKS.tolist(), key=misfit))
 
 
 def filter_of(run: RoadRun, values: RoadParameters, walk: float) -> Whitener:
-    """Whitener of this run; walk : of the steps, in those that the load cell's noise makes."""
+    """Whitener of this run.
+
+    walk : step of the random walk, over the step that the load cell's noise makes [1]
+    """
     white, step = noises(run, values)
     return whitener(white, walk * step, *run.masks)
 
 
 def noises(run: RoadRun, values: RoadParameters) -> tuple[float, float]:
-    """Standard deviations of the compared velocity and of the walk's step between two [m/s]."""
+    """Standard deviations of a velocity sample, and of the walk's step per sample [m/s]."""
     truck = run.truck
     per_torque = truck.ratio * values.efficiency / (truck.wheel_radius * truck.mass)
     step = per_torque * run.torque_noise * float(np.sqrt(run.torque.period * run.spacing))
     return run.velocity_noise, step
 
 
-def descended(
+def fit_from(
     run: RoadRun, start: RoadParameters, free: Indices, prior: Prior, filters: Whitener
 ) -> RoadFit:
-    """The optimum that bounded least squares finds from there."""
+    """Fit the free parameters from one start by bounded least squares."""
     from scipy.optimize import least_squares
     from threadpoolctl import threadpool_limits
 
@@ -125,22 +136,22 @@ def descended(
 
     def rows(x: Array) -> Array:
         values = values_at(x)
-        data = filters.whitened(run.residual(parameters(values))[:, None])[:, 0]
+        data = filters.whiten(run.residual(parameters(values))[:, None])[:, 0]
         return np.concatenate([data, prior.residual(values)])
 
-    def slopes(x: Array) -> Array:
-        data = filters.whitened(differences(run, values_at(x), free)) * scale
-        known = np.zeros((len(prior.rows), len(free)))
+    def derivatives(x: Array) -> Array:
+        of_data = filters.whiten(jacobian(run, values_at(x), free)) * scale
+        of_prior = np.zeros((len(prior.rows), len(free)))
         for row, index in enumerate(prior.rows):
-            known[row] = np.where(free == index, -scale / prior.deviation[index], 0.0)
-        return np.concatenate([data, known])
+            of_prior[row] = np.where(free == index, -scale / prior.deviation[index], 0.0)
+        return np.concatenate([of_data, of_prior])
 
     bounds = (LOWER[free] / scale, UPPER[free] / scale)
     x0 = np.clip(base[free] / scale, bounds[0], bounds[1])
-    # Decompositions of eight columns gain nothing from a second thread and spend twice the time.
+    # A decomposition of eight columns takes twice as much processor time with a second thread.
     with threadpool_limits(1):
         found = least_squares(
-            rows, x0, slopes, bounds, xtol=1e-7, ftol=1e-7, gtol=1e-7, max_nfev=EVALUATIONS
+            rows, x0, derivatives, bounds, xtol=1e-7, ftol=1e-7, gtol=1e-7, max_nfev=EVALUATIONS
         )
     return RoadFit(
         run=run,
@@ -155,8 +166,11 @@ def descended(
     )
 
 
-def differences(run: RoadRun, values: Array, free: Indices) -> Array:
-    """Derivatives of the residual by central differences, shape (m, free), per unit."""
+def jacobian(run: RoadRun, values: Array, free: Indices) -> Array:
+    """Derivatives of the residual per unit of each free parameter, shape (m, free).
+
+    They are central differences over STEPS.
+    """
 
     def moved(index: int, by: float) -> Array:
         changed = values.copy()

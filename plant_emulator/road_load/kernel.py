@@ -1,6 +1,6 @@
-"""The two loops over samples that are compiled: the truck's travel, and a Kalman filter (pure).
+"""The two compiled loops over samples: the truck's travel and a Kalman filter (pure).
 
-Each is one plain function without callees, so that numba's cache on disk knows all of it.
+Each loop is one function that calls no other, because numba's disk cache tracks one file only.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 @cache
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The loop, compiled at its first call."""
+    """Compiled form of a loop; numba compiles it at its first call."""
     compiler.use_cache([__file__, str(compiler.__file__)], ["road"])
     return compiler.compile_function(function, on_disk=True)
 
 
-def travelled(
+def travel(
     torque: Array,
     held: NDArray[np.bool_],
     period: float,
@@ -39,9 +39,11 @@ def travelled(
 ) -> Array:
     """Velocity [m/s] under the true motor torque [N m], shape (n,).
 
-    driving, braking : acceleration per torque [m/s^2 / (N m)]; rolling [m/s^2], viscous [1/s]
-    A truck that comes to rest within a period goes on from rest for what is left of it. One loop
-    without callees, for the compiler's cache.
+    held : where the truck is known to stand, shape (n,); period : of the samples [s]
+    driving, braking : acceleration per torque [m/s^2 / (N m)]
+    rolling : deceleration [m/s^2]; viscous : deceleration per velocity [1/s]
+    start : velocity at the first sample [m/s]
+    If the truck comes to rest within a period, the remaining time of the period starts from rest.
     """
     found = np.zeros(len(torque))
     found[0] = start
@@ -65,10 +67,12 @@ def travelled(
     return found
 
 
-def foreseen(residuals: Array, gain: Array, stands: NDArray[np.bool_]) -> Array:
-    """Random walk in each column of residuals as known before each row, shape (m, columns).
+def predict_walk(residuals: Array, gain: Array, stands: NDArray[np.bool_]) -> Array:
+    """Random walk of each column, predicted from the rows before, shape (m, columns).
 
-    walk <- walk + gain (residual - walk), 0 where the truck stands; gain and stands, shape (m,)
+    walk <- walk + gain (residual - walk), 0 where the truck stands
+
+    gain : Kalman gain, shape (m,); stands : where the truck stands, shape (m,)
     """
     walk = np.zeros(residuals.shape)
     for k in range(1, len(residuals)):

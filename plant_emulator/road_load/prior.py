@@ -1,9 +1,9 @@
-"""What is known of a truck before its road logs are fitted, and where the fits begin (pure).
+"""The prior of a truck's parameters, and the starts of the fits (pure).
 
-Known are the gain of the load cell within its calibration, its offset as the standing truck shows
-it, and that the rates of two clocks differ by some 100 ppm. The starts are the plain values of the
-thesis, a regression of the acceleration on the torque, which needs no simulation, and four points
-around it.
+The prior holds the load cell's gain within its calibration, the load cell's offset at standstill,
+a difference of about 100 ppm between the two clocks, and a small C_rr,v. The starts are a
+regression of the acceleration on the torque (which needs no simulation), the values of the thesis,
+and four points around the regression.
 """
 
 from __future__ import annotations
@@ -26,62 +26,68 @@ Indices = NDArray[np.int64]
 
 NAMES = tuple(RoadParameters.__dataclass_fields__)
 CLOCK_SKEW = 100e-6
-"""Standard deviation of what two free-running clocks differ by [1]."""
+"""Prior standard deviation of the relative rate of two free-running clocks [1]."""
 CRR_V = 1e-3
-"""Standard deviation of C_rr,v beforehand [s]: at 14 km/h as large as half of C_rr."""
+"""Prior standard deviation of C_rr,v [s]; at 14 km/h it is half of C_rr."""
 OFFSET = 1.0
-"""[N m] by which a load cell may be off where no standstill shows it."""
+"""Prior standard deviation of the load cell's offset without a standstill [N m]."""
 LEAST_STANDSTILL = 0.3
-"""[s] of sure standstill without which the offset of the load cell is not seen."""
+"""Shortest standstill that shows the load cell's offset [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Prior:
-    """What is known beforehand, shape (parameters,): means, deviations (infinite: nothing)."""
+    """Prior means and standard deviations in order of NAMES, shape (parameters,) each.
+
+    An infinite deviation means that the parameter has no prior.
+    """
 
     mean: Array
     deviation: Array
 
     @property
     def rows(self) -> Indices:
-        """The parameters about which something is known: their indices."""
+        """Indices of the parameters that have a prior."""
         return np.flatnonzero(np.isfinite(self.deviation)).astype(np.int64)
 
     def residual(self, values: Array) -> Array:
-        """Distance from the means in deviations, one row for each that is known."""
+        """Distance from the means [standard deviations], one row per index of `rows`."""
         found: Array = ((self.mean - values) / self.deviation)[self.rows]
         return found
 
 
 def vector(values: RoadParameters) -> Array:
-    """Values in the order of NAMES."""
+    """Values as an array in order of NAMES."""
     return np.array(astuple(values), dtype=np.float64)
 
 
 def parameters(values: Array) -> RoadParameters:
-    """The record of values in the order of NAMES."""
+    """Record of an array in order of NAMES."""
     return RoadParameters(**dict(zip(NAMES, values.tolist(), strict=True)))
 
 
 def prior_of(run: RoadRun, gain_deviation: float) -> Prior:
-    """What is known without a fit."""
+    """Prior of a run.
+
+    gain_deviation : prior standard deviation of the load cell's gain from 1 [1]
+    """
     mean, deviation = np.zeros(len(NAMES)), np.full(len(NAMES), np.inf)
-    known = {
+    priors = {
         "torque_gain": (1.0, gain_deviation),
         "clock_skew": (0.0, CLOCK_SKEW),
         "crr_v": (0.0, CRR_V),
         "torque_offset": standstill_offset(run),
     }
-    for name, (value, spread) in known.items():
+    for name, (value, spread) in priors.items():
         mean[NAMES.index(name)], deviation[NAMES.index(name)] = value, spread
     return Prior(mean=mean, deviation=deviation)
 
 
 def standstill_offset(run: RoadRun) -> tuple[float, float]:
-    """Torque that the load cell shows while the truck stands, and its standard error [N m].
+    """Measured torque while the truck stands, and its standard error [N m].
 
-    From the noise, or from how far the standstills differ among each other where that is more: a
-    load cell drifts.
+    The standard error is that of the noise, or the scatter between the standstills if this is
+    larger, because a load cell drifts.
     """
     edges = np.flatnonzero(np.diff(np.r_[False, run.held, False].astype(np.int8)))
     rests = [run.torque.values[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True)]
@@ -99,7 +105,7 @@ def standstill_offset(run: RoadRun) -> tuple[float, float]:
 
 
 def starts(run: RoadRun, prior: Prior) -> list[RoadParameters]:
-    """Where the fits begin."""
+    """Starts of the fits."""
     near = regression(run, prior)
     plain = replace(near, crr=0.0117, crr_v=0.0, efficiency=0.9, torque_gain=1.0)
     around = [(0.6, 0.93, 0.02), (1.5, 1.05, -0.02), (0.8, 1.05, 0.05), (1.25, 0.93, -0.05)]
@@ -116,7 +122,7 @@ def starts(run: RoadRun, prior: Prior) -> list[RoadParameters]:
 
 
 def regression(run: RoadRun, prior: Prior) -> RoadParameters:
-    """A start without simulation: acceleration on driving torque, braking torque and direction.
+    """Start from a regression of acceleration on driving torque, braking torque and direction.
 
     dv/dt = xi eta / (r_w m gain) T+ + xi / (eta r_w m gain) T- - g C_rr sgn v
     """
@@ -125,19 +131,21 @@ def regression(run: RoadRun, prior: Prior) -> RoadParameters:
     speed = low_pass(run.measured, period, 4.0)
     shown = low_pass(run.torque.values, run.torque.period, 4.0) - offset
     torque = np.interp(run.time + run.ahead, run.torque.time, shown)
-    used = run.known & (np.abs(speed) > 0.3)
+    used = run.valid & (np.abs(speed) > 0.3)
     sign = np.sign(speed)
     drives = torque * sign > 0.0
     columns = np.stack([np.where(drives, torque, 0.0), np.where(drives, 0.0, torque), -sign], 1)
     found = np.linalg.lstsq(columns[used], np.gradient(speed, period)[used])[0]
     lossless = truck.ratio / (truck.wheel_radius * truck.mass)
     driving, braking = (float(value) / lossless for value in found[:2])
-    sound = 0.2 < driving < 2.0 and driving < braking < 4.0
+    plausible = 0.2 < driving < 2.0 and driving < braking < 4.0
     return RoadParameters(
         crr=float(np.clip(found[2] / GRAVITY, 1e-3, 0.1)),
         crr_v=0.0,
-        efficiency=float(np.clip(np.sqrt(driving / braking), 0.5, 0.99)) if sound else 0.9,
-        torque_gain=float(np.clip(1.0 / np.sqrt(driving * braking), 0.8, 1.25)) if sound else 1.0,
+        efficiency=float(np.clip(np.sqrt(driving / braking), 0.5, 0.99)) if plausible else 0.9,
+        torque_gain=(
+            float(np.clip(1.0 / np.sqrt(driving * braking), 0.8, 1.25)) if plausible else 1.0
+        ),
         torque_offset=offset,
         clock_ahead=run.ahead,
         clock_skew=0.0,

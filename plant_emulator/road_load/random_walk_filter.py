@@ -1,11 +1,11 @@
-"""Residuals of a simulated velocity made white: a Kalman filter of one random walk (pure).
+"""Whitens the residual of a simulated velocity by a Kalman filter of a random walk (pure).
 
     residual = walk + white,   walk(k+1) = walk(k) + step,   walk = 0 where the truck stands
 
     K = P / (P + R)   P <- (1 - K) P + Q            R, Q : variances of white and step
-    white residual = (residual - walk estimate) / sqrt(P + R)
+    whitened residual = (residual - predicted walk) / sqrt(P + R)
 
-The gains do not depend on the residual, so that the same filter whitens its derivatives.
+The gains do not depend on the residual, so the filter also whitens derivatives of the residual.
 """
 
 from __future__ import annotations
@@ -15,54 +15,63 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.road_load.kernel import compiled, foreseen
+from plant_emulator.road_load.kernel import compiled, predict_walk
 
 if TYPE_CHECKING:
     from plant_emulator.road_load.signal import Mask
     from plant_emulator.signals.log import Array
 
 
-LOST = 0.05
-"""[m/s] as which the walk may be anything, after the truck came near to rest."""
+UNKNOWN_WALK = 0.05
+"""Standard deviation of the walk after the truck came close to standstill [m/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Whitener:
-    """Gains [1], shape (m,), deviations of what is new in each sample, and where the walk is 0."""
+    """A Kalman filter, fixed before the fit.
+
+    gain : Kalman gain [1], shape (m,)
+    deviation : standard deviation of the innovation [m/s], shape (m,)
+    valid : samples that count, shape (m,); rests : where the walk is 0, shape (m,)
+    """
 
     gain: Array
     deviation: Array
-    known: Mask
+    valid: Mask
     rests: Mask
 
-    def whitened(self, residuals: Array) -> Array:
-        """Residuals, shape (m, columns), in standard deviations and without what was foreseen.
+    def whiten(self, residuals: Array) -> Array:
+        """Innovations in standard deviations, shape (valid samples, columns).
 
-        Samples that are not known are left out: the result has as many rows as are known.
+        residuals : [m/s], shape (m, columns)
         """
-        new = residuals - compiled(foreseen)(residuals, self.gain, self.rests)
-        found: Array = (new / self.deviation[:, None])[self.known]
+        innovation = residuals - compiled(predict_walk)(residuals, self.gain, self.rests)
+        found: Array = (innovation / self.deviation[:, None])[self.valid]
         return found
 
     def misfit(self, residual: Array) -> float:
         """-2 log likelihood of a residual, up to a constant."""
-        white = self.whitened(residual[:, None])
-        return float(np.sum(white**2) + 2.0 * np.sum(np.log(self.deviation[self.known])))
+        white = self.whiten(residual[:, None])
+        return float(np.sum(white**2) + 2.0 * np.sum(np.log(self.deviation[self.valid])))
 
 
-def whitener(white: float, step: float, known: Mask, rests: Mask, moves: Mask) -> Whitener:
-    """The filter for standard deviations of the white part and of the walk's step, equal units."""
-    gain, deviation = np.zeros(len(known)), np.ones(len(known))
+def whitener(white: float, step: float, valid: Mask, rests: Mask, moves: Mask) -> Whitener:
+    """Filter for a white part and a random walk.
+
+    white, step : standard deviations of the white part and of the walk's step, same unit
+    valid, rests, moves : where samples count, the truck stands, the truck moves, shape (m,) each
+    """
+    gain, deviation = np.zeros(len(valid)), np.ones(len(valid))
     variance, moved = step**2, False
-    for k in range(len(known)):
+    for k in range(len(valid)):
         if rests[k]:
             variance = 0.0
         elif moved and not moves[k]:
-            variance = LOST**2
+            variance = UNKNOWN_WALK**2
         moved = bool(moves[k])
         total = variance + white**2
         deviation[k] = np.sqrt(total)
-        if known[k]:
+        if valid[k]:
             gain[k] = variance / total
         variance = (1.0 - gain[k]) * variance + step**2
-    return Whitener(gain=gain, deviation=deviation, known=known, rests=rests)
+    return Whitener(gain=gain, deviation=deviation, valid=valid, rests=rests)

@@ -1,12 +1,11 @@
-"""What a pair of road logs is compared on: one window, one filter, one grid, its noise (pure).
+"""Prepares a pair of road logs for the fit: one time window, one low pass, one grid (pure).
 
-The truck is simulated at the torque's own rate; the simulated velocity then passes the low pass
-that the measured one passed, and is read off at the measured samples through the two clocks.
+The truck is simulated at the torque's sample rate. The simulated velocity passes the same low pass
+as the measured velocity. It is then interpolated at the times of the measured samples.
 
-Two kinds of noise make the residual. The speed sensor's is white. The load cell's passes through
-the truck, which integrates it into a random walk that ends whenever the truck stands. A Kalman
-filter of that walk whitens the residual, so that least squares weighs every sample by what is new
-in it; the filter is fixed beforehand, so that it stays least squares.
+The residual holds two kinds of noise. The speed sensor's noise is white. The truck integrates the
+load cell's noise to a random walk, which ends when the truck stands. A Kalman filter of this walk
+whitens the residual (`random_walk_filter`).
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ import numpy as np
 from plant_emulator.errors import LogError
 from plant_emulator.road_load import truck_model
 from plant_emulator.road_load.clock_offset import LEAST_OVERLAP, clock_ahead
-from plant_emulator.road_load.signal import low_pass, noise, resting, trimmed
+from plant_emulator.road_load.signal import find_rests, low_pass, noise, trim
 
 if TYPE_CHECKING:
     from plant_emulator.road_load.signal import Mask, Signal
@@ -28,30 +27,32 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 RATE = 100.0
-"""Samples a second that are compared, where both loggers are faster."""
+"""Largest rate of the compared samples [1/s]."""
 EDGE = 0.2
-"""[s] left out at both ends, where the low pass knows one side only."""
+"""Time at both ends that is not compared, because the low pass has one side only [s]."""
 CREEP = 0.05
-"""[m/s] below which nothing is compared but standstill: the moment at which a truck stops wipes out
-what the load cell's noise had added up to, and would weigh as if it were knowledge."""
+"""Speed below which only standstill is compared [m/s]. The random walk ends at the moment of the
+stop, so the residual close to it would get too much weight."""
 QUIETEST = (0.02, 0.001)
-"""[N m] and [m/s] of noise below which the model itself, not the sensor, is the limit."""
+"""Smallest noise of torque [N m] and velocity [m/s]; below it the model's error dominates."""
 UNSURE = (0.3, 0.5)
-"""[s] after a stop and before a start in which the motor's torque may already or still be there."""
+"""Time after a stop and before a start in which the motor's torque may not be 0 [s]."""
 LEAST_REST = 0.3
-"""[s] of sure standstill without which it is not used."""
+"""Shortest standstill that is used, without the times of UNSURE [s]."""
 BRIDGED = 0.05
-"""[s] of lost torque over which a line may stand: its impulse moves the truck."""
+"""Longest hole in the torque that is interpolated [s], because its impulse moves the truck."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RoadRun:
-    """A truck's two logs, prepared.
+    """A truck's two logs, prepared for the fit.
 
-    torque_time [s], torque [N m], torque_held (where the truck is known to stand), shape (n,), at
-    even `period` [s]; time [s] by the velocity's clock, measured [m/s], known, stands, shape (m,)
-    ahead : first estimate of the clocks' distance [s]; cutoff : of the low pass [Hz]
-    torque_noise [N m], velocity_noise [m/s] : standard deviations of a sample, on the grid
+    first : index of the first simulated torque sample
+    held : torque samples at which the truck is known to stand, shape (n,)
+    time : of the compared samples on the velocity's clock [s], shape (m,)
+    measured : velocity after the low pass [m/s], shape (m,)
+    valid, rests, moves : where samples count, the truck stands, the truck moves, shape (m,) each
+    ahead : first estimate of the clock offset [s]; cutoff : of the low pass [Hz]
     """
 
     truck: Truck
@@ -61,7 +62,7 @@ class RoadRun:
     held: Mask
     time: Array
     measured: Array
-    known: Mask
+    valid: Mask
     rests: Mask
     moves: Mask
     ahead: float
@@ -69,35 +70,35 @@ class RoadRun:
 
     @property
     def moving_start(self) -> bool:
-        """Whether the common part of the logs begins on the move."""
+        """Whether the truck moves at the start of the common window."""
         return not bool(self.rests[0])
 
     @cached_property
     def spacing(self) -> float:
-        """Time between two compared samples [s]."""
+        """Time between compared samples [s]."""
         return float(np.median(np.diff(self.time)))
 
     @property
     def masks(self) -> tuple[Mask, Mask, Mask]:
-        """known, rests, moves."""
-        return self.known, self.rests, self.moves
+        """The masks valid, rests, moves."""
+        return self.valid, self.rests, self.moves
 
     @cached_property
     def torque_noise(self) -> float:
-        """Standard deviation of one sample of the torque [N m]."""
+        """Standard deviation of the noise of a torque sample [N m]."""
         return max(noise(self.torque.values), QUIETEST[0])
 
     @cached_property
     def velocity_noise(self) -> float:
-        """Standard deviation of one compared sample of the velocity [m/s].
+        """Standard deviation of the noise of a compared velocity sample [m/s].
 
-        What white noise has below the low pass: as that of a mean over the samples left out.
+        The low pass reduces white noise like a mean over the samples of one spacing.
         """
         shrink = self.velocity.period / self.spacing
         return max(noise(self.velocity.values), QUIETEST[1]) * float(np.sqrt(shrink))
 
     def simulated(self, parameters: RoadParameters) -> Array:
-        """Velocity at the torque's samples from `first` on [m/s], low-passed."""
+        """Simulated velocity after the low pass, at the torque's samples from `first` on [m/s]."""
         torque = self.torque.values[self.first :]
         period = self.torque.period
         found = truck_model.velocity(
@@ -106,19 +107,19 @@ class RoadRun:
         return low_pass(found, period, self.cutoff)
 
     def compared(self, parameters: RoadParameters, time: Array) -> Array:
-        """Simulated velocity at those times of the velocity's clock [m/s]."""
+        """Simulated velocity at these times on the velocity's clock [m/s]."""
         late = parameters.clock_skew * (time - self.velocity.start) + parameters.clock_ahead
         torque_time = self.torque.time[self.first :]
         return np.interp(time + late, torque_time, self.simulated(parameters))
 
     def residual(self, parameters: RoadParameters) -> Array:
-        """Measured minus simulated velocity on the grid [m/s], shape (m,)."""
+        """Measured minus simulated velocity [m/s], shape (m,)."""
         return self.measured - self.compared(parameters, self.time)
 
 
-def prepared(torque: Signal, velocity: Signal, truck: Truck) -> RoadRun:
-    """The two logs, brought together; LogError names what stands in the way."""
-    _check_gaps(torque)
+def prepare(torque: Signal, velocity: Signal, truck: Truck) -> RoadRun:
+    """Prepare the two logs of a run. Raises LogError if they cannot be compared."""
+    _check_holes(torque)
     ahead = clock_ahead(torque, velocity)
     step = max(1, round(1.0 / (velocity.period * RATE)))
     period = step * velocity.period
@@ -129,12 +130,12 @@ def prepared(torque: Signal, velocity: Signal, truck: Truck) -> RoadRun:
     end = min(torque.end, velocity.end + ahead) - EDGE
     inside = (velocity.time + ahead >= begin + EDGE) & (velocity.time + ahead <= end)
     chosen = np.flatnonzero(inside)[::step]
-    rests = resting(velocity.values, velocity.period)
+    rests = find_rests(velocity.values, velocity.period)
     samples = [round(part / velocity.period) for part in (*UNSURE, LEAST_REST)]
-    stands = trimmed(rests, *samples)
+    stands = trim(rests, *samples)
     moves = np.abs(smooth) > CREEP
-    known = _sure(velocity, 0.5 / cutoff) & (moves | stands)
-    _check_amount(known[chosen], period, torque, velocity)
+    valid = _far_from_holes(velocity, 0.5 / cutoff) & (moves | stands)
+    _check_amount(valid[chosen], period, torque, velocity)
     nearest = np.round((torque.time - ahead - velocity.start) / velocity.period).astype(np.int64)
     held = stands[np.clip(nearest, 0, len(stands) - 1)]
     return RoadRun(
@@ -145,7 +146,7 @@ def prepared(torque: Signal, velocity: Signal, truck: Truck) -> RoadRun:
         held=held,
         time=velocity.time[chosen],
         measured=smooth[chosen],
-        known=known[chosen],
+        valid=valid[chosen],
         rests=rests[chosen],
         moves=moves[chosen],
         ahead=ahead,
@@ -153,15 +154,15 @@ def prepared(torque: Signal, velocity: Signal, truck: Truck) -> RoadRun:
     )
 
 
-def _sure(velocity: Signal, reach: float) -> Mask:
-    """Samples further than `reach` [s] from any gap, shape (n,)."""
+def _far_from_holes(velocity: Signal, reach: float) -> Mask:
+    """Samples that are further than `reach` [s] from any hole, shape (n,)."""
     width = 2 * round(reach / velocity.period) + 1
-    missing = np.convolve(~velocity.known, np.ones(width), mode="same")
+    missing = np.convolve(~velocity.valid, np.ones(width), mode="same")
     return missing < 0.5
 
 
-def _check_amount(known: Mask, period: float, torque: Signal, velocity: Signal) -> None:
-    length = period * int(np.count_nonzero(known))
+def _check_amount(valid: Mask, period: float, torque: Signal, velocity: Signal) -> None:
+    length = period * int(np.count_nonzero(valid))
     if length < LEAST_OVERLAP:
         raise LogError(
             f"{torque.source}, {velocity.source}: only {length:.3g} s can be compared; at least "
@@ -169,8 +170,8 @@ def _check_amount(known: Mask, period: float, torque: Signal, velocity: Signal) 
         )
 
 
-def _check_gaps(torque: Signal) -> None:
-    for start, length in torque.gaps():
+def _check_holes(torque: Signal) -> None:
+    for start, length in torque.holes():
         if length > BRIDGED:
             raise LogError(
                 f"{torque.source}: no torque (missing, held or saturated) for {length:.3g} s from "

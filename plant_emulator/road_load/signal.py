@@ -1,9 +1,8 @@
-"""One sampled channel of a road log: even samples, what is missing, noise, low pass (pure).
+"""One channel of a road log: even samples, holes, noise, low pass and standstill (pure).
 
-The two channels come from two loggers with rates of their own. Each is brought to even samples at
-its own rate here; stretches without information are remembered, not invented. The low pass runs
-forwards and backwards and so shifts nothing; it is applied to the measured and the simulated
-velocity alike, before either is thinned out.
+Two loggers with different rates record the two channels. This module resamples each channel to even
+samples at its own rate and marks its holes. The low pass runs forwards and backwards, so it shifts
+nothing. Measured and simulated velocity pass it before they are decimated.
 """
 
 from __future__ import annotations
@@ -22,24 +21,26 @@ if TYPE_CHECKING:
 Mask = NDArray[np.bool_]
 
 SLOWEST = 20.0
-"""Samples a second below which start and stop of a truck can no longer be told in time."""
+"""Lowest sample rate that resolves starts and stops of a truck [1/s]."""
 HELD = 0.05
-"""[s] from which a value that stands still in a noisy signal was held, not measured."""
+"""Shortest constant stretch of a noisy signal that the logger held instead of measured [s]."""
 ORDER = 2
+"""Order of the Butterworth low pass, per direction."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Signal:
     """Even samples of one channel.
 
-    start : time of the first sample [s]; period [s]; values, shape (n,)
-    known : where values rest on samples, shape (n,); elsewhere they are bridged by a line
+    start : time of the first sample [s]; period : time between samples [s]
+    values : in the channel's unit, shape (n,), interpolated linearly in holes
+    valid : where values are measured, shape (n,); source : name of the log
     """
 
     start: float
     period: float
     values: Array
-    known: Mask
+    valid: Mask
     source: str
 
     @property
@@ -52,9 +53,9 @@ class Signal:
         """Time of the last sample [s]."""
         return self.start + self.period * (len(self.values) - 1)
 
-    def gaps(self) -> list[tuple[float, float]]:
+    def holes(self) -> list[tuple[float, float]]:
         """Start [s] and length [s] of every stretch without samples."""
-        edges = np.flatnonzero(np.diff(np.r_[True, self.known, True].astype(np.int8)))
+        edges = np.flatnonzero(np.diff(np.r_[True, self.valid, True].astype(np.int8)))
         firsts, lasts = edges[::2], edges[1::2]
         return [
             (self.start + self.period * (first - 1), self.period * (last - first + 1))
@@ -63,30 +64,31 @@ class Signal:
 
 
 def signal(time: Array, values: Array, source: str, *, rest: float | None = None) -> Signal:
-    """Even samples of a channel, time [s] strictly increasing, shape (n,) each.
+    """Even samples of a channel.
 
-    rest : the value at which the sensor may honestly stand still, if there is one
-    Raises LogError where it was sampled too slowly, or sampled slower than it was written.
+    time : strictly increasing [s], shape (n,); values : shape (n,)
+    source : name of the log; rest : value at which a working sensor may stay constant
+    Raises LogError if the sample rate is too low, or if the logger repeats every sample.
     """
     if len(time) < 50:
         raise LogError(f"{source}: {len(time)} samples; a run of some seconds is needed")
     _check_rate(time, values, source)
-    measured = ~held(time, values, rest) & ~spikes(values)
+    measured = ~find_held(time, values, rest) & ~find_spikes(values)
     since, values = time[measured] - time[0], values[measured]
     period = period_of(since)
     grid = np.arange(int(np.round(since[-1] / period)) + 1)
-    known = np.zeros(len(grid), dtype=np.bool_)
-    known[np.clip(np.round(since / period).astype(np.int64), 0, len(grid) - 1)] = True
+    valid = np.zeros(len(grid), dtype=np.bool_)
+    valid[np.clip(np.round(since / period).astype(np.int64), 0, len(grid) - 1)] = True
     even = np.interp(grid * period, since, values)
-    # One or two samples that jitter took away, or a spike, are bridged and no gap.
-    lost = trimmed(~known, 0, 0, 1 + min(2, int(0.01 / period)))
-    return Signal(start=float(time[0]), period=period, values=even, known=~lost, source=source)
+    # One or two samples lost by jitter, or one spike, are interpolated and do not make a hole.
+    lost = trim(~valid, 0, 0, 1 + min(2, int(0.01 / period)))
+    return Signal(start=float(time[0]), period=period, values=even, valid=~lost, source=source)
 
 
 def period_of(time: Array) -> float:
-    """Time between two samples [s], also where some are lost, late, or their stamps rounded.
+    """Time between two samples [s], robust against lost samples, jitter and rounded stamps.
 
-    Stamps over their numbers, the numbers counted from stamp to stamp.
+    It is the slope of a regression of the time stamps on the sample numbers.
     """
     steps = np.diff(time)
     number = np.r_[0.0, np.cumsum(np.round(steps / np.median(steps)))]
@@ -94,8 +96,8 @@ def period_of(time: Array) -> float:
     return float(number @ (time - time.mean()) / (number @ number))
 
 
-def spikes(values: Array) -> Mask:
-    """Lone samples far off the median of their five neighbours, shape (n,)."""
+def find_spikes(values: Array) -> Mask:
+    """Single samples far from the median of five neighbours, shape (n,)."""
     from scipy.signal import medfilt
 
     off = np.abs(values - medfilt(values, 5))
@@ -112,16 +114,16 @@ def _check_rate(time: Array, values: Array, source: str) -> None:
     usual = int(np.median(lengths))
     if len(lengths) > 50 and usual > 1 and np.mean(lengths == usual) > 0.8:
         raise LogError(
-            f"{source}: every value stands {usual} times; it was sampled at {rate / usual:.4g} Hz "
-            f"and held, keep one of {usual} rows"
+            f"{source}: every value occurs {usual} times in a row; it was sampled at "
+            f"{rate / usual:.4g} Hz and held, keep one of {usual} rows"
         )
 
 
-def held(time: Array, values: Array, rest: float | None) -> Mask:
-    """Samples that only repeat the one before, shape (n,): a logger that waits for its sensor.
+def find_held(time: Array, values: Array, rest: float | None) -> Mask:
+    """Samples that repeat the one before, because the logger held the value, shape (n,).
 
-    Told by runs of equal values that are far longer than the signal's usual ones; one without
-    noise, whose runs are long as a rule, has none, and runs at `rest` are none.
+    They are runs of equal values that are much longer than usual. A signal without noise has long
+    runs everywhere, so it has no held samples. Runs at the value `rest` do not count.
     """
     firsts = np.flatnonzero(np.r_[True, np.diff(values) != 0.0])
     lengths = np.diff(np.r_[firsts, len(values)])
@@ -138,10 +140,11 @@ def held(time: Array, values: Array, rest: float | None) -> Mask:
 
 
 def noise(values: Array) -> float:
-    """Standard deviation of the white part of a signal, in its unit, from third differences.
+    """Standard deviation of a signal's white noise [its unit].
 
-    A smooth signal has none; their variance is 20 times that of the noise. Median of magnitudes,
-    so that steps do not count. At least what rounding to the signal's smallest step makes.
+    Third differences cancel a smooth signal and multiply the variance of white noise by 20. The
+    median of their magnitudes ignores steps. The result is at least the rounding error of the
+    signal's smallest step.
     """
     steps = np.abs(np.diff(values))
     rounding = float(np.min(steps[steps > 0.0], initial=np.inf)) / np.sqrt(12.0)
@@ -150,9 +153,10 @@ def noise(values: Array) -> float:
 
 
 def low_pass(values: Array, period: float, cutoff: float) -> Array:
-    """Values without what lies above `cutoff` [Hz]; Butterworth, forwards and backwards.
+    """Values after a Butterworth low pass that runs forwards and backwards.
 
-    A signal whose own rate holds nothing above it stays as it is.
+    period : of the samples [s]; cutoff : [Hz]
+    A signal that is sampled too slowly to hold anything above the cutoff stays unchanged.
     """
     from scipy.signal import butter, sosfiltfilt
 
@@ -163,21 +167,22 @@ def low_pass(values: Array, period: float, cutoff: float) -> Array:
     return found
 
 
-def resting(velocity: Array, period: float) -> Mask:
-    """Where the truck rests, shape (n,): its speed is 0 within the noise for 0.2 s and more.
+def find_rests(velocity: Array, period: float) -> Mask:
+    """Samples at which the truck stands, shape (n,): speed 0 within the noise for 0.2 s or more.
 
-    The first 0.1 s are left out, in which the low pass still brings some of the travel.
+    The first 0.1 s of a standstill do not count, because the low pass smears the travel into them.
     """
     cutoff = 5.0
     smooth = low_pass(velocity, period, cutoff)
-    quiet = np.abs(smooth) < max(0.006, 6.0 * noise(velocity) * np.sqrt(2.0 * cutoff * period))
-    return trimmed(quiet, round(0.1 / period), 0, round(0.1 / period))
+    slow = np.abs(smooth) < max(0.006, 6.0 * noise(velocity) * np.sqrt(2.0 * cutoff * period))
+    return trim(slow, round(0.1 / period), 0, round(0.1 / period))
 
 
-def trimmed(mask: Mask, head: int, tail: int, least: int) -> Mask:
-    """Stretches of a mask without their first `head` and last `tail` samples, if `least` remain.
+def trim(mask: Mask, head: int, tail: int, least: int) -> Mask:
+    """Cut `head` samples from the start and `tail` samples from the end of every true stretch.
 
-    A stretch that begins or ends with the log keeps that end.
+    A stretch that keeps fewer than `least` samples is dropped. A stretch at the start or end of the
+    log keeps that end.
     """
     found = np.zeros(len(mask), dtype=np.bool_)
     edges = np.flatnonzero(np.diff(np.r_[False, mask, False].astype(np.int8)))

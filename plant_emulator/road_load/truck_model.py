@@ -1,13 +1,13 @@
-"""A truck on the level road, driven by the torque of its motor as its load cell shows it (pure).
+"""A truck on a level road, driven by the measured torque of its motor (pure).
 
     m dv/dt = F_w - m g (C_rr + C_rr,v |v| / r_d) sgn v          (thesis, eq 4.14-4.16 over r_w)
     F_w = xi T eta / r_w     where the motor drives, T v > 0               (thesis, eq 4.13)
     F_w = xi T / (eta r_w)   where it brakes: the loss of the gear then helps to brake
     T_shown = gain T + offset
 
-The thesis multiplies by the efficiency in both directions, which makes the brakes 1 - eta^2 too
-weak; power that flows back through a gear is divided by it. At rest the truck stays until the motor
-overcomes C_rr. Clocks, filters and estimation are left to the other `road_*` modules.
+The thesis multiplies by the efficiency in both directions, so its brakes are too weak by 1 - eta^2.
+Here the torque that flows back through the gear is divided by the efficiency. A truck at rest
+stays at rest until the motor overcomes C_rr.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from plant_emulator.road_load.kernel import compiled, travelled
+from plant_emulator.road_load.kernel import compiled, travel
 from plant_emulator.simulation.truck import GRAVITY
 
 if TYPE_CHECKING:
@@ -25,7 +25,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Truck:
-    """What is known of the truck: mass with load [kg], ratio [1], radii of wheel and drum [m]."""
+    """Given properties of the truck and of the bench.
+
+    mass : with load [kg]; ratio : motor speed over wheel speed [1]; wheel_radius [m]
+    drum_radius : of the bench [m], because C_rr,v refers to the drum's speed
+    """
 
     mass: float
     ratio: float = 14.0
@@ -34,19 +38,20 @@ class Truck:
 
     @property
     def weight(self) -> float:
-        """m g [N]"""
+        """Weight m g [N]."""
         return self.mass * GRAVITY
 
 
 @dataclass(frozen=True, kw_only=True)
 class RoadParameters:
-    """What the logs are asked for.
+    """The estimated parameters.
 
-    crr, crr_v : rolling resistance [1], and its part with the drum's speed [s]
-    efficiency : of the truck's gear; torque_gain [1], torque_offset [N m] : of the load cell
-    clock_ahead [s], clock_skew [1] : the velocity sample stamped t belongs to the torque's time
-        t + clock_skew (t - t_0) + clock_ahead, t_0 the first stamp of the velocity
-    initial_velocity : where the logs begin on the move [m/s]
+    crr : rolling resistance C_rr [1]; crr_v : its increase per drum speed C_rr,v [s]
+    efficiency : of the truck's gear eta [1]
+    torque_gain [1], torque_offset [N m] : of the load cell
+    clock_ahead [s], clock_skew [1] : a velocity sample with time stamp t was taken at
+        t + clock_skew (t - t_0) + clock_ahead on the torque's clock; t_0 is the first stamp
+    initial_velocity : at the start of the common window [m/s]
     """
 
     crr: float
@@ -64,14 +69,14 @@ def velocity(
 ) -> Array:
     """Velocity of the truck [m/s] at each sample of the torque, shape (n,).
 
-    shown : torque as the load cell shows it [N m], linear between its samples, shape (n,)
-    held : where the truck is known to stand, whatever holds it, shape (n,)
+    shown : measured torque, linear between its samples [N m], shape (n,)
+    held : samples at which the truck is known to stand, shape (n,)
     period : of the samples [s]
     """
     p = parameters
     torque = (shown - p.torque_offset) / p.torque_gain
     per_torque = truck.ratio / (truck.wheel_radius * truck.mass)
-    found: Array = compiled(travelled)(
+    found: Array = compiled(travel)(
         torque,
         held,
         period,

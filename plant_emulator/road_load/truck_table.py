@@ -1,4 +1,4 @@
-"""An identified truck as the `[truck]` table of the gateway's configuration (pure)."""
+"""Writes an identified truck as the `[truck]` table of the gateway's configuration (pure)."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ if TYPE_CHECKING:
 
 
 def table(answer: RoadAnswer, truck: Truck, origin: Sequence[str]) -> str:
-    """The text of a TOML file; `origin` are lines about where it comes from, as comments.
+    """Text of a TOML file with the `[truck]` table.
 
-    The road load stands as F0 and F1, which need no drum. What the gateway does not take is told
-    in comments, and stays with the table when that is pasted.
+    origin : lines about the origin of the values, written as comments
+    The table holds the road load as F0 and F1, which do not depend on a drum. Comments hold the
+    estimates that the gateway does not need.
     """
     lines = [*origin, "Standard errors at the end of a line; mass and radius as given.", ""]
     for name in ("crr", "crr_v", "efficiency", "torque_gain", "torque_offset_Nm"):

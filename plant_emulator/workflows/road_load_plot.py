@@ -1,4 +1,4 @@
-"""The picture of a fitted road log: velocity measured and simulated, residual, torque."""
+"""Plot of a fitted road log: measured and simulated velocity, residual and torque."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ if TYPE_CHECKING:
     from plant_emulator.road_load.fit import RoadFit
 
 
-def draw(fit: RoadFit, path: str) -> None:
-    """Write the picture; times by the velocity's clock."""
+def plot(fit: RoadFit, path: str | Path) -> None:
+    """Plot a fit to a file. The times are those of the velocity's clock."""
     from matplotlib.figure import Figure
 
     run, values = fit.run, fit.values
     residual = run.residual(values)
     first = run.velocity.start
-    since = (run.torque.time - first - values.clock_ahead) / (1.0 + values.clock_skew)
+    since_start = (run.torque.time - first - values.clock_ahead) / (1.0 + values.clock_skew)
     figure = Figure(figsize=(10.0, 8.0), layout="constrained")
     upper, middle, lower = figure.subplots(3, 1, sharex=True, height_ratios=[3, 1, 2])
     upper.plot(run.time, run.measured, color=MEASURED, linewidth=1.6, label="measured")
@@ -29,7 +29,7 @@ def draw(fit: RoadFit, path: str) -> None:
     middle.plot(run.time, residual, color=RESIDUAL, linewidth=0.7)
     middle.axhline(0.0, color="#999999", linewidth=0.5)
     middle.set_ylabel("residual [m/s]")
-    lower.plot(first + since, run.torque.values, color=MEASURED, linewidth=0.6)
+    lower.plot(first + since_start, run.torque.values, color=MEASURED, linewidth=0.6)
     lower.axhline(values.torque_offset, color="#999999", linewidth=0.5)
     lower.set_ylabel("motor torque [N m]")
     lower.set_xlabel("time of the velocity log [s]")

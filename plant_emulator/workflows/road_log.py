@@ -1,8 +1,8 @@
-"""Reads one channel of a truck's road log: a CSV file, plain or gzip-compressed, with its time.
+"""Reads one channel of a truck's road log: a CSV file with its time, plain or gzip-compressed.
 
-Columns `time_s` and `motor_torque_Nm` (load cell between the truck's motor and its gear, positive
-forwards) or `velocity_m_s` (measuring wheel); others are passed over. Each file has the clock and
-the rate of its own logger.
+The columns are `time_s` and `motor_torque_Nm` (load cell between motor and gear, positive forwards)
+or `velocity_m_s` (measuring wheel). Other columns are ignored. Each file has the clock and the
+sample rate of its own logger.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def channel(column: str, signal: str, unit: str) -> LogColumn:
-    """A column of a road log; whether it is there is judged by `read`, which knows the files."""
+    """Declaration of a column. `read` checks whether the file has it, because it knows the role."""
     return LogColumn(
         column=column, signal=signal, unit=unit, needed=False, measured=None, decimals=4
     )
@@ -36,7 +36,11 @@ ROLES = {TORQUE.column: "TORQUE", VELOCITY.column: "VELOCITY"}
 
 
 def read(path: str, wanted: LogColumn) -> tuple[Array, Array]:
-    """Time [s] and the channel, shape (n,) each; LogError names file, line and column."""
+    """Read time [s] and one channel [SI], shape (n,) each.
+
+    wanted : TORQUE or VELOCITY
+    Raises LogError with file, line and column.
+    """
     try:
         columns = {TIME: LOG_COLUMNS[TIME], wanted.column: wanted}
         found = parse(Path(path).read_bytes(), columns)
@@ -53,7 +57,7 @@ def read(path: str, wanted: LogColumn) -> tuple[Array, Array]:
 
 
 def origin(*paths: str) -> list[str]:
-    """Where a result comes from: date, version of the program, logs with their SHA-256."""
+    """Origin of a result: date, version of the program, and the logs with their SHA-256."""
     digests = [hashlib.sha256(Path(path).read_bytes()).hexdigest() for path in paths]
     logs = [f"{path}, SHA-256 {digest}" for path, digest in zip(paths, digests, strict=True)]
     made = (

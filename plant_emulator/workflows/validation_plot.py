@@ -1,4 +1,4 @@
-"""Pictures of the emulator's answers. matplotlib is imported only when one is drawn."""
+"""Plot of measured and simulated signals. Only a call of a function imports matplotlib."""
 
 from __future__ import annotations
 
@@ -19,12 +19,15 @@ LABELS = {
     "shaft_torque": "shaft torque [N m]",
     "armature_voltage": "armature voltage [V]",
 }
-# Okabe and Ito's colours: told apart with every kind of colour vision.
+# Colours of Okabe and Ito, which all kinds of colour vision distinguish.
 MEASURED, SIMULATED, RESIDUAL = "#000000", "#0072B2", "#D55E00"
 
 
-def draw_validation(pairs: Sequence[tuple[Log, Log]], path: str) -> None:
-    """Measured over simulated and the residual below, one column a log; writes the picture."""
+def draw_validation(pairs: Sequence[tuple[Log, Log]], path: str | Path) -> None:
+    """Plot each log and its simulation, with the residuals below, one column per log, to a file.
+
+    pairs : (measured, simulated)
+    """
     from matplotlib.figure import Figure
 
     shown = {name for log, _ in pairs for name in compared(log)}

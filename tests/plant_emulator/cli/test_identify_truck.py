@@ -1,4 +1,4 @@
-"""The command identify-truck as an operator calls it: answer, files, and every bad input."""
+"""The command identify-truck and its library function: answer, files and every bad input."""
 
 import gzip
 import json
@@ -12,8 +12,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 from plant_emulator.cli import main
-from plant_emulator.road_load.answer import answer, problems, velocity_fit
-from tests.plant_emulator.road_load.test_road_practice import DATA, LABELS, case
+from plant_emulator.road_load.answer import answer_of, problems, velocity_fit
+from plant_emulator.workflows.truck_identification import identify_truck
+from tests.plant_emulator.road_load.test_labelled_logs import DATA, LABELS, case
 
 Array = np.ndarray
 Command = Callable[..., Result]
@@ -27,7 +28,7 @@ def table(name: str) -> Array:
 
 @pytest.fixture
 def write(tmp_path: Path) -> Callable[..., tuple[str, str]]:
-    """Return a function: tables of torque and velocity -> their files; road_1's where not given."""
+    """A function that writes tables of torque and velocity to files; the default is road_1."""
 
     def files(torque: Array | None = None, velocity: Array | None = None) -> tuple[str, str]:
         paths = []
@@ -81,7 +82,7 @@ def test_answer_has_the_schema_and_the_labels_values(done: tuple[Result, Path]) 
         assert abs(found[name]["value"] - value) < 3.0 * found[name]["standard_error"]
 
 
-def test_answer_is_told_with_units_and_limits(done: tuple[Result, Path]) -> None:
+def test_table_has_units_and_limits(done: tuple[Result, Path]) -> None:
     text = done[0].stdout
     assert "6 of 6 starts" in text
     assert "not separable: mass from torque_gain" in text
@@ -97,8 +98,20 @@ def test_saved_table_is_the_truck_with_its_origin(done: tuple[Result, Path]) -> 
     assert "SHA-256" in text
 
 
-def test_picture_is_a_png(done: tuple[Result, Path]) -> None:
+def test_plot_is_a_png(done: tuple[Result, Path]) -> None:
     assert (done[1] / "truck.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_library_function_gives_the_answer_of_the_command(done: tuple[Result, Path]) -> None:
+    result, folder = done
+    found = identify_truck(DATA / TORQUE, DATA / VELOCITY, mass=3640.0)
+    assert found.converged
+    assert found.to_json() == json.loads((folder / "truck.json").read_text())
+    assert repr(found) == result.stdout.rstrip("\n")
+    assert (
+        found.truck_table().splitlines()[-7:]
+        == ((folder / "truck.toml").read_text().splitlines()[-7:])
+    )
 
 
 def test_json_on_standard_output_stands_alone() -> None:
@@ -106,19 +119,19 @@ def test_json_on_standard_output_stands_alone() -> None:
     assert json.loads(result.stdout)["converged"] is True
 
 
-def test_swapped_files_are_told() -> None:
+def test_swapped_files_are_refused() -> None:
     line = refusal(call(DATA / VELOCITY, DATA / TORQUE))
     assert "the order is TORQUE VELOCITY" in line
 
 
-def test_wrong_sign_of_the_torque_is_told(write: Callable[..., tuple[str, str]]) -> None:
+def test_wrong_sign_of_the_torque_is_refused(write: Callable[..., tuple[str, str]]) -> None:
     line = refusal(call(*write(torque=table(TORQUE) * [1, -1])))
     assert "opposite signs" in line
     assert "positive torque has to drive the truck forwards" in line
 
 
 @pytest.mark.parametrize("kind", ["missing", "held", "saturated"])
-def test_lost_torque_is_told_with_place_and_length(
+def test_lost_torque_is_refused_with_time_and_length(
     write: Callable[..., tuple[str, str]], kind: str
 ) -> None:
     rows = table(TORQUE)
@@ -152,13 +165,13 @@ def test_lost_velocity_is_left_out_and_the_rest_used(
     assert abs(crr["value"] - LABELS["road_1"]["crr"]) < 3.0 * crr["standard_error"]
 
 
-def test_velocity_that_jumps_is_told(write: Callable[..., tuple[str, str]]) -> None:
+def test_velocity_that_jumps_is_refused(write: Callable[..., tuple[str, str]]) -> None:
     rows = table(VELOCITY)
     rows[(rows[:, 0] > 10.0) & (rows[:, 0] < 10.3), 1] = 0.0
     assert "the velocity jumps by" in refusal(call(*write(velocity=rows)))
 
 
-def test_standstill_only_is_told(write: Callable[..., tuple[str, str]]) -> None:
+def test_standstill_only_is_refused(write: Callable[..., tuple[str, str]]) -> None:
     rows = table(VELOCITY) * [1, 0]
     assert "the truck stands" in refusal(call(*write(velocity=rows)))
 
@@ -169,7 +182,7 @@ def test_cruise_only_is_too_little_excitation(write: Callable[..., tuple[str, st
     assert "too little excitation" in refusal(call(*write(*parts)))
 
 
-def test_logs_without_common_time_are_told(write: Callable[..., tuple[str, str]]) -> None:
+def test_logs_without_common_time_are_refused(write: Callable[..., tuple[str, str]]) -> None:
     line = refusal(call(*write(velocity=table(VELOCITY) + np.array([100, 0]))))
     assert "100 .. 159.999 s; at least 5 s in common are needed" in line
 
@@ -192,13 +205,13 @@ def test_another_mass_than_the_load_cell_allows_fails_and_saves_nothing(tmp_path
     result = call(DATA / TORQUE, DATA / VELOCITY, "--save", saved, "--json", "-", mass=5240)
     line = refusal(result, 1)
     assert "gain would be 0.688" in line
-    assert "is the mass, the gear ratio or the wheel radius another one?" in line
+    assert "are mass, gear ratio and wheel radius right?" in line
     assert json.loads(result.stdout)["converged"] is False
     assert not saved.exists()
 
 
 def test_zero_of_the_load_cell_that_moves_fails(write: Callable[..., tuple[str, str]]) -> None:
-    """0.5 N m from the middle of the log on; believed, they would be 9 % of C_rr."""
+    """The zero moves by 0.5 N m in the middle of the log, which is 9 % of C_rr."""
     torque = table(TORQUE)
     torque[len(torque) // 2 :, 1] += 0.5
     line = refusal(call(*write(torque=torque)), 1)
@@ -211,11 +224,11 @@ def test_velocity_of_another_run_fails(other: str) -> None:
     assert "both logs of one run?" in refusal(result, 1)
 
 
-def test_search_that_did_not_settle_is_not_converged() -> None:
+def test_search_that_did_not_converge_is_reported() -> None:
     unsettled = replace(case("road_1").fit, settled=False)
-    said = answer(unsettled)
-    assert said.converged is False
-    assert said.as_json()["problems"] == ["the search ended before it settled"]
+    found = answer_of(unsettled)
+    assert found.converged is False
+    assert found.to_json()["problems"] == ["the search ended before it converged"]
 
 
 def test_value_at_its_bound_is_a_problem() -> None:
@@ -239,7 +252,7 @@ def test_value_at_its_bound_is_a_problem() -> None:
         ("time_s,velocity_m_s\n0,1\n1,2\n", "2 samples; a run of some seconds"),
     ],
 )
-def test_fault_of_a_file_is_told_with_its_place(tmp_path: Path, text: str, fault: str) -> None:
+def test_fault_of_a_file_is_reported_with_its_place(tmp_path: Path, text: str, fault: str) -> None:
     path = tmp_path / "velocity.csv"
     path.write_text(text)
     line = refusal(call(DATA / TORQUE, path))
@@ -248,7 +261,7 @@ def test_fault_of_a_file_is_told_with_its_place(tmp_path: Path, text: str, fault
 
 
 @pytest.mark.parametrize("content", [b"\x1f\x8bdamaged", b"\xff\xfe\x00"])
-def test_file_that_is_no_text_is_told(tmp_path: Path, content: bytes) -> None:
+def test_file_that_is_no_text_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "torque.csv"
     path.write_bytes(content)
     assert str(path) in refusal(call(path, DATA / VELOCITY))

@@ -1,4 +1,4 @@
-"""The four road logs with labels: what was hidden in them is found, from any start."""
+"""The four labelled road logs: the estimates match the labels, from any start."""
 
 import csv
 from dataclasses import dataclass, replace
@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from plant_emulator.road_load.answer import RoadAnswer, answer
-from plant_emulator.road_load.fit import RoadFit, descended, filter_of, fit
+from plant_emulator.road_load.answer import RoadAnswer, answer_of
+from plant_emulator.road_load.fit import RoadFit, filter_of, fit, fit_from
 from plant_emulator.road_load.prior import prior_of, starts
-from plant_emulator.road_load.run import prepared
+from plant_emulator.road_load.run import prepare
 from plant_emulator.road_load.signal import signal
 from plant_emulator.road_load.truck_model import Truck
 from plant_emulator.workflows import road_log
@@ -41,13 +41,13 @@ class Case:
 def case(name: str) -> Case:
     torque = str(DATA / f"{name}_torque.csv.gz")
     velocity = str(DATA / f"{name}_velocity.csv.gz")
-    run = prepared(
+    run = prepare(
         signal(*road_log.read(torque, road_log.TORQUE), torque),
         signal(*road_log.read(velocity, road_log.VELOCITY), velocity, rest=0.0),
         Truck(mass=LABELS[name]["mass_kg"]),
     )
     found = fit(run, 0.02)
-    return Case(found, answer(found), LABELS[name])
+    return Case(found, answer_of(found), LABELS[name])
 
 
 @pytest.mark.parametrize("name", LOGS)
@@ -61,7 +61,7 @@ def test_every_estimate_is_within_three_standard_errors_of_its_label(name: str) 
 
 @pytest.mark.parametrize("name", LOGS)
 def test_figures_that_a_bench_needs(name: str) -> None:
-    """Rolling resistance to 3 %, efficiency to 0.005, lag to 2 ms, Val1 of the velocity 99.3 %."""
+    """Rolling resistance to 3 %, efficiency to 0.005, clock offset to 2 ms, Val1 99.3 %."""
     found = case(name)
     assert found.answer.converged
     value = {key: estimate.value for key, estimate in found.answer.estimates.items()}
@@ -86,8 +86,8 @@ def test_forces_are_those_of_the_labels(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", LOGS)
-def test_what_the_log_cannot_tell_is_named(name: str) -> None:
-    """The labels' C_rr,v make 0.1 .. 0.6 N of some 500 N: less than what the load cell sees."""
+def test_what_the_log_cannot_separate_is_named(name: str) -> None:
+    """The labels' C_rr,v make 0.1 to 0.6 N of some 500 N, less than the load cell resolves."""
     said = " ".join(case(name).answer.not_separable)
     assert "mass from torque_gain" in said
     assert "crr_v from 0" in said
@@ -106,10 +106,10 @@ def test_every_start_comes_to_the_same_optimum(name: str) -> None:
 def test_plain_and_far_starts_reach_the_optimum_of_road_2(
     crr: float, efficiency: float, ahead: float
 ) -> None:
-    """The truck creeps at 0.03 m/s at 46 s: a simulated one that stops there is easily caught."""
+    """The truck creeps at 0.03 m/s at 46 s; one that stops there is a local minimum."""
     best = case("road_2").fit
     prior = prior_of(best.run, 0.02)
     plain = starts(best.run, prior)[1]
     start = replace(plain, crr=crr, efficiency=efficiency, clock_ahead=ahead)
-    found = descended(best.run, start, best.free, prior, filter_of(best.run, best.values, 1.0))
+    found = fit_from(best.run, start, best.free, prior, filter_of(best.run, best.values, 1.0))
     assert found.cost == pytest.approx(best.cost, abs=1.0)

@@ -1,7 +1,7 @@
-"""Intervals cover the truth at their rate, for trucks made by an independent integrator.
+"""Coverage of the 95 % intervals, for trucks that an independent integrator simulates.
 
-ROAD_REPEATS says how many trucks; 60 and more for a figure, for instance
-ROAD_REPEATS=100 python -m pytest -s tests/plant_emulator/road_load/test_road_coverage.py
+ROAD_REPEATS is the number of trucks. A figure needs 60 or more, for instance
+ROAD_REPEATS=100 python -m pytest -s tests/plant_emulator/road_load/test_coverage.py
 """
 
 import os
@@ -9,12 +9,12 @@ import os
 import numpy as np
 import pytest
 
-from plant_emulator.road_load.answer import RoadAnswer, answer
+from plant_emulator.road_load.answer import RoadAnswer, answer_of
 from plant_emulator.road_load.fit import fit
-from plant_emulator.road_load.run import prepared
+from plant_emulator.road_load.run import prepare
 from plant_emulator.road_load.signal import signal
 from plant_emulator.road_load.truck_model import Truck
-from tests.plant_emulator.road_load.road_truth import Truth, drawn, logged
+from tests.plant_emulator.road_load.road_simulator import Truth, draw_truth, record
 
 NAMES = {
     "crr": "crr",
@@ -27,12 +27,12 @@ NAMES = {
 }
 
 
-def identified(truth: Truth, seed: int) -> RoadAnswer:
-    torque, velocity = logged(truth, seed)
-    run = prepared(
+def identify(truth: Truth, seed: int) -> RoadAnswer:
+    torque, velocity = record(truth, seed)
+    run = prepare(
         signal(*torque, "torque"), signal(*velocity, "velocity", rest=0.0), Truck(mass=truth.mass)
     )
-    return answer(fit(run, 0.02))
+    return answer_of(fit(run, 0.02))
 
 
 def distances(truth: Truth, found: RoadAnswer) -> list[float]:
@@ -46,13 +46,13 @@ def distances(truth: Truth, found: RoadAnswer) -> list[float]:
 @pytest.mark.slow
 def test_95_percent_intervals_cover_the_truth_at_their_rate() -> None:
     count = int(os.environ.get("ROAD_REPEATS", "12"))
-    trucks = [drawn(seed) for seed in range(1000, 1000 + count)]
-    found = [identified(truth, seed) for seed, truth in enumerate(trucks)]
+    trucks = [draw_truth(seed) for seed in range(1000, 1000 + count)]
+    found = [identify(truth, seed) for seed, truth in enumerate(trucks)]
     assert all(one.converged for one in found)
     far = np.array([distances(*pair) for pair in zip(trucks, found, strict=True)])
     covered = np.abs(far) < 1.959964
     print(dict(zip(NAMES, covered.mean(axis=0).round(3).tolist(), strict=True)), covered.mean())
-    # 7 intervals a truck; they are correlated within a truck, hence the wider band for few trucks
+    # The 7 intervals of a truck are correlated, so few trucks need a wider band.
     slack = 0.05 if count < 60 else 0.0
     assert 0.90 - slack <= covered.mean() <= 0.99 + slack
 
@@ -69,30 +69,30 @@ def test_95_percent_intervals_cover_the_truth_at_their_rate() -> None:
 )
 def test_other_loggers_give_the_same_truck(loggers: dict[str, float]) -> None:
     truth = Truth(**loggers)
-    found = identified(truth, 1)
+    found = identify(truth, 1)
     assert found.converged
     assert np.max(np.abs(distances(truth, found))) < 3.5
 
 
 def test_waves_of_the_road_widen_the_intervals() -> None:
-    """0.2 permille, which is waves of 0.5 mm, does more than the noise of the load cell."""
+    """A grade of 0.2 permille (waves of 0.5 mm) outweighs the load cell's noise."""
     level, uneven = Truth(), Truth(grade=2e-4)
-    found = identified(uneven, 1)
+    found = identify(uneven, 1)
     assert found.converged
     assert np.max(np.abs(distances(uneven, found))) < 3.0
-    error = identified(level, 1).estimates["crr"].standard_error
+    error = identify(level, 1).estimates["crr"].standard_error
     assert found.estimates["crr"].standard_error > 2.0 * error
 
 
-def test_a_road_too_steep_to_be_level_is_told() -> None:
-    found = identified(Truth(grade=5e-3), 1)
+def test_a_road_too_steep_to_be_level_is_reported() -> None:
+    found = identify(Truth(grade=5e-3), 1)
     assert not found.converged
     assert "level road" in found.problems[0]
 
 
 def test_without_braking_the_efficiency_is_as_unsure_as_the_gain() -> None:
     """2 % of 0.9 is 0.018; with braking it is 0.0002."""
-    found = identified(Truth(targets=((2.0, 4.0),), duration=14.0), 1)
+    found = identify(Truth(targets=((2.0, 4.0),), duration=14.0), 1)
     assert found.estimates["efficiency"].standard_error == pytest.approx(0.018, rel=0.1)
     assert any(text.startswith("efficiency from torque_gain") for text in found.not_separable)
     assert any(text.startswith("crr from crr_v") for text in found.not_separable)
@@ -100,15 +100,15 @@ def test_without_braking_the_efficiency_is_as_unsure_as_the_gain() -> None:
 
 def test_a_log_that_begins_on_the_move_needs_no_standstill() -> None:
     truth = Truth()
-    (torque_time, torque), (time, velocity) = logged(truth, 2)
-    run = prepared(
+    (torque_time, torque), (time, velocity) = record(truth, 2)
+    run = prepare(
         signal(torque_time[3000:15000], torque[3000:15000], "torque"),
         signal(time[7000:31000], velocity[7000:31000], "velocity", rest=0.0),
         Truck(mass=truth.mass),
     )
-    found = answer(fit(run, 0.02))
+    found = answer_of(fit(run, 0.02))
     assert run.moving_start
-    # told at the first stamp of the velocity, 7 s
+    # The answer refers to the first stamp of the velocity, 7 s.
     shifted = Truth(ahead=truth.ahead + 7.0 * truth.ppm * 1e-6)
     assert found.converged
     assert np.max(np.abs(distances(shifted, found))) < 3.0

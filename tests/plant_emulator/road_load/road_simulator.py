@@ -1,7 +1,7 @@
-"""A truck driven on a level road, and what its two loggers write: for tests of its identification.
+"""Simulates a truck on a level road and its two loggers, for tests of its identification.
 
-The truck is integrated by explicit Euler at 0.2 ms, with its own stick and slip, under a driver
-whose torque follows with a lag; the code under test knows none of that.
+Explicit Euler with steps of 0.2 ms integrates the truck with its own model of standstill. The
+driver's torque follows with a lag. Nothing here uses the code under test.
 """
 
 from collections.abc import Sequence
@@ -17,9 +17,9 @@ FULL_CYCLE = ((2.0, 4.0), (16.0, 0.0), (24.0, -3.0), (38.0, 0.0), (46.0, 2.3), (
 
 @dataclass(frozen=True, kw_only=True)
 class Truth:
-    """What the logs are made with: the names and units of the answer, and the loggers.
+    """True parameters, by the names and in the units of the answer, and properties of the loggers.
 
-    grade : how steep the road's waves are, 16 m long [1]; the code under test takes it as level
+    grade : largest grade of the road's waves, which are 16 m long [1]; the model assumes 0
     """
 
     mass: float = 3640.0
@@ -39,8 +39,8 @@ class Truth:
     targets: Sequence[tuple[float, float]] = FULL_CYCLE
 
 
-def driven(truth: Truth) -> tuple[Array, Array, Array]:
-    """Time [s], velocity [m/s] and motor torque [N m] of the ride."""
+def drive(truth: Truth) -> tuple[Array, Array, Array]:
+    """Time [s], velocity [m/s] and motor torque [N m] of the drive."""
     count = round(truth.duration / STEP) + 1
     velocity, torque = np.zeros(count), np.zeros(count)
     v = t = x = 0.0
@@ -51,15 +51,15 @@ def driven(truth: Truth) -> tuple[Array, Array, Array]:
             turn += 1
         wanted = 0.0 if target == 0.0 and abs(v) < 0.02 else 90.0 * (target - v)
         t += STEP / 0.12 * (min(max(wanted, -60.0), 60.0) - t)
-        v = moved(truth, v, t)
+        v = step_velocity(truth, v, t)
         v -= STEP * 9.81 * truth.grade * np.sin(x / 2.5) if v != 0.0 else 0.0
         x += STEP * v
         velocity[k], torque[k] = v, t
     return STEP * np.arange(count), velocity, torque
 
 
-def moved(truth: Truth, v: float, torque: float) -> float:
-    """Velocity one step later [m/s]: wheel of 0.1715 m, gear 14, drum of 0.645 m, 9.81 m/s^2."""
+def step_velocity(truth: Truth, v: float, torque: float) -> float:
+    """Velocity after one step [m/s]; wheel 0.1715 m, ratio 14, drum 0.645 m, 9.81 m/s^2."""
     driving = torque * v > 0.0 or v == 0.0
     wheel = 14.0 * torque * (truth.efficiency if driving else 1.0 / truth.efficiency) / 0.1715
     road = truth.mass * 9.81 * (truth.crr + truth.crr_v * abs(v) / 0.645)
@@ -70,10 +70,10 @@ def moved(truth: Truth, v: float, torque: float) -> float:
     return 0.0 if v * after < 0.0 else float(after)
 
 
-def logged(truth: Truth, seed: int) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    """Time and torque as one logger writes them, time and velocity as the other does."""
+def record(truth: Truth, seed: int) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """Time and torque of one logger, time and velocity of the other."""
     draw = np.random.default_rng(seed)
-    time, velocity, torque = driven(truth)
+    time, velocity, torque = drive(truth)
     torque_time = np.arange(round(truth.duration * truth.torque_rate)) / truth.torque_rate
     shown = np.interp(torque_time, time, torque) * truth.gain + truth.offset
     shown += truth.torque_noise * draw.standard_normal(len(shown))
@@ -83,8 +83,8 @@ def logged(truth: Truth, seed: int) -> tuple[tuple[Array, Array], tuple[Array, A
     return (torque_time, np.round(shown, 3)), (stamp, 0.002 * np.round(seen / 0.002))
 
 
-def drawn(seed: int) -> Truth:
-    """A truck with its loggers at random, and a ride of its own."""
+def draw_truth(seed: int) -> Truth:
+    """Draw a truck, its loggers and its drive."""
     draw = np.random.default_rng(seed)
     return Truth(
         mass=float(draw.choice([3640.0, 5240.0])),
