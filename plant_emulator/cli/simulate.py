@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from typing import Literal
 
 import click
 
@@ -35,8 +36,8 @@ def command(
     parameters: str,
     effect_texts: tuple[str, ...],
     seed: int | None,
-    reference: str | None,
-    start: str,
+    reference: Literal["linear", "staircase"] | None,
+    start: Literal["fit", "middle"],
     out: str | None,
 ) -> None:
     """Simulate a program (program1-4, program6, program6L) or the inputs of a log.
@@ -44,20 +45,18 @@ def command(
     A log's start position in the backlash gap is fitted to it unless --start middle; a program
     starts in the middle of the gap.
     """
-    from plant_emulator import effects, logs
+    from plant_emulator import logs
     from plant_emulator.logs import csv
-    from plant_emulator.parameter_sets import with_effects
-    from plant_emulator.simulation.sensor_noise import noisy
-    from plant_emulator.workflows.simulation import simulated
+    from plant_emulator.workflows.simulation import simulate
 
-    log = simulated(
+    log = simulate(
         program,
-        with_effects.load(parameters),
-        effects.parse(effect_texts),
-        hold=reference,
+        parameters=parameters,
+        effects=effect_texts,
+        seed=seed,
+        reference=reference,
         start=start,
     )
-    log = log if seed is None else noisy(log, seed)
     if out:
         logs.write(log, out)
         click.echo(f"{out}: {len(log.time)} samples, {log.time[-1]:g} s", err=True)

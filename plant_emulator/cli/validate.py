@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
 
@@ -37,8 +37,8 @@ def command(
     logs: tuple[str, ...],
     parameters: str,
     effect_texts: tuple[str, ...],
-    reference: str | None,
-    start: str,
+    reference: Literal["linear", "staircase"] | None,
+    start: Literal["fit", "middle"],
     cutoff: float | None,
     table: str | None,
     plot: str | None,
@@ -53,11 +53,11 @@ def command(
     from plant_emulator.identification.report import measures, table_of, table_rows
     from plant_emulator.parameter_sets import with_effects
     from plant_emulator.simulation.fit_metrics import validate, zero_phase
-    from plant_emulator.workflows.simulation import followed
+    from plant_emulator.workflows.simulation import simulate_log
 
     values, effect_values = with_effects.load(parameters), effects.parse(effect_texts)
     measured = [log_files.read(path) for path in logs]
-    pairs = [(log, followed(log, values, effect_values, reference, start)) for log in measured]
+    pairs = [(log, simulate_log(log, values, effect_values, reference, start)) for log in measured]
     if cutoff is not None:
         pairs = [(zero_phase(log, cutoff), zero_phase(other, cutoff)) for log, other in pairs]
     fits = {log.source: validate(log, simulation) for log, simulation in pairs}

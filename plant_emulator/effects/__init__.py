@@ -42,6 +42,7 @@ __all__ = [
     "Effect",
     "EffectParameter",
     "Memory",
+    "complete",
     "from_file",
     "from_files",
     "load",
@@ -107,10 +108,19 @@ def parse(texts: tuple[str, ...] | list[str]) -> dict[str, dict[str, float]]:
     return dict(_parse_one(text) for text in texts)
 
 
+def complete(values: Mapping[str, Mapping[str, float]]) -> dict[str, dict[str, float]]:
+    """Values of all parameters of these effects [SI]: those given, else the plausible ones.
+
+    values : by effect and parameter [SI]
+    Raises ParameterError for an unknown effect or parameter, and for a value outside of its bounds.
+    """
+    return {name: load(name).complete(own) for name, own in values.items()}
+
+
 def _parse_one(text: str) -> tuple[str, dict[str, float]]:
     name, _, rest = text.partition(":")
     effect = load(name)
-    values = effect.plausible()
+    values: dict[str, float] = {}
     for item in filter(None, rest.split(",")):
         key, _, number = item.partition("=")
         if key not in effect.parameters:
@@ -122,7 +132,7 @@ def _parse_one(text: str) -> tuple[str, dict[str, float]]:
             values[key] = float(number)
         except ValueError:
             raise ParameterError(f"--effect {text}: {key}={number!r}; a number is needed") from None
-    return name, effect.checked(values)
+    return name, effect.complete(values)
 
 
 def neutral_values(effects: Mapping[str, Effect]) -> dict[str, float]:

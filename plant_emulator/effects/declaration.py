@@ -109,16 +109,25 @@ class Effect:
         """A plausible size of the effect, by parameter."""
         return {key: parameter.plausible for key, parameter in self.parameters.items()}
 
-    def checked(self, values: Mapping[str, float]) -> dict[str, float]:
-        """The values, if each lies within its bounds; ParameterError otherwise."""
+    def complete(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Values of all parameters [SI]: those given, else the plausible ones.
+
+        Raises ParameterError for an unknown parameter and for a value outside of its bounds.
+        """
         for key, value in values.items():
+            if key not in self.parameters:
+                known = ", ".join(self.parameters)
+                raise ParameterError(f"effect {self.name}: {key} is no parameter; known: {known}")
             bounds = self.parameters[key]
             if not isfinite(value) or not bounds.lower <= value <= bounds.upper:
                 raise ParameterError(
                     f"effect {self.name}: {key}={value!r}; "
                     f"{bounds.lower:g} to {bounds.upper:g} {bounds.unit} is allowed"
                 )
-        return dict(values)
+        return {**self.plausible(), **values}
+
+    def __repr__(self) -> str:
+        return f"<Effect {self.name} ({self.subsystem}): {', '.join(self.parameters)}>"
 
 
 def effect_of(name: str, module: ModuleType) -> Effect:

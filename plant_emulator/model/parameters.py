@@ -128,6 +128,10 @@ class ParameterSet:
     def __iter__(self) -> Iterator[Parameter]:
         return iter(self.parameters.values())
 
+    def __repr__(self) -> str:
+        effects = f"; effects: {', '.join(self.effects)}" if self.effects else ""
+        return f"<ParameterSet {self.name}: {len(self.parameters)} parameters{effects}>"
+
     def value(self, name: str) -> float:
         """Value of one parameter [its unit]."""
         return self.parameters[name].value

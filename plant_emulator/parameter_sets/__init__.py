@@ -23,10 +23,10 @@ def names() -> list[str]:
     return sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 
-def load(name: str = DEFAULT) -> ParameterSet:
+def load(name: str | Path = DEFAULT) -> ParameterSet:
     """The shipped set of that name, or the set in the TOML file of that path."""
     shipped = FOLDER / f"{name}.toml"
-    path = shipped if name in names() else Path(name)
+    path = shipped if str(name) in names() else Path(name)
     if not path.is_file():
         raise ParameterError(
             f"{name}: no such parameter set; a file, or one of {', '.join(names())}"
@@ -35,7 +35,7 @@ def load(name: str = DEFAULT) -> ParameterSet:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:  # no TOML or UTF-8, or a number too long
         raise ParameterError(f"{path}: {error}") from error
-    return parameter_set(name, table)
+    return parameter_set(str(name), table)
 
 
 def save(parameters: ParameterSet, path: str | Path) -> None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from plant_emulator.model.parameters import ParameterSet
 
 
-def load(name: str, own: Sequence[str] = ()) -> ParameterSet:
+def load(name: str | Path = parameter_sets.DEFAULT, own: Sequence[str] = ()) -> ParameterSet:
     """The set of that name or file; ParameterError also where an effect of it, or a parameter of
     that, is unknown.
 
@@ -25,7 +25,7 @@ def load(name: str, own: Sequence[str] = ()) -> ParameterSet:
     if found.effects:
         mine = {effect.name: effect for effect in effects.from_files([Path(file) for file in own])}
         for key, values in found.effects.items():
-            _check(name, key, values, mine)
+            _check(found.name, key, values, mine)
     return found
 
 

@@ -44,6 +44,11 @@ class Log:
     def __contains__(self, signal: str) -> bool:
         return signal in self.signals
 
+    def __repr__(self) -> str:
+        seconds = self.time[-1] - self.time[0] if len(self.time) else 0.0
+        names = ", ".join(self.signals)
+        return f"<Log {self.source}: {len(self.time)} samples, {seconds:g} s; {names}>"
+
 
 def compared(log: Log) -> tuple[str, ...]:
     """Channels of a log that a simulation is compared on.

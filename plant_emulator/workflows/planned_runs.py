@@ -24,7 +24,7 @@ from plant_emulator.simulation.programs import PROGRAMS
 from plant_emulator.simulation.sensor_noise import SENSORS
 from plant_emulator.simulation.simulate import run_of
 from plant_emulator.workflows.loading import admitted
-from plant_emulator.workflows.simulation import simulated
+from plant_emulator.workflows.simulation import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -37,7 +37,7 @@ def planned_run(
     name: str, parameters: ParameterSet, channels: tuple[str, ...] = COMPARED
 ) -> Recording:
     """A drive program as it would be recorded, without noise but judged by the sensors' noise."""
-    log = simulated(name, parameters, {}, hold=None, start="middle")
+    log = simulate(name, parameters=parameters, start="middle")
     return Recording(
         log,
         run_of(log),

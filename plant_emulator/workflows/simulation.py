@@ -1,59 +1,118 @@
-"""What the commands simulate: a program by its name, or a log by its inputs."""
+"""The simulation as a library call: a drive program or the inputs of a log in, a log out."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Literal
 
+from plant_emulator import effects as library
 from plant_emulator import logs
 from plant_emulator.estimation.initial_states import fit_states, states_of, with_own
+from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.model.stage import split_gap_position
+from plant_emulator.parameter_sets import DEFAULT, with_effects
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log, without_voltage
-from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram, program
-from plant_emulator.simulation.simulate import Hold, fit_start, run_of, simulate, values_of
+from plant_emulator.simulation import simulate as kernel_level
+from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram, TravelProgram, program
+from plant_emulator.simulation.sensor_noise import noisy
+from plant_emulator.simulation.simulate import Hold, fit_start, run_of, values_of
 from plant_emulator.simulation.travel_program import travel
 from plant_emulator.solver.kernel import kernel
 
 if TYPE_CHECKING:
-    from plant_emulator.model.parameters import ParameterSet
+    from plant_emulator.simulation.programs import Program
 
 Effects = Mapping[str, Mapping[str, float]]
+Start = Literal["fit", "middle"]
 
 
-def simulated(
-    name: str, parameters: ParameterSet, effects: Effects, *, hold: str | None, start: str
+def simulate(
+    source: str | Path | Log | Program,
+    *,
+    parameters: ParameterSet | str | Path = DEFAULT,
+    effects: Effects | Sequence[str] = (),
+    seed: int | None = None,
+    reference: Hold | None = None,
+    start: Start = "fit",
 ) -> Log:
-    """The simulated log of a program, or of the inputs of the log file of that path."""
+    """Simulate a drive program, or the bench under the inputs of a log; all signals are SI.
+
+    source : a drive program or its name ("program1"), a log, or the path of a log file. The inputs
+        of a log are its speed reference and, if it has one, its wheel torque.
+    parameters : a parameter set, the name of a shipped one, or the path of its file
+    effects : effects beyond those of the set, by effect and parameter [SI], or as the texts
+        "NAME[:PARAM=VALUE,...]" of the command line. A parameter without value takes its plausible
+        size.
+    seed : seed of the sensors' noise and quantisation; None: the log has neither
+    reference : what holds between samples of the speed reference; None: "staircase" in a log with a
+        wheel torque, else "linear"
+    start : "fit" fits the position in the backlash gap at the start to a log, and with it the start
+        states of the set's effects; "middle" starts in the middle of the gap, as a program does
+    Raises InputError for a source, a set or an effect that cannot be used, and UnsettledError where
+    the equations cannot be solved.
+    """
+    bench = parameter_set(parameters)
+    values = effect_values(effects)
+    source = read_source(source)
+    if isinstance(source, Log):
+        log = simulate_log(source, bench, values, reference, start)
+    elif isinstance(source, TravelProgram):
+        log = travel(source, bench, values)
+    else:
+        log = kernel_level.simulate(run_of(inputs(source), reference), values_of(bench, values))
+    return log if seed is None else noisy(log, seed)
+
+
+def parameter_set(parameters: ParameterSet | str | Path) -> ParameterSet:
+    """The parameter set itself, or the set of that name or file; ParameterError where none is."""
+    if isinstance(parameters, ParameterSet):
+        return parameters
+    return with_effects.load(parameters)
+
+
+def effect_values(effects: Effects | Sequence[str]) -> Effects:
+    """Values of effects by effect and parameter [SI]; see `simulate` for what may be given."""
+    if isinstance(effects, Mapping):
+        return library.complete(effects)
+    return library.parse([effects] if isinstance(effects, str) else list(effects))
+
+
+def read_source(source: str | Path | Log | Program) -> Log | Program:
+    """The log or the program that `source` is or names; InputError where there is none."""
+    if not isinstance(source, str | Path):
+        return source
+    name = str(source)
     if name not in PROGRAMS and Path(name).exists():
-        return followed(logs.read(name), parameters, effects, hold, start)
-    known = program(name)
-    if not isinstance(known, SpeedProgram):
-        return travel(known, parameters, effects)
-    time, reference = known.reference()
-    inputs = Log(time, {"speed_reference": reference}, name)
-    return simulate(run_of(inputs, cast("Hold | None", hold)), values_of(parameters, effects))
+        return logs.read(name)
+    return program(name)
 
 
-def followed(
-    log: Log, parameters: ParameterSet, effects: Effects, hold: str | None, start: str
+def inputs(program: SpeedProgram) -> Log:
+    """The speed reference of a drive program, as a log."""
+    time, reference = program.reference()
+    return Log(time, {"speed_reference": reference}, program.name)
+
+
+def simulate_log(
+    log: Log, parameters: ParameterSet, effects: Effects, reference: Hold | None, start: Start
 ) -> Log:
-    """The simulation of a log from its reference and truck torque.
+    """Simulate the bench under the inputs of a log.
 
-    What the effects of the set start from is each run's own, as its position in the gap; of an
-    effect that is asked for, in `effects`, every value stays as it was given.
+    Start states of the set's own effects are fitted to the log, as its position in the gap is. An
+    effect in `effects` keeps every value that is given.
 
-    hold, start : as the options --reference and --start
+    reference, start : see `simulate`
     """
     values = values_of(parameters, effects)
-    left = {name: own for name, own in parameters.effects.items() if name not in effects}
-    known = kernel().effects if left else {}
-    if start == "fit" and any(p.per_run for name in left for p in known[name].parameters.values()):
-        measured = with_own(recording(without_voltage(log), cast("Hold | None", hold)), left)
-        states = fit_states(measured, values, states_of(left))
-        own, gap = split_gap_position({**values, **measured.own, **states})
-        return simulate(measured.run, own, gap_position=gap)
-    run = run_of(log, cast("Hold | None", hold))
-    position = fit_start(log, run, values) if start == "fit" else 0.0
-    return simulate(run, values, gap_position=position)
+    own = {name: table for name, table in parameters.effects.items() if name not in effects}
+    library = kernel().effects if own else {}
+    if start == "fit" and any(p.per_run for e in own for p in library[e].parameters.values()):
+        measured = with_own(recording(without_voltage(log), reference), own)
+        states = fit_states(measured, values, states_of(own))
+        values, gap = split_gap_position({**values, **measured.own, **states})
+        return kernel_level.simulate(measured.run, values, gap_position=gap)
+    run = run_of(log, reference)
+    gap = fit_start(log, run, values) if start == "fit" else 0.0
+    return kernel_level.simulate(run, values, gap_position=gap)

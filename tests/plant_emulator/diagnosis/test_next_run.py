@@ -23,8 +23,7 @@ from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.input_noise import NoiseDirections
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Array
-from plant_emulator.simulation.sensor_noise import noisy
-from plant_emulator.workflows.simulation import simulated
+from plant_emulator.workflows.simulation import simulate
 
 N = 400
 SLOW = np.linspace(0.0, 1.0, N)
@@ -274,10 +273,7 @@ def test_fit_that_did_not_converge_is_sent_to_the_run_that_determines_most():
 def test_bench_names_the_program_that_has_what_an_effect_needs():
     """A truck's wheel needs a truck, a wound-up controller the jump in program 4's reference."""
     given = parameter_sets.load("thesis_table_3_1")
-    logs = [
-        noisy(simulated(f"program{k}", given, {}, hold=None, start="middle"), seed=k)
-        for k in (1, 2, 3)
-    ]
+    logs = [simulate(f"program{k}", parameters=given, seed=k) for k in (1, 2, 3)]
     recipe = BenchRecipe(tuple(recording(log) for log in logs), given)
     model = recipe.build()
     null = FitResult(

@@ -17,9 +17,9 @@ from plant_emulator.diagnosis.report.document import from_json
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
-from plant_emulator.simulation.sensor_noise import SENSORS, noisy
+from plant_emulator.simulation.sensor_noise import SENSORS
 from plant_emulator.workflows.diagnosis.saved_set import parameter_set
-from plant_emulator.workflows.simulation import followed, simulated
+from plant_emulator.workflows.simulation import simulate
 from tests.plant_emulator.diagnosis import answers
 
 BenchLog = Callable[[str], Log]
@@ -69,16 +69,16 @@ def test_shell_is_saved_as_warm_as_it_was_measured(
 def test_run_is_followed_from_its_own_start_of_the_sets_effects(nominal: ParameterSet) -> None:
     """Made with a phase of 2 rad; the set has the mean of other runs, 0."""
     made = {"gear_eccentricity": {"amplitude": 0.3, "phase": 2.0}}
-    log = noisy(simulated("program1", nominal, made, hold=None, start="middle"), seed=1)
+    log = simulate("program1", parameters=nominal, effects=made, seed=1)
     known = ParameterSet(
         nominal.name,
         nominal.parameters,
         effects={"gear_eccentricity": {"amplitude": 0.3, "phase": 0.0}},
     )
-    own = followed(log, known, {}, None, "fit")
+    own = simulate(log, parameters=known)
     assert rms(log, own) < 1.1 * SENSORS["shaft_torque"][0]
     # as it was asked for, a value stays
-    asked = followed(log, nominal, known.effects, None, "fit")
+    asked = simulate(log, parameters=nominal, effects=known.effects)
     assert rms(log, asked) > 2.0 * SENSORS["shaft_torque"][0]
 
 
@@ -89,9 +89,7 @@ def test_diagnosis_finds_each_runs_own_start_of_the_sets_effects(nominal: Parame
     runs = []
     for seed, phase in enumerate((1.0, 4.0)):
         own = replace(nominal, effects={"gear_eccentricity": {**wobble, "phase": phase}})
-        runs.append(
-            recording(noisy(simulated("program1", own, {}, hold=None, start="middle"), seed))
-        )
+        runs.append(recording(simulate("program1", parameters=own, seed=seed)))
     model = BenchRecipe(tuple(runs), bench).build()
     assert "gear_eccentricity" not in model.candidates
     found = fit_null(model, (0, 1))

@@ -13,8 +13,7 @@ from plant_emulator.errors import LogError
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.same_bench import DIFFERENT, PICTURE, one_bench, scale_of
 from plant_emulator.signals.log import Log
-from plant_emulator.simulation.sensor_noise import noisy
-from plant_emulator.workflows.simulation import simulated
+from plant_emulator.workflows.simulation import simulate
 
 DATA = Path(__file__).parents[2] / "data" / "bench_practice"
 BENCHES = {
@@ -109,7 +108,7 @@ def test_twice_an_effect_in_every_run_is_no_second_bench(
         for key, p in effects.load(name).parameters.items()
     }
     logs = [
-        noisy(simulated(program, nominal, {name: sizes}, hold=None, start="middle"), seed)
+        simulate(program, parameters=nominal, effects={name: sizes}, seed=seed)
         for seed, program in enumerate(("program1", "program2", "program3", "program4"))
     ]
     one_bench(logs, values)
