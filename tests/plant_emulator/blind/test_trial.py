@@ -46,7 +46,7 @@ def short_log(tmp_path: Path, nominal: ParameterSet) -> Path:
 
 
 @pytest.mark.slow
-def test_diagnosis_opens_no_sealed_case_and_imports_no_law_of_the_trial(
+def test_diagnosis_opens_no_answer_and_imports_no_law_of_the_trial(
     tmp_path: Path, short_log: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     trial = Trial(folder, 1, 2)
@@ -68,7 +68,7 @@ def test_diagnosis_opens_no_sealed_case_and_imports_no_law_of_the_trial(
     assert not [line for line in seen if "plant_emulator.blind" in line]
 
 
-def test_witness_would_record_an_opened_sealed_case(tmp_path: Path, folder: Path) -> None:
+def test_witness_would_record_an_opened_answer(tmp_path: Path, folder: Path) -> None:
     Trial(folder, 1, 1).seal()
     record = tmp_path / "record.txt"
     answer = folder / "sealed" / "case_001.json"
