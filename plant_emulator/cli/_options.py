@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+import os
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from register_maps.command_line.parameters import PICTURES, OutputFile
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 parameters = click.option(
     "--parameters",
@@ -47,6 +51,18 @@ json_file = click.option(
     type=OutputFile(dash=True),
     help="Write the machine-readable answer; - is standard output.",
 )
+
+
+def workers(text: str) -> Callable[[Any], Any]:
+    """The option --workers with this help text."""
+    return click.option(
+        "--workers",
+        type=click.IntRange(min=1),
+        default=os.cpu_count() or 1,
+        show_default="all cores",
+        metavar="N",
+        help=text,
+    )
 
 
 def write_json(answer: Any, target: str) -> None:

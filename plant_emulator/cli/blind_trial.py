@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 from pathlib import Path
 
@@ -35,14 +34,7 @@ Examples:
     metavar="DIR",
     help="Folder of the trial; default blind_trial_seed_SEED. A started trial is continued.",
 )
-@click.option(
-    "--workers",
-    type=click.IntRange(min=1),
-    default=os.cpu_count() or 1,
-    show_default="all cores",
-    metavar="N",
-    help="Diagnoses that run at once.",
-)
+@_options.workers("Diagnoses that run at once.")
 @_options.json_file
 def command(cases: int, seed: int, out: str | None, workers: int, json_file: str | None) -> None:
     """Test the diagnosis on simulated benches whose truth is hidden.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shlex
 import sys
 from pathlib import Path
@@ -54,14 +53,7 @@ Examples:
     help="An effect of your own beside the library; may be repeated.",
 )
 @_options.reference
-@click.option(
-    "--workers",
-    type=click.IntRange(min=1),
-    default=os.cpu_count() or 1,
-    show_default="all cores",
-    metavar="N",
-    help="Processes that fit side by side.",
-)
+@_options.workers("Processes that fit side by side.")
 @click.option("--scheduler", metavar="ADDRESS", help="A Dask scheduler instead, tcp://host:port.")
 @click.option(
     "--save", type=OutputFile(), help="Write the parameter set with the accepted effects."

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 from time import process_time
 from typing import TYPE_CHECKING, Any, cast
@@ -21,6 +18,7 @@ from plant_emulator.recordings.preflight import preflight
 from plant_emulator.recordings.recording import recording
 from plant_emulator.simulation.fit_metrics import validate
 from plant_emulator.simulation.simulate import Hold, simulate, values_of
+from plant_emulator.workflows.provenance import file_hash, program_version, today
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -73,8 +71,8 @@ class Result:
         return report.parameter_set(
             self.found,
             {log: self.hashes[log] for log in self.fitted},
-            date=datetime.now(UTC).date().isoformat(),
-            version=version("road-load-bench"),
+            date=today(),
+            version=program_version(),
         )
 
 
@@ -133,7 +131,7 @@ def _hashes(paths: Sequence[str]) -> dict[str, str]:
     for path in paths:
         if not Path(path).is_file():
             logs.read(path)  # says what is wrong
-        digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()
+        digest = file_hash(path)
         for other, known in found.items():
             if digest == known:
                 raise IdentificationError(f"{path}: the same run as {other}; give every run once")

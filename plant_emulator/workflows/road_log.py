@@ -7,15 +7,14 @@ sample rate of its own logger.
 
 from __future__ import annotations
 
-import hashlib
 from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from plant_emulator.errors import LogError
+from plant_emulator.workflows.provenance import file_hash, program_version
 from register_maps.csv_log import TIME, CsvLogError, parse
 from register_maps.signals import LOG_COLUMNS, LogColumn
 
@@ -58,9 +57,6 @@ def read(path: str, wanted: LogColumn) -> tuple[Array, Array]:
 
 def origin(*paths: str) -> list[str]:
     """Origin of a result: date, version of the program, and the logs with their SHA-256."""
-    digests = [hashlib.sha256(Path(path).read_bytes()).hexdigest() for path in paths]
-    logs = [f"{path}, SHA-256 {digest}" for path, digest in zip(paths, digests, strict=True)]
-    made = (
-        f"{datetime.now(tz=UTC):%Y-%m-%d %H:%M} UTC, road-load-bench {version('road-load-bench')}"
-    )
+    logs = [f"{path}, SHA-256 {file_hash(path)}" for path in paths]
+    made = f"{datetime.now(tz=UTC):%Y-%m-%d %H:%M} UTC, road-load-bench {program_version()}"
     return [f"plant-emulator identify-truck, {made}", *logs]

@@ -1,4 +1,4 @@
-"""From road logs to the gateway: its configuration takes the saved truck, alone and pasted."""
+"""From road logs to the gateway, whose configuration accepts the saved truck."""
 
 import tomllib
 from pathlib import Path
@@ -14,7 +14,7 @@ from gateway.road_load import road_load
 ROOT = Path(__file__).parents[2]
 DATA = ROOT / "tests" / "data" / "road_practice"
 CRR = 0.009924
-"""Rolling resistance that road_2 was made with (labels.tsv)."""
+"""True rolling resistance of road_2 (labels.tsv)."""
 
 
 @pytest.fixture(scope="module")

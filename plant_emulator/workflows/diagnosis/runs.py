@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,6 +18,7 @@ from plant_emulator.signals.log import Log
 from plant_emulator.workflows import axis_reader
 from plant_emulator.workflows.diagnosis.plan import plan_of, planned
 from plant_emulator.workflows.loading import admitted, distinct, unlabelled
+from plant_emulator.workflows.provenance import file_hash, program_version, today
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -132,10 +130,10 @@ def _check_names(without: Sequence[str], library: Collection[str]) -> None:
 def _settings(own: Mapping[str, str], sources: Sequence[object]) -> dict[str, str]:
     """Date, version, these settings, and the SHA-256 of every source that is a file."""
     files = [str(one) for one in sources if isinstance(one, str | Path) and Path(one).is_file()]
-    hashes = {file: hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in files}
+    hashes = {file: file_hash(file) for file in files}
     return {
-        "date": datetime.now(UTC).date().isoformat(),
-        "version": version("road-load-bench"),
+        "date": today(),
+        "version": program_version(),
         **own,
         **{f"sha256 of {file}": digest for file, digest in hashes.items()},
     }

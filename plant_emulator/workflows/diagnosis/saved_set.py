@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from datetime import UTC, datetime
-from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from plant_emulator.estimation.initial_states import with_own
 from plant_emulator.solver.kernel import kernel
+from plant_emulator.workflows.provenance import program_version, today
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -43,8 +42,8 @@ def parameter_set(
         for name, p in new.parameters.items()
     }
     origin = {
-        "date": datetime.now(UTC).date().isoformat(),
-        "version": version("road-load-bench"),
+        "date": today(),
+        "version": program_version(),
         "before": parameters.name,
         "logs": list(findings.answer.logs.estimation),
         "verdict": findings.answer.verdict.statement,

@@ -1,4 +1,4 @@
-"""An answer written as JSON is JSON, whatever its numbers."""
+"""A JSON answer is valid JSON, whatever its numbers."""
 
 import json
 from pathlib import Path
@@ -10,7 +10,7 @@ from plant_emulator.cli._options import write_json
 
 
 def refuse(constant: str) -> None:
-    """NaN and Infinity are no JSON: RFC 8259, section 6."""
+    """JSON has neither NaN nor Infinity: RFC 8259, section 6."""
     raise AssertionError(constant)
 
 

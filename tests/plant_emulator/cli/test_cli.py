@@ -19,7 +19,7 @@ Command = Callable[..., Result]
 
 @pytest.fixture
 def command() -> Command:
-    """Return a function: arguments -> the finished call of plant-emulator."""
+    """A function that calls plant-emulator with its arguments and returns the result."""
     return lambda *arguments: CliRunner().invoke(main, [str(a) for a in arguments])
 
 
