@@ -11,7 +11,6 @@ import pytest
 from plant_emulator.errors import IdentificationError
 from plant_emulator.estimation.equation_error import start_values
 from plant_emulator.estimation.free_parameters import free_parameters
-from plant_emulator.identification.experiment_design import experiments
 from plant_emulator.identification.identify import Identification, identify
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.preflight import preflight
@@ -21,30 +20,9 @@ from plant_emulator.simulation.fit_metrics import validate
 from plant_emulator.simulation.programs import PROGRAMS
 from plant_emulator.simulation.sensor_noise import SENSORS, noisy
 from plant_emulator.simulation.simulate import fit_start, run_of, simulate, values_of
+from tests.plant_emulator.identification.practice import DEVIATIONS, FREE, truth
 
 Reader = Callable[[str], Log]
-FREE = (
-    "flux_constant_1",
-    "flux_constant_2",
-    "drum_shaft_damping",
-    "gear_coulomb_friction",
-    "gear_viscous_friction",
-    "gear_friction_exponent",
-    "backlash_half_gap",
-    "drum_inertia",
-    "dead_time",
-)
-# What the independent bench was run with, percent of Table 3.1 (tests/data/README.md).
-DRIFT = {
-    "practice_002": (-0.3381, -10.8028, 15.7512, 7.0193, 1.1620, -0.8991, 1.0622, 0.6135, 2.0889),
-    "practice_008": (0.0790, 11.8866, -3.7832, -11.6864, -1.0671, -2.1532, 4.1425, 8.0, -7.0835),
-}
-
-
-def truth(nominal: ParameterSet, case: str) -> dict[str, float]:
-    """The parameters that a case was made with [SI]."""
-    drift = zip(FREE, DRIFT[case], strict=True)
-    return {name: nominal.value(name) * (1 + percent / 100) for name, percent in drift}
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +50,7 @@ def test_all_estimated_parameters_but_the_gear_inertia_are_free(nominal: Paramet
     assert set(free_parameters(nominal)) == set(FREE)
 
 
-@pytest.mark.parametrize("case", list(DRIFT))
+@pytest.mark.parametrize("case", list(DEVIATIONS))
 def test_parameters_of_the_independent_bench_are_found(
     nominal: ParameterSet, fitted: Callable[[str], Identification], case: str
 ) -> None:
@@ -90,7 +68,7 @@ def friction(values: dict[str, float], speed: np.ndarray) -> np.ndarray:
     return level + factor * speed ** values["gear_friction_exponent"]
 
 
-@pytest.mark.parametrize("case", list(DRIFT))
+@pytest.mark.parametrize("case", list(DEVIATIONS))
 def test_what_matters_is_found_within_two_percent(
     nominal: ParameterSet, fitted: Callable[[str], Identification], case: str
 ) -> None:
@@ -105,7 +83,7 @@ def test_what_matters_is_found_within_two_percent(
     assert flux[0] == pytest.approx(flux[1], rel=0.02)
 
 
-@pytest.mark.parametrize("case", list(DRIFT))
+@pytest.mark.parametrize("case", list(DEVIATIONS))
 def test_held_out_run_is_predicted_to_the_noise(
     nominal: ParameterSet, bench_log: Reader, fitted: Callable[[str], Identification], case: str
 ) -> None:
@@ -178,39 +156,6 @@ def test_log_without_field_weakening_says_nothing_of_its_flux(nominal: Parameter
     assert by_name["drum_inertia"].identifiable
     assert by_name["flux_constant_1"].value == pytest.approx(366.83, rel=0.01)  # the prior's
     assert by_name["flux_constant_1"].standard_error == pytest.approx(18.34, rel=0.05)
-
-
-def test_gear_inertia_is_not_determined_by_any_program(
-    nominal: ParameterSet, recordings: Callable[..., list[Recording]]
-) -> None:
-    """It shows only through J_g + xi^2 J_m = 502 kg m^2, of which it is 0.004 %."""
-    logs = recordings("practice_008", 1)
-    found = identify(logs, nominal, ("gear_inertia", "drum_inertia"))
-    by_name = {p.name: p for p in found.parameters}
-    assert not by_name["gear_inertia"].identifiable
-    assert by_name["drum_inertia"].identifiable
-    (advice,) = experiments(found, logs, values_of(found.parameter_set))
-    assert advice.parameter == "gear_inertia"
-    assert not advice.enough
-
-
-def test_experiment_that_would_determine_the_flux_is_named(
-    nominal: ParameterSet, recordings: Callable[..., list[Recording]]
-) -> None:
-    """The promise is checked by making the experiment."""
-    logs = recordings("practice_002", 1)
-    found = identify(logs, nominal)
-    assert [p.name for p in found.parameters if not p.identifiable] == ["flux_constant_2"]
-    (advice,) = experiments(found, logs, values_of(found.parameter_set))
-    assert (advice.parameter, advice.enough) == ("flux_constant_2", True)
-    time, reference = PROGRAMS[advice.program].reference()  # type: ignore[union-attr]
-    values = {**values_of(nominal), **truth(nominal, "practice_002")}
-    made = simulate(run_of(Log(time, {"speed_reference": reference}, advice.program)), values)
-    both = identify([*logs, recording(noisy(made, seed=1))], nominal)
-    flux = next(p for p in both.parameters if p.name == "flux_constant_2")
-    assert flux.identifiable
-    # the spread of a standard error that rests on where the drum meets the gear in the new run
-    assert 0.5 < flux.data_error / advice.standard_error < 2.0
 
 
 def test_samples_left_out_do_not_count(nominal: ParameterSet, bench_log: Reader) -> None:
