@@ -30,7 +30,7 @@ class Quantity:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ParameterShift:
+class ParameterDeviation:
     """A parameter that lies more than 3 standard errors from its nominal value.
 
     nominal, estimated, standard_error : [unit]
@@ -59,7 +59,7 @@ class Verdict:
 
     effects : the accepted effects
     classes : for each of them, the effects that these logs cannot tell from it, itself first
-    parameters : the parameters that shifted
+    parameters : the parameters that deviate from their nominal values
     confidence : share of right answers among trial cases with this evidence; None: not known
     statement : the verdict in one sentence
     next_experiment : the run that would decide what is open; None: nothing is open
@@ -68,7 +68,7 @@ class Verdict:
     kind: Kind
     effects: tuple[str, ...]
     classes: tuple[tuple[str, ...], ...]
-    parameters: tuple[ParameterShift, ...]
+    parameters: tuple[ParameterDeviation, ...]
     confidence: float | None
     statement: str
     next_experiment: str | None

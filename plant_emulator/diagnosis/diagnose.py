@@ -18,7 +18,7 @@ from plant_emulator.diagnosis.prediction.held_out import NOMINAL, HeldOut
 from plant_emulator.diagnosis.prediction.remainder import rest_of
 from plant_emulator.diagnosis.prediction.trace import traces
 from plant_emulator.diagnosis.report.details import Details
-from plant_emulator.diagnosis.report.ranking import rank, ranked, undetectable, with_chance
+from plant_emulator.diagnosis.report.ranking import rank, ranked, undetectable, with_random_effects
 from plant_emulator.diagnosis.report.shrinkage import held_out_gap, waterfall
 from plant_emulator.diagnosis.report.statement import statement, verdict
 from plant_emulator.diagnosis.selection import subsystem
@@ -125,7 +125,7 @@ class Diagnose:
         lengths = gap.block_lengths(predicted[()])
         gaps = {key: gap.gap(runs, some, lengths) for key, some in predicted.items()}
         followed = _followed(explained, decision)
-        final = with_chance(explained) if decision.effects else explained.null
+        final = with_random_effects(explained) if decision.effects else explained.null
         drawn = traces(runs, predicted[()], predicted[followed])
         rest = None
         if not self.model.reaches_noise:

@@ -1,4 +1,4 @@
-"""Names and numbers of an answer as a person reads them, on a terminal and in a report."""
+"""Names and numbers of an answer in words, for the terminal and for the report."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
         HeldOutGap,
         Location,
         Logs,
-        ParameterShift,
+        ParameterDeviation,
         Quantity,
         Verdict,
     )
@@ -24,14 +24,14 @@ WITHOUT_UNIT = (None, "", "1")
 UNITS = {column.signal: column.unit for column in LOG_COLUMNS.values()}
 KINDS = {
     "effect": "Effect found",
-    "parameter": "Same equations, other values",
+    "parameter": "Parameter deviations only",
     "none": "No gap beyond the noise",
     "unknown": "Cause unknown",
 }
-# What a subsystem's share is of.
+# The whole that the subsystems' shares are parts of.
 RESIDUAL, EXPLAINED = "of the residual", "of what effects explain"
 EXPLAINED_GAP = "explained"
-# Numbers of this size and more, or less, are written with an exponent.
+# Numbers from LARGE on, and below SMALL, are written with an exponent.
 LARGE, SMALL = 1e6, 1e-4
 
 
@@ -46,14 +46,14 @@ def spoken(name: str | None) -> str:
 
 
 def listed(items: Sequence[str], most: int, between: str = ", ") -> str:
-    """The items in a row, and the number of those beyond so many."""
+    """The first `most` items in a row, and the number of the others."""
     shown = [printable(item) for item in items[:most]]
     rest = len(items) - len(shown)
     return between.join([*shown, f"and {rest} more"] if rest else shown)
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A number with this many significant digits."""
+    """A number with so many significant digits, or UNKNOWN."""
     if value is None or not isfinite(value):
         return UNKNOWN
     if value == 0.0:
@@ -64,12 +64,12 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def _power(value: float, digits: int) -> int:
-    """The power of ten of a number after it was rounded to its digits."""
+    """The power of ten of a number that is rounded to so many digits."""
     return int(f"{value:.{digits - 1}e}".partition("e")[2])
 
 
 def with_error(value: float | None, standard_error: float | None, sign: str = "+-") -> str:
-    """A value and its standard error, both to the second digit of the error."""
+    """A value and its standard error, both rounded to the second digit of the error."""
     if value is None or not isfinite(value):
         return UNKNOWN
     if standard_error is None or not isfinite(standard_error):
@@ -85,7 +85,7 @@ def with_error(value: float | None, standard_error: float | None, sign: str = "+
 
 
 def percent(share: float | None) -> str:
-    """A share of 1 in percent; one decimal where it is small or nearly all."""
+    """A share of 1 in percent; with one decimal where it is nearly 0 or nearly 1."""
     if share is None or not isfinite(share):
         return UNKNOWN
     decimals = 1 if 0.0005 <= abs(share) < 0.0095 or 0.995 <= share < 0.9995 else 0
@@ -111,7 +111,10 @@ def own_name(parameter: str, effect: str) -> str:
 
 
 def gap_rows(gap: HeldOutGap) -> dict[str, Mapping[str, float]]:
-    """By name in words: the gap of every channel at each step, and the noise floor."""
+    """The gap by channel of every model, and the noise floor, each by its name in words.
+
+    A row without channels is left out.
+    """
     rows = {
         "nominal": gap.nominal,
         "recalibrated": gap.recalibrated,
@@ -122,14 +125,14 @@ def gap_rows(gap: HeldOutGap) -> dict[str, Mapping[str, float]]:
 
 
 def times_noise(gap: Mapping[str, float], noise_floor: Mapping[str, float]) -> float | None:
-    """Gap of all channels together in the noise: sqrt(mean((gap / floor)^2)) [1]."""
+    """Gap of all channels together over the noise [1]: sqrt(mean((gap / noise_floor)^2))."""
     rows = [(g, noise_floor.get(c)) for c, g in gap.items()]
     shares = [g / floor_ for g, floor_ in rows if isfinite(g) and floor_]
     return (sum(s * s for s in shares) / len(shares)) ** 0.5 if shares else None
 
 
 def logs_used(logs: Logs) -> str:
-    """How many logs were fitted, and how many held out; the same ones are held out in turn."""
+    """How many logs were fitted, and how many were held out."""
     fitted, held_out = logs.estimation, logs.held_out
     if len(fitted) == 1 and fitted == held_out:
         return "1 log, its last part held out"
@@ -140,7 +143,7 @@ def logs_used(logs: Logs) -> str:
 
 
 def closed(gap: HeldOutGap) -> str | None:
-    """The closed fraction with its interval, or None where the answer has none."""
+    """The closed fraction with its interval; None where the answer has no closed fraction."""
     if gap.closed_fraction is None:
         return None
     text, interval = percent(gap.closed_fraction), gap.closed_fraction_ci95
@@ -168,16 +171,19 @@ def place(location: Location, units: Mapping[str, str]) -> str | None:
 
 
 def share_of(location: Location) -> str:
-    """What the subsystems' shares are of: without blocks to tell apart, of the effects' gains."""
+    """The whole that the subsystems' shares are parts of.
+
+    For a machine without separable blocks it is what the effects explain, else the residual.
+    """
     return RESIDUAL if location.cells else EXPLAINED
 
 
-def shifted(parameter: ParameterShift, sign: str = "+-") -> str:
-    """A parameter that is not what the set says: from, to, standard error, unit."""
+def deviation(parameter: ParameterDeviation, sign: str = "+-") -> str:
+    """A parameter deviation: nominal value, estimated value, standard error and unit."""
     estimated = size(parameter.quantity, sign)
     return f"{printable(parameter.name)} {number(parameter.nominal, 4)} -> {estimated}"
 
 
 def indistinguishable(verdict: Verdict) -> dict[str, tuple[str, ...]]:
-    """By accepted effect: the others that these logs cannot tell from it."""
+    """By accepted effect, the other effects that these logs cannot distinguish from it."""
     return {group[0]: group[1:] for group in verdict.classes if group}

@@ -158,8 +158,9 @@ def test_report_of_a_real_diagnosis_holds_all_and_loads_nothing(
     assert asked(chromium, diagnosed.report, tmp_path) == []
     assert not re.search(r"<(script|link|img|iframe)\b", document)
     for title in (
-        "How far the gap shrinks", "Where it lies", "Which effect", "Parameters that moved",
-        "What these logs cannot show", "Held-out runs, measured over predicted", "To repeat it",
+        "How far the gap shrinks", "Where the gap lies", "Which effects were tested",
+        "Parameter deviations", "What these logs cannot show",
+        "Held-out runs: measured and predicted", "How to repeat this diagnosis",
     ):  # fmt: skip
         assert f"<h2>{title}</h2>" in document
     assert "with torque_sensor_lag" in re.search(r'aria-label="(Waterfall of[^"]*)', document)[1]

@@ -205,5 +205,5 @@ def _needs(found: DetectionLimit, candidate: Candidate) -> str | None:
     if candidate.needs:
         return candidate.needs
     if found.total_norm >= DETECTABLE_NORM:
-        return f"a run in which drift of {found.confounded_with} does not look the same"
+        return f"a run in which a deviation of {found.confounded_with} does not look the same"
     return "a run that excites it"

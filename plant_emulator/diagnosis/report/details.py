@@ -1,4 +1,4 @@
-"""What a report draws beside the answer itself."""
+"""What a report shows beside the answer."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Step:
-    """A step of the waterfall: the held-out gap, in the noise, with its 95 % interval.
+    """A step of the waterfall: the held-out gap of one model, in multiples of the noise.
 
     gap : rms of the whitened held-out residual over all channels; 1: the noise floor
+    low, high : its 95 % interval
     """
 
     label: str
@@ -27,11 +28,11 @@ class Step:
 
 @dataclass(frozen=True, kw_only=True)
 class Details:
-    """Everything but the answer.
+    """What a report shows beside the answer.
 
-    settings : how to repeat it: command, version, date, hashes of logs and sets, thresholds
-    notes : what the preflight told of the logs
-    rest : of a machine in outline, of which more than the noise is left
+    settings : what repeats the diagnosis: command, version, date, hashes of files, thresholds
+    notes : what was noticed about the logs, a sentence each
+    rest : the unmodelled remainder; None for a machine that is modelled down to its noise
     """
 
     traces: tuple[Trace, ...]

@@ -13,7 +13,7 @@ from plant_emulator.diagnosis.answer import (
     HeldOutGap,
     Location,
     Logs,
-    ParameterShift,
+    ParameterDeviation,
     Quantity,
     RankedEffect,
     Undetectable,
@@ -88,7 +88,7 @@ def _verdict(part: Mapping[str, Any]) -> Verdict:
         effects=tuple(part["effects"]),
         classes=tuple(tuple(names) for names in part["class"]),
         parameters=tuple(
-            ParameterShift(**_numbers(entry, "nominal", "estimated", "standard_error"))
+            ParameterDeviation(**_numbers(entry, "nominal", "estimated", "standard_error"))
             for entry in part["parameters"]
         ),
         confidence=part["confidence"],

@@ -1,7 +1,7 @@
-"""The answer of a diagnosis as one HTML file that needs nothing else: no network, font or script.
+"""The report of a diagnosis: one HTML file that needs no network, no font and no script.
 
-The verdict comes first, then what it rests on: how far the gap shrinks on runs that nothing was
-fitted to, where it lies, which effect, what remains open, and how to repeat it all.
+The verdict comes first. Then follow the held-out gap, the place of the gap, the tested effects, the
+parameter deviations, what the logs cannot show, the held-out runs, and how to repeat the diagnosis.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from plant_emulator.diagnosis.report.html_parts import code, scrolled
 from plant_emulator.diagnosis.report.html_pictures import line, waterfall
 from plant_emulator.diagnosis.report.html_remainder import rest_by_band
 from plant_emulator.diagnosis.report.html_style import STYLE
+from plant_emulator.diagnosis.report.html_tables import PLUS_MINUS
 from plant_emulator.diagnosis.report.markup import Markup, join, tag
 from plant_emulator.diagnosis.wording import (
     KINDS,
@@ -34,26 +35,27 @@ if TYPE_CHECKING:
         HeldOutGap,
         Location,
         Logs,
-        ParameterShift,
+        ParameterDeviation,
         Undetectable,
     )
     from plant_emulator.diagnosis.prediction.remainder import Remainder
     from plant_emulator.diagnosis.prediction.trace import Trace
     from plant_emulator.diagnosis.report.details import Details
 
-# Runs drawn: those with the largest gaps; the others are named.
+HEADING = "Sim-to-real gap"
+# Held-out runs that are drawn: those with the largest gaps. The others are named.
 MOST_RUNS = 8
-# No browser loads anything for this page, whatever the names in a log contain.
+# No browser loads anything for this page, whatever a log's names contain.
 POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 LEGEND = {
     "measured": "measured",
     "before": "predicted before (same equations, parameters re-estimated)",
-    "after": "predicted after (with the effects found)",
+    "after": "predicted after (with the accepted effects)",
 }
 
 
 def html(answer: Answer, details: Details) -> str:
-    """The report, a whole HTML document."""
+    """The report as a complete HTML document."""
     verdict = answer.verdict
     units = {**UNITS, **{t.channel: t.unit for t in details.traces}}
     title = ", ".join([KINDS[verdict.kind], *verdict.effects])
@@ -62,7 +64,7 @@ def html(answer: Answer, details: Details) -> str:
         tag("meta", charset="utf-8"),
         Markup(f'<meta http-equiv="Content-Security-Policy" content="{POLICY}"/>'),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("title", f"Gap between bench and model: {title}"),
+        tag("title", f"{HEADING}: {title}"),
         tag("style", Markup(STYLE)),
     )
     body = tag(
@@ -95,7 +97,7 @@ def _verdict(answer: Answer, units: Mapping[str, str]) -> Markup:
     }
     told = [join(tag("dt", key), tag("dd", value)) for key, value in facts.items() if value]
     parts = [
-        tag("h1", "Gap between bench and model"),
+        tag("h1", HEADING),
         tag(
             "div",
             tag("p", KINDS[verdict.kind], class_="kind"),
@@ -113,16 +115,16 @@ def _verdict(answer: Answer, units: Mapping[str, str]) -> Markup:
 def _confidence(share: float | None) -> str | None:
     if share is None:
         return None
-    return f"{percent(share)}: so often were answers of this kind right where the truth was known"
+    return f"{percent(share)}: share of such answers that were right in trials with known truth"
 
 
 def _shrinkage(gap: HeldOutGap, details: Details) -> Markup:
     parts = []
     if details.waterfall:
         caption = (
-            "Rms of the whitened residual over all channels of the held-out runs. Filled: what is "
-            "left above the noise; dashed: what the step took away; whiskers: 95 % interval from "
-            "a block bootstrap."
+            "Rms of the whitened residual over all channels of the held-out runs. Filled bar: gap "
+            "above the noise. Dashed box: gap that this step removed. Whiskers: 95 % interval "
+            "(block bootstrap)."
         )
         drawn = scrolled(waterfall(details.waterfall), "Waterfall")
         parts.append(tag("figure", drawn, tag("figcaption", caption)))
@@ -141,40 +143,40 @@ def _location(location: Location, units: Mapping[str, str]) -> Markup:
         parts += tables.residual_maps(location.maps, units)
     if location.shares:
         parts.append(tables.subsystems(location))
-    return _section("Where it lies", *(parts or [tag("p", "Nothing stands out of the noise.")]))
+    return _section("Where the gap lies", *(parts or [tag("p", "No residual exceeds the noise.")]))
 
 
 def _rest(rest: Remainder | None) -> Markup:
-    return Markup("") if rest is None else _section("What is left", rest_by_band(rest))
+    return Markup("") if rest is None else _section("Unmodelled remainder", rest_by_band(rest))
 
 
 def _effects(answer: Answer) -> Markup:
     if not answer.ranking:
-        return _section("Which effect", tag("p", "No effect was worth a test."))
+        return _section("Which effects were tested", tag("p", "No effect was tested."))
     classes = [
         tag("li", *_class(name, others))
         for name, others in indistinguishable(answer.verdict).items()
     ]
     parts = [tables.ranking(answer.ranking)]
     if classes:
-        parts += [tag("h3", "Can another effect look the same?"), tag("ul", *classes)]
-    return _section("Which effect", *parts)
+        parts += [tag("h3", "Effects that cannot be distinguished"), tag("ul", *classes)]
+    return _section("Which effects were tested", *parts)
 
 
 def _class(name: str, others: Sequence[str]) -> list[str]:
     if not others:
-        return [code(name), ": these logs tell it from every other effect of the library."]
+        return [code(name), ": these logs distinguish it from every other effect of the library."]
     listed = [part for other in others for part in (", ", code(other))][1:]
-    return [code(name), ": these logs cannot tell it from ", *listed, "."]
+    return [code(name), ": these logs cannot distinguish it from ", *listed, "."]
 
 
-def _parameters(shifted: Sequence[ParameterShift]) -> Markup:
-    none = tag("p", "None lies more than 3 standard errors away from the set.")
-    return _section("Parameters that moved", tables.parameters(shifted) if shifted else none)
+def _parameters(deviations: Sequence[ParameterDeviation]) -> Markup:
+    none = tag("p", "No parameter lies more than 3 standard errors from the set.")
+    return _section("Parameter deviations", tables.parameters(deviations) if deviations else none)
 
 
 def _limits(entries: Sequence[Undetectable]) -> Markup:
-    none = tag("p", "Every effect of the library would show in these logs.")
+    none = tag("p", "These logs would show every effect of the library at its plausible size.")
     return _section(
         "What these logs cannot show", tables.undetectable(entries) if entries else none
     )
@@ -193,11 +195,11 @@ def _runs(traces: Sequence[Trace]) -> Markup:
         parts += [tag("h3", name), *(_figure(trace, columns) for trace in runs[name])]
     if left_out:
         parts.append(tag("p", f"Not drawn, with smaller gaps: {', '.join(left_out)}."))
-    return _section("Held-out runs, measured over predicted", *parts)
+    return _section("Held-out runs: measured and predicted", *parts)
 
 
 def _worst(run: Sequence[Trace]) -> float:
-    """Largest gap of a run over its noise, before [1]."""
+    """The largest gap of a run over its noise [1], before the effects."""
     return max(
         html_traces.rms(t.measured - t.recalibrated) / t.noise if t.noise else 0.0 for t in run
     )
@@ -214,9 +216,7 @@ def _legend(traces: Sequence[Trace]) -> Markup:
         for look, words in LEGEND.items()
         if look in looks
     ]
-    band = tag(
-        "span", "grey band, dotted edges: two standard deviations of the noise to either side"
-    )
+    band = tag("span", f"grey band: {PLUS_MINUS} 2 standard deviations of the noise")
     return tag("p", *shown, band, class_="legend small")
 
 
@@ -233,5 +233,5 @@ def _repeat(logs: Logs, details: Details) -> Markup:
     parts = [tables.named({**named, **details.settings})]
     if details.notes:
         notes = [tag("li", note, class_="any") for note in details.notes]
-        parts += [tag("h3", "What was noticed about the logs"), tag("ul", *notes)]
-    return _section("To repeat it", *parts)
+        parts += [tag("h3", "Notes on the logs"), tag("ul", *notes)]
+    return _section("How to repeat this diagnosis", *parts)

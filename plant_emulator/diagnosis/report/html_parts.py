@@ -1,4 +1,4 @@
-"""What the tables of the report are made of."""
+"""Tables of the report and their cells."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ def table(
 
 
 def scrolled(content: Markup, label: str) -> Markup:
-    """Content that can be scrolled where it is wider than the screen, also by keyboard."""
+    """Content that scrolls, also by keyboard, where it is wider than the screen."""
     return tag("div", content, class_="wide", tabindex="0", role="region", aria_label=label)
 
 
 def right(head: str) -> Markup:
-    """A column's head over numbers."""
+    """The head of a column of numbers."""
     return tag("th", head, scope="col", class_="n")
 
 
@@ -41,16 +41,16 @@ def cell(value: str) -> Markup:
 
 
 def row_head(*content: str) -> Markup:
-    """What a row is about."""
+    """The head of a row."""
     return tag("th", *content, scope="row")
 
 
 def bar(value: str, share: float | None) -> Markup:
-    """A number over a bar of this share of the cell."""
+    """A number over a bar that fills this share of the cell."""
     long = 100.0 * min(1.0, max(0.0, share or 0.0))
     return tag("td", value, class_="n bar", style=f"background-size: {long:.1f}% 1.3em")
 
 
 def code(name: str) -> Markup:
-    """A name as it is typed."""
+    """A name in the type of program text."""
     return tag("code", name)

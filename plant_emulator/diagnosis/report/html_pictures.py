@@ -1,7 +1,7 @@
-"""Parts that the report's pictures share, and the waterfall of the held-out gap.
+"""Parts of the report's pictures, and the waterfall of the held-out gap.
 
-SVG drawn by hand: it takes its colours from the page, so that it follows dark screens and paper,
-and it needs no drawing library. Sizes are pixels of a picture WIDTH wide.
+The pictures are SVG that takes its colours from the page, so that it follows dark screens and
+paper. Lengths are pixels of a picture that is WIDTH wide.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ LEFT, RIGHT, ROW, TOP = 245.0, 585.0, 34.0, 26.0
 
 
 def picture(height: float, told: str, *content: str) -> Markup:
-    """An SVG picture; `told` is what a reader hears who does not see it."""
+    """An SVG picture; `told` : its text for readers who do not see it."""
     return tag("svg", *content, viewBox=f"0 0 {WIDTH:g} {height:g}", role="img", aria_label=told)
 
 
@@ -39,12 +39,12 @@ def line(x1: float, y1: float, x2: float, y2: float, look: str) -> Markup:
 
 
 def rectangle(x: float, y: float, width: float, height: float, look: str) -> Markup:
-    """A box; a negative width goes to the left."""
+    """A box that extends to the left where its width is negative."""
     return tag("rect", x=min(x, x + width), y=y, width=abs(width), height=height, class_=look)
 
 
 def ticks(low: float, high: float, most: int) -> list[float]:
-    """Round values between two limits: at most so many, 1, 2 or 5 times a power of ten apart."""
+    """At most `most` round values between two limits, 1, 2 or 5 times a power of ten apart."""
     span = (high - low) / most
     if not isfinite(span) or span <= 0.0:
         return [low]
@@ -54,7 +54,7 @@ def ticks(low: float, high: float, most: int) -> list[float]:
 
 
 def tick_label(value: float, values: Sequence[float]) -> str:
-    """A tick with the decimals that tell it from its neighbours."""
+    """A tick with as many decimals as distinguish it from its neighbours."""
     step = abs(values[1] - values[0]) if len(values) > 1 else abs(value) or 1.0
     if not 1e-4 <= step < 1e6:
         return f"{value:.1e}"
@@ -62,9 +62,9 @@ def tick_label(value: float, values: Sequence[float]) -> str:
 
 
 def waterfall(steps: Sequence[Step]) -> Markup:
-    """The held-out gap in the noise after each step: what is left, what went, 95 % interval.
+    """The held-out gap after each step in multiples of the noise, with its 95 % interval.
 
-    The axis is logarithmic and the bars start at the noise floor, 1.
+    The axis is logarithmic. The bars start at the noise floor, 1.
     """
     drawn = [s for s in steps if isfinite(s.gap) and s.gap > 0.0 and not _is_floor(s)]
     ends = [e for s in drawn for e in (s.gap, *_interval(s))]
@@ -89,7 +89,7 @@ def waterfall(steps: Sequence[Step]) -> Markup:
 
 
 def _is_floor(step: Step) -> bool:
-    """The noise floor itself is drawn as a line."""
+    """Whether a step is the noise floor, which is drawn as a line."""
     return step.gap == step.low == step.high == 1.0
 
 
@@ -120,7 +120,7 @@ def _step(step: Step, before: Step | None, y: float, x: Callable[[float], float]
 
 
 def _decades(low: float, high: float) -> list[float]:
-    """1, 2, 5, 10, ... between two limits; only the powers of ten where there are many."""
+    """1, 2, 5, 10, ... between two limits; only powers of ten between distant limits."""
     powers = range(floor(log10(low)), ceil(log10(high)) + 1)
     factors = (1.0, 2.0, 5.0) if high / low < 1000.0 else (1.0,)
     found = [m * 10.0**k for k in powers for m in factors]

@@ -1,7 +1,7 @@
-"""How the report looks: light and dark screens, narrow ones, and A4 paper.
+"""Style sheet of the report, for light, dark and narrow screens and for A4 paper.
 
-Colours are Okabe and Ito's (vermillion before, blue after, told apart with every kind of colour
-vision); dashes, labels and numbers say the same once more, so that nothing hangs on colour.
+The colours are those of Okabe and Ito: vermillion before, blue after. Every kind of colour vision
+distinguishes them. Dashes, labels and numbers repeat what the colours say.
 """
 
 STYLE = """

@@ -1,4 +1,4 @@
-"""The tables of the report: gap by channel, residual map, ranking, parameters."""
+"""The tables of the report: held-out gap, residual maps, ranking, parameters, hidden effects."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ if TYPE_CHECKING:
         Cell,
         HeldOutGap,
         Location,
-        ParameterShift,
+        ParameterDeviation,
         Quantity,
         RankedEffect,
         Undetectable,
     )
     from plant_emulator.diagnosis.prediction.trace import Trace
 
-# From which multiple of the noise a cell of the map takes which tint.
+# Tints of the cells of a residual map, each from a multiple of the noise on.
 HEAT = ((10.0, "heat4"), (5.0, "heat3"), (2.0, "heat2"), (1.2, "heat1"))
-# Axes of the residual map but the phase, in words.
+# Axes of the residual map beside the phase, in words.
 AXES = {
-    "speed": "the motor's speed",
+    "speed": "motor speed",
     "load": "load on the drum",
     "direction": "direction",
     "frequency": "frequency",
@@ -55,7 +55,7 @@ TIMES = "\N{MULTIPLICATION SIGN}"
 
 
 def gap_by_channel(gap: HeldOutGap, traces: Sequence[Trace]) -> Markup:
-    """The held-out gap of every channel, in percent of its range and in its own unit."""
+    """The held-out gap of every channel, in percent of its range and in its unit."""
     steps = gap_rows(gap)
     both = any("after" in residuals(t) for t in traces)
     rows = [
@@ -70,8 +70,8 @@ def gap_by_channel(gap: HeldOutGap, traces: Sequence[Trace]) -> Markup:
     rms_of = ["rms before", "rms after"] if both else ["rms"]
     heads = [*(f"{name} [%]" for name in steps), *rms_of, "noise"]
     return table(
-        "Held-out runs, all samples of a channel together. Gap in percent of the channel's "
-        "measured range; rms of the residual in the channel's unit.",
+        "Held-out gap of every channel over all samples of all runs, in percent of the channel's "
+        "measured range (NRMSD), and rms of the residual in the channel's unit.",
         ["channel", *map(right, heads)],
         rows,
     )
@@ -82,7 +82,7 @@ def _range_share(share: float) -> str:
 
 
 def _pooled(traces: Sequence[Trace], both: bool) -> list[str]:
-    """Rms before (and after), and the noise, of a channel over all its runs."""
+    """Rms before the effects, rms after where `both`, and noise of a channel over its runs."""
     if not traces:
         return [""] * (2 + both)
     found = [residuals(t) for t in traces]
@@ -96,7 +96,7 @@ def _pooled(traces: Sequence[Trace], both: bool) -> list[str]:
 
 
 def residual_map(location: Location, units: Mapping[str, str]) -> Markup:
-    """Channel by phase: the gap over the noise, tinted, and the gap in the channel's unit."""
+    """The residual by channel and phase: in multiples of the noise, and in the channel's unit."""
     cells = location.maps["phase"]
     seen = dict.fromkeys(cell_.bin for cell_ in cells)
     phases = [p for p in PHASES if p in seen] + [p for p in seen if p not in PHASES]
@@ -104,19 +104,19 @@ def residual_map(location: Location, units: Mapping[str, str]) -> Markup:
         cells,
         phases,
         units,
-        "Residual by channel and phase of operation, in multiples of the noise, and in the "
-        "channel's unit. Darker tint: from 1.2, 2, 5 and 10 times the noise. Framed: the place "
-        "that the answer names.",
+        "Residual without effects by channel and phase of operation, in multiples of the noise and "
+        "in the channel's unit. Tints begin at 1.2, 2, 5 and 10 times the noise. A frame marks the "
+        "place that the answer names.",
         (location.channel, location.phase),
     )
 
 
 def residual_maps(maps: Mapping[str, Sequence[Cell]], units: Mapping[str, str]) -> Iterator[Markup]:
-    """The residual along every axis but the phase, as `residual_map` shows it."""
+    """The residual by channel and every axis beside the phase, a table for each axis."""
     for axis, words in AXES.items():
         if axis in maps:
             bins = list(dict.fromkeys(cell_.bin for cell_ in maps[axis]))
-            yield _map(maps[axis], bins, units, f"The same by {words}.")
+            yield _map(maps[axis], bins, units, f"Residual without effects by channel and {words}.")
 
 
 def _map(
@@ -153,15 +153,15 @@ def _map_cell(found: Cell | None, unit: str | None, here: bool) -> Markup:
 
 
 def subsystems(location: Location) -> Markup:
-    """Every subsystem's share of the residual."""
+    """The share of every subsystem in the residual, or in what the effects explain."""
     rows = [
         tag("tr", row_head(spoken(name)), bar(percent(share), share))
         for name, share in location.shares.items()
     ]
     whole = share_of(location)
     told = {
-        RESIDUAL: "in the residual, without any hypothesis about the cause",
-        EXPLAINED: "in what the best effect of each explains alone",
+        RESIDUAL: "in the residual, found without a hypothesis about the cause",
+        EXPLAINED: "in what its best effect explains alone",
     }
     return table(
         f"Share of each subsystem {told[whole]}.", ["subsystem", right(f"share {whole}")], rows
@@ -169,12 +169,12 @@ def subsystems(location: Location) -> Markup:
 
 
 def ranking(entries: Sequence[RankedEffect]) -> Markup:
-    """The effects by evidence, each with its parameters and their 95 % intervals."""
+    """The tested effects by evidence, with their parameters and 95 % intervals."""
     most = max([1e-9, *(e.evidence for e in entries if isfinite(e.evidence))])
     return table(
-        "Evidence: fall of the penalised cost, corrected for autocorrelation. Held-out gain: "
-        "share of the gap that the effect closes alone on runs it was not fitted to. Standard "
-        "error: with that of the effect's law.",
+        "Evidence: fall of the penalised sum of squares, corrected for autocorrelation. Held-out "
+        "gain: share of the gap that the effect alone closes on runs it was not fitted to. The "
+        "standard error includes the model-form error of the effect's law.",
         [
             "effect",
             "subsystem",
@@ -200,14 +200,14 @@ def _ranked(entry: RankedEffect, most: float) -> Markup:
         tag("td", spoken(entry.subsystem)),
         tag("td", "yes" if entry.accepted else "no"),
         bar(evidence, entry.evidence / most if known else 0.0),
-        cell(percent(entry.held_out_gain)),
+        cell("not computed" if entry.held_out_gain is None else percent(entry.held_out_gain)),
         tag("td", *sizes),
         class_="accepted" if entry.accepted else "other",
     )
 
 
 def _estimate(estimated: Quantity) -> list[Markup]:
-    """Value with standard error, and the 95 % interval where there is one."""
+    """A value with its standard error, and its 95 % interval where it has one."""
     value, error = estimated.value, estimated.standard_error
     found = [tag("span", size(estimated, PLUS_MINUS))]
     if isfinite(value) and error and isfinite(error):
@@ -216,8 +216,8 @@ def _estimate(estimated: Quantity) -> list[Markup]:
     return found
 
 
-def parameters(shifted: Sequence[ParameterShift]) -> Markup:
-    """Parameters that the logs put more than 3 standard errors away from the set."""
+def parameters(deviations: Sequence[ParameterDeviation]) -> Markup:
+    """The parameters that lie more than 3 standard errors from the set."""
     rows = [
         tag(
             "tr",
@@ -227,37 +227,43 @@ def parameters(shifted: Sequence[ParameterShift]) -> Markup:
             cell(_change(p)),
             cell(_distance(p)),
         )
-        for p in shifted
+        for p in deviations
     ]
-    heads = ["set", f"estimated {PLUS_MINUS} standard error", "change", "standard errors"]
+    heads = [
+        "set",
+        f"estimated {PLUS_MINUS} standard error",
+        "change",
+        "distance in standard errors",
+    ]
     return table(
-        "Parameters that these logs put more than 3 standard errors away from the set.",
+        "Parameters that lie more than 3 standard errors from the parameter set.",
         ["parameter", *map(right, heads)],
         rows,
     )
 
 
-def _change(p: ParameterShift) -> str:
+def _change(p: ParameterDeviation) -> str:
     return f"{100.0 * (p.estimated / p.nominal - 1.0):+.1f} %" if p.nominal else ""
 
 
-def _distance(p: ParameterShift) -> str:
+def _distance(p: ParameterDeviation) -> str:
     error = p.standard_error
     return number(abs(p.estimated - p.nominal) / error, 2) if error else number(None)
 
 
 def undetectable(entries: Sequence[Undetectable]) -> Markup:
-    """Effects that may be there without these logs showing them."""
+    """The effects that may be there although these logs do not show them."""
     rows = [tag("tr", row_head(code(u.effect)), tag("td", u.reason)) for u in entries]
     return table(
-        "Effects that these logs cannot show: that they are not named says nothing about them.",
-        ["effect", "why, and what would show it"],
+        "Effects that these logs cannot show at their plausible size. Such an effect may be there "
+        "although the verdict does not name it.",
+        ["effect", "reason, and what would show it"],
         rows,
     )
 
 
 def named(entries: Mapping[str, str]) -> Markup:
-    """Names and what belongs to them."""
+    """A list of names, each with its text."""
     pairs = [
         join(tag("dt", name), tag("dd", value, class_="hash")) for name, value in entries.items()
     ]

@@ -1,7 +1,7 @@
-"""Measured over predicted on a held-out run, with the residual before and after below.
+"""Pictures of the held-out runs: measured and predicted, with the residuals below.
 
-A curve of many samples is drawn by the smallest and the largest of every pixel column: it looks
-the same, spikes included, and the file stays small.
+A curve of many samples is drawn by the smallest and the largest value of every pixel column. It
+then shows every spike, and the file stays small.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ LEFT, RIGHT = 60.0, WIDTH - 12.0
 TOP, PANEL, GAP, STRIP, BELOW = 8.0, 130.0, 22.0, 46.0, 34.0
 # Pixel columns of a curve, fewer where many curves share the file.
 FINEST, COARSEST, COLUMNS_IN_ALL = 680, 120, 90_000
-# A strip shows this share of the residuals and at least so many noises; the rest is told.
+# Share of the residuals that a strip shows, and its least half height in multiples of the noise.
 SHOWN, LEAST = 0.995, 4.0
 
 
 def residuals(trace: Trace) -> dict[str, Array]:
-    """Measured minus predicted, before and after; only before where no effect was added."""
+    """Measured minus predicted, before and after the effects; only before where there are none."""
     before = trace.measured - trace.recalibrated
     if np.array_equal(trace.recalibrated, trace.explained, equal_nan=True):
         return {"before": before}
@@ -56,12 +56,12 @@ def rms(residual: Array) -> float:
 
 
 def columns_of(traces: Sequence[Trace]) -> int:
-    """Pixel columns a curve may have, so that all of them stay within the file's size."""
+    """Pixel columns of a curve that keep the file small, whatever the number of curves is."""
     return int(np.clip(COLUMNS_IN_ALL // max(1, 5 * len(traces)), COARSEST, FINEST))
 
 
 def summary(trace: Trace) -> str:
-    """The trace's figures in its own unit."""
+    """Rms of the residuals, and the noise, of a trace in its unit."""
     found = residuals(trace)
     when = found if len(found) > 1 else ("",)
     parts = [
@@ -134,7 +134,7 @@ def _strip(
     top: float,
     columns: int,
 ) -> Markup:
-    """The residual over a band of two noises to either side; what leaves the strip is told."""
+    """A residual over a band of 2 standard deviations; the title tells a value beyond the strip."""
     y = _scale(-limit, limit, top + STRIP, top)
     edges = [_at(y, sign * 2.0 * trace.noise) for sign in (1.0, -1.0)]
     largest = float(np.abs(_finite(residual)).max())
@@ -158,7 +158,7 @@ def _strip(
 
 
 def _limit(trace: Trace, found: dict[str, Array]) -> float:
-    """Half height of the strips, the same for before and after [unit]."""
+    """Half height of both strips [unit]."""
     bulk = max(float(np.quantile(np.abs(_finite(r)), SHOWN)) for r in found.values())
     return max(1.1 * bulk, LEAST * trace.noise, 1e-12)
 
@@ -169,7 +169,7 @@ def _round(limit: float) -> float:
 
 
 def path(x: Array, y: Array, columns: int) -> str:
-    """An SVG path through the points, broken where one is not finite, thinned to the columns."""
+    """An SVG path through the finite points, thinned to the columns."""
     good = np.isfinite(x) & np.isfinite(y)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(int)))
     found = []
@@ -180,7 +180,7 @@ def path(x: Array, y: Array, columns: int) -> str:
 
 
 def thinned(x: Array, y: Array, pitch: float) -> NDArray[np.intp]:
-    """Indices of the smallest and the largest y of every column, and of both ends."""
+    """Indices of the smallest and the largest y in every column of this width, and of both ends."""
     if len(x) <= 3:
         return np.arange(len(x))
     column = np.floor(x / pitch)
@@ -191,7 +191,7 @@ def thinned(x: Array, y: Array, pitch: float) -> NDArray[np.intp]:
 
 
 def _polyline(x: Array, y: Array) -> str:
-    """Tenths of a pixel, each point relative to the one before: short. One alone is a dot."""
+    """A short SVG path: steps from point to point in tenths of a pixel; a single point is a dot."""
     points = np.rint(10.0 * np.column_stack([x, y])).astype(int)
     steps = np.diff(points, axis=0)
     start = f"M{points[0, 0] / 10:g} {points[0, 1] / 10:g}"
@@ -199,7 +199,7 @@ def _polyline(x: Array, y: Array) -> str:
 
 
 def _scale(low: float, high: float, start: float, end: float) -> Axis:
-    """From a value to its pixel."""
+    """The map from values between low and high to pixels between start and end."""
     slope = (end - start) / ((high - low) or 1.0)
     return lambda value: start + slope * (value - low)
 
@@ -209,6 +209,6 @@ def _at(axis: Axis, value: float) -> float:
 
 
 def _finite(values: Array) -> Array:
-    """The finite ones; a zero where there are none."""
+    """The finite values; a single 0 where there are none."""
     kept = values[np.isfinite(values)]
     return kept if len(kept) else np.zeros(1)

@@ -1,7 +1,7 @@
-"""HTML and SVG elements in which text can only be text.
+"""HTML and SVG elements whose text is always escaped.
 
-Whatever is not made by `tag` is escaped, so a name out of a log file can never become markup. The
-result is also well-formed XML: a strict parser reads it.
+Text that `tag` did not make is escaped, so that a name from a log file never becomes markup. The
+result is also well-formed XML.
 """
 
 from __future__ import annotations
@@ -14,13 +14,16 @@ EMPTY = frozenset({"meta", "line", "rect", "path", "circle", "br", "col"})
 
 
 class Markup(str):
-    """Text that is markup already."""
+    """Text that is already markup and is not escaped again."""
 
     __slots__ = ()
 
 
 def tag(name: str, /, *content: str, **attributes: str | float) -> Markup:
-    """An element; `class_` stands for class, an underscore in an attribute for a hyphen."""
+    """An element with this content and these attributes.
+
+    `class_` stands for the attribute class, and an underscore for a hyphen.
+    """
     words = "".join(
         f' {key.rstrip("_").replace("_", "-")}="{_attribute(value)}"'
         for key, value in attributes.items()
@@ -31,7 +34,7 @@ def tag(name: str, /, *content: str, **attributes: str | float) -> Markup:
 
 
 def join(*content: str) -> Markup:
-    """Markup as it is and text escaped, one after the other."""
+    """Markup and escaped text, one after the other."""
     return Markup("".join(c if isinstance(c, Markup) else _text(c) for c in content))
 
 

@@ -1,4 +1,4 @@
-"""The effects of an answer: those ranked by evidence, and those that the logs cannot show."""
+"""The effects of an answer: the ranking by evidence, and the effects that do not show."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
     from plant_emulator.diagnosis.machine import Candidate
 
-# Effects of no account that a ranking still shows.
+# Effects that a ranking shows at least, whatever their evidence is.
 SHOWN = 5
 
 
 def ranked(explained: Explanation) -> list[Hypothesis]:
-    """Effects with evidence or accepted, and a few of those without, the best first.
+    """The effects to show, the best first: at least SHOWN, and all that count or are accepted.
 
-    What is needed beside another effect may have little evidence alone.
+    An effect that is accepted beside another one may have little evidence alone.
     """
     order = sorted(explained.hypotheses, key=explained.evidence, reverse=True)
     counting = [c for c in order if explained.evidence(c) > EVIDENCE_THRESHOLD]
@@ -33,8 +33,8 @@ def ranked(explained: Explanation) -> list[Hypothesis]:
     return [*order[:shown], *accepted]
 
 
-def with_chance(explained: Explanation) -> FitResult:
-    """The final fit with the sizes and shapes of effects whose course is chance."""
+def with_random_effects(explained: Explanation) -> FitResult:
+    """The final fit with the sizes and shapes of the random effects."""
     values: dict[str, float] = {}
     for one in explained.random_effects:
         values |= {one.parameter: one.size, **one.shape}
@@ -48,7 +48,7 @@ def with_chance(explained: Explanation) -> FitResult:
 
 
 def rank(
-    contender: Hypothesis,
+    hypothesis: Hypothesis,
     explained: Explanation,
     accepted: Sequence[str],
     candidate: Candidate,
@@ -56,18 +56,18 @@ def rank(
     gain: float | None = None,
     law_errors: Mapping[str, float] | None = None,
 ) -> RankedEffect:
-    """One effect of the ranking; sizes and errors of an accepted effect from the final fit.
+    """One effect of the ranking; an accepted effect has its sizes from the final fit.
 
     gain : closed fraction with this effect alone; None: not predicted
-    law_errors : standard errors by name that other laws of an effect make, see `law_error`
+    law_errors : relative standard error of every size by name, see `law_errors`
     """
-    name = contender.effect
-    point = with_chance(explained) if name in accepted else contender.fit
+    name = hypothesis.effect
+    point = with_random_effects(explained) if name in accepted else hypothesis.fit
     sizes = () if point is None else _sizes(point, candidate, law_errors or {})
     return RankedEffect(
         effect=name,
         subsystem=candidate.subsystem,
-        evidence=explained.evidence(contender),
+        evidence=explained.evidence(hypothesis),
         held_out_gain=gain,
         parameters=tuple(sizes),
         accepted=name in accepted,
@@ -77,9 +77,9 @@ def rank(
 def _sizes(
     point: FitResult, candidate: Candidate, law_errors: Mapping[str, float]
 ) -> Iterator[Quantity]:
-    """Sizes and shapes of an effect in a fit; their errors hold those of the effect's law."""
+    """Sizes and shapes of an effect in a fit; the standard errors hold the model-form error."""
     usual = {u.name: abs(u.start - candidate.neutral[u.name]) for u in candidate.sizes}
-    # Of an effect of chance course the size is all that is estimated.
+    # Only the size of a random effect is estimated.
     shapes = () if candidate.stochastic else candidate.shapes
     for name in (u.name for u in (*candidate.sizes, *shapes)):
         value = point.values[name]
@@ -95,9 +95,9 @@ def _sizes(
 def undetectable(
     explained: Explanation, candidates: Mapping[str, Candidate]
 ) -> tuple[Undetectable, ...]:
-    """Effects that these logs could not show at their plausible size, with the reason."""
+    """The effects that these logs could not show at their plausible size, and why."""
     return tuple(
-        Undetectable(effect=c.effect, reason=hidden(c, candidates[c.effect]))
+        Undetectable(effect=c.effect, reason=reason_hidden(c, candidates[c.effect]))
         for c in explained.hypotheses
         if c.orthogonal_norm < DETECTABLE_NORM
         and c.effect not in explained.named
@@ -105,12 +105,12 @@ def undetectable(
     )
 
 
-def hidden(contender: Hypothesis, candidate: Candidate) -> str:
-    """Why an effect does not show."""
+def reason_hidden(hypothesis: Hypothesis, candidate: Candidate) -> str:
+    """Why an effect does not show, and what would show it."""
     if candidate.stochastic:
-        return candidate.needs or "its course is chance, and too small here to be seen"
-    if contender.total_norm < DETECTABLE_NORM:
+        return candidate.needs or "a random effect, too small to show in these logs"
+    if hypothesis.total_norm < DETECTABLE_NORM:
         reason = "too small in these channels and runs at its plausible size"
     else:
-        reason = f"drift of {contender.confounded_with} looks the same"
+        reason = f"a deviation of {hypothesis.confounded_with} looks the same"
     return f"{reason}; {candidate.needs}" if candidate.needs else reason

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.answer import ParameterShift, Verdict
+from plant_emulator.diagnosis.answer import ParameterDeviation, Verdict
 from plant_emulator.diagnosis.prediction.remainder import lies, shrinks
 from plant_emulator.diagnosis.wording import number, percent, spoken
 
@@ -33,7 +33,7 @@ def verdict(
         effects=decision.effects,
         classes=tuple(map(tuple, classes)) if decision.kind == "effect" else (),
         parameters=tuple(
-            ParameterShift(
+            ParameterDeviation(
                 name=shift.name,
                 nominal=shift.nominal,
                 estimated=shift.estimated,

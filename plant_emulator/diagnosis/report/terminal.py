@@ -1,7 +1,7 @@
-"""The answer of a diagnosis on one screen: statement, place, ranking, shrinkage, what is next.
+"""The answer of a diagnosis on one screen: verdict, place, ranking, held-out gap, next experiment.
 
-Plain text without colours, so that it reads the same in a terminal, a file and a mail. What does
-not fit is counted ("and 3 more"): the whole stands in the JSON answer and in the report.
+The text has no colours, so that it reads alike in a terminal, a file and a mail. The screen counts
+what does not fit ("and 3 more"); the JSON answer and the report are complete.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from plant_emulator.diagnosis.wording import (
     KINDS,
     UNITS,
     closed,
+    deviation,
     gap_rows,
     indistinguishable,
     logs_used,
@@ -24,7 +25,6 @@ from plant_emulator.diagnosis.wording import (
     percent,
     place,
     printable,
-    shifted,
     size,
     times_noise,
 )
@@ -34,25 +34,25 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.answer import Answer, HeldOutGap, RankedEffect, Undetectable
 
-# A screen has 24 lines; the last is the prompt's.
+# Lines of a screen of 24 lines whose last line holds the prompt.
 HEIGHT = 23
 MOST_RANKED = 6
-# Columns of the table of the gap that leave its bars some room.
+# Channels in the table of the gap, so that its bars have some room.
 MOST_CHANNELS = 5
 NAME, CELL = 29, 9
 LABEL = 13
 EVIDENCE_DECIMALS = 1
-# Lines of the statement, and with effects that have much to tell beside them.
+# Most lines of the statement; the second number where the ranking lacks room.
 STATEMENT, LEAST_STATEMENT = 4, 3
-# Runners-up beyond so many give way to the empty lines between the sections.
+# Least number of other effects to show before the sections are parted by empty lines.
 LEAST_OTHERS = 2
-# Spaces within "2.83 N m" at which no line ends.
+# Spaces within a quantity such as "2.83 N m", at which no line may end.
 WITHIN_QUANTITY = re.compile(r"(?<=\d) (?=[%A-Za-z])|(?<=[\d ]N) (?=m\b)|(?<=kg) (?=m\^2)")
 UNBROKEN = "\N{NO-BREAK SPACE}"
 
 
 def lines(answer: Answer, width: int = 80) -> list[str]:
-    """The answer for a terminal of this width and 24 lines."""
+    """The lines of the answer for a terminal of 24 lines, each at most `width` characters."""
     head = _verdict(answer, width)
     shrinkage = _shrinkage(answer.gap, width)
     rest = _rest(answer, width)
@@ -73,7 +73,7 @@ def lines(answer: Answer, width: int = 80) -> list[str]:
 
 
 def _paragraph(text: str, width: int, most: int, label: str = "") -> list[str]:
-    """Text in at most so many lines behind a label, cut at a word with three dots."""
+    """A text behind a label in at most `most` lines; three dots end a text that is cut."""
     first = f"{label:9}" if label else ""
     rows = wrap(
         WITHIN_QUANTITY.sub(UNBROKEN, printable(text)),
@@ -89,7 +89,10 @@ def _paragraph(text: str, width: int, most: int, label: str = "") -> list[str]:
 def _listed(
     items: Sequence[str], width: int, most: int, label: str, names: Sequence[str] = ()
 ) -> list[str]:
-    """As many items as fit, and the number of those that do not; their names where none fits."""
+    """As many items as fit into `most` lines, and the number of the others.
+
+    names : shorter forms of the items, for the case that not even the first item fits
+    """
     for shown in range(len(items), 0, -1):
         more = f"; and {len(items) - shown} more" if shown < len(items) else ""
         rows = _paragraph("; ".join(items[:shown]) + more, width, 99, label)
@@ -115,7 +118,7 @@ def _verdict(answer: Answer, width: int, most: int = STATEMENT) -> list[str]:
 
 
 def _ranking(answer: Answer, room: int, width: int) -> list[str]:
-    """Head of the ranking, and the accepted effects with what there is room for."""
+    """The head of the ranking, and the accepted effects with as many details as there is room."""
     accepted = [r for r in answer.ranking if r.accepted]
     if not accepted and not _runners_up(answer.ranking):
         return []
@@ -130,7 +133,7 @@ def _ranking(answer: Answer, room: int, width: int) -> list[str]:
 
 
 def _runners_up(ranking: Sequence[RankedEffect]) -> list[str]:
-    """The effects that were not accepted, a line each, but for those whose evidence reads 0.0."""
+    """A line for every effect that was not accepted and whose evidence is not written as 0.0."""
     accepted = sum(r.accepted for r in ranking)
     counting = [r for r in ranking if not round(r.evidence, EVIDENCE_DECIMALS) <= 0.0]
     others = [_row(r) for r in counting if not r.accepted]
@@ -138,7 +141,7 @@ def _runners_up(ranking: Sequence[RankedEffect]) -> list[str]:
 
 
 def _row(entry: RankedEffect) -> str:
-    """Effect, evidence, share of the held-out gap that it closes alone, its first size."""
+    """A line of the ranking: effect, evidence, held-out gain and first size."""
     mark = "*" if entry.accepted else " "
     gain = "" if entry.held_out_gain is None else percent(entry.held_out_gain)
     evidence = f"{entry.evidence:.{EVIDENCE_DECIMALS}f}" if isfinite(entry.evidence) else ""
@@ -148,14 +151,14 @@ def _row(entry: RankedEffect) -> str:
 
 
 def _beside(entry: RankedEffect, others: Sequence[str], width: int) -> list[str]:
-    """Further parameters of an accepted effect, and what cannot be told from it."""
+    """Other parameters of an accepted effect, and effects that are not separable from it."""
     more = [f"{own_name(p.name, entry.effect)} {size(p)}" for p in entry.parameters[1:]]
-    alike = [f"not told from {others[0]}", *others[1:]] if others else []
+    alike = [f"not separable from {others[0]}", *others[1:]] if others else []
     return _listed(more, width, 1, "  with") + _listed(alike, width, 1, "  class")
 
 
 def _shrinkage(gap: HeldOutGap, width: int) -> list[str]:
-    """The held-out gap in the noise as bars, and in percent of every channel's range."""
+    """The held-out gap: bars in multiples of the noise, and percent of each channel's range."""
     floor = gap.noise_floor
     rows = gap_rows(gap)
     if gap.explained == gap.recalibrated:
@@ -183,7 +186,7 @@ def _range_share(share: float) -> str:
 
 
 def _short(channels: Sequence[str]) -> list[str]:
-    """One word a channel: its last, or its first where others end alike."""
+    """One word for each channel: its last word, or its first where two channels end alike."""
     last = [name.rpartition("_")[2] for name in channels]
     return [
         printable(end if last.count(end) == 1 else name.partition("_")[0])[: CELL - 1]
@@ -192,17 +195,17 @@ def _short(channels: Sequence[str]) -> list[str]:
 
 
 def _rest(answer: Answer, width: int) -> list[str]:
-    """Parameters that moved, effects that these logs cannot show, the next experiment."""
+    """Parameter deviations, effects that these logs cannot show, and the next experiment."""
     verdict = answer.verdict
-    moved = [shifted(p) for p in verdict.parameters]
+    deviations = [deviation(p) for p in verdict.parameters]
     names = [p.name for p in verdict.parameters]
-    rows = _listed(moved, width, 2 if verdict.kind == "parameter" else 1, "moved", names)
+    rows = _listed(deviations, width, 2 if verdict.kind == "parameter" else 1, "deviates", names)
     rows += _unseen(answer.undetectable, width, 1 if len(verdict.effects) > 1 else 2)
     return rows + _paragraph(verdict.next_experiment or "", width, 3, "next")
 
 
 def _unseen(hidden: Sequence[Undetectable], width: int, most: int) -> list[str]:
-    """Effects that these logs cannot show, each with its reason if there is room for all."""
+    """Effects that these logs cannot show, with their reasons where all of them fit."""
     reasons = "; ".join(f"{u.effect} ({u.reason})" for u in hidden)
     rows = _paragraph(reasons, width, most + 1, "unseen") if hidden else []
     if len(rows) <= most:

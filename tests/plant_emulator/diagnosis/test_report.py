@@ -43,8 +43,8 @@ every_kind = pytest.mark.parametrize("kind", answers.KINDS)
 def test_report_is_well_formed_and_says_what_it_is(kind):
     root = page(kind)
     assert root.get("lang") == "en"
-    assert [words(h) for h in root.iter("h1")] == ["Gap between bench and model"]
-    assert words(root.find("head/title")).startswith("Gap between bench and model: ")
+    assert [words(h) for h in root.iter("h1")] == ["Sim-to-real gap"]
+    assert words(root.find("head/title")).startswith("Sim-to-real gap: ")
     assert answers.KINDS[kind]()["verdict"]["statement"] in words(root.find("body/main/header"))
 
 
@@ -123,7 +123,7 @@ def test_verdict_place_and_shrinkage_stand_first():
         "Effect found",
         "gear (81 % of the residual), armature current in field weakening: 1.25 A, noise 0.25 A",
         "98 % (95 % interval 96 % to 99 %)",
-        "98 %: so often were answers of this kind right",
+        "98 %: share of such answers that were right",
         "2 logs fitted, 1 log held out",
         "Next experiment: drive program1 in reverse from a cold start",
     ):
@@ -131,7 +131,7 @@ def test_verdict_place_and_shrinkage_stand_first():
 
 
 def test_ranking_shows_intervals_of_two_normal_tails():
-    rows = [words(r) for r in section(page("two_effects"), "Which effect").iter("tr")]
+    rows = [words(r) for r in section(page("two_effects"), "Which effects were tested").iter("tr")]
     # 0.1013 -+ 1.96 * 0.0024 by hand
     assert rows[2].startswith("torque_sensor_lag torque sensor yes 214.2 18 %")
     assert "0.1013 \N{PLUS-MINUS SIGN} 0.0024 s (0.09660 to 0.1060)" in rows[2]
@@ -139,14 +139,16 @@ def test_ranking_shows_intervals_of_two_normal_tails():
 
 
 def test_effects_that_cannot_be_told_apart_are_named():
-    told = [words(li) for li in section(page("two_effects"), "Which effect").iter("li")]
+    told = [
+        words(li) for li in section(page("two_effects"), "Which effects were tested").iter("li")
+    ]
     assert told[1] == (
-        "torque_sensor_lag : these logs cannot tell it from shaft_damping , drum_speed_lag ."
+        "torque_sensor_lag : these logs cannot distinguish it from shaft_damping , drum_speed_lag ."
     )
 
 
-def test_moved_parameter_shows_its_distance_from_the_set():
-    row = [words(r) for r in section(page("parameter"), "Parameters that moved").iter("tr")][1]
+def test_parameter_deviation_shows_its_distance_from_the_set():
+    row = [words(r) for r in section(page("parameter"), "Parameter deviations").iter("tr")][1]
     # (340.1 - 312.69) / 1.2 = 22.8; 340.1 / 312.69 = 1.0877
     expected = "drum_inertia 312.7 kg m^2 340.1 \N{PLUS-MINUS SIGN} 1.2 kg m^2 +8.8 % 23"
     assert row == expected
@@ -170,26 +172,30 @@ def test_residual_is_mapped_along_every_axis():
     found = ET.fromstring(html(replace(answer, location=location), answers.DETAILS))
     tables = {words(t.find("caption")): t for t in found.iter("table") if t.get("class") == "map"}
     assert len(tables) == 3
-    rows = [words(r) for r in tables["The same by the motor's speed."].iter("tr")]
+    rows = [
+        words(r) for r in tables["Residual without effects by channel and motor speed."].iter("tr")
+    ]
     times = "\N{MULTIPLICATION SIGN}"
     assert rows == [
         "channel 0 to 25 rad/s 25 to 50 rad/s",
         f"armature current 2.0 {times} 0.500 A 4.0 {times} 1.00 A",
     ]
-    rows = [words(r) for r in tables["The same by direction."].iter("tr")]
+    rows = [
+        words(r) for r in tables["Residual without effects by channel and direction."].iter("tr")
+    ]
     assert rows == ["channel backward", f"shaft torque 1.2 {times} 0.300 N m"]
 
 
 def test_what_is_null_is_told_as_not_known_and_never_as_none_or_nan():
     for kind in answers.KINDS:
         told = words(page(kind).find("body"))
-        assert not re.search(r"\b(None|nan|null)\b[^ ]", told.replace("None lies", ""))
-    row = words(section(page("unknown"), "Which effect").find(".//tbody/tr"))
-    assert row == "stribeck gear no 31.7 not known rise 12.00 \N{PLUS-MINUS SIGN} not known N m"
+        assert not re.search(r"\b(None|nan|null)\b[^ ]", told)
+    row = words(section(page("unknown"), "Which effects were tested").find(".//tbody/tr"))
+    assert row == "stribeck gear no 31.7 not computed rise 12.00 \N{PLUS-MINUS SIGN} not known N m"
 
 
 def test_settings_hashes_and_notes_are_there_to_repeat_it():
-    told = words(section(page("none"), "To repeat it"))
+    told = words(section(page("none"), "How to repeat this diagnosis"))
     for text in (*answers.DETAILS.settings.values(), *answers.DETAILS.notes):
         assert text in told
     assert "Held out program3.csv.gz" in told

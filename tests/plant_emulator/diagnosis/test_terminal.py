@@ -54,7 +54,7 @@ def test_longest_answer_keeps_verdict_place_ranking_shrinkage_and_what_is_next()
         "where    gear (81 % of the residual), armature current in field weakening",
         "* gear_oil_temperature           812.4   71 %  0.02134 +- 0.00041 1/K",
         "* torque_sensor_lag              214.2   18 %  0.1013 +- 0.0024 s",
-        "class  not told from shaft_damping; drum_speed_lag",
+        "class  not separable from shaft_damping; drum_speed_lag",
         "closed: 98 % (95 % interval 96 % to 99 %)",
         "drum_inertia 312.7 -> 340.1 +- 1.2 kg m^2; and 2 more",
         "next     drive program1 in reverse",
@@ -84,7 +84,7 @@ def test_shrinkage_is_the_rms_over_the_channels_in_the_noise():
 def test_answer_without_a_gap_says_so_and_invents_nothing():
     rows = lines(answers.none())
     assert rows[0].startswith("NO GAP BEYOND THE NOISE")
-    assert not [row for row in rows if row.startswith(("where", "closed", "moved", "next"))]
+    assert not [row for row in rows if row.startswith(("where", "closed", "deviates", "next"))]
 
 
 def test_unconverged_answer_shows_its_statement_and_no_confidence():
@@ -143,12 +143,12 @@ def test_effects_that_do_not_show_are_all_named_where_their_reasons_have_no_room
     assert "too small" not in told
 
 
-def test_parameters_that_moved_are_counted_where_the_first_has_no_room():
+def test_parameter_deviations_are_counted_where_the_first_has_no_room():
     answer = answers.effect()
     long = answers.INERTIA | {"name": "gear_viscous_friction", "unit": "N m (s/rad)^delta_g"}
     answer["verdict"]["parameters"] = [long, *[answers.INERTIA] * 4]
-    (moved,) = [row for row in lines(answer) if row.startswith("moved")]
-    assert moved == "moved    gear_viscous_friction; drum_inertia; drum_inertia; and 2 more"
+    (row,) = [row for row in lines(answer) if row.startswith("deviates")]
+    assert row == "deviates gear_viscous_friction; drum_inertia; drum_inertia; and 2 more"
 
 
 def test_a_single_log_is_told_as_one():
