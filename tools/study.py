@@ -14,7 +14,7 @@ from timing import Action, alone
 from plant_emulator import parameter_sets
 from plant_emulator.signals.log import Array, Log
 from plant_emulator.simulation import programs
-from plant_emulator.simulation.simulate import LARGEST_STEP, run_of, simulate
+from plant_emulator.simulation.simulate import LARGEST_STEP, inputs_of, simulate
 from plant_emulator.solver.stepper import CHANNELS
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Study:
         program = programs.PROGRAMS[PROGRAM]
         assert isinstance(program, programs.SpeedProgram)
         self.time, reference = program.reference()
-        self.run = run_of(Log(self.time, {"speed_reference": reference}, PROGRAM))
+        self.run = inputs_of(Log(self.time, {"speed_reference": reference}, PROGRAM))
         self.duration = program.duration
         last = program.corners[-1][1]
         self.corners = ((0.0, program.corners[0][1]), *program.corners, (program.duration, last))

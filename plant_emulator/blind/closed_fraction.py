@@ -18,7 +18,7 @@ from plant_emulator.estimation.initial_states import fit_states, states_of, with
 from plant_emulator.model.stage import split_gap_position
 from plant_emulator.recordings.recording import Recording
 from plant_emulator.signals.log import COMPARED
-from plant_emulator.simulation.simulate import run_of, values_of
+from plant_emulator.simulation.simulate import inputs_of, values_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,7 +51,7 @@ def true_closed_fraction(answer: Answer, saved: ParameterSet, logs: Sequence[Log
 def _residual(log: Log, saved: ParameterSet) -> Array:
     """Truth minus model over the noise, shape (channels, samples)."""
     use = np.ones((len(COMPARED), len(log.time)), bool)
-    bare = Recording(log, run_of(log), COMPARED, noise_levels(COMPARED), use)
+    bare = Recording(log, inputs_of(log), COMPARED, noise_levels(COMPARED), use)
     recording = with_own(bare, saved.effects)
     values = values_of(saved)
     states = fit_states(recording, values, states_of(saved.effects))

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 from plant_emulator.errors import UnsettledError
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation.programs import SpeedProgram, program
-from plant_emulator.simulation.sensor_noise import noisy
-from plant_emulator.simulation.simulate import run_of, simulate, values_of
-from plant_emulator.simulation.travel_program import travel
+from plant_emulator.simulation.sensor_noise import add_noise
+from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
+from plant_emulator.simulation.travel_program import simulate_travel
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from plant_emulator.blind.case import Case
     from plant_emulator.model.parameters import ParameterSet
-    from plant_emulator.simulation.simulate import Run
+    from plant_emulator.simulation.simulate import RunInputs
 
 # [s] A fiftieth of a sample. The diagnosis uses adaptive steps of up to a whole sample. The step is
 # halved at most HALVINGS times if the solver does not converge.
@@ -41,15 +41,15 @@ def _simulate_run(case: Case, run: int, parameters: ParameterSet) -> Log:
     found = program(case.programs[run])
     if isinstance(found, SpeedProgram):
         time, reference = found.reference()
-        inputs = run_of(Log(time, {"speed_reference": reference}, found.name))
+        inputs = inputs_of(Log(time, {"speed_reference": reference}, found.name))
         log = _simulate_converged(inputs, values_of(bench, effects), case.gaps[run])
     else:
-        log = travel(found, bench, effects, gap_position=case.gaps[run])
+        log = simulate_travel(found, bench, effects, gap_position=case.gaps[run])
     signals = {name: signal for name, signal in log.signals.items() if name != NOT_LOGGED}
     return Log(log.time, signals, found.name)
 
 
-def _simulate_converged(inputs: Run, values: Mapping[str, float], gap_position: float) -> Log:
+def _simulate_converged(inputs: RunInputs, values: Mapping[str, float], gap_position: float) -> Log:
     """Simulate with the largest step with which the solver converges."""
     for halvings in range(HALVINGS):
         with suppress(UnsettledError):
@@ -59,4 +59,4 @@ def _simulate_converged(inputs: Run, values: Mapping[str, float], gap_position: 
 
 def measure(case: Case, log: Log, run: int) -> Log:
     """Add the sensor noise and quantisation of one run to its noise-free log."""
-    return noisy(log, case.noise + run)
+    return add_noise(log, case.noise + run)

@@ -21,7 +21,7 @@ from plant_emulator.model.stage import GAP_POSITION, split_gap_position
 from plant_emulator.recordings.recording import IMPOSSIBLE
 from plant_emulator.signals.log import COMPARED
 from plant_emulator.simulation.sensor_noise import SENSORS
-from plant_emulator.simulation.simulate import run_of, simulate, values_of
+from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -113,7 +113,7 @@ def _simulation(
     case: Case, run: int, log: Log, parameters: ParameterSet, hidden: Sequence[Hidden]
 ) -> Residual:
     """A run simulated from parameters and gap position, whitened, shape (channels, samples)."""
-    inputs = run_of(log)
+    inputs = inputs_of(log)
     levels = noise_levels(COMPARED)[:, None]
     effects = {h.law: h.in_run(run) for h in hidden}
     fixed = values_of(parameters.with_values(case.parameters), effects)

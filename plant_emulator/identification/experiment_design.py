@@ -30,7 +30,7 @@ from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import Recording
 from plant_emulator.signals.log import COMPARED, VOLTAGE, Log
 from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram
-from plant_emulator.simulation.simulate import run_of, simulate
+from plant_emulator.simulation.simulate import inputs_of, simulate
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from plant_emulator.estimation.unknowns import Estimate, Residual, Unknown
     from plant_emulator.identification.identify import Identification
     from plant_emulator.signals.log import Array
-    from plant_emulator.simulation.simulate import Run
+    from plant_emulator.simulation.simulate import RunInputs
 
 # Where in the gap a planned run may start, -1 to 1.
 GAP_POSITIONS = (-0.8, -0.4, 0.0, 0.4, 0.8)
@@ -147,7 +147,7 @@ def _linearisations(
     A first linearisation only sets the steps of the differences.
     """
     time, reference = program.reference()
-    run = run_of(Log(time, {"speed_reference": reference}, program.name))
+    run = inputs_of(Log(time, {"speed_reference": reference}, program.name))
     near: Estimate | None = None
     for position in GAP_POSITIONS:
         unknowns = _unknowns(found, position)
@@ -174,7 +174,9 @@ def _starts(unknowns: Sequence[Unknown]) -> dict[str, float]:
     return {u.name: u.start for u in unknowns}
 
 
-def _planned_residual(run: Run, there: Mapping[str, float], noise: Mapping[str, float]) -> Residual:
+def _planned_residual(
+    run: RunInputs, there: Mapping[str, float], noise: Mapping[str, float]
+) -> Residual:
     """Residual of a planned run whose measurement is its simulation at the values `there`."""
     values = dict(there)
     measured = simulate(

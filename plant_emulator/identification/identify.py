@@ -137,7 +137,7 @@ def fit_from(
 ) -> Estimate:
     """Least squares from where a search has come to; priors that the data outdo are given up."""
     coarse = residual_functions(recordings, search.values, free)
-    truck = any(recording.run.truck for recording in recordings)
+    truck = any(recording.inputs.truck for recording in recordings)
     tolerance = TOLERANCE if truck else FINAL_TOLERANCE
     fine = residual_functions(recordings, search.values, free, tolerance)
     tell = _telling(recordings, progress)

@@ -78,13 +78,13 @@ def noise_directions(
     far apart to meet in a stretch are simulated together: an answer has to end within MEMORY, else
     what is left of it adds to that of the next.
     """
-    if not recording.run.truck:
+    if not recording.inputs.truck:
         return None
     try:
         base = recording.settled(values, gap_position, TOLERANCE)
     except UnsettledError:
         return None
-    length = max(1, round(WINDOW / recording.run.interval))
+    length = max(1, round(WINDOW / recording.inputs.interval))
     stretch, memory = (length * round(span / WINDOW) for span in (STRETCH, MEMORY))
     answers = [
         _answer(recording.fed(torque), values, gap_position, base)
@@ -121,7 +121,7 @@ def _disturbed(recording: Recording, length: int, every: int) -> list[Array]:
     deviation, then that of the second, and so on; only where the truck is not parked and a sample
     that counts comes after.
     """
-    run = recording.run
+    run = recording.inputs
     step = noise(recording.log["wheel_torque"]) / np.sqrt(length)
     places = np.arange(len(run.time))
     last = np.flatnonzero(recording.use.any(axis=0)).max(initial=-1)

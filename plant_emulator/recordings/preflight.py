@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant_emulator.errors import LogError
-from plant_emulator.signals.log import VOLTAGE, Array, Log, compared, without_voltage
+from plant_emulator.signals.log import VOLTAGE, Array, Log, compared_channels, without_voltage
 from plant_emulator.signals.noise import FLOOR, noise
 from register_maps.signals import LOG_COLUMNS
 
@@ -84,7 +84,7 @@ def preflight(measured: Log, gear_ratio: float) -> Preflight:
         notes.append(f"{measured.source}: {NAMES[VOLTAGE]} {wrong}; it is left out")
         measured = without_voltage(measured)
     use = {}
-    for name in compared(measured):
+    for name in compared_channels(measured):
         try:
             use[name], told = _counting(measured, name)
         except LogError as error:
@@ -188,7 +188,7 @@ def _wrong_voltage(measured: Log) -> str:
     """What is wrong with a voltage, which no log needs; nothing: it can be used."""
     if VOLTAGE not in measured:
         return ""
-    if VOLTAGE not in compared(measured):
+    if VOLTAGE not in compared_channels(measured):
         return "does not move"
     speed, (low, high) = measured["motor_speed"], VOLTS_PER_SPEED
     for words, turning in (("forward", speed > STEADY_SPEED), ("reverse", speed < -STEADY_SPEED)):
@@ -208,7 +208,9 @@ def _counting(measured: Log, name: str) -> tuple[Use, list[str]]:
     channel = measured[name]
     nothing = np.zeros(len(channel), bool)
     repeated = _repeated(channel)
-    others = np.sum([_repeated(measured[o]) for o in compared(measured)], axis=0) - repeated
+    others = (
+        np.sum([_repeated(measured[o]) for o in compared_channels(measured)], axis=0) - repeated
+    )
     alive = ~_runs(repeated, others, CERTAINLY_FROZEN)
     noisy = noise(channel, alive) > NOISY * np.ptp(channel)
     held = repeated if _held(channel, repeated) else nothing

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.errors import IdentificationError, UnsettledError
-from plant_emulator.signals.log import VOLTAGE, Array, Log, compared, without_voltage
+from plant_emulator.signals.log import VOLTAGE, Array, Log, compared_channels, without_voltage
 from plant_emulator.signals.noise import noise
-from plant_emulator.simulation.simulate import TOLERANCE, Hold, Run, run_of, simulate
+from plant_emulator.simulation.simulate import TOLERANCE, Hold, RunInputs, inputs_of, simulate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -33,7 +33,7 @@ class Recording:
     """
 
     log: Log
-    run: Run
+    inputs: RunInputs
     channels: tuple[str, ...]
     noise: Array
     use: NDArray[np.bool_]
@@ -58,7 +58,7 @@ class Recording:
         self, values: Mapping[str, float], gap_position: float, tolerance: float = TOLERANCE
     ) -> Array:
         """The same; UnsettledError where the model cannot be simulated at these values."""
-        found = simulate(self.run, values, gap_position=gap_position, tolerance=tolerance)
+        found = simulate(self.inputs, values, gap_position=gap_position, tolerance=tolerance)
         difference = np.stack([self.log[name] - found[name] for name in self.channels])
         white = np.where(self.use, difference / self.noise[:, None], 0.0)
         if VOLTAGE in self.channels:
@@ -69,7 +69,7 @@ class Recording:
 
     def fed(self, wheel_torque: Array) -> Recording:
         """The same log simulated with another wheel torque [N m], shape (n,)."""
-        return replace(self, run=replace(self.run, wheel_torque=wheel_torque))
+        return replace(self, inputs=replace(self.inputs, wheel_torque=wheel_torque))
 
 
 def voltage_errors(voltage: Array) -> Array:
@@ -102,7 +102,7 @@ def recording(
     """
     if use is not None and VOLTAGE not in use:
         log = without_voltage(log)
-    channels = compared(log)
+    channels = compared_channels(log)
     everything = np.ones(len(log.time), bool)
     counted = np.stack([(use or {}).get(name, everything) for name in channels])
     levels = [noise(log[name], counted[k]) for k, name in enumerate(channels)]
@@ -111,4 +111,4 @@ def recording(
         raise IdentificationError(
             f"{log.source}: {still} does not move; a run that excites it is needed"
         )
-    return Recording(log, run_of(log, hold), channels, np.array(levels), counted)
+    return Recording(log, inputs_of(log, hold), channels, np.array(levels), counted)

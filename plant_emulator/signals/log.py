@@ -50,7 +50,7 @@ class Log:
         return f"<Log {self.source}: {len(self.time)} samples, {seconds:g} s; {names}>"
 
 
-def compared(log: Log) -> tuple[str, ...]:
+def compared_channels(log: Log) -> tuple[str, ...]:
     """Channels of a log that a simulation is compared on.
 
     The voltage only where it moves: a column of it that nobody feeds stays where it is.

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from plant_emulator.errors import LogError
-from plant_emulator.signals.log import COMPARED, VOLTAGE, Array, Log, compared
+from plant_emulator.signals.log import COMPARED, VOLTAGE, Array, Log, compared_channels
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def validate(measured: Log, simulated: Log) -> dict[str, Fit]:
     """Measures of every compared channel that the measured log has."""
     return {
         name: fit(measured[name], simulated[name], f"{measured.source}: {name}")
-        for name in compared(measured)
+        for name in compared_channels(measured)
     }
 
 

@@ -164,7 +164,7 @@ PROGRAMS: dict[str, Program] = {
 }
 
 
-def in_words(program: Program) -> str:
+def describe(program: Program) -> str:
     """A program as one plans it: name, length, what it reaches or carries."""
     if isinstance(program, TravelProgram):
         return f"{program.name} (a truck of {program.mass:.0f} kg on the drum)"

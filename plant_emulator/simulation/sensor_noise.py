@@ -22,7 +22,7 @@ SENSORS: dict[str, tuple[float, float]] = {
 }
 
 
-def noisy(log: Log, seed: int) -> Log:
+def add_noise(log: Log, seed: int) -> Log:
     """The log as the sensors would show it, noise drawn from `seed`."""
     random = np.random.default_rng(seed)
     signals = dict(log.signals)

@@ -1,8 +1,8 @@
-"""From a log of inputs to a log of simulated signals.
+"""Simulates a run: the inputs of a log in, a log of simulated signals out.
 
-A `Run` holds what of a log the kernel needs (reference, its corners, truck torque), prepared once
-and simulated many times with other values. Between samples the reference is linear, in a log with
-a truck a staircase; the wheel torque is the one that acted up to its sample.
+`RunInputs` are prepared once and simulated many times with other values. Between samples the speed
+reference is linear; in a log with a truck it is a staircase. The wheel torque of a sample acted
+during the interval before the sample.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ WHEEL_TORQUE_STARTS = 10.0
 
 
 @dataclass(frozen=True)
-class Run:
+class RunInputs:
     """The inputs of one run as the kernel takes them, shape (n,) each but `corners`.
 
     truck : whether there is one; without it the drum is free and the log has no wheel torque
@@ -59,7 +59,7 @@ class Run:
     interval: float
 
 
-def run_of(log: Log, hold: Hold | None = None) -> Run:
+def inputs_of(log: Log, hold: Hold | None = None) -> RunInputs:
     """The inputs in a log.
 
     hold : what holds between samples of the reference; None: staircase with a truck, else linear
@@ -74,7 +74,7 @@ def run_of(log: Log, hold: Hold | None = None) -> Run:
         slope[:-1] = np.diff(reference) / np.diff(time)
         corners = time[1:-1][np.abs(np.diff(slope[:-1])) > CORNER]
     wheel_torque = log["wheel_torque"] if truck else np.zeros_like(reference)
-    return Run(
+    return RunInputs(
         time=np.ascontiguousarray(time),
         reference=np.ascontiguousarray(reference),
         slope=slope,
@@ -95,7 +95,7 @@ def _parked(wheel_torque: Array) -> Array:
 
 
 def simulate(
-    run: Run,
+    run: RunInputs,
     values: Mapping[str, float],
     *,
     gap_position: float = 0.0,
@@ -138,7 +138,7 @@ def simulate(
     return Log(run.time, {"speed_reference": run.reference, **signals}, run.source)
 
 
-def _refuse_unsolved(run: Run, unsettled: float, out: Array) -> None:
+def _refuse_unsolved(run: RunInputs, unsettled: float, out: Array) -> None:
     """Raise UnsettledError for a result that is not the model's."""
     if unsettled > 0.0:
         raise UnsettledError(
@@ -162,7 +162,7 @@ def values_of(
     return {**parameters.values(), **flat}
 
 
-def whitened(measured: Log, simulated: Log) -> float:
+def mean_square_residual(measured: Log, simulated: Log) -> float:
     """Mean square of the residual in units of the sensors' noise, over the compared channels but
     the voltage, whose sensor may be off.
     """
@@ -174,7 +174,7 @@ def whitened(measured: Log, simulated: Log) -> float:
     return float(np.mean(squares))
 
 
-def fit_start(log: Log, run: Run, values: Mapping[str, float], points: int = 41) -> float:
+def fit_start(log: Log, run: RunInputs, values: Mapping[str, float], points: int = 41) -> float:
     """Gap position at the start that fits the log best, -1 to 1.
 
     A scan, because the timing of the first contact makes the cost many-valleyed, then a bounded
@@ -183,7 +183,9 @@ def fit_start(log: Log, run: Run, values: Mapping[str, float], points: int = 41)
     from scipy.optimize import minimize_scalar
 
     def cost(position: float) -> float:
-        return whitened(log, simulate(run, values, gap_position=position, tolerance=1e-4))
+        return mean_square_residual(
+            log, simulate(run, values, gap_position=position, tolerance=1e-4)
+        )
 
     grid = np.linspace(-1.0, 1.0, points)
     best = float(grid[np.argmin([cost(float(position)) for position in grid])])

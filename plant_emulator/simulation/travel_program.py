@@ -63,7 +63,7 @@ class ThesisReference:
         return value("gear_ratio") * self.drum_reference
 
 
-def travel(
+def simulate_travel(
     program: TravelProgram,
     parameters: ParameterSet,
     effects: Mapping[str, Mapping[str, float]] | None = None,

@@ -97,7 +97,7 @@ def identified(
     estimation = [with_own(r, effects) for r in estimation]
     prediction = [with_own(r, effects) for r in prediction]
     given = values_of(parameters, effects)
-    simulate(estimation[0].run, given)  # compiling is not part of the fit's time
+    simulate(estimation[0].inputs, given)  # compiling is not part of the fit's time
     begin = process_time()
     found = identify(estimation, parameters, free, effects=effects, progress=progress)
     spent = process_time() - begin
@@ -122,7 +122,7 @@ def _simulated(
 ) -> Pair:
     """A run as measured and as simulated."""
     own, gap = split_gap_position({**values, **recording.own, **states})
-    return recording.log, simulate(recording.run, own, gap_position=gap)
+    return recording.log, simulate(recording.inputs, own, gap_position=gap)
 
 
 def _hashes(paths: Sequence[str]) -> dict[str, str]:

@@ -22,7 +22,7 @@ from plant_emulator.recordings.recording import Recording
 from plant_emulator.signals.log import COMPARED, Log
 from plant_emulator.simulation.programs import PROGRAMS
 from plant_emulator.simulation.sensor_noise import SENSORS
-from plant_emulator.simulation.simulate import run_of
+from plant_emulator.simulation.simulate import inputs_of
 from plant_emulator.workflows.loading import admitted
 from plant_emulator.workflows.simulation import simulate
 
@@ -40,7 +40,7 @@ def planned_run(
     log = simulate(name, parameters=parameters, start="middle")
     return Recording(
         log,
-        run_of(log),
+        inputs_of(log),
         channels,
         np.array([SENSORS[channel][0] for channel in channels]),
         np.ones((len(channels), len(log.time)), bool),

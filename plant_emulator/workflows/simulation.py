@@ -16,9 +16,9 @@ from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log, without_voltage
 from plant_emulator.simulation import simulate as kernel_level
 from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram, TravelProgram, program
-from plant_emulator.simulation.sensor_noise import noisy
-from plant_emulator.simulation.simulate import Hold, fit_start, run_of, values_of
-from plant_emulator.simulation.travel_program import travel
+from plant_emulator.simulation.sensor_noise import add_noise
+from plant_emulator.simulation.simulate import Hold, fit_start, inputs_of, values_of
+from plant_emulator.simulation.travel_program import simulate_travel
 from plant_emulator.solver.kernel import kernel
 
 if TYPE_CHECKING:
@@ -59,10 +59,10 @@ def simulate(
     if isinstance(source, Log):
         log = simulate_log(source, bench, values, reference, start)
     elif isinstance(source, TravelProgram):
-        log = travel(source, bench, values)
+        log = simulate_travel(source, bench, values)
     else:
-        log = kernel_level.simulate(run_of(inputs(source), reference), values_of(bench, values))
-    return log if seed is None else noisy(log, seed)
+        log = kernel_level.simulate(inputs_of(inputs(source), reference), values_of(bench, values))
+    return log if seed is None else add_noise(log, seed)
 
 
 def parameter_set(parameters: ParameterSet | str | Path) -> ParameterSet:
@@ -112,7 +112,7 @@ def simulate_log(
         measured = with_own(recording(without_voltage(log), reference), own)
         states = fit_states(measured, values, states_of(own))
         values, gap = split_gap_position({**values, **measured.own, **states})
-        return kernel_level.simulate(measured.run, values, gap_position=gap)
-    run = run_of(log, reference)
+        return kernel_level.simulate(measured.inputs, values, gap_position=gap)
+    run = inputs_of(log, reference)
     gap = fit_start(log, run, values) if start == "fit" else 0.0
     return kernel_level.simulate(run, values, gap_position=gap)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from plant_emulator.signals.log import COMPARED, VOLTAGE, Log, compared
+from plant_emulator.signals.log import COMPARED, VOLTAGE, Log, compared_channels
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,7 +30,7 @@ def draw_validation(pairs: Sequence[tuple[Log, Log]], path: str | Path) -> None:
     """
     from matplotlib.figure import Figure
 
-    shown = {name for log, _ in pairs for name in compared(log)}
+    shown = {name for log, _ in pairs for name in compared_channels(log)}
     names = [name for name in (*COMPARED, VOLTAGE) if name in shown]
     figure = Figure(figsize=(7.0 * len(pairs), 3.2 * len(names)), layout="constrained")
     axes = figure.subplots(
@@ -43,7 +43,7 @@ def draw_validation(pairs: Sequence[tuple[Log, Log]], path: str | Path) -> None:
     for column, (log, simulation) in enumerate(pairs):
         axes[0][column].set_title(log.source)
         for row, name in enumerate(names):
-            if name in compared(log):
+            if name in compared_channels(log):
                 _draw(axes[2 * row][column], axes[2 * row + 1][column], log, simulation, name)
             else:
                 axes[2 * row][column].set_visible(False)

@@ -10,7 +10,7 @@ import pytest
 
 from plant_emulator.signals.log import Array, Log
 from plant_emulator.simulation.programs import sample_times
-from plant_emulator.simulation.simulate import run_of
+from plant_emulator.simulation.simulate import inputs_of
 from plant_emulator.simulation.simulate import simulate as simulate_run
 from plant_emulator.solver import compiler
 from plant_emulator.solver.kernel import Kernel, kernel
@@ -37,7 +37,7 @@ def with_truck(inputs: Log, wheel_torque: Array) -> Log:
 
 def simulate(inputs: Log, values: Mapping[str, float], **options: Any) -> Log:
     """Simulate inputs made by hand."""
-    return simulate_run(run_of(inputs), values, **options)
+    return simulate_run(inputs_of(inputs), values, **options)
 
 
 @dataclass

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import plant_emulator as pe
-from plant_emulator.simulation.simulate import run_of, values_of
+from plant_emulator.simulation.simulate import inputs_of, values_of
 from plant_emulator.simulation.simulate import simulate as simulate_run
 
 ROOT = Path(__file__).parents[2]
@@ -71,7 +71,7 @@ def test_program_by_name_and_as_data_are_the_same_run() -> None:
     inputs = pe.Log(log.time, {"speed_reference": log["speed_reference"]})
     assert same(log, pe.simulate(inputs, start="middle"))
     given = values_of(pe.load_parameters())
-    assert same(log, simulate_run(run_of(inputs), given))
+    assert same(log, simulate_run(inputs_of(inputs), given))
 
 
 def test_effect_without_value_has_its_plausible_size() -> None:

@@ -16,7 +16,7 @@ import pytest
 from plant_emulator import parameter_sets
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation import programs
-from plant_emulator.simulation.simulate import run_of, simulate
+from plant_emulator.simulation.simulate import inputs_of, simulate
 
 ROOT = Path(__file__).resolve().parents[2]
 KEYS = {"name", "ours", "peer", "peers", "unit", "ratio", "target", "holds"}
@@ -72,7 +72,7 @@ def test_scipy_on_the_thesis_equations_agrees_with_the_simulation(style: str) ->
     assert isinstance(program, programs.SpeedProgram)
     time, reference = program.reference()
     values = parameter_sets.load().values()
-    ours = simulate(run_of(Log(time, {"speed_reference": reference})), values)
+    ours = simulate(inputs_of(Log(time, {"speed_reference": reference})), values)
     peers = runpy.run_path(str(ROOT / "tools" / "peers.py"))
     corners = ((0.0, 0.0), *program.corners, (program.duration, 0.0))
     theirs = peers["Lsoda"](time, peers[style](corners, values), values)(1e-5)

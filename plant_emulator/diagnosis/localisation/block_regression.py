@@ -100,7 +100,7 @@ class Site:
         """
         recording, gap = self.recordings[run], self.null.states[run][GAP_POSITION]
         try:
-            log = simulate(recording.run, self.fitted, gap_position=gap)
+            log = simulate(recording.inputs, self.fitted, gap_position=gap)
         except UnsettledError:
             return None
         m = measured(replace(recording, log=log), self.fitted)

@@ -63,7 +63,7 @@ class DrumSide:
 
         found : gap, damping, the gap's position at the start, sizes of the unknown torque, torque_k
         """
-        p, inputs = self.values, self.recordings[run].run
+        p, inputs = self.values, self.recordings[run].inputs
         sizes = [found.get(f"torque_{k}", 0.0) for k in range(self.laws[run].shape[1])]
         wheel = p["drum_radius"] / p["wheel_radius"] * inputs.wheel_torque
         driven = compiled(drum_speed)(

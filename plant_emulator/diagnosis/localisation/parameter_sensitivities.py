@@ -21,7 +21,7 @@ from plant_emulator.diagnosis.localisation.parity_relations import (
     delayed_reference,
     flux,
     middle,
-    told_reference,
+    reconstructed_reference,
 )
 from plant_emulator.estimation.robust_scan import cauchy_loss
 
@@ -124,14 +124,16 @@ def dead_time(runs: Sequence[Measured], p: Mapping[str, float], known: Parameter
     known : what is known of it beforehand
     """
     nominal, std = known.value, known.std or 0.5 * known.value
-    told = [told_reference(m, p, delayed_reference(m, p["dead_time"]))[0] for m in runs]
+    references = [
+        reconstructed_reference(m, p, delayed_reference(m, p["dead_time"]))[0] for m in runs
+    ]
 
     def loss(factor: float) -> float:
         trial = factor * nominal
         away = 0.5 * ((trial - nominal) / std) ** 2
         return away + sum(
             cauchy_loss((t - delayed_reference(m, trial)) / m.noise[0])
-            for t, m in zip(told, runs, strict=True)
+            for t, m in zip(references, runs, strict=True)
         )
 
     return float(min(DEAD_TIMES, key=loss) * nominal)

@@ -125,7 +125,7 @@ def measured(recording: Recording, p: Mapping[str, float]) -> Measured:
     return Measured(
         time=log.time,
         reference=log["speed_reference"],
-        staircase=not np.any(recording.run.slope),
+        staircase=not np.any(recording.inputs.slope),
         motor_speed=log["motor_speed"],
         drum_speed=log["drum_speed"],
         current=current,
@@ -191,7 +191,7 @@ def delayed_reference(m: Measured, dead_time: float) -> Array:
     return np.asarray(m.reference[np.maximum(held, 0)])
 
 
-def told_reference(
+def reconstructed_reference(
     m: Measured, p: Mapping[str, float], nominal: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Reference that the drive must have had [rad/s], and where it was limited and tells nothing.
@@ -203,8 +203,8 @@ def told_reference(
         voltage = p["armature_resistance"] * m.current + flux(m.speed, p) * m.motor_speed
         voltage += p["armature_inductance"] * np.gradient(m.current, m.time)
     steps = np.diff(m.time, prepend=2.0 * m.time[0] - m.time[1])
-    told = np.empty_like(m.time)
-    limited = np.zeros(len(told), bool)
+    reconstructed = np.empty_like(m.time)
+    limited = np.zeros(len(reconstructed), bool)
     held_voltage = held_current = 0.0
     for n, (u, i, h) in enumerate(zip(voltage, m.current, steps, strict=True)):
         short = (u - held_voltage) / (1.0 + h / p["current_integral_time"]) / p["current_gain"]
@@ -218,8 +218,8 @@ def told_reference(
             held_voltage += h / p["current_integral_time"] * p["current_gain"] * short
         if not over:
             held_current += h / p["speed_integral_time"] * p["speed_gain"] * error
-        told[n] = m.motor_speed[n] + error
-    return told, limited
+        reconstructed[n] = m.motor_speed[n] + error
+    return reconstructed, limited
 
 
 @dataclass(frozen=True)
@@ -249,8 +249,12 @@ def values(m: Measured, p: Mapping[str, float]) -> tuple[Array, NDArray[np.bool_
     )
     driven += middle(friction(m.speed / xi, p)) - m.drum_torque
     nominal = delayed_reference(m, p["dead_time"])
-    told, limited = told_reference(m, p, nominal)
-    rows = [motor - middle(m.torque), middle(m.torque) + driven / xi, middle(told - nominal)]
+    reconstructed, limited = reconstructed_reference(m, p, nominal)
+    rows = [
+        motor - middle(m.torque),
+        middle(m.torque) + driven / xi,
+        middle(reconstructed - nominal),
+    ]
     if m.voltage is not None:
         induced = p["armature_inductance"] * np.diff(m.current) / step
         emf = flux(m.speed, p) * m.motor_speed

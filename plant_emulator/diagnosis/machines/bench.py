@@ -171,7 +171,7 @@ class BenchModel:
                 time=r.log.time,
                 measured=np.stack([r.log[name] for name in r.channels]),
                 noise=r.noise,
-                measured_input=r.run.truck,
+                measured_input=r.inputs.truck,
             )
             for r in recordings
         ]
@@ -186,7 +186,7 @@ class BenchModel:
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
         """See `Model`."""
         recording, fixed = self._recordings[run], self._fixed(run, effects)
-        tolerance = WITH_TRUCK if recording.run.truck else TOLERANCE
+        tolerance = WITH_TRUCK if recording.inputs.truck else TOLERANCE
 
         def residual(found: Mapping[str, float]) -> Array:
             return recording.residual(*split_gap_position({**fixed, **found}), tolerance)

@@ -17,10 +17,10 @@ from plant_emulator.identification.experiment_design import noise_levels
 from plant_emulator.model.stage import split_gap_position
 from plant_emulator.recordings.preflight import LEAST_MOTION, NAMES
 from plant_emulator.recordings.recording import Recording
-from plant_emulator.signals.log import VOLTAGE, Log, compared
-from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram, TravelProgram, in_words
-from plant_emulator.simulation.simulate import run_of, simulate
-from plant_emulator.simulation.travel_program import travel
+from plant_emulator.signals.log import VOLTAGE, Log, compared_channels
+from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram, TravelProgram, describe
+from plant_emulator.simulation.simulate import inputs_of, simulate
+from plant_emulator.simulation.travel_program import simulate_travel
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -73,7 +73,7 @@ def planned(
     levels = noise_levels(recordings)
     shell = _last_shell(logs)
     for speeds in (p for p in rest if isinstance(p, SpeedProgram)):
-        yield from _recorded(in_words(speeds), _inputs(speeds), warm, levels, shell)
+        yield from _recorded(describe(speeds), _inputs(speeds), warm, levels, shell)
     if not cold(logs):
         speeds = max(
             (p for p in PROGRAMS.values() if isinstance(p, SpeedProgram)), key=lambda p: p.duration
@@ -82,8 +82,8 @@ def planned(
         yield from _recorded(words, _inputs(speeds), from_cold, levels, COLD_SHELL)
     for cycle in (p for p in rest if isinstance(p, TravelProgram)):
         with suppress(UnsettledError):
-            inputs = travel(cycle, parameters)
-            yield from _recorded(in_words(cycle), inputs, warm, levels, shell)
+            inputs = simulate_travel(cycle, parameters)
+            yield from _recorded(describe(cycle), inputs, warm, levels, shell)
 
 
 def _last_shell(logs: Sequence[Log]) -> float | None:
@@ -100,7 +100,7 @@ def _recorded(
     words: str, inputs: Log, values: Values, levels: Mapping[str, float], shell: float | None
 ) -> Iterator[Recording]:
     """The run as these values predict it; none where they cannot be driven through it."""
-    run = run_of(inputs)
+    run = inputs_of(inputs)
     with suppress(UnsettledError):
         others, gap = split_gap_position(values)
         log = simulate(run, others, gap_position=gap)
@@ -124,8 +124,9 @@ def missing_experiments(logs: Sequence[Log], base_speed: float) -> dict[str, tup
     """
     fastest = max(float(log["motor_speed"].max()) for log in logs)
     backwards = min(float(log["speed_reference"].min()) for log in logs) < -LEAST_MOTION
+    voltage = any(VOLTAGE in compared_channels(log) for log in logs)
     missing = (
-        (not any(VOLTAGE in compared(log) for log in logs), NAMES[VOLTAGE], ("drive", "motor")),
+        (not voltage, NAMES[VOLTAGE], ("drive", "motor")),
         (
             fastest < base_speed,
             f"a run above {base_speed:.0f} rad/s, where the field is weakened",

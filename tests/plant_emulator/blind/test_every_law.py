@@ -10,7 +10,7 @@ from plant_emulator.effects import Effect
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import COMPARED, Log
 from plant_emulator.simulation.sensor_noise import SENSORS
-from plant_emulator.simulation.simulate import run_of, simulate, values_of
+from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
 from tests.plant_emulator.runs import linear, with_truck
 
 UP = linear((0.2, 0.0), (2.2, 330.0), (4.0, 0.0), duration=5.0)
@@ -47,7 +47,7 @@ def _plausible(name: str) -> dict[str, float]:
 
 @pytest.fixture(scope="module")
 def nominals(nominal: ParameterSet) -> dict[str, Log]:
-    return {name: simulate(run_of(run), nominal.values()) for name, run in RUNS.items()}
+    return {name: simulate(inputs_of(run), nominal.values()) for name, run in RUNS.items()}
 
 
 @every_law
@@ -55,7 +55,7 @@ def nominals(nominal: ParameterSet) -> dict[str, Log]:
 def test_law_is_absent_at_its_neutral_value(
     name: str, run: str, nominal: ParameterSet, nominals: dict[str, Log]
 ) -> None:
-    found = simulate(run_of(RUNS[run]), values_of(nominal, {name: _neutral(name)}))
+    found = simulate(inputs_of(RUNS[run]), values_of(nominal, {name: _neutral(name)}))
     for signal in found.signals:
         np.testing.assert_array_equal(found[signal], nominals[run][signal])
 
@@ -65,7 +65,7 @@ def test_law_of_plausible_size_shows(
     name: str, nominal: ParameterSet, nominals: dict[str, Log]
 ) -> None:
     values = values_of(nominal, {name: _plausible(name)})
-    found = {run: simulate(run_of(log), values) for run, log in RUNS.items()}
+    found = {run: simulate(inputs_of(log), values) for run, log in RUNS.items()}
     assert max(size(found[run], nominals[run]) for run in RUNS) > 0.5
 
 
@@ -79,7 +79,7 @@ def test_law_differs_from_that_of_the_library_at_any_size(
     theirs = values_of(nominal, {effect: _plausible(effect)})
     parts = []
     for run, log in RUNS.items():
-        both = [simulate(run_of(log), values) for values in (ours, theirs)]
+        both = [simulate(inputs_of(log), values) for values in (ours, theirs)]
         changes = [
             np.concatenate([(f[c] - nominals[run][c]) / SENSORS[c][0] for c in COMPARED])
             for f in both
@@ -105,7 +105,7 @@ def test_law_is_not_in_the_library(name: str) -> None:
 @every_law
 def test_law_leaves_a_bench_at_rest_at_rest(name: str, nominal: ParameterSet) -> None:
     values = values_of(nominal, {name: _plausible(name)})
-    log = simulate(run_of(linear((0.0, 0.0), duration=1.0)), values)
+    log = simulate(inputs_of(linear((0.0, 0.0), duration=1.0)), values)
     assert np.abs(log["motor_speed"]).max() < 1e-9
 
 

@@ -13,7 +13,7 @@ from plant_emulator.errors import UnsettledError
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import COMPARED, Array
 from plant_emulator.simulation.sensor_noise import SENSORS
-from plant_emulator.simulation.simulate import run_of, simulate
+from plant_emulator.simulation.simulate import inputs_of, simulate
 from plant_emulator.solver.kernel import kernel, use_own_effects
 from tests.plant_emulator.blind.conftest import case_with, hidden
 
@@ -21,8 +21,8 @@ from tests.plant_emulator.blind.conftest import case_with, hidden
 def test_truth_has_the_gap_position_and_the_parameters_of_its_case(nominal: ParameterSet) -> None:
     """Small fixed steps and adaptive steps agree within half of the noise."""
     (log,) = simulate_truth(case_with(kind="none"), nominal)
-    found = simulate(run_of(log), nominal.values(), gap_position=0.3)
-    other = simulate(run_of(log), nominal.values(), gap_position=-0.3)
+    found = simulate(inputs_of(log), nominal.values(), gap_position=0.3)
+    other = simulate(inputs_of(log), nominal.values(), gap_position=-0.3)
     errors = [np.abs(log[c] - found[c]).max() / SENSORS[c][0] for c in COMPARED]
     assert 0.0 < max(errors) < 0.5
     assert max(np.abs(log[c] - other[c]).max() / SENSORS[c][0] for c in COMPARED) > 5.0

@@ -13,8 +13,8 @@ from plant_emulator import logs
 from plant_emulator.cli import main
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import Log
-from plant_emulator.simulation.sensor_noise import noisy
-from plant_emulator.simulation.simulate import run_of, simulate
+from plant_emulator.simulation.sensor_noise import add_noise
+from plant_emulator.simulation.simulate import inputs_of, simulate
 from plant_emulator.workflows.blind_trial.examiner import Examiner
 from plant_emulator.workflows.blind_trial.folder import ROOT, program_hash
 from plant_emulator.workflows.blind_trial.trial import Trial
@@ -37,11 +37,11 @@ atexit.register(lambda: (out.write("\\n".join(f"module {{m}}" for m in sys.modul
 def short_log(tmp_path: Path, nominal: ParameterSet) -> Path:
     """A log of a few seconds of the nominal bench."""
     run = linear((0.2, 0.0), (2.0, 230.0), (2.5, 230.0), (4.0, 60.0), duration=5.0)
-    found = simulate(run_of(run), nominal.values())
+    found = simulate(inputs_of(run), nominal.values())
     signals = {k: v for k, v in found.signals.items() if k != "armature_voltage"}
     file = tmp_path / "given" / "program1.csv.gz"
     file.parent.mkdir()
-    logs.write(noisy(Log(found.time, signals), 1), file)
+    logs.write(add_noise(Log(found.time, signals), 1), file)
     return file
 
 
@@ -78,7 +78,7 @@ def test_witness_would_record_an_opened_answer(tmp_path: Path, folder: Path) -> 
 
 
 def test_refused_log_is_reported_by_its_one_line(tmp_path: Path, nominal: ParameterSet) -> None:
-    still = simulate(run_of(linear((0.0, 0.0), duration=1.0)), nominal.values())
+    still = simulate(inputs_of(linear((0.0, 0.0), duration=1.0)), nominal.values())
     file = tmp_path / "program1.csv.gz"
     logs.write(still, file)
     found = Examiner().diagnose([file])

@@ -4,7 +4,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.machines.bench_programs import missing_experiments, shows, undriven
 from plant_emulator.signals.log import Array, Log
-from plant_emulator.simulation.programs import PROGRAMS, in_words
+from plant_emulator.simulation.programs import PROGRAMS, describe
 
 
 def driven(name: str, factor: float = 1.0, **more: Array) -> Log:
@@ -40,5 +40,5 @@ def test_what_logs_lack_is_told_of_the_blocks_that_it_tells_of():
 
 
 def test_program_is_told_as_one_plans_it():
-    assert in_words(PROGRAMS["program4"]) == "program4 (60 s, to 350 rad/s, with sweeps)"
-    assert in_words(PROGRAMS["program6"]) == "program6 (a truck of 3640 kg on the drum)"
+    assert describe(PROGRAMS["program4"]) == "program4 (60 s, to 350 rad/s, with sweeps)"
+    assert describe(PROGRAMS["program6"]) == "program6 (a truck of 3640 kg on the drum)"

@@ -12,8 +12,8 @@ from plant_emulator.diagnosis.localisation.locate import WORTHWHILE_BLOCK_GAIN, 
 from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
-from plant_emulator.simulation.sensor_noise import noisy
-from plant_emulator.simulation.simulate import run_of, simulate, values_of
+from plant_emulator.simulation.sensor_noise import add_noise
+from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
 from plant_emulator.solver.kernel import kernel
 
 PARAMETERS = parameter_sets.load("thesis_table_3_1")
@@ -34,7 +34,7 @@ def with_effect(inputs: Log, effects: Mapping[str, Mapping[str, float]]) -> Log:
     values = values_of(PARAMETERS, effects)
     drift = {"gear_coulomb_friction": 1.1, "drum_inertia": 1.02, "dead_time": 0.97}
     values |= {name: factor * values[name] for name, factor in drift.items()}
-    return noisy(simulate(run_of(inputs), values, gap_position=0.3, step=5e-4), seed=1)
+    return add_noise(simulate(inputs_of(inputs), values, gap_position=0.3, step=5e-4), seed=1)
 
 
 def test_equal_gains_are_equal_shares_and_a_small_one_is_little() -> None:

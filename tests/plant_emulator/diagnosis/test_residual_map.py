@@ -43,7 +43,7 @@ def test_runs_are_pooled_by_their_samples(run: Recording) -> None:
 
 def test_samples_that_do_not_count_are_left_out(run: Recording) -> None:
     half = np.arange(run.use.shape[1]) < 900
-    used = Recording(run.log, run.run, run.channels, run.noise, run.use & half)
+    used = Recording(run.log, run.inputs, run.channels, run.noise, run.use & half)
     cells = residual_map([used], [np.where(half, 1.0, 100.0) * used.use], BASE_SPEED)
     found = cell(cells, "drum_speed", "phase", "cruise")
     assert found.gap / found.noise == pytest.approx(1.0)

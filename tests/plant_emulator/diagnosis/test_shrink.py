@@ -26,7 +26,7 @@ def constant(*levels: float) -> Prediction:
     return prediction(*(np.full(100, level) for level in levels))
 
 
-def run_of(*channels: str, samples: int = 100, noise: float = 1.0) -> MeasuredRun:
+def inputs_of(*channels: str, samples: int = 100, noise: float = 1.0) -> MeasuredRun:
     """A run with these channels, each with the same noise."""
     return MeasuredRun(
         source="run",
@@ -38,7 +38,7 @@ def run_of(*channels: str, samples: int = 100, noise: float = 1.0) -> MeasuredRu
     )
 
 
-NAMES = [run_of("a", "b")]
+NAMES = [inputs_of("a", "b")]
 
 
 def test_closed_fraction_by_hand() -> None:
@@ -69,7 +69,7 @@ def test_worse_prediction_closes_less_than_nothing() -> None:
 
 def test_samples_of_all_runs_are_pooled() -> None:
     both = gap(
-        [run_of("a"), run_of("a")],
+        [inputs_of("a"), inputs_of("a")],
         [prediction(np.full(100, 3.0)), prediction(np.full(300, 1.0))],
         [10, 10],
     )
@@ -79,12 +79,14 @@ def test_samples_of_all_runs_are_pooled() -> None:
 def test_samples_that_do_not_count_are_left_out() -> None:
     residual = np.full(100, 2.0)
     residual[:50] = 0.0
-    found = gap([run_of("a")], [prediction(residual)], [10])
+    found = gap([inputs_of("a")], [prediction(residual)], [10])
     assert found.by_channel == pytest.approx([2.0])
 
 
 def test_channel_that_only_one_run_has_counts_there() -> None:
-    found = gap([run_of("a", "b"), run_of("a")], [constant(2.0, 3.0), constant(1.0)], [10, 10])
+    found = gap(
+        [inputs_of("a", "b"), inputs_of("a")], [constant(2.0, 3.0), constant(1.0)], [10, 10]
+    )
     assert found.channels == ("a", "b")
     assert found.by_channel == pytest.approx([np.sqrt(2.5), 3.0])
 
@@ -105,8 +107,8 @@ def test_interval_covers_the_truth_at_its_rate(memory: float, samples: int, leas
     for _ in range(300):
         first, second = (first_order(random, memory, samples) for _ in range(2))
         blocks = block_lengths([prediction(2.0 * first)])
-        before = gap([run_of("a")], [prediction(2.0 * first)], blocks)
-        after = gap([run_of("a")], [prediction(1.3 * second)], blocks)
+        before = gap([inputs_of("a")], [prediction(2.0 * first)], blocks)
+        after = gap([inputs_of("a")], [prediction(1.3 * second)], blocks)
         found = interval(before, after)
         assert found is not None
         hits += found[0] <= 1 - 0.69 / 3 <= found[1]
@@ -131,7 +133,7 @@ def test_interval_of_a_channel_that_one_run_of_many_has_is_finite() -> None:
     rare = np.zeros(100)
     rare[:10] = 3.0
     some = [constant(2.0)] * 5 + [prediction(np.full(100, 2.0), rare)]
-    runs = [run_of("a")] * 5 + [run_of("a", "b")]
+    runs = [inputs_of("a")] * 5 + [inputs_of("a", "b")]
     before = gap(runs, some, [10] * 6)
     found = interval(before, before)
     assert found == pytest.approx((0.0, 0.0))
@@ -145,7 +147,7 @@ def test_channel_without_held_out_samples_has_no_gap() -> None:
 
 def test_gap_over_the_noise_is_that_of_the_pooled_squares() -> None:
     """Residuals of 1 at a noise of 1, and of 6 at a noise of 3: (1 + 36) / (1 + 9)."""
-    runs = [run_of("a"), run_of("a", noise=3.0)]
+    runs = [inputs_of("a"), inputs_of("a", noise=3.0)]
     found = gap(runs, [constant(1.0), constant(2.0)], [10, 10])
     assert found.by_channel == pytest.approx([np.sqrt(3.7)])
     assert found.noise == pytest.approx([np.sqrt(5.0)])

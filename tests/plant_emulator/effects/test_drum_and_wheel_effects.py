@@ -9,7 +9,7 @@ from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.simulation.programs import TravelProgram
 from plant_emulator.simulation.running_bench import Bench
 from plant_emulator.simulation.simulate import values_of
-from plant_emulator.simulation.travel_program import travel
+from plant_emulator.simulation.travel_program import simulate_travel
 from tests import reference_plant as thesis
 from tests.plant_emulator.runs import DRUM, Piecewise, linear, simulate, with_truck
 
@@ -132,6 +132,6 @@ def test_running_bench_knows_whether_a_truck_stands_on_it(nominal: ParameterSet)
 
 def test_travel_program_has_its_truck_on_the_drum(nominal: ParameterSet) -> None:
     program = TravelProgram(name="short", duration=4.0, mass=3640.0)
-    plain = travel(program, nominal)
-    lossy = travel(program, nominal, {"tyre_rolling_loss": {"force": 300.0}})
+    plain = simulate_travel(program, nominal)
+    lossy = simulate_travel(program, nominal, {"tyre_rolling_loss": {"force": 300.0}})
     assert lossy["drum_speed"][-1] < 0.95 * plain["drum_speed"][-1]

@@ -13,7 +13,7 @@ from plant_emulator.model import laws
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.model.stage import STAGE
 from plant_emulator.signals.log import Log
-from plant_emulator.simulation.simulate import run_of, simulate, values_of
+from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
 from tests.plant_emulator.runs import linear
 
 ReadLog = Callable[[str], Log]
@@ -45,7 +45,7 @@ def without(nominal: ParameterSet, inputs: dict[str, Log]) -> Callable[[str], Lo
 
     @cache
     def simulated(run: str) -> Log:
-        return simulate(run_of(inputs[run]), nominal.values())
+        return simulate(inputs_of(inputs[run]), nominal.values())
 
     return simulated
 
@@ -84,7 +84,7 @@ def test_effect_is_absent_at_its_neutral_value(
     without: Callable[[str], Log],
 ) -> None:  # fmt: skip
     neutral = {key: p.neutral for key, p in effects.load(name).parameters.items()}
-    found = simulate(run_of(inputs[run]), values_of(nominal, {name: neutral}))
+    found = simulate(inputs_of(inputs[run]), values_of(nominal, {name: neutral}))
     for signal in found.signals:
         np.testing.assert_array_equal(found[signal], without(run)[signal])
 
@@ -99,7 +99,7 @@ def test_effect_of_plausible_size_shows_in_some_channel(
     values = values_of(nominal, {name: effects.load(name).plausible()})
     changes = []
     for run, log in inputs.items():
-        found = simulate(run_of(log), values)
+        found = simulate(inputs_of(log), values)
         assert all(np.isfinite(signal).all() for signal in found.signals.values())
         changes += [np.abs(found[k] - without(run)[k]).max() / n for k, n in noise.items()]
     assert max(changes) > 0.1
@@ -108,7 +108,7 @@ def test_effect_of_plausible_size_shows_in_some_channel(
 @every_effect
 def test_effect_leaves_a_bench_at_rest_at_rest(name: str, nominal: ParameterSet) -> None:
     values = values_of(nominal, {name: effects.load(name).plausible()})
-    log = simulate(run_of(linear((0.0, 0.0), duration=1.0)), values)
+    log = simulate(inputs_of(linear((0.0, 0.0), duration=1.0)), values)
     assert np.abs(log["motor_speed"]).max() < 1e-9
     assert np.abs(log["drum_speed"]).max() < 1e-9
 
@@ -156,7 +156,7 @@ def test_all_effects_at_once_settle(nominal: ParameterSet, inputs: dict[str, Log
     """Each of plausible size; a stage that does not settle is refused by `simulate`."""
     values = values_of(nominal, {name: effects.load(name).plausible() for name in effects.names()})
     for log in inputs.values():
-        found = simulate(run_of(log), values)
+        found = simulate(inputs_of(log), values)
         assert all(np.isfinite(signal).all() for signal in found.signals.values())
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation.running_bench import Bench
-from plant_emulator.simulation.simulate import fit_start, run_of, whitened
+from plant_emulator.simulation.simulate import fit_start, inputs_of, mean_square_residual
 from tests.plant_emulator.model.test_plant import energy
 from tests.plant_emulator.runs import GEAR, Piecewise, linear, simulate
 
@@ -129,13 +129,13 @@ def test_loss_of_an_independent_bench_is_told_to_the_noise(
     The truck's torque is logged with noise, which adds 0.04 to program 6.
     """
     log = bench_log(f"bench_practice/practice_009/{program}")
-    run, values = run_of(log), nominal.values()
+    run, values = inputs_of(log), nominal.values()
     values |= {key: (1.0 + percent / 100.0) * values[key] for key, percent in DRIFT.items()}
     lossy = {**values, SHARE: 0.14}
     start = fit_start(log, run, lossy)
 
     def misfit(of: dict[str, float]) -> float:
-        return whitened(log, simulate(log, of, gap_position=start))
+        return mean_square_residual(log, simulate(log, of, gap_position=start))
 
     assert misfit(lossy) < 1.06
     assert misfit(values) > without

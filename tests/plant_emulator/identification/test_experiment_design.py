@@ -14,8 +14,8 @@ from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import Recording, recording
 from plant_emulator.signals.log import Log, without_voltage
 from plant_emulator.simulation.programs import PROGRAMS
-from plant_emulator.simulation.sensor_noise import noisy
-from plant_emulator.simulation.simulate import run_of, simulate, values_of
+from plant_emulator.simulation.sensor_noise import add_noise
+from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
 from tests.plant_emulator.identification.practice import truth
 
 Reader = Callable[[str], Log]
@@ -45,7 +45,9 @@ class Bench:
     def run(self, time: np.ndarray, reference: np.ndarray, seed: int, gap: float = 0.0) -> Log:
         """The log of a run with other noise, of the channels that the practice logs have."""
         inputs = Log(time, {"speed_reference": reference}, "made")
-        return without_voltage(noisy(simulate(run_of(inputs), self.true, gap_position=gap), seed))
+        return without_voltage(
+            add_noise(simulate(inputs_of(inputs), self.true, gap_position=gap), seed)
+        )
 
     def fitted_with(self, program: str, seed: int) -> Identification:
         """The fit to the log at hand and a run of the program, from the true parameters."""

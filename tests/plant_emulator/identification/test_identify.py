@@ -18,8 +18,8 @@ from plant_emulator.recordings.recording import Recording, recording
 from plant_emulator.signals.log import COMPARED, Log
 from plant_emulator.simulation.fit_metrics import validate
 from plant_emulator.simulation.programs import PROGRAMS
-from plant_emulator.simulation.sensor_noise import SENSORS, noisy
-from plant_emulator.simulation.simulate import fit_start, run_of, simulate, values_of
+from plant_emulator.simulation.sensor_noise import SENSORS, add_noise
+from plant_emulator.simulation.simulate import fit_start, inputs_of, simulate, values_of
 from tests.plant_emulator.identification.practice import DEVIATIONS, FREE, truth
 
 Reader = Callable[[str], Log]
@@ -88,7 +88,7 @@ def test_held_out_run_is_predicted_to_the_noise(
     nominal: ParameterSet, bench_log: Reader, fitted: Callable[[str], Identification], case: str
 ) -> None:
     log = bench_log(f"bench_practice/{case}/program2")
-    run, values = run_of(log), values_of(fitted(case).parameter_set)
+    run, values = inputs_of(log), values_of(fitted(case).parameter_set)
     simulated = simulate(run, values, gap_position=fit_start(log, run, values))
     fits = validate(log, simulated)
     least = {
@@ -148,7 +148,7 @@ def test_log_without_field_weakening_says_nothing_of_its_flux(nominal: Parameter
     time = np.arange(1200) * 0.01
     reference = np.interp(time, [0, 3, 6, 9, 12], [0, 120, 120, 0, 0])
     log = Log(time, {"speed_reference": reference}, "slow")
-    measured = noisy(simulate(run_of(log), values_of(nominal)), seed=1)
+    measured = add_noise(simulate(inputs_of(log), values_of(nominal)), seed=1)
     found = identify([recording(measured)], nominal)
     by_name = {p.name: p for p in found.parameters}
     assert not by_name["flux_constant_1"].identifiable
@@ -220,12 +220,12 @@ def test_temperature_at_the_start_belongs_to_its_run(nominal: ParameterSet) -> N
     """Two runs with the same gear, one cold, one half warm; what the shell shows is taken."""
     own = {"viscosity_coefficient": 0.02, "start_temperature": 305.15, "shell_temperature": 305.15}
     time, reference = PROGRAMS["program1"].reference()  # type: ignore[union-attr]
-    run = run_of(Log(time, {"speed_reference": reference}, "made"))
+    run = inputs_of(Log(time, {"speed_reference": reference}, "made"))
     recordings = []
     for seed, (oil, shell) in enumerate([(285.0, 284.0), (300.0, 298.0)]):
         there = own | {"start_temperature": oil, "shell_temperature": shell}
         values = values_of(nominal, {"gear_oil_temperature": there}) | {"drum_inertia": 330.0}
-        recordings.append(recording(noisy(simulate(run, values), seed)))
+        recordings.append(recording(add_noise(simulate(run, values), seed)))
     found = identify(recordings, nominal, ("drum_inertia",), effects={"gear_oil_temperature": own})
     assert found.parameters[0].value == pytest.approx(330.0, rel=2e-3)
     temperatures = [s["gear_oil_temperature_start_temperature"] for s in found.states]
@@ -265,7 +265,7 @@ def test_parameter_at_the_end_of_its_range_is_told(
 
 def repeats(nominal: ParameterSet, log: Log, count: int) -> Sequence[np.ndarray]:
     """Errors over standard errors of fits to synthetic logs, one row a repeat."""
-    run, rows = run_of(log), []
+    run, rows = inputs_of(log), []
     for seed in range(count):
         random = np.random.default_rng(seed)
         true = values_of(nominal) | {
@@ -273,7 +273,7 @@ def repeats(nominal: ParameterSet, log: Log, count: int) -> Sequence[np.ndarray]
             for n, z in zip(FREE, random.standard_normal(len(FREE)), strict=True)
         }
         bench = simulate(run, true, gap_position=random.uniform(-1, 1), step=5e-4)
-        found = identify([recording(noisy(bench, seed))], nominal)
+        found = identify([recording(add_noise(bench, seed))], nominal)
         rows.append(
             np.array([(p.value - true[p.name]) / p.standard_error for p in found.parameters])
         )

@@ -6,7 +6,7 @@ import pytest
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation.fit_metrics import validate
-from plant_emulator.simulation.simulate import run_of, simulate
+from plant_emulator.simulation.simulate import inputs_of, simulate
 from tests import reference_plant
 
 RUNS = {
@@ -26,7 +26,7 @@ def test_model_is_the_thesis_equations(nominal: ParameterSet, name: str) -> None
     plain = reference_plant.simulate(corners, time, gap_position)
     reference = np.interp(time, *zip(*corners, strict=True))
     expected = Log(time, {"speed_reference": reference, **plain}, "reference plant")
-    found = simulate(run_of(expected), nominal.values(), gap_position=gap_position)
+    found = simulate(inputs_of(expected), nominal.values(), gap_position=gap_position)
     for channel, fit in validate(expected, found).items():
         assert fit.nrmsd <= 5e-5, (channel, fit.nrmsd)
 
@@ -35,6 +35,6 @@ def test_limits_are_reached_in_the_run_that_is_to_reach_them(nominal: ParameterS
     corners, gap_position = RUNS["current and voltage at their limits"]
     time = np.round(np.arange(301) * 0.01, 9)
     reference = np.interp(time, *zip(*corners, strict=True))
-    run = run_of(Log(time, {"speed_reference": reference}))
+    run = inputs_of(Log(time, {"speed_reference": reference}))
     log = simulate(run, nominal.values(), gap_position=gap_position)
     assert np.sum(np.abs(log["armature_current"]) > 70.0) > 5

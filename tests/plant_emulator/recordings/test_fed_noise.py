@@ -14,8 +14,8 @@ from plant_emulator.recordings.input_noise import NoiseDirections, noise_directi
 from plant_emulator.recordings.recording import Recording, recording
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation.programs import TravelProgram, program
-from plant_emulator.simulation.sensor_noise import SENSORS, noisy
-from plant_emulator.simulation.travel_program import travel
+from plant_emulator.simulation.sensor_noise import SENSORS, add_noise
+from plant_emulator.simulation.travel_program import simulate_travel
 
 GAP = 0.3
 
@@ -25,12 +25,12 @@ def true_log(nominal: ParameterSet) -> Log:
     """Program 6 without noise."""
     known = program("program6")
     assert isinstance(known, TravelProgram)
-    return travel(known, nominal, gap_position=GAP)
+    return simulate_travel(known, nominal, gap_position=GAP)
 
 
 @pytest.fixture(scope="module")
 def measured(true_log: Log) -> Recording:
-    return recording(noisy(true_log, 1))
+    return recording(add_noise(true_log, 1))
 
 
 def test_direction_of_deviation_three_comes_out_with_variance_one() -> None:
@@ -74,7 +74,7 @@ def test_directions_hold_what_drawn_noise_of_the_wheel_torque_does(
 
 def test_samples_that_do_not_count_stay_zero(true_log: Log, nominal: ParameterSet) -> None:
     counted = true_log.time < 22.55
-    log = noisy(true_log, 1)
+    log = add_noise(true_log, 1)
     part = recording(log, use={"armature_current": counted})
     found = noise_directions(part, nominal.values(), GAP)
     assert found is not None
@@ -84,7 +84,7 @@ def test_samples_that_do_not_count_stay_zero(true_log: Log, nominal: ParameterSe
 
 
 def test_log_without_a_truck_feeds_nothing(nominal: ParameterSet, true_log: Log) -> None:
-    signals = {k: v for k, v in noisy(true_log, 1).signals.items() if k != "wheel_torque"}
+    signals = {k: v for k, v in add_noise(true_log, 1).signals.items() if k != "wheel_torque"}
     alone = recording(Log(true_log.time, signals, true_log.source))
     assert noise_directions(alone, nominal.values(), GAP) is None
 
@@ -93,7 +93,7 @@ def test_drum_inertia_of_a_noisy_log_lies_within_its_standard_error(
     true_log: Log, nominal: ParameterSet
 ) -> None:
     """With the sensors' noise alone it is 21 standard errors off."""
-    answer = identify([recording(noisy(true_log, 4000))], nominal, ["drum_inertia"])
+    answer = identify([recording(add_noise(true_log, 4000))], nominal, ["drum_inertia"])
     (inertia,) = answer.parameters
     assert abs(inertia.value - 312.69) < 3.5 * inertia.standard_error
 
@@ -130,7 +130,7 @@ def test_long_log_needs_no_more_simulations_than_a_short_one(
         return settled(self, *values)
 
     monkeypatch.setattr(Recording, "settled", counting)
-    assert noise_directions(recording(noisy(true_log, 1)), nominal.values(), GAP) is not None
+    assert noise_directions(recording(add_noise(true_log, 1)), nominal.values(), GAP) is not None
     assert next(calls) == 61
 
 

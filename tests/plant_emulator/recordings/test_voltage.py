@@ -25,9 +25,9 @@ from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.preflight import preflight
 from plant_emulator.recordings.recording import OFFSET, Recording, recording
-from plant_emulator.signals.log import COMPARED, VOLTAGE, Log, compared, without_voltage
-from plant_emulator.simulation.sensor_noise import SENSORS, noisy
-from plant_emulator.simulation.simulate import run_of, simulate, values_of
+from plant_emulator.signals.log import COMPARED, VOLTAGE, Log, compared_channels, without_voltage
+from plant_emulator.simulation.sensor_noise import SENSORS, add_noise
+from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
 from plant_emulator.solver.kernel import kernel
 from plant_emulator.workflows.loading import alike
 
@@ -44,7 +44,7 @@ def driven(
 ) -> Log:
     """A run of a bench with its voltage, stepped finely, with the sensors' noise."""
     values = values_of(nominal, effects) | changed
-    return noisy(simulate(run_of(inputs), values, gap_position=0.3, step=1e-3), seed)
+    return add_noise(simulate(inputs_of(inputs), values, gap_position=0.3, step=1e-3), seed)
 
 
 def runs_of(
@@ -69,7 +69,7 @@ def with_voltage(log: Log, voltage: np.ndarray) -> Log:
 def test_column_of_the_voltage_that_nobody_feeds_is_left_out_and_told(bench_log: Reader) -> None:
     log = bench_log("bench_practice/practice_002/program1")
     dead = with_voltage(log, np.zeros_like(log.time))
-    assert compared(dead) == COMPARED
+    assert compared_channels(dead) == COMPARED
     assert preflight(dead, 62.6).notes == (
         "run.csv: armature_voltage_V does not move; it is left out",
     )
@@ -168,7 +168,7 @@ def test_derivatives_of_the_relations_are_those_of_finite_differences(
     bench_log: Reader, nominal: ParameterSet
 ) -> None:
     """What is left with a parameter taken too small, over how much: its column in `slopes`."""
-    log = simulate(run_of(bench_log("bench_nominal/program1")), nominal.values())
+    log = simulate(inputs_of(bench_log("bench_nominal/program1")), nominal.values())
     true = nominal.values()
     m = measured(recording(log), true)
     q = inside(m, m.drum_speed, true)
@@ -271,8 +271,8 @@ def test_place_of_what_the_voltage_shows(
 def test_noise_of_the_voltage_changes_no_other_channel_s(
     bench_log: Reader, nominal: ParameterSet
 ) -> None:
-    log = simulate(run_of(bench_log("bench_nominal/program1")), nominal.values())
+    log = simulate(inputs_of(bench_log("bench_nominal/program1")), nominal.values())
     others = {name: channel for name, channel in log.signals.items() if name != VOLTAGE}
-    with_it, without = noisy(log, 5), noisy(replace(log, signals=others), 5)
+    with_it, without = add_noise(log, 5), add_noise(replace(log, signals=others), 5)
     assert all(np.array_equal(with_it[name], without[name]) for name in COMPARED)
     assert np.std(with_it[VOLTAGE] - log[VOLTAGE]) == pytest.approx(SENSORS[VOLTAGE][0], rel=0.05)

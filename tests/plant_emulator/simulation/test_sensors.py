@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from plant_emulator.signals.log import Log
-from plant_emulator.simulation.sensor_noise import SENSORS, noisy
+from plant_emulator.simulation.sensor_noise import SENSORS, add_noise
 
 # signal -> noise rms, quantisation step (README of the data, one more digit)
 LEVELS = {
@@ -24,7 +24,7 @@ STILL = Log(TIME, {"speed_reference": np.ones(20_000), **{k: np.full(20_000, 7.0
 @pytest.mark.parametrize("signal", LEVELS)
 def test_noise_has_its_level_and_resolution(signal: str) -> None:
     deviation, step = LEVELS[signal]
-    shown = noisy(STILL, 1)[signal]
+    shown = add_noise(STILL, 1)[signal]
     assert np.std(shown) == pytest.approx(np.hypot(deviation, step / np.sqrt(12)), rel=0.03)
     assert shown.mean() == pytest.approx(7.0, abs=0.05 * deviation)
     counts = shown / step
@@ -41,11 +41,13 @@ def test_resolution_is_that_of_the_noisy_logs(signal: str, bench_log: Callable[[
 
 
 def test_noise_is_drawn_from_its_seed() -> None:
-    assert np.array_equal(noisy(STILL, 3)["motor_speed"], noisy(STILL, 3)["motor_speed"])
-    assert not np.array_equal(noisy(STILL, 3)["motor_speed"], noisy(STILL, 4)["motor_speed"])
+    assert np.array_equal(add_noise(STILL, 3)["motor_speed"], add_noise(STILL, 3)["motor_speed"])
+    assert not np.array_equal(
+        add_noise(STILL, 3)["motor_speed"], add_noise(STILL, 4)["motor_speed"]
+    )
 
 
 def test_reference_and_time_stay_exact() -> None:
-    shown = noisy(STILL, 1)
+    shown = add_noise(STILL, 1)
     assert np.array_equal(shown["speed_reference"], STILL["speed_reference"])
     assert np.array_equal(shown.time, TIME)

@@ -8,7 +8,13 @@ import pytest
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import COMPARED, Log
 from plant_emulator.simulation.fit_metrics import validate
-from plant_emulator.simulation.simulate import fit_start, run_of, simulate, values_of, whitened
+from plant_emulator.simulation.simulate import (
+    fit_start,
+    inputs_of,
+    mean_square_residual,
+    simulate,
+    values_of,
+)
 from tests.plant_emulator.runs import linear, with_truck
 
 ReadLog = Callable[[str], Log]
@@ -43,7 +49,7 @@ def test_every_channel_follows_the_independent_bench(
     nominal: ParameterSet, bench_log: ReadLog, program: str
 ) -> None:
     log = bench_log(f"bench_nominal/{program}")
-    fits = validate(log, simulate(run_of(log), nominal.values()))
+    fits = validate(log, simulate(inputs_of(log), nominal.values()))
     assert set(fits) == set(COMPARED)
     for channel, fit in fits.items():
         assert 100.0 * fit.nrmsd <= LIMITS[program], (channel, 100.0 * fit.nrmsd)
@@ -54,7 +60,7 @@ def test_noisy_log_without_effect_leaves_only_the_sensors_noise(
     nominal: ParameterSet, bench_log: ReadLog, program: str
 ) -> None:
     log = bench_log(f"bench_practice/practice_004/{program}")
-    for channel, fit in validate(log, simulate(run_of(log), nominal.values())).items():
+    for channel, fit in validate(log, simulate(inputs_of(log), nominal.values())).items():
         assert fit.rms <= 1.1 * NOISE[channel], (channel, fit.rms)
 
 
@@ -67,7 +73,7 @@ def test_lagging_sensor_of_the_independent_bench_is_ours(
     drifted = {n: nominal.value(n) * (1 + percent / 100) for n, percent in DRIFT_003.items()}
     lag = {"torque_sensor_lag": {"time_constant": 0.1}}
     values = values_of(nominal.with_values(drifted), lag)
-    run = run_of(log)
+    run = inputs_of(log)
     position = fit_start(log, run, values)
     for channel, fit in validate(log, simulate(run, values, gap_position=position)).items():
         assert fit.rms <= 1.1 * NOISE[channel], (channel, fit.rms)
@@ -77,28 +83,28 @@ def test_start_in_the_middle_is_found_in_the_independent_log(
     nominal: ParameterSet, bench_log: ReadLog
 ) -> None:
     log = bench_log("bench_nominal/program1")
-    assert fit_start(log, run_of(log), nominal.values()) == pytest.approx(0.0, abs=0.002)
+    assert fit_start(log, inputs_of(log), nominal.values()) == pytest.approx(0.0, abs=0.002)
 
 
 @pytest.mark.parametrize("position", [-1.0, -0.37, 0.62, 1.0])
 def test_start_position_is_found_again(nominal: ParameterSet, position: float) -> None:
     inputs = linear((0.5, 0.0), (2.5, 150.0), (4.0, 150.0), (5.0, 40.0), duration=6.0)
     values = nominal.values()
-    log = simulate(run_of(inputs), values, gap_position=position)
-    assert fit_start(log, run_of(log), values) == pytest.approx(position, abs=0.01)
+    log = simulate(inputs_of(inputs), values, gap_position=position)
+    assert fit_start(log, inputs_of(log), values) == pytest.approx(position, abs=0.01)
 
 
 def test_whitened_residual_of_one_noise_is_one(bench_log: ReadLog) -> None:
     log = bench_log("bench_nominal/program1")
     off = {name: log[name] + NOISE[name] for name in COMPARED}
-    assert whitened(log, Log(log.time, off)) == pytest.approx(1.0)
+    assert mean_square_residual(log, Log(log.time, off)) == pytest.approx(1.0)
 
 
 # --- what holds between samples ---------------------------------------------------------------
 
 
 def test_reference_is_linear_between_samples_without_a_truck() -> None:
-    run = run_of(linear((0.0, 0.0), (1.0, 10.0), duration=1.0, period=0.1))
+    run = inputs_of(linear((0.0, 0.0), (1.0, 10.0), duration=1.0, period=0.1))
     assert run.slope[:-1] == pytest.approx(10.0)
     assert not run.truck
 
@@ -106,37 +112,39 @@ def test_reference_is_linear_between_samples_without_a_truck() -> None:
 def test_reference_is_a_staircase_with_a_truck_unless_overridden() -> None:
     inputs = linear((0.0, 0.0), (1.0, 10.0), duration=1.0, period=0.1)
     log = with_truck(inputs, np.zeros(11))
-    assert not run_of(log).slope.any()
-    assert run_of(log).corners == pytest.approx(0.1 * np.arange(1, 11))
-    assert run_of(log, "linear").slope[:-1] == pytest.approx(10.0)
-    assert not run_of(inputs, "staircase").slope.any()
+    assert not inputs_of(log).slope.any()
+    assert inputs_of(log).corners == pytest.approx(0.1 * np.arange(1, 11))
+    assert inputs_of(log, "linear").slope[:-1] == pytest.approx(10.0)
+    assert not inputs_of(inputs, "staircase").slope.any()
 
 
 def test_corners_are_where_the_slope_changes() -> None:
-    run = run_of(linear((0.2, 0.0), (0.5, 30.0), (0.8, 30.0), (1.0, 0.0), duration=1.0, period=0.1))
+    run = inputs_of(
+        linear((0.2, 0.0), (0.5, 30.0), (0.8, 30.0), (1.0, 0.0), duration=1.0, period=0.1)
+    )
     assert run.corners == pytest.approx([0.2, 0.5, 0.8])
 
 
 def test_truck_is_parked_until_its_torque_leaves_the_noise() -> None:
     inputs = linear((0.0, 0.0), duration=0.4, period=0.1)
-    run = run_of(with_truck(inputs, np.array([1.0, -4.0, 3.0, 200.0, 0.0])))
+    run = inputs_of(with_truck(inputs, np.array([1.0, -4.0, 3.0, 200.0, 0.0])))
     assert run.parked.tolist() == [1.0, 1.0, 1.0, 0.0, 0.0]
 
 
 def test_truck_that_never_starts_stays_parked() -> None:
     inputs = linear((0.0, 0.0), duration=0.2, period=0.1)
-    assert run_of(with_truck(inputs, np.zeros(3))).parked.all()
+    assert inputs_of(with_truck(inputs, np.zeros(3))).parked.all()
 
 
 def test_log_of_a_run_without_truck_has_no_wheel_torque(nominal: ParameterSet) -> None:
     inputs = linear((0.1, 0.0), (0.2, 5.0), duration=0.5)
-    assert "wheel_torque" not in simulate(run_of(inputs), nominal.values())
+    assert "wheel_torque" not in simulate(inputs_of(inputs), nominal.values())
 
 
 def test_simulated_run_simulated_again_is_the_same(nominal: ParameterSet) -> None:
     inputs = linear((0.1, 0.0), (1.0, 80.0), duration=2.0)
-    once = simulate(run_of(inputs), nominal.values())
-    again = simulate(run_of(once), nominal.values())
+    once = simulate(inputs_of(inputs), nominal.values())
+    again = simulate(inputs_of(once), nominal.values())
     for name in COMPARED:
         np.testing.assert_array_equal(once[name], again[name])
 
@@ -146,6 +154,6 @@ def test_wheel_torque_acts_during_the_interval_that_ends_at_its_sample(
 ) -> None:
     inputs = linear((0.0, 0.0), duration=0.3, period=0.1)
     log = with_truck(inputs, np.array([0.0, 0.0, 50.0, 0.0]))
-    drum = simulate(run_of(log), nominal.values())["drum_speed"]
+    drum = simulate(inputs_of(log), nominal.values())["drum_speed"]
     gained = 0.645 / 0.1715 * 50.0 / 312.69 * 0.1
     assert drum == pytest.approx([0.0, 0.0, gained, gained])

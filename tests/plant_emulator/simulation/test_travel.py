@@ -9,7 +9,7 @@ from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import COMPARED, Log
 from plant_emulator.simulation.fit_metrics import fit, validate
 from plant_emulator.simulation.programs import TravelProgram, program
-from plant_emulator.simulation.travel_program import ThesisReference, travel
+from plant_emulator.simulation.travel_program import ThesisReference, simulate_travel
 from plant_emulator.simulation.truck import Forklift, PiDriver
 
 ReadLog = Callable[[str], Log]
@@ -18,7 +18,7 @@ ReadLog = Callable[[str], Log]
 def run(name: str, nominal: ParameterSet) -> Log:
     known = program(name)
     assert isinstance(known, TravelProgram)
-    return travel(known, nominal)
+    return simulate_travel(known, nominal)
 
 
 @pytest.mark.parametrize("name", ["program6", "program6L"])
@@ -36,7 +36,7 @@ def test_loop_around_the_bench_reproduces_the_independent_log(
 def test_pi_driver_on_the_drum_feels_the_road_load(mass: float, nominal: ParameterSet) -> None:
     truck = Forklift(mass=mass)
     known = TravelProgram(name="pi", duration=22.0, mass=mass)
-    log = travel(known, nominal, driver=PiDriver(truck))
+    log = simulate_travel(known, nominal, driver=PiDriver(truck))
     cruise = (log.time > 14.0) & (log.time < 21.9)
     force = log["wheel_torque"][cruise].mean() / truck.wheel_radius
     assert force == pytest.approx(truck.road_load(14 / 3.6), rel=0.03)
@@ -54,8 +54,8 @@ def test_drum_stands_while_the_truck_is_parked(nominal: ParameterSet) -> None:
 
 def test_effect_acts_in_the_loop(nominal: ParameterSet) -> None:
     known = TravelProgram(name="short", duration=6.0, mass=3640.0)
-    plain = travel(known, nominal)
-    lagging = travel(known, nominal, {"torque_sensor_lag": {"time_constant": 0.2}})
+    plain = simulate_travel(known, nominal)
+    lagging = simulate_travel(known, nominal, {"torque_sensor_lag": {"time_constant": 0.2}})
     assert set(COMPARED) < set(lagging.signals)
     assert np.abs(plain["drum_speed"] - lagging["drum_speed"]).max() > 0.01
 

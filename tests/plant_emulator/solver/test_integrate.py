@@ -11,7 +11,7 @@ from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import COMPARED, Log
 from plant_emulator.simulation.fit_metrics import validate
 from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram
-from plant_emulator.simulation.simulate import run_of
+from plant_emulator.simulation.simulate import inputs_of
 from plant_emulator.simulation.simulate import simulate as simulate_run
 from plant_emulator.solver.kernel import Kernel
 from tests.plant_emulator.runs import BACKLASH, CURRENT, DRUM, MOTOR, Piecewise, linear, simulate
@@ -199,7 +199,7 @@ def test_jump_that_counts_as_the_sample_after_it_acts_from_there(
     time = 0.01 * np.arange(7)
     inputs = Log(time, {"speed_reference": np.where(time >= 0.03, 1.0, 0.0)}, "by hand")
     on, just_before = (
-        simulate_run(run_of(inputs, "staircase"), {**nominal.values(), "dead_time": dead_time})
+        simulate_run(inputs_of(inputs, "staircase"), {**nominal.values(), "dead_time": dead_time})
         for dead_time in (0.01, 0.01 - before)
     )
     assert on["armature_current"][4] == 0.0
