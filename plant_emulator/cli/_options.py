@@ -32,7 +32,7 @@ effect = click.option(
 reference = click.option(
     "--reference",
     type=click.Choice(["linear", "staircase"]),
-    help="Course of the reference between its samples; default: staircase with a truck.",
+    help="Shape of the reference between its samples; default: staircase with a truck.",
 )
 start = click.option(
     "--start",
