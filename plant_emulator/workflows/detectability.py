@@ -53,7 +53,7 @@ class Detectability:
 def detectability(
     runs: Sequence[str | Path | Log],
     *,
-    parameters: ParameterSet | str = DEFAULT,
+    parameters: ParameterSet | str | Path = DEFAULT,
     reference: Literal["linear", "staircase"] | None = None,
 ) -> Detectability:
     """Find what recorded and planned runs show together of every effect.

@@ -93,7 +93,7 @@ def diagnose(
     logs: Sequence[Source],
     *,
     hold_out: Sequence[Source] = (),
-    parameters: ParameterSet | str = DEFAULT,
+    parameters: ParameterSet | str | Path = DEFAULT,
     model: Literal["bench", "axis"] = "bench",
     without: Sequence[str] = (),
     effects: Sequence[str | Path] = (),
@@ -144,7 +144,7 @@ def diagnose(
     return Diagnosis(findings=findings, given=given, fitted=runs.fitted)
 
 
-def _set(parameters: ParameterSet | str, own: Sequence[str | Path]) -> ParameterSet:
+def _set(parameters: ParameterSet | str | Path, own: Sequence[str | Path]) -> ParameterSet:
     if isinstance(parameters, ParameterSet):
         return parameters
     return with_effects.load(parameters, [str(file) for file in own])
