@@ -23,7 +23,7 @@ from threadpoolctl import threadpool_limits
 from plant_emulator import effects, logs, parameter_sets
 from plant_emulator.blind import draw, laws, score
 from plant_emulator.blind.generate import measure, simulate_truth
-from plant_emulator.diagnosis.execution.pool import InProcess, build_model
+from plant_emulator.diagnosis.execution.pool import InProcess, TaskRunner, build_model
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
 from plant_emulator.diagnosis.report.ranking import rank
 from plant_emulator.diagnosis.selection.procedure import Procedure
@@ -55,8 +55,8 @@ def sizes(seed: int, only: tuple[str, ...], number: int) -> list[dict[str, Any]]
     recipe = BenchRecipe(tuple(_recordings(case, nominal)), nominal, others)
     with threadpool_limits(1):
         model, runs = build_model(recipe), tuple(range(len(case.programs)))
-        inquiry = Procedure(pool=InProcess(), recipe=recipe, model=model, runs=runs)
-        found, _, _ = inquiry.with_quiet_inputs().found()
+        runner = TaskRunner(pool=InProcess(), recipe=recipe, model=model, runs=runs)
+        found, _, _ = Procedure(runner=runner).with_input_noise().run()
     if not found.named:
         return []
     (contender,) = found.hypotheses

@@ -1,4 +1,10 @@
-"""One diagnosis from the contest to the answer."""
+"""One diagnosis, from a plan of runs to the findings.
+
+1. The procedure tests the hypotheses and decides (`selection.procedure`).
+2. The held-out runs are predicted with every hypothesis that counts (`prediction.held_out`).
+3. The gap is located (`selection.subsystem`).
+4. The answer and the details of the report are put together (`report`).
+"""
 
 from __future__ import annotations
 
@@ -8,17 +14,20 @@ from typing import TYPE_CHECKING
 from plant_emulator.diagnosis.answer import Answer, Logs
 from plant_emulator.diagnosis.calibration.confidence import confidence
 from plant_emulator.diagnosis.design.next_experiment import Advice
-from plant_emulator.diagnosis.execution.pool import build_model
+from plant_emulator.diagnosis.execution.pool import TaskRunner, build_model
 from plant_emulator.diagnosis.execution.progress import ReportingPool
-from plant_emulator.diagnosis.fitting.derived_quantities import in_terms
+from plant_emulator.diagnosis.fitting.derived_quantities import derived_quantities
 from plant_emulator.diagnosis.fitting.evidence import EVIDENCE_THRESHOLD, NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.task import Task
-from plant_emulator.diagnosis.prediction import gap
-from plant_emulator.diagnosis.prediction.held_out import NOMINAL, HeldOut
-from plant_emulator.diagnosis.prediction.remainder import rest_of
-from plant_emulator.diagnosis.prediction.trace import traces
+from plant_emulator.diagnosis.prediction.held_out import HeldOut
+from plant_emulator.diagnosis.prediction.remainder import unmodelled_remainder
 from plant_emulator.diagnosis.report.details import Details
-from plant_emulator.diagnosis.report.ranking import rank, ranked, undetectable, with_random_effects
+from plant_emulator.diagnosis.report.ranking import (
+    rank,
+    ranked,
+    undetectable,
+    with_random_effects,
+)
 from plant_emulator.diagnosis.report.shrinkage import held_out_gap, waterfall
 from plant_emulator.diagnosis.report.statement import statement, verdict
 from plant_emulator.diagnosis.selection import subsystem
@@ -28,23 +37,40 @@ from plant_emulator.diagnosis.selection.rules import SECOND
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.answer import Location, Quantity, RankedEffect
+    from plant_emulator.diagnosis.answer import (
+        HeldOutGap,
+        Location,
+        Quantity,
+        RankedEffect,
+        Undetectable,
+        Verdict,
+    )
     from plant_emulator.diagnosis.calibration.confidence import Case
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
     from plant_emulator.diagnosis.execution.progress import Progress
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
-    from plant_emulator.diagnosis.machine import Model
-    from plant_emulator.diagnosis.prediction.gap import Gap, Prediction
-    from plant_emulator.diagnosis.prediction.held_out import Plan
+    from plant_emulator.diagnosis.prediction.gap import Gap
+    from plant_emulator.diagnosis.prediction.held_out import Gaps, Plan
+    from plant_emulator.diagnosis.prediction.remainder import Remainder
+    from plant_emulator.diagnosis.prediction.trace import Trace
     from plant_emulator.diagnosis.selection.verdict import Decision
+
+# Thresholds of the hypothesis tests, for the report.
+THRESHOLDS = {
+    "evidence that an effect needs": f"{EVIDENCE_THRESHOLD:g}",
+    "evidence that a second one needs": f"{SECOND:g}",
+    "mean square over the noise up to which a fit leaves noise": f"{NOISE_MEAN_SQUARE:g}",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Findings:
-    """The answer, what a report shows beside it, and the values to save.
+    """What a diagnosis found.
 
-    fixed : of every accepted effect the values that were not fitted, by name in the effect
+    details : what a report shows beside the answer
+    final : fit whose values can be saved
+    fixed : for each accepted effect the values that were not fitted, by name in the effect
     """
 
     answer: Answer
@@ -53,20 +79,43 @@ class Findings:
     fixed: Mapping[str, Mapping[str, float]]
 
 
-# Of the contest, as the report tells them.
-THRESHOLDS = {
-    "evidence that an effect needs": f"{EVIDENCE_THRESHOLD:g}",
-    "evidence that a second one needs": f"{SECOND:g}",
-    "mean square over the noise up to which a fit leaves noise": f"{NOISE_MEAN_SQUARE:g}",
-}
+@dataclass(frozen=True, kw_only=True)
+class _Tests:
+    """The tested hypotheses; runner : in whose noise their costs count."""
+
+    explained: Explanation
+    decision: Decision
+    runner: TaskRunner
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The accepted effects that a simulation can follow."""
+        return self.explained.final.effects if self.decision.effects else ()
+
+    @property
+    def final(self) -> FitResult:
+        """The fit with the accepted effects, the random ones included."""
+        return with_random_effects(self.explained) if self.decision.effects else self.explained.null
+
+    def reference(self, gaps: Gaps) -> Gap | None:
+        """The gap that the decision closes a share of.
+
+        None: the decision names no cause, no run can be predicted with it, or the cause is a random
+        effect, whose course nothing predicts.
+        """
+        if not gaps.predictable or (self.decision.effects and not self.effects):
+            return None
+        return {"parameter": gaps.nominal, "effect": gaps.null}.get(self.decision.kind)
 
 
 class Diagnose:
     """The steps from a plan to the findings of a diagnosis.
 
-    cases : a blind trial's, for the confidence; None: there are none of this machine
-    law_errors : of sizes by name, relative, see `law_error`
-    progress : told every step and its done share
+    settings : lines for the report on how to repeat the diagnosis, by name
+    cases : of a blind trial, for the confidence; None: there are none of this machine
+    law_errors : relative standard errors of sizes by name, see `calibration.model_form_error`
+    notes : on the logs, for the report
+    progress : called with the label of each step and its done share [1]
     """
 
     def __init__(
@@ -81,161 +130,135 @@ class Diagnose:
         notes: Sequence[str] = (),
         progress: Progress | None = None,
     ) -> None:
-        self.pool = pool if progress is None else ReportingPool(pool, progress)
-        self.recipe, self.plan = recipe, plan
-        self.model: Model = build_model(recipe)
+        self.runner = TaskRunner(
+            pool=pool if progress is None else ReportingPool(pool, progress),
+            recipe=recipe,
+            model=build_model(recipe),
+            runs=plan.fitted,
+        )
+        self.model, self.plan = self.runner.model, plan
         self.settings, self.notes = settings, tuple(notes)
         self.cases = None if cases is None else tuple(cases)
         self.law_errors = law_errors or {}
-        self.folds, self.predictable = plan.folds, True
 
     def diagnose(self) -> Findings:
-        """Contest, verdict, held-out runs, place."""
-        inquiry = Procedure(
-            pool=self.pool,
-            recipe=self.recipe,
-            model=self.model,
-            runs=self.plan.fitted,
+        """Test the hypotheses, predict the held-out runs, locate the gap; give the findings."""
+        tests = self._test()
+        gaps = HeldOut(runner=self.runner, plan=self.plan).gaps(tests.explained, tests.effects)
+        drawn = gaps.traces(tests.effects)
+        remainder = self._remainder(tests, drawn)
+        return Findings(
+            answer=self._answer(tests, gaps, remainder),
+            details=Details(
+                traces=drawn,
+                waterfall=waterfall(gaps.by_effects, tests.effects),
+                settings={**self.settings, **THRESHOLDS},
+                notes=(*self.notes, *gaps.notes),
+                rest=remainder,
+            ),
+            final=tests.final,
+            fixed={name: self._fixed(name) for name in tests.decision.effects},
         )
-        inquiry = inquiry.with_quiet_inputs()
-        explained, decision, quiet = inquiry.found()
-        held_out = HeldOut(
-            pool=self.pool,
-            recipe=self.recipe,
-            model=self.model,
-            plan=self.plan,
-        )
-        followed = _followed(explained, decision)
-        usable, notes = held_out.usable(explained, followed)
-        self.notes += notes
-        # Where nothing can be predicted with the effects, all runs show what is left without them.
-        self.folds, self.predictable = usable or self.plan.folds, bool(usable)
-        predicted = held_out.predictions(explained, followed, self.folds)
-        self.notes += held_out.unsettled(self.folds, predicted)
-        return self._findings(explained, decision, predicted, quiet)
 
-    def _findings(
-        self,
-        explained: Explanation,
-        decision: Decision,
-        predicted: Mapping[tuple[str, ...], list[Prediction]],
-        quiet: Recipe,
-    ) -> Findings:
-        runs = [self.model.runs[run] for _, some in self.folds for run in some]
-        lengths = gap.block_lengths(predicted[()])
-        gaps = {key: gap.gap(runs, some, lengths) for key, some in predicted.items()}
-        followed = _followed(explained, decision)
-        final = with_random_effects(explained) if decision.effects else explained.null
-        drawn = traces(runs, predicted[()], predicted[followed])
-        rest = None
-        if not self.model.reaches_noise:
-            rest = rest_of(self.model, final, self.plan.fitted, drawn)
-        location = self._location(explained, decision)
-        shrinkage = held_out_gap(gaps, runs, followed, self._reference(decision, followed, gaps))
-        hidden = undetectable(explained, self.model.candidates)
-        terms = in_terms(self.model, final, self.plan.fitted)
-        sentence = statement(
-            decision,
-            self.model.candidates,
-            shrinkage.closed_fraction,
-            location.subsystem,
-            terms=terms,
-            rest=rest,
-        )
-        advice = Advice(self.pool, quiet, self.model, self.plan.fitted)
-        answer = Answer(
+    def _test(self) -> _Tests:
+        procedure = Procedure(runner=self.runner).with_input_noise()
+        explained, decision, runner = procedure.run()
+        return _Tests(explained=explained, decision=decision, runner=runner)
+
+    def _remainder(self, tests: _Tests, drawn: Sequence[Trace]) -> Remainder | None:
+        """The unmodelled remainder of a machine that is modelled in outline; else None."""
+        if self.model.reaches_noise:
+            return None
+        return unmodelled_remainder(self.model, tests.final, self.plan.fitted, drawn)
+
+    def _answer(self, tests: _Tests, gaps: Gaps, remainder: Remainder | None) -> Answer:
+        location = self._location(tests)
+        gap = held_out_gap(gaps.by_effects, gaps.runs, tests.effects, tests.reference(gaps))
+        hidden = undetectable(tests.explained, self.model.candidates)
+        derived = derived_quantities(self.model, tests.final, self.plan.fitted)
+        return Answer(
             logs=Logs(
                 estimation=tuple(self.model.runs[k].source for k in self.plan.fitted),
-                held_out=tuple(dict.fromkeys(run.source for run in runs)),
+                held_out=tuple(dict.fromkeys(run.source for run in gaps.runs)),
             ),
-            verdict=verdict(
-                decision,
-                classes=explained.classes(),
-                confidence=self._confidence(explained, decision),
-                sentence=sentence,
-                next_experiment=advice.next_experiment(
-                    explained, decision, location, [one.effect for one in hidden]
-                ),
-            ),
+            verdict=self._verdict(tests, gap, location, hidden, derived, remainder),
             location=location,
-            gap=shrinkage,
+            gap=gap,
             ranking=tuple(
-                self._ranked(c, explained, decision, gaps, terms.get(c.effect, ()))
-                for c in ranked(explained)
+                self._ranked(one, tests, gaps.gain(one.effect), derived.get(one.effect, ()))
+                for one in ranked(tests.explained)
             ),
             undetectable=hidden,
         )
-        details = Details(
-            traces=drawn,
-            waterfall=waterfall(gaps, followed),
-            settings={**self.settings, **THRESHOLDS},
-            notes=self.notes,
-            rest=rest,
+
+    def _verdict(
+        self,
+        tests: _Tests,
+        gap: HeldOutGap,
+        location: Location,
+        hidden: Sequence[Undetectable],
+        derived: Mapping[str, tuple[Quantity, ...]],
+        remainder: Remainder | None,
+    ) -> Verdict:
+        sentence = statement(
+            tests.decision,
+            self.model.candidates,
+            gap.closed_fraction,
+            location.subsystem,
+            terms=derived,
+            rest=remainder,
         )
-        return Findings(
-            answer=answer,
-            details=details,
-            final=final,
-            fixed={name: self._fixed(name) for name in decision.effects},
+        next_experiment = Advice(runner=tests.runner).next_experiment(
+            tests.explained, tests.decision, location, [one.effect for one in hidden]
         )
+        return verdict(
+            tests.decision,
+            classes=tests.explained.classes(),
+            confidence=self._confidence(tests),
+            sentence=sentence,
+            next_experiment=next_experiment,
+        )
+
+    def _location(self, tests: _Tests) -> Location:
+        task = Task(base=tests.explained.null, runs=self.plan.fitted)
+        (located,) = self.runner.map(subsystem.locate_gap, [task])
+        if located is None:
+            shares = subsystem.evidence_shares(tests.explained, self.model.candidates)
+        else:
+            shares = dict(located.shares)
+        faulty = subsystem.faulty_subsystem(tests.decision, self.model.candidates, shares)
+        return subsystem.location(faulty, shares, located)
+
+    def _ranked(
+        self,
+        hypothesis: Hypothesis,
+        tests: _Tests,
+        gain: float | None,
+        derived: tuple[Quantity, ...],
+    ) -> RankedEffect:
+        entry = rank(
+            hypothesis,
+            tests.explained,
+            tests.decision.effects,
+            self.model.candidates[hypothesis.effect],
+            gain=gain,
+            law_errors=self.law_errors,
+        )
+        return replace(entry, parameters=(*entry.parameters, *derived))
+
+    def _confidence(self, tests: _Tests) -> float | None:
+        if self.cases is None:
+            return None
+        return confidence(self.cases, tests.decision.kind, _evidence(tests))
 
     def _fixed(self, name: str) -> dict[str, float]:
         fixed = self.model.candidates[name].fixed
         return {key.removeprefix(f"{name}_"): value for key, value in fixed.items()}
 
-    def _location(self, explained: Explanation, decision: Decision) -> Location:
-        task = Task(base=explained.null, runs=self.plan.fitted)
-        (located,) = self.pool.map(subsystem.site, self.recipe, [task])
-        if located is None:
-            shares = subsystem.evidence_shares(explained, self.model.candidates)
-        else:
-            shares = dict(located.shares)
-        place = subsystem.subsystem(decision, self.model.candidates, shares)
-        return subsystem.location(place, shares, located)
 
-    def _reference(
-        self, decision: Decision, followed: tuple[str, ...], gaps: Mapping[tuple[str, ...], Gap]
-    ) -> Gap | None:
-        """The gap that the verdict closes a share of.
-
-        None: the verdict names no cause, no held-out run can be predicted with it, or the cause is
-        chance alone, whose course nothing predicts.
-        """
-        if not self.predictable or (decision.effects and not followed):
-            return None
-        return {"parameter": gaps[NOMINAL], "effect": gaps[()]}.get(decision.kind)
-
-    def _ranked(
-        self,
-        contender: Hypothesis,
-        explained: Explanation,
-        decision: Decision,
-        gaps: Mapping[tuple[str, ...], Gap],
-        terms: tuple[Quantity, ...],
-    ) -> RankedEffect:
-        alone = gaps.get((contender.effect,))
-        entry = rank(
-            contender,
-            explained,
-            decision.effects,
-            self.model.candidates[contender.effect],
-            gain=None if alone is None else gap.closed_fraction(gaps[()], alone),
-            law_errors=self.law_errors,
-        )
-        return replace(entry, parameters=(*entry.parameters, *terms))
-
-    def _confidence(self, explained: Explanation, decision: Decision) -> float | None:
-        if self.cases is None:
-            return None
-        return confidence(self.cases, decision.kind, self._evidence(explained, decision))
-
-    def _evidence(self, explained: Explanation, decision: Decision) -> float:
-        """Evidence of the weakest effect that is named; of the best one where none is."""
-        by_name = {c.effect: explained.evidence(c) for c in explained.hypotheses}
-        named = [by_name[name] for name in decision.effects]
-        return min(named) if named else max(by_name.values(), default=0.0)
-
-
-def _followed(explained: Explanation, decision: Decision) -> tuple[str, ...]:
-    """The effects named that a simulation can follow."""
-    return explained.final.effects if decision.effects else ()
+def _evidence(tests: _Tests) -> float:
+    """Evidence of the weakest accepted effect, or of the best one where none is accepted."""
+    explained = tests.explained
+    by_name = {one.effect: explained.evidence(one) for one in explained.hypotheses}
+    named = [by_name[name] for name in tests.decision.effects]
+    return min(named) if named else max(by_name.values(), default=0.0)

@@ -1,6 +1,7 @@
 """What the diagnosis asks of a machine: parameters, effects, states, and simulated residuals.
 
-The bench is one such machine, a single motor-driven axis another; nothing else here knows either.
+The bench is one such machine, a single motor-driven axis another (`machines`). Every other module
+of the diagnosis knows a machine only as the `Model` of this module.
 """
 
 from __future__ import annotations
@@ -20,30 +21,33 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class DerivedQuantity:
-    """A quantity that the field knows an effect by, such as a coefficient of either direction.
+    """A quantity that follows from the values of a fit, such as a friction coefficient.
 
-    of : its value [unit] from the values of a fit by name
+    formula : from the values of a fit by name to the quantity [unit]
     """
 
     name: str
     unit: str
-    of: Callable[[Mapping[str, float]], float]
+    formula: Callable[[Mapping[str, float]], float]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
-    """An effect that the nominal model lacks.
+    """An effect that the nominal model lacks, as unknowns of a fit.
 
-    sizes : its unknowns that are absent at their neutral value, starting at a plausible one
-    shapes : its unknowns that only shape it, each with a prior
-    states : its unknowns of one run only
+    sizes : unknowns that are neutral where the effect is absent; they start at a plausible size
+    shapes : unknowns that only shape the effect, each with a prior
+    states : unknowns that each run has of its own
     neutral : values of the sizes at which the effect is absent
-    fixed : values of the rest while the effect is there
-    units : of all its parameters, by name
-    title : what it is, in one line; needs : what a log must have to show it, empty: nothing special
-    stochastic : its unknowns of one run that no fit and no measurement tells: its course is chance
-    derived : what else it is known by, made of its own values and the machine's
-    exact_form : its law can have no other form, so that it leaves nothing where it is the cause
+    fixed : values of the parameters that no fit changes
+    units : of all parameters of the effect, by name
+    title : the effect in one line
+    needs : what a log must have to show the effect; empty where it needs nothing special
+    stochastic : unknowns of each run that follow chance, so that no fit and no measurement finds
+        them; empty for an effect that is not random
+    derived : further quantities that the field knows the effect by
+    exact_form : whether its law can have no other form, as a factor or an offset; such a law leaves
+        nothing where it is the cause
     """
 
     name: str
@@ -63,11 +67,13 @@ class Candidate:
 
 @dataclass(frozen=True, kw_only=True)
 class MeasuredRun:
-    """A measured run.
+    """A measured run of the machine.
 
-    time : of its samples [s], shape (n,); measured : shape (channels, n) [units]
-    noise : standard deviation of each channel's noise, shape (channels,) [units]
-    measured_input : whether an input of its simulation is a measurement with noise of its own
+    source : name of the log
+    time : of the samples [s], shape (n,)
+    measured : the channels [units], shape (channels, n)
+    noise : standard deviation of each channel's noise [units], shape (channels,)
+    measured_input : whether an input of the simulation is a measurement with noise of its own
     """
 
     source: str
@@ -80,74 +86,79 @@ class MeasuredRun:
 
 
 class Model(Protocol):
-    """A machine that can be simulated, and the runs that it was given."""
+    """A machine that can be simulated, with its measured runs."""
 
     @property
     def runs(self) -> Sequence[MeasuredRun]:
-        """The measured runs."""
+        """The measured runs; all methods name a run by its number in this sequence."""
 
     @property
     def parameters(self) -> tuple[Unknown, ...]:
-        """Parameters that drift, with their priors; the prior's mean is the nominal value."""
+        """The nuisance parameters, with their priors; a prior's mean is the nominal value."""
 
     @property
     def units(self) -> Mapping[str, str]:
-        """Units of the parameters by name."""
+        """Units of the parameters, by name."""
 
     @property
     def subsystems(self) -> Mapping[str, str]:
-        """Where each parameter belongs, by name."""
+        """Subsystem of each parameter, by name."""
 
     @property
     def reaches_noise(self) -> bool:
-        """Whether with the right effects nothing but the noise is left.
+        """Whether only the noise is left with the right effects.
 
-        A machine modelled down to its sensors does; one modelled in outline leaves a rest, and a
-        cause is then known by its evidence alone.
+        A machine that is modelled down to its sensors reaches the noise. A machine that is modelled
+        in outline leaves a remainder, so that only the evidence of an effect counts.
         """
 
     @property
     def states(self) -> tuple[Unknown, ...]:
-        """States of a run, without those of effects."""
+        """The initial states of a run, without the states of effects."""
 
     @property
     def candidates(self) -> Mapping[str, Candidate]:
-        """The library of effects by name."""
+        """The library of effects, by name."""
 
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
-        """With these effects there: from values by name to the whitened residual.
+        """Give the whitened residual of a run with these effects, as a function of the values.
 
-        Measured minus simulated over the noise, shape (channels, samples); 0: does not count.
+        The residual is measured minus simulated over the noise [1], shape (channels, samples); it
+        is exactly 0 where a sample does not count.
         """
 
     def input_noise(
         self, run: int, where: FitResult, state: Mapping[str, float]
     ) -> NoiseDirections | None:
-        """What the noise of the run's fed inputs does to it at a fit; see `fed_noise`."""
+        """Find what the noise of the run's measured inputs does to its residual at a fit.
+
+        state : of the run, by name
+        None: the run has no measured input, or its noise does not count
+        """
 
     def nominal(self, runs: Sequence[int]) -> Mapping[str, float]:
-        """The parameters as given; of a machine without such, what these runs tell of them."""
+        """Nominal parameters by name: the given ones, or an estimate from these runs."""
 
     def start_values(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
-        """Parameters, and the states of each of these runs, near the best fit without effects."""
+        """Find parameters, and the states of each of these runs, near the fit without effects."""
 
     def initial_states(
         self, run: int, effects: Sequence[str], values: Mapping[str, float]
     ) -> dict[str, float]:
-        """States of a run near the best at these values of everything else."""
+        """Find states of a run near the best ones, with all other values as given."""
 
     def locate(self, where: FitResult, runs: Sequence[int]) -> Location | None:
-        """Where the gap of a fit without effects lies, without any hypothesis of its cause.
+        """Find the subsystem that holds the gap of a fit, without a hypothesis of its cause.
 
-        None: this machine has no blocks to tell apart.
+        None: the machine has no blocks that could be told apart
         """
 
     def with_planned_runs(self, where: FitResult, runs: Sequence[int]) -> Model:
-        """The machine with runs that it has not shown yet behind its own, the least effort first.
+        """Give the machine with planned runs behind its own, the run of least effort first.
 
-        As the fit of these runs predicts them, without noise, judged by its own runs' noise; their
-        source tells a person what to do. A machine that plans no runs has its own only.
+        A planned run is simulated at the fit, without noise, and is judged by the noise of the
+        machine's own runs. Its source says what to do. A machine without planned runs gives itself.
         """
 
     def missing_experiments(self, runs: Sequence[int]) -> Mapping[str, Sequence[str]]:
-        """By subsystem: what would tell more of it and is in none of these runs."""
+        """What would show more of each subsystem and is in none of these runs, by subsystem."""

@@ -28,7 +28,6 @@ import numpy as np
 
 from plant_emulator.diagnosis.fitting.evidence import DETECTABLE_NORM
 from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
-from plant_emulator.diagnosis.fitting.looks import FEW_WITH_STATES
 from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
 from plant_emulator.diagnosis.fitting.signature import bounded, signs
 
@@ -40,43 +39,54 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.machine import Model
 
 
+# Iterations of the fit of an alternative: it only has to show what the alternative can follow.
+ALTERNATIVE_ITERATIONS = 24
+
+
 @dataclass(frozen=True)
 class PlannedRecipe:
-    """What builds the machine of a recipe with the runs that it has not shown yet.
+    """The recipe of a machine with planned runs behind its own.
 
-    where : the fit to `runs` that foretells them
+    fitted : fit to `runs` at which the planned runs are simulated
     """
 
     recipe: Recipe
-    where: FitResult
+    fitted: FitResult
     runs: tuple[int, ...]
 
     def build(self) -> Model:
-        """The extended machine."""
-        return self.recipe.build().with_planned_runs(self.where, self.runs)
+        """Build the extended machine."""
+        return self.recipe.build().with_planned_runs(self.fitted, self.runs)
 
     def digest(self) -> str:
-        """The same for the same machine, fit and runs only."""
-        fitted = repr((self.where.key, self.runs))
-        return f"{self.recipe.digest()}+{hashlib.sha256(fitted.encode()).hexdigest()}"
+        """Hash of the machine's recipe, the fit and the runs."""
+        own = repr((self.fitted.key, self.runs))
+        return f"{self.recipe.digest()}+{hashlib.sha256(own.encode()).hexdigest()}"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Asked:
-    """A question to one planned run.
+class PlannedRun:
+    """A planned run, and the fit that it is judged by.
 
-    where : a fit to `runs`: of a rival, or without effects; names : of the effects asked about
+    planned : number of the planned run
+    fitted : fit to `runs`, of an alternative or without effects
+    effects : names of the effects that are looked for
     """
 
-    where: FitResult
+    fitted: FitResult
     runs: tuple[int, ...]
     planned: int
-    names: tuple[str, ...] = ()
+    effects: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
-class Exchange:
-    """An accepted effect exchanged for another one, the rest as accepted, on these runs."""
+class Alternative:
+    """The hypothesis with another effect in the place of an accepted one.
+
+    final : fit with the accepted effects to `runs`
+    name : of the effect that is replaced; other : of the effect in its place
+    alone : fit with the other effect alone; None: there is none
+    """
 
     final: FitResult
     name: str
@@ -85,67 +95,69 @@ class Exchange:
     runs: tuple[int, ...]
 
 
-def rival(model: Model, asked: Exchange) -> FitResult:
-    """Step: the fit with one effect in the place of another.
-
-    That of the contest where the other effect is the only one.
-    """
+def fit_alternative(model: Model, asked: Alternative) -> FitResult:
+    """Fit an alternative (a step); a fit with the other effect alone is not made again."""
     effects = (*(e for e in asked.final.effects if e != asked.name), asked.other)
     if asked.alone is not None and asked.alone.effects == effects:
         return asked.alone
     known = {} if asked.alone is None else dict(asked.alone.values)
     values = {**known, **asked.final.values}
-    return fit(model, effects, asked.runs, values, asked.final.states, FEW_WITH_STATES)
+    return fit(model, effects, asked.runs, values, asked.final.states, ALTERNATIVE_ITERATIONS)
 
 
-def apart(model: Model, asked: Asked) -> float:
-    """Step: what of a planned run the rival cannot follow, norm in the noise."""
-    own = model.initial_states(asked.planned, asked.where.effects, asked.where.values)
-    where = replace(asked.where, states=(*asked.where.states, own))
-    ahead = model.residual(asked.planned, where.effects)({**where.values, **own})
-    raw = float(np.linalg.norm(ahead))
-    if raw < DETECTABLE_NORM:
-        return raw
-    runs = (*asked.runs, asked.planned)
-    found = fit(model, where.effects, runs, where.values, where.states, FEW_WITH_STATES)
-    return min(
-        raw, sqrt(max(0.0, found.cost - found.occam_penalty - where.cost + where.occam_penalty))
+def discriminability(model: Model, asked: PlannedRun) -> float:
+    """Norm of what an alternative cannot follow in a planned run, in the noise (a step)."""
+    alternative = asked.fitted
+    own = model.initial_states(asked.planned, alternative.effects, alternative.values)
+    ahead = model.residual(asked.planned, alternative.effects)({**alternative.values, **own})
+    unfitted = float(np.linalg.norm(ahead))
+    if unfitted < DETECTABLE_NORM:
+        return unfitted
+    found = fit(
+        model,
+        alternative.effects,
+        (*asked.runs, asked.planned),
+        alternative.values,
+        (*alternative.states, own),
+        ALTERNATIVE_ITERATIONS,
     )
+    rise = found.cost - found.occam_penalty - alternative.cost + alternative.occam_penalty
+    return min(unfitted, sqrt(max(0.0, rise)))
 
 
-def seen(model: Model, asked: Asked) -> dict[str, float]:
-    """Step: norm of the drift-free signature of effects at their plausible size, by name."""
-    where, runs = _as_foretold(asked)
-    tangents = NuisanceSpace(linearise(model, where, runs))
-    return {name: _signature_norm(model, name, where, runs, tangents) for name in asked.names}
+def visibility(model: Model, asked: PlannedRun) -> dict[str, float]:
+    """Norm of each effect's orthogonal signature with a planned run, in the noise (a step)."""
+    fitted, runs = _with_planned_run(asked)
+    nuisance = NuisanceSpace(linearise(model, fitted, runs))
+    return {name: _signature_norm(model, name, fitted, runs, nuisance) for name in asked.effects}
 
 
-def informs(model: Model, asked: Asked) -> float:
-    """Step: logarithm of how sharply a planned run determines, with these, all that drifts."""
-    found = linearise(model, *_as_foretold(asked))
+def information_gain(model: Model, asked: PlannedRun) -> float:
+    """Log determinant of the information with a planned run and the priors [1] (a step)."""
+    found = linearise(model, *_with_planned_run(asked))
     precision = np.diag([u.scaled_std**-2.0 for u in found.unknowns])
     return float(np.linalg.slogdet(found.information + precision).logabsdet)
 
 
-def _as_foretold(asked: Asked) -> tuple[FitResult, tuple[int, ...]]:
-    """The fit and its runs with the planned one, which starts as the last one did."""
-    where = asked.where
-    return replace(where, states=(*where.states, where.states[-1])), (*asked.runs, asked.planned)
+def _with_planned_run(asked: PlannedRun) -> tuple[FitResult, tuple[int, ...]]:
+    """The fit and its runs with the planned run, which starts as the last run did."""
+    states = (*asked.fitted.states, asked.fitted.states[-1])
+    return replace(asked.fitted, states=states), (*asked.runs, asked.planned)
 
 
 def _signature_norm(
-    model: Model, name: str, where: FitResult, runs: Sequence[int], tangents: NuisanceSpace
+    model: Model, name: str, fitted: FitResult, runs: Sequence[int], nuisance: NuisanceSpace
 ) -> float:
-    """Norm of the part of an effect's signature that drift cannot imitate, the larger sign."""
+    """Norm of an effect's orthogonal signature at its plausible size, of the larger sign."""
     candidate = model.candidates[name]
     own = {u.name: u.start for u in (*candidate.states, *candidate.shapes)}
     norms = []
     for sign in signs(candidate.sizes):
         sizes = {u.name: bounded(u, candidate.neutral[u.name], sign) for u in candidate.sizes}
         rows = [
-            model.residual(k, (*where.effects, name))({**where.values, **state, **own, **sizes})
-            for k, state in zip(runs, where.states, strict=True)
+            model.residual(k, (*fitted.effects, name))({**fitted.values, **state, **own, **sizes})
+            for k, state in zip(runs, fitted.states, strict=True)
         ]
-        change = np.concatenate([row.ravel() for row in rows]) - tangents.residual
-        norms.append(float(np.linalg.norm(tangents.orthogonal(change))))
+        change = np.concatenate([row.ravel() for row in rows]) - nuisance.residual
+        norms.append(float(np.linalg.norm(nuisance.orthogonal(change))))
     return max(norms)

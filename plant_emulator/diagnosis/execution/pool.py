@@ -1,11 +1,12 @@
-"""How the steps of a diagnosis are run, one after the other or (see `workers`) side by side.
+"""How the tasks of a diagnosis run: one after the other, or side by side (`workflows.workers`).
 
-A step is a function of a model and one item. The model goes to a worker as the recipe that builds
-it; a worker builds it once.
+A step is a function of a model and one item. A worker gets the recipe of the model instead of the
+model, and builds the model once.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 if TYPE_CHECKING:
@@ -18,43 +19,43 @@ Answer = TypeVar("Answer")
 
 
 class Recipe(Protocol):
-    """What builds a model; picklable, and equal to its copies."""
+    """Plain data that build a model; picklable, and equal to their copies."""
 
     def build(self) -> Model:
-        """The model."""
+        """Build the model."""
 
     def digest(self) -> str:
-        """The same for the same model only."""
+        """Hash that only a recipe of the same model shares."""
 
 
 _MODELS: dict[str, Model] = {}
 
 
 def build_model(recipe: Recipe) -> Model:
-    """The recipe's model, built once in this process; older ones are let go."""
+    """Build the model of a recipe, or give the last one that was built from an equal recipe."""
     key = recipe.digest()
     model = _MODELS.get(key)
     if model is None:
         model = recipe.build()
         _MODELS.clear()
         _MODELS[key] = model
-    return model  # not what stands there by now: a worker may have several threads
+    return model  # a worker may have several threads: _MODELS may hold another model by now
 
 
 class Pool(Protocol):
-    """Runs a step for many items; answers in the items' order, each as soon as it is there."""
+    """Runs a step for many items, in this process or on others."""
 
     def map(
         self, function: Callable[[Model, Item], Answer], recipe: Recipe, items: Sequence[Item]
     ) -> Iterator[Answer]:
-        """The answers."""
+        """Give the answers in the order of the items, each as soon as it is there."""
 
     def close(self) -> None:
         """End what was started."""
 
 
 class InProcess:
-    """One after the other in this process."""
+    """Runs a step for one item after the other in this process."""
 
     def map(
         self, function: Callable[[Model, Item], Answer], recipe: Recipe, items: Sequence[Item]
@@ -63,4 +64,25 @@ class InProcess:
         return (function(build_model(recipe), item) for item in items)
 
     def close(self) -> None:
-        """Nothing was started."""
+        """Do nothing: nothing was started."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskRunner:
+    """What the steps of one diagnosis run on: a pool, a recipe, and the fitted runs.
+
+    recipe : of the model that the steps get
+    model : the machine in this process, for what it says of its runs and effects
+    runs : numbers of the fitted runs
+    """
+
+    pool: Pool
+    recipe: Recipe
+    model: Model
+    runs: tuple[int, ...]
+
+    def map(
+        self, function: Callable[[Model, Item], Answer], items: Sequence[Item]
+    ) -> Iterator[Answer]:
+        """Run a step for these items; give the answers in their order."""
+        return self.pool.map(function, self.recipe, items)

@@ -1,4 +1,4 @@
-"""A pool that tells how far each step has come."""
+"""The progress of a diagnosis: a pool that reports how far each step has come."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 Item = TypeVar("Item")
 Answer = TypeVar("Answer")
 
-# What steps are told as, by the name of their function; the others are fits that start elsewhere.
-SPOKEN = {
+# What a person reads about a step, by the name of its function.
+LABELS = {
     "start": "fit without effects",
     "spread": "fit without effects",
     "find_input_noise": "noise of the inputs",
@@ -25,22 +25,26 @@ SPOKEN = {
     "contend": "first fits of effects",
     "follow": "fits of the best effects",
     "refit": "fits to their end",
-    "fit_random_effect": "effects of chance",
-    "alone": "each run alone",
-    "site": "where the gap lies",
-    "shown": "what held-out runs need",
+    "fit_random_effect": "random effects",
+    "fit_alone": "each run alone",
+    "locate_gap": "where the gap lies",
+    "signature_norms": "what held-out runs need",
     "predict": "held-out runs",
-    "apart": "what to drive next",
-    "rival": "what to drive next",
-    "informs": "what to drive next",
-    "seen": "what to drive next",
+    "discriminability": "what to drive next",
+    "fit_alternative": "what to drive next",
+    "information_gain": "what to drive next",
+    "visibility": "what to drive next",
 }
-ELSEWHERE = "fits from elsewhere"
+# All other steps are fits from alternative starts.
+OTHER_LABEL = "fits from other starts"
 
 
 @dataclass(frozen=True)
 class ReportingPool:
-    """A pool; progress : told what is done and its done share, from 0 on."""
+    """A pool that reports progress.
+
+    progress : called with the label of a step and its done share [1], from 0 on
+    """
 
     pool: Pool
     progress: Progress
@@ -49,11 +53,11 @@ class ReportingPool:
         self, function: Callable[[Model, Item], Answer], recipe: Recipe, items: Sequence[Item]
     ) -> Iterator[Answer]:
         """See `Pool`."""
-        said = SPOKEN.get(function.__name__, ELSEWHERE)
+        label = LABELS.get(function.__name__, OTHER_LABEL)
         if items:
-            self.progress(said, 0.0)
+            self.progress(label, 0.0)
         for done, answer in enumerate(self.pool.map(function, recipe, items)):
-            self.progress(said, (done + 1) / len(items))
+            self.progress(label, (done + 1) / len(items))
             yield answer
 
     def close(self) -> None:

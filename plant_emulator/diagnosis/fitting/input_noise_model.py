@@ -1,13 +1,14 @@
-"""The noise of fed inputs as part of the noise, in every fit of a contest; see `fed_noise`.
+"""A model whose residuals are whitened for the noise of its measured inputs.
 
-Its directions are those at the fit without effects, which is where a gap closes when it does in the
-log. They are the same for all fits, whose costs are compared.
+An input that is measured brings its noise into the simulation. `recordings.input_noise` finds the
+directions of the residual that this noise disturbs. They are found once, at the fit without
+effects, and stay the same for every fit, because the costs of the fits are compared.
 """
 
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, cast
 
 from plant_emulator.diagnosis.fitting.steps import refit, start
@@ -16,7 +17,7 @@ from plant_emulator.diagnosis.fitting.task import Task
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.execution.pool import Pool, Recipe
+    from plant_emulator.diagnosis.execution.pool import Recipe, TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.estimation.unknowns import Residual
@@ -24,37 +25,35 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 
-def whiten_inputs(
-    pool: Pool, recipe: Recipe, model: Model, runs: tuple[int, ...]
-) -> tuple[Recipe, FitResult | None]:
-    """The recipe of a model whose residuals have white noise also where inputs are fed.
+def whiten_inputs(runner: TaskRunner) -> tuple[TaskRunner, FitResult | None]:
+    """Give a runner whose model is whitened for input noise, and the fit without effects there.
 
-    The recipe itself where these runs feed none, or none that counts; and the fit without effects
-    by it, None where none was needed.
+    The runner stays as it is where no input of the fitted runs is measured, or where the noise of
+    the inputs does not count. The fit is None where none was needed to know that.
     """
-    if not any(model.runs[run].measured_input for run in runs):
-        return recipe, None
-    (null,) = pool.map(start, recipe, [runs])
-    (found,) = pool.map(find_input_noise, recipe, [Task(base=null, runs=runs)])
+    if not any(runner.model.runs[run].measured_input for run in runner.runs):
+        return runner, None
+    (null,) = runner.map(start, [runner.runs])
+    (found,) = runner.map(find_input_noise, [Task(base=null, runs=runner.runs)])
     if not found:
-        return recipe, null
-    quiet = InputNoiseRecipe(recipe, found)
-    (null,) = pool.map(refit, quiet, [Task(base=null, runs=runs)])
-    return quiet, null
+        return runner, null
+    whitened = replace(runner, recipe=InputNoiseRecipe(runner.recipe, found))
+    (null,) = whitened.map(refit, [Task(base=null, runs=runner.runs)])
+    return whitened, null
 
 
 def find_input_noise(model: Model, task: Task) -> dict[int, NoiseDirections]:
-    """Step of a diagnosis: what the noise of fed inputs does to the runs of a fit, by run."""
-    fed = [
-        (run, model.input_noise(run, task.base, state))
+    """Find the directions of the residual that input noise disturbs at a fit, by run (a step)."""
+    found = {
+        run: model.input_noise(run, task.base, state)
         for run, state in zip(task.runs, task.base.states, strict=True)
         if model.runs[run].measured_input
-    ]
-    return {run: found for run, found in fed if found is not None}
+    }
+    return {run: noise for run, noise in found.items() if noise is not None}
 
 
 class _InputNoiseModel:
-    """A model whose residuals are whitened; all else as it is."""
+    """A model with whitened residuals; everything else is the plain model's."""
 
     def __init__(self, model: Model, noise: Mapping[int, NoiseDirections]) -> None:
         self._model, self._noise = model, noise
@@ -63,7 +62,7 @@ class _InputNoiseModel:
         return getattr(self._model, name)
 
     def with_planned_runs(self, where: FitResult, runs: Sequence[int]) -> Model:
-        """See `Model`; the planned runs come behind its own, whose noise stays as it is."""
+        """See `Model`; the planned runs follow the model's own, and are not whitened."""
         return cast(
             "Model", _InputNoiseModel(self._model.with_planned_runs(where, runs), self._noise)
         )
@@ -82,17 +81,17 @@ class _InputNoiseModel:
 
 @dataclass(frozen=True)
 class InputNoiseRecipe:
-    """What builds a model whose residuals are whitened; noise : by run."""
+    """The recipe of a model that is whitened for input noise; noise : by run."""
 
     recipe: Recipe
     noise: Mapping[int, NoiseDirections]
 
     def build(self) -> Model:
-        """The model."""
+        """Build the model."""
         return cast("Model", _InputNoiseModel(self.recipe.build(), self.noise))
 
     def digest(self) -> str:
-        """The same for the same model only."""
+        """Hash of the plain recipe and of the noise directions."""
         own = hashlib.sha256(self.recipe.digest().encode())
         for run, found in sorted(self.noise.items()):
             sparse = found.directions

@@ -1,16 +1,17 @@
-"""Effects whose course is chance, as a dead time that varies from scan to scan.
+"""Random effects: effects whose course is chance, such as a dead time that varies at each scan.
 
-No fit can follow such a course. What it leaves is unrest, the more so where the effect would move
-a channel much: residuals of the variance
+No fit can follow a random course. The course leaves a residual whose variance is larger wherever
+the effect would move a channel. The whitened residual then has the variance
 
     1 + a^2 v
 
-v : variance of the whitened channels over courses drawn by chance, of an effect of the size 1
-a : its size, by maximum likelihood (a variance component: S. R. Searle, G. Casella,
-    C. E. McCulloch, Variance Components, 1992)
+v : variance of the whitened channels over courses that are drawn at random, for an effect of size 1
+a : size of the effect, a variance component estimated by maximum likelihood (S. R. Searle,
+    G. Casella, C. E. McCulloch, Variance Components, 1992)
 
-Whatever else makes a residual large is restless elsewhere, or not random: the unrest has to be as
-large as it says at every level of v, and nearly white.
+Another cause leaves a large residual at other samples, or a residual that is not random. A random
+effect therefore counts only where the weighted residual has the same variance at every level of v,
+and is nearly white.
 """
 
 from __future__ import annotations
@@ -36,48 +37,49 @@ if TYPE_CHECKING:
     from plant_emulator.estimation.unknowns import Residual, Unknown
     from plant_emulator.signals.log import Array
 
-# Courses that are drawn: their variance is known to 30 %.
+# Courses that are drawn: the standard deviation over them is known to 15 %.
 REALISATIONS = 24
-# Added variance from which on a sample is restless; quantiles that part these into levels.
-RESTLESS, LEVELS = 0.05, (0.0, 0.25, 0.5, 0.75, 1.0)
-# Mean square that is left at a level: known no better, for the courses are few and the scans of the
-# machine others than the model's.
+# Added variance from which on a sample shows the effect, and quantiles that divide such samples
+# into levels.
+SHOWN_VARIANCE, LEVELS = 0.05, (0.0, 0.25, 0.5, 0.75, 1.0)
+# Mean square that may be left at a level. The bounds are wide: the courses are few, and the
+# machine's scans differ from the model's.
 LEAST_LEFT, MOST_LEFT = 0.5, 2.0
-# Structure left, as a share of the evidence: 0.0002 to 0.009 of such courses, 0.035 to 0.13 of
-# coarse references.
-LEFT_STRUCTURED = 0.01
-# Of little evidence the share is larger, up to 0.036, for courses leave 400 to 900 of structure in
-# three runs whatever their size, since scans and samples beat; coarse references left 60 000.
-LITTLE_STRUCTURED, BEAT = 0.04, 350.0
+# Ljung-Box excess that may be left, as a share of the evidence: 0.0002 to 0.009 after random
+# courses, 0.035 to 0.13 after coarse references.
+WHITE_SHARE = 0.01
+# The same share may be larger, up to 0.036, where it stays below this excess for each run. Random
+# courses leave an excess of 400 to 900 in three runs whatever their size, because scans and samples
+# beat; coarse references left 60 000.
+WHITE_SHARE_OF_BEAT, BEAT_EXCESS = 0.04, 350.0
 
 
 def fit_random_effect(model: Model, task: Task) -> VarianceComponent:
-    """Step of a diagnosis: the unrest that `task.effect` explains of a fit's residual.
+    """Fit the random effect `task.effect` to the residual of the fit `task.base` (a step).
 
-    Where it does not hold, once more on the fit with its weights: restless samples, taken at the
-    sensors' noise, draw a fit to their chance course, and what that leaves elsewhere is not random.
-    Of what is random the likeliest of some shapes: a scan of exactly the log's period is seen at
-    one phase only, any other at all.
+    A fit at the sensors' noise follows the chance course, and leaves a residual elsewhere that is
+    not random. The component is then fitted again on a fit with its own weights. Where the result
+    is white, the likeliest of several shapes counts: a scan of exactly the log's period shows one
+    phase only.
     """
     candidate = model.candidates[task.effect]
     usual = {u.name: u.start for u in candidate.shapes}
-    found = _variance_component(model, task, usual)
+    found = _fit_component(model, task, usual)
     if found.evidence <= EVIDENCE_THRESHOLD:
         return found
     if not found.consistent:
-        weighted = cast(
-            "Model", _WeightedModel(model, dict(zip(task.runs, found.weights, strict=True)))
-        )
+        weights = dict(zip(task.runs, found.weights, strict=True))
+        weighted = cast("Model", _WeightedModel(model, weights))
         task = replace(task, base=fit_from(weighted, task.base.effects, task.runs, task.base))
-        found = _variance_component(model, task, usual)
+        found = _fit_component(model, task, usual)
     if not found.white:
         return found
-    others = [_variance_component(model, task, usual | shape) for shape in _shapes(candidate)]
+    others = [_fit_component(model, task, usual | shape) for shape in _other_shapes(candidate)]
     return max([found, *others], key=lambda one: one.evidence)
 
 
-def _shapes(candidate: Candidate) -> list[dict[str, float]]:
-    """Shapes of an effect other than the usual one: each constant a deviation to either side."""
+def _other_shapes(candidate: Candidate) -> list[dict[str, float]]:
+    """Shapes with one constant a prior standard deviation to either side of the usual value."""
     return [
         {u.name: float(np.clip(u.start + side * u.std, u.lower, u.upper))}
         for u in candidate.shapes
@@ -86,23 +88,20 @@ def _shapes(candidate: Candidate) -> list[dict[str, float]]:
     ]
 
 
-def _variance_component(model: Model, task: Task, shape: Mapping[str, float]) -> VarianceComponent:
-    where, (size,) = task.base, model.candidates[task.effect].sizes
+def _fit_component(model: Model, task: Task, shape: Mapping[str, float]) -> VarianceComponent:
+    """Fit the variance component of an effect of this shape."""
+    base, (size,) = task.base, model.candidates[task.effect].sizes
     residuals = [
-        model.residual(run, where.effects)({**where.values, **states})
-        for run, states in zip(task.runs, where.states, strict=True)
+        model.residual(run, base.effects)({**base.values, **states})
+        for run, states in zip(task.runs, base.states, strict=True)
     ]
     variances = _variances(model, task, shape, size.start)
     counted = [residual != 0.0 for residual in residuals]
     squares = np.concatenate([r[c] for r, c in zip(residuals, counted, strict=True)]) ** 2
     added = np.concatenate([v[c] for v, c in zip(variances, counted, strict=True)])
-    found, error, evidence = _most_likely(squares, added, size.upper)
+    found, error, evidence = _maximise_likelihood(squares, added, size.upper)
     weights = tuple(1.0 / np.sqrt(1.0 + found**2 * v) for v in variances)
-    left = sum(
-        structure(channel)
-        for residual, weight in zip(residuals, weights, strict=True)
-        for channel in residual * weight
-    )
+    weighted = [r * w for r, w in zip(residuals, weights, strict=True)]
     return VarianceComponent(
         effect=task.effect,
         parameter=size.name,
@@ -111,37 +110,45 @@ def _variance_component(model: Model, task: Task, shape: Mapping[str, float]) ->
         shape=shape,
         evidence=evidence,
         weights=weights,
-        homoscedastic=_even(squares, found**2 * added),
-        white=left
-        < max(
-            LEFT_STRUCTURED * evidence,
-            min(LITTLE_STRUCTURED * evidence, BEAT * len(residuals)),
-        ),
+        homoscedastic=_is_homoscedastic(squares, found**2 * added),
+        white=_is_white(weighted, evidence),
     )
 
 
+def _is_white(residuals: Sequence[Array], evidence: float) -> bool:
+    """Whether the weighted residuals have no more Ljung-Box excess than random courses leave."""
+    excess = sum(structure(channel) for residual in residuals for channel in residual)
+    of_beat = min(WHITE_SHARE_OF_BEAT * evidence, BEAT_EXCESS * len(residuals))
+    return excess < max(WHITE_SHARE * evidence, of_beat)
+
+
 def _variances(model: Model, task: Task, shape: Mapping[str, float], size: float) -> list[Array]:
-    """Variance of every run's whitened channels over the courses, of the size 1."""
-    where, candidate = task.base, model.candidates[task.effect]
+    """Variance v of each run's whitened channels over the courses, for an effect of size 1."""
+    base, candidate = task.base, model.candidates[task.effect]
     random = np.random.default_rng(0)
     found = []
-    for run, states in zip(task.runs, where.states, strict=True):
-        residual = model.residual(run, (*where.effects, task.effect))
-        plain = {**where.values, **states, **shape, candidate.sizes[0].name: size}
+    for run, states in zip(task.runs, base.states, strict=True):
+        residual = model.residual(run, (*base.effects, task.effect))
+        plain = {**base.values, **states, **shape, candidate.sizes[0].name: size}
         courses = [
-            residual({**plain, **{u.name: _drawn(u, random) for u in candidate.stochastic}})
+            residual({**plain, **{u.name: _draw(u, random) for u in candidate.stochastic}})
             for _ in range(REALISATIONS)
         ]
         found.append(np.var(np.stack(courses), axis=0, ddof=1) / size**2)
     return found
 
 
-def _drawn(unknown: Unknown, random: np.random.Generator) -> float:
+def _draw(unknown: Unknown, random: np.random.Generator) -> float:
     return float(random.uniform(unknown.lower, unknown.upper))
 
 
-def _most_likely(squares: Array, added: Array, upper: float) -> tuple[float, float, float]:
-    """Size, its standard error, and the evidence; squares, added : of the samples that count."""
+def _maximise_likelihood(squares: Array, added: Array, upper: float) -> tuple[float, float, float]:
+    """Estimate the size a; give it, its standard error, and the evidence.
+
+    squares : of the whitened residual's samples that count
+    added : variance v of the same samples
+    upper : bound of the size
+    """
     from scipy.optimize import minimize_scalar
 
     def loss(size: float) -> float:
@@ -156,12 +163,12 @@ def _most_likely(squares: Array, added: Array, upper: float) -> tuple[float, flo
     return size, error, max(0.0, loss(0.0) - loss(size))
 
 
-def _even(squares: Array, added: Array) -> bool:
-    """Whether the residual is as restless as the added variance says, at every level of it."""
-    restless = added > RESTLESS
-    if not restless.any():
+def _is_homoscedastic(squares: Array, added: Array) -> bool:
+    """Whether the weighted residual has the same variance at every level of the added variance."""
+    shown = added > SHOWN_VARIANCE
+    if not shown.any():
         return False
-    left, level = squares[restless] / (1.0 + added[restless]), added[restless]
+    left, level = squares[shown] / (1.0 + added[shown]), added[shown]
     edges = np.quantile(level, LEVELS)
     bins = np.clip(np.searchsorted(edges, level, side="right") - 1, 0, len(edges) - 2)
     means = [left[bins == k].mean() for k in range(len(edges) - 1) if (bins == k).any()]
@@ -169,7 +176,7 @@ def _even(squares: Array, added: Array) -> bool:
 
 
 class _WeightedModel:
-    """A model whose residuals are weighted; all else as it is."""
+    """A model with weighted residuals; everything else is the plain model's."""
 
     def __init__(self, model: Model, weights: Mapping[int, Array]) -> None:
         self._model, self._weights = model, weights
@@ -178,7 +185,7 @@ class _WeightedModel:
         return getattr(self._model, name)
 
     def with_planned_runs(self, where: FitResult, runs: Sequence[int]) -> Model:
-        """See `Model`; the planned runs come behind its own, without unrest."""
+        """See `Model`; the planned runs follow the model's own, and are not weighted."""
         return cast(
             "Model", _WeightedModel(self._model.with_planned_runs(where, runs), self._weights)
         )
@@ -195,17 +202,17 @@ class _WeightedModel:
 
 @dataclass(frozen=True)
 class WeightedRecipe:
-    """What builds a model whose noise is larger by an unrest; weights : of the model's runs."""
+    """The recipe of a model whose noise is larger by a random effect; weights : of all its runs."""
 
     recipe: Recipe
     weights: tuple[Array, ...]
 
     def build(self) -> Model:
-        """The model."""
+        """Build the model."""
         return cast("Model", _WeightedModel(self.recipe.build(), dict(enumerate(self.weights))))
 
     def digest(self) -> str:
-        """The same for the same model only."""
+        """Hash of the plain recipe and of the weights."""
         own = hashlib.sha256(self.recipe.digest().encode())
         for weight in self.weights:
             own.update(np.ascontiguousarray(weight).tobytes())

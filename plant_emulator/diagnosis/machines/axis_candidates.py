@@ -73,10 +73,10 @@ def candidate(name: str, effect: AxisEffect, scale: Scale, *, rotary: bool) -> C
 def _one_way(effect: str, friction: str, way: str, unit: str) -> DerivedQuantity:
     """The coefficient of one direction, (1 + a) F forwards and (1 - a) F backwards [unit]."""
 
-    def of(p: Mapping[str, float]) -> float:
+    def formula(p: Mapping[str, float]) -> float:
         return p[friction] * (1.0 + DIRECTIONS[way] * p[f"{effect}_ratio"])
 
-    return DerivedQuantity(name=way, unit=unit, of=of)
+    return DerivedQuantity(name=way, unit=unit, formula=formula)
 
 
 def measure(constant: Constant, scale: Scale) -> float:

@@ -1,8 +1,9 @@
-"""Sums over a run drawn anew in blocks of time, for intervals that allow for the residual's memory.
+"""The circular block bootstrap: sums over runs that are drawn anew in blocks of time.
 
-Each block starts anywhere, goes on at the run's beginning where it passes the end, and the last one
-is cut so that a draw is as long as the run: the circular block bootstrap (D. N. Politis, J. P.
-Romano, in LePage, Billard (ed.), Exploring the Limits of Bootstrap, Wiley 1992, 263).
+Intervals from such draws allow for the autocorrelation of the residual. A block starts at any
+sample, and continues at the beginning of the run where it passes the end. The last block is cut, so
+that a draw is as long as the run (D. N. Politis, J. P. Romano, in LePage, Billard (ed.), Exploring
+the Limits of Bootstrap, Wiley 1992, 263).
 """
 
 from __future__ import annotations
@@ -18,28 +19,28 @@ if TYPE_CHECKING:
 
     from plant_emulator.signals.log import Array
 
-# A block in memories of the squares.
-MEMORIES = 3.0
-FEWEST, MOST = 10, 500
-"""Blocks of a run."""
+# Length of a block in correlation times of the squares.
+CORRELATION_TIMES = 3.0
+# Blocks of a run.
+FEWEST_BLOCKS, MOST_BLOCKS = 10, 500
 DRAWS = 400
 SEED = 1
 
 
 def block_length(residual: Array) -> int:
-    """Samples of a block for a run of this residual, shape (channels, samples).
+    """Samples of a block for a run with this residual, shape (channels, samples).
 
-    What is drawn is a mean of squares, so that the memory that counts is the one of the squares
-    about their mean: an offset lengthens no block. A block has MEMORIES of it, which leaves out a
-    sixth of the variance of such a mean at most (first-order residuals), and at most 1/FEWEST of
-    the run: of m blocks the interval's width is known to 1/sqrt(2 m), a fifth at ten; of fewer it
-    is a guess. Of runs of a thousand samples the usual bound, 3 sqrt(n), is the same (D. N.
-    Politis, H. White, Econometric Reviews 23 (2004) 53). More than MOST blocks would not be
-    better, only slower.
+    A draw estimates a mean of squares, so the correlation time of the squares about their mean
+    counts; an offset lengthens no block. A block of CORRELATION_TIMES leaves out at most a sixth of
+    the variance of such a mean (first-order residuals). A run has at least FEWEST_BLOCKS: m blocks
+    give the interval's width to 1/sqrt(2 m), which is a fifth at ten blocks. For runs of a thousand
+    samples the usual bound, 3 sqrt(n), is the same (D. N. Politis, H. White, Econometric Reviews 23
+    (2004) 53). More than MOST_BLOCKS would only take longer.
     """
     samples = residual.shape[1]
-    wanted = MEMORIES * max(correlation_time(_squares(channel)) for channel in residual)
-    return max(1, round(float(np.clip(wanted, samples / MOST, samples / FEWEST))))
+    wanted = CORRELATION_TIMES * max(correlation_time(_squares(channel)) for channel in residual)
+    shortest, longest = samples / MOST_BLOCKS, samples / FEWEST_BLOCKS
+    return max(1, round(float(np.clip(wanted, shortest, longest))))
 
 
 def _squares(channel: Array) -> Array:
@@ -50,11 +51,11 @@ def _squares(channel: Array) -> Array:
     return np.where(counted, channel**2 - np.mean(channel[counted] ** 2), 0.0)
 
 
-def sums(runs: Sequence[Array], lengths: Sequence[int]) -> Array:
-    """Sums over time of DRAWS draws of all runs, shape (channels, DRAWS).
+def resampled_sums(runs: Sequence[Array], lengths: Sequence[int]) -> Array:
+    """Sums over time of DRAWS draws of all runs together, shape (channels, DRAWS).
 
-    runs : shape (channels, samples) each; lengths : of each run's blocks
-    The same for all runs of the same length and blocks, so that what is drawn can be compared.
+    runs : shape (channels, samples) each; lengths : samples of a block of each run
+    Runs of equal length and blocks are drawn alike, so that two hypotheses can be compared.
     """
     random = np.random.default_rng(SEED)
     return np.asarray(

@@ -1,8 +1,9 @@
-"""How far the gap shrinks, on runs that were not fitted.
+"""How far the gap shrinks on runs that were not fitted.
 
-A fold fits on some runs and predicts others; a predicted run keeps all parameters, and only its own
-start states are fitted to it. The gap of a model is what its predictions leave, all held-out
-samples of a channel pooled; intervals come from runs drawn anew in blocks of time (`resample`).
+A fold fits some runs and predicts others. A predicted run keeps all parameters; only its own
+initial states are fitted to it. The gap of a hypothesis is the root mean square of its predictions'
+residuals, over all held-out samples of a channel. Intervals come from runs that are drawn anew in
+blocks of time (`block_bootstrap`).
 """
 
 from __future__ import annotations
@@ -25,19 +26,19 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.machine import MeasuredRun, Model
     from plant_emulator.signals.log import Array
 
-# A channel counts in the closed fraction from this gap on, in the noise.
-OPEN = 1.1
-# Times that a fit that ran out of steps is taken up again.
-PATIENCE = 3
+# A channel counts in the closed fraction from this gap on, in the noise [1].
+OPEN_GAP = 1.1
+# A fit that ran out of iterations is continued at most so many times.
+CONTINUATIONS = 3
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fold:
-    """Runs to fit, and runs to predict.
+    """A cross-validation fold: runs to fit, and runs to predict.
 
-    start : where the fit begins, with the states of the fitted runs
-    refitted : False: the start's values are taken as they are
-    as_fitted : the predicted run is a later part of the fitted one, and starts as that does
+    start : fit to start from, with the states of the fitted runs
+    refitted : whether the runs are fitted; else the start's values are taken as they are
+    as_fitted : whether the predicted run is a later part of the fitted one, and starts as that does
     """
 
     fitted: tuple[int, ...]
@@ -49,9 +50,9 @@ class Fold:
 
 @dataclass(frozen=True, kw_only=True)
 class Prediction:
-    """The whitened residual of predicted runs, one array a run, shape (channels, samples).
+    """The whitened residuals of predicted runs [1], shape (channels, samples) each.
 
-    converged : the fit, and those of the predicted runs' own states
+    converged : whether the fit of the fold and the fits of the runs' own states converged
     """
 
     residuals: tuple[Array, ...]
@@ -59,72 +60,76 @@ class Prediction:
 
 
 def predict(model: Model, fold: Fold) -> Prediction:
-    """Fit the fold's model on its runs, and predict the others."""
-    point = refitted(model, fold) if fold.refitted else fold.start
-    known = point.states[0] if fold.as_fitted else None
-    found = [_predicted(model, point, run, known) for run in fold.predicted]
+    """Fit the fold's hypothesis to its fitted runs, and predict the others (a step)."""
+    found = refit_fold(model, fold) if fold.refitted else fold.start
+    known = found.states[0] if fold.as_fitted else None
+    predicted = [_predict_run(model, found, run, known) for run in fold.predicted]
     return Prediction(
-        residuals=tuple(residual for residual, _ in found),
-        converged=(point.converged or not fold.refitted) and all(ended for _, ended in found),
+        residuals=tuple(residual for residual, _ in predicted),
+        converged=(found.converged or not fold.refitted) and all(ended for _, ended in predicted),
     )
 
 
-def refitted(model: Model, fold: Fold) -> FitResult:
-    """The fold's model fitted on its runs, taken up again where it ran out of steps.
+def refit_fold(model: Model, fold: Fold) -> FitResult:
+    """Fit the fold's hypothesis to its fitted runs, and continue until the fit converges.
 
-    What these runs tell nothing of, as a pause that none of them has, would end anywhere.
+    The sizes have a shrinkage prior: a size that these runs do not show would end anywhere.
     """
-    point = fold.start
-    for _ in range(1 + PATIENCE):
-        point = fit(model, point.effects, fold.fitted, point.values, point.states, shrinkage=True)
-        if point.converged:
+    found = fold.start
+    for _ in range(1 + CONTINUATIONS):
+        found = fit(model, found.effects, fold.fitted, found.values, found.states, shrinkage=True)
+        if found.converged:
             break
-    return point
+    return found
 
 
-def shown(model: Model, fold: Fold) -> dict[str, float]:
-    """What each effect of the fold's start does to the fitted runs that drift cannot [noise]."""
-    return {name: _shown(model, fold, name) for name in fold.start.effects}
+def signature_norms(model: Model, fold: Fold) -> dict[str, float]:
+    """Norm of each effect's orthogonal signature in the fitted runs, in the noise (a step)."""
+    return {name: _signature_norm(model, fold, name) for name in fold.start.effects}
 
 
-def _shown(model: Model, fold: Fold, name: str) -> float:
+def _signature_norm(model: Model, fold: Fold, name: str) -> float:
     start = fold.start
     without = replace(start, effects=tuple(e for e in start.effects if e != name))
-    tangents = NuisanceSpace(linearise(model, without, fold.fitted))
+    nuisance = NuisanceSpace(linearise(model, without, fold.fitted))
     complete = [
         model.residual(run, start.effects)({**start.values, **states}).ravel()
         for run, states in zip(fold.fitted, start.states, strict=True)
     ]
-    return float(np.linalg.norm(tangents.orthogonal(np.concatenate(complete) - tangents.residual)))
+    return float(np.linalg.norm(nuisance.orthogonal(np.concatenate(complete) - nuisance.residual)))
 
 
-def _predicted(
-    model: Model, point: FitResult, run: int, known: Mapping[str, float] | None
+def _predict_run(
+    model: Model, found: FitResult, run: int, known: Mapping[str, float] | None
 ) -> tuple[Array, bool]:
-    """Residual of a run with all parameters kept, its own states fitted unless known; converged."""
-    effects = point.effects
+    """Residual of a run with all parameters kept, and whether the fit of its states converged.
+
+    known : the run's states; None: they are fitted to it
+    """
+    effects = found.effects
     residual = model.residual(run, effects)
 
-    def of(found: Mapping[str, float]) -> Array:
-        return residual({**point.values, **found})
+    def predicted(states: Mapping[str, float]) -> Array:
+        return residual({**found.values, **states})
 
     own = (*model.states, *(u for name in effects for u in model.candidates[name].states))
     if known is not None or not own:
-        return of(known or {}), True
-    start = model.initial_states(run, effects, point.values)
+        return predicted(known or {}), True
+    start = model.initial_states(run, effects, found.values)
     states = [replace(u, run=0, start=float(np.clip(start[u.name], u.lower, u.upper))) for u in own]
-    found = estimate(states, [of])
-    return found.residuals[0], found.converged
+    estimated = estimate(states, [predicted])
+    return estimated.residuals[0], estimated.converged
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gap:
-    """The held-out gap of a model, of every channel that has held-out samples.
+    """The held-out gap of a hypothesis, for every channel with held-out samples.
 
-    noise : of a channel, pooled over the held-out samples, shape (channels,) [units]
-    squares : of the residual in that noise, one array a run, shape (channels, samples)
-    weights : variance of a sample's own noise in that noise; 0 where a sample does not count
-    blocks : samples of a block of every run, see `resample`
+    noise : of each channel, pooled over the held-out samples [units], shape (channels,)
+    squares : of the residual over that noise, shape (channels, samples), one array a run
+    weights : variance of each sample's own noise over that noise's, 0 where the sample does not
+        count; same shapes
+    blocks : samples of a block of each run, see `block_bootstrap`
     """
 
     channels: tuple[str, ...]
@@ -135,27 +140,26 @@ class Gap:
 
     @property
     def by_channel(self) -> Array:
-        """Rms over the noise, shape (channels,)."""
+        """Root mean square over the noise [1], shape (channels,)."""
         return np.asarray(np.sqrt(self.mean_squares[:, 0]))
 
     @property
     def mean_squares(self) -> Array:
-        """Mean square over the noise's, shape (channels, 1)."""
+        """Mean square over the noise's variance [1], shape (channels, 1)."""
         total = sum(squares.sum(axis=1, keepdims=True) for squares in self.squares)
         return np.asarray(total / sum(w.sum(axis=1, keepdims=True) for w in self.weights))
 
     @cached_property
-    def drawn(self) -> tuple[Array, Array]:
-        """Sums of squares and of weights in draws of the runs, shape (channels, draws) each."""
-        return block_bootstrap.sums(self.squares, self.blocks), block_bootstrap.sums(
-            self.weights, self.blocks
-        )
+    def resampled(self) -> tuple[Array, Array]:
+        """Sums of squares and of weights in bootstrap draws, shape (channels, draws) each."""
+        squares = block_bootstrap.resampled_sums(self.squares, self.blocks)
+        return squares, block_bootstrap.resampled_sums(self.weights, self.blocks)
 
 
-def gap(
+def measure_gap(
     runs: Sequence[MeasuredRun], predictions: Sequence[Prediction], blocks: Sequence[int]
 ) -> Gap:
-    """The gap from the predictions of all folds; runs, blocks : of every predicted run."""
+    """Measure the gap of the predictions of all folds; runs, blocks : of every predicted run."""
     residuals = [r for prediction in predictions for r in prediction.residuals]
     pairs = list(zip(runs, residuals, strict=True))
     names = tuple(
@@ -177,44 +181,45 @@ def gap(
 
 
 def _rows(names: Sequence[str], run: MeasuredRun, values: Array) -> Array:
-    """A run's rows in the order of these channels; 0 of those that it has not."""
+    """Rows of a run in the order of these channels; zeros for a channel that it lacks."""
     nothing = np.zeros(values.shape[1])
     own = dict(zip(run.channels, values, strict=True))
     return np.stack([own.get(name, nothing) for name in names])
 
 
 def block_lengths(predictions: Sequence[Prediction]) -> list[int]:
-    """Samples of a block for every predicted run."""
+    """Samples of a bootstrap block for every predicted run."""
     return [
         block_bootstrap.block_length(r) for prediction in predictions for r in prediction.residuals
     ]
 
 
 def closed_fraction(reference: Gap, explained: Gap) -> float | None:
-    """Share of the gap beyond the noise that an explanation closes; None where there is no gap.
+    """Share of the gap beyond the noise that a hypothesis closes [1]; None where there is no gap.
 
-    1 - sum max(0, explained^2 - 1) / sum (reference^2 - 1), over channels with a reference of OPEN
-    or more, all in the noise.
+    1 - sum max(0, explained^2 - 1) / sum (reference^2 - 1)
+
+    over the channels whose reference is OPEN_GAP or more; both gaps in the noise.
     """
     (found,) = _closed(reference, reference.mean_squares, explained.mean_squares)
     return float(found) if np.isfinite(found) else None
 
 
 def _closed(reference: Gap, before: Array, after: Array) -> Array:
-    """The closed fraction of mean squares, shape (channels, draws); NaN where there is no gap."""
-    counting = reference.by_channel >= OPEN
+    """Closed fraction for mean squares of shape (channels, draws); NaN where there is no gap."""
+    counting = reference.by_channel >= OPEN_GAP
     gap_before = np.sum(before[counting] - 1.0, axis=0)
     left = np.sum(np.maximum(0.0, after[counting] - 1.0), axis=0)
     there = gap_before > 0.0
     return np.where(there, 1.0 - left / np.where(there, gap_before, 1.0), np.nan)
 
 
-def interval(reference: Gap, explained: Gap) -> tuple[float, float] | None:
-    """95 % interval of the closed fraction; draws without samples of a channel do not count."""
+def closed_fraction_interval(reference: Gap, explained: Gap) -> tuple[float, float] | None:
+    """95 % interval of the closed fraction [1]; draws without samples of a channel do not count."""
     if closed_fraction(reference, explained) is None:
         return None
     with np.errstate(invalid="ignore"):
-        before, after = (np.divide(*found.drawn) for found in (reference, explained))
+        before, after = (np.divide(*found.resampled) for found in (reference, explained))
     drawn = _closed(reference, before, after)
     drawn = drawn[np.isfinite(drawn)]
     if not len(drawn):
@@ -223,9 +228,9 @@ def interval(reference: Gap, explained: Gap) -> tuple[float, float] | None:
     return float(low), float(high)
 
 
-def combined(found: Gap) -> tuple[float, float, float]:
-    """Rms over all channels, in the noise, with its 95 % interval."""
-    squares, weights = found.drawn
+def combined_gap(found: Gap) -> tuple[float, float, float]:
+    """Root mean square over all channels, in the noise [1], and its 95 % interval."""
+    squares, weights = found.resampled
     low, high = np.nanquantile(np.sqrt(squares.sum(axis=0) / weights.sum(axis=0)), [0.025, 0.975])
     total = sum(s.sum() for s in found.squares) / sum(w.sum() for w in found.weights)
     return float(np.sqrt(total)), float(low), float(high)

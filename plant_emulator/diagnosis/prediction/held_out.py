@@ -1,4 +1,4 @@
-"""The runs held out of a diagnosis: which can be predicted, and what every model leaves there."""
+"""The held-out runs: which can be predicted, and what each hypothesis leaves there."""
 
 from __future__ import annotations
 
@@ -6,36 +6,47 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fitting.evidence import DETECTABLE_NORM, EVIDENCE_THRESHOLD
-from plant_emulator.diagnosis.prediction import gap
-from plant_emulator.diagnosis.prediction.gap import Fold
+from plant_emulator.diagnosis.prediction.gap import (
+    Fold,
+    block_lengths,
+    closed_fraction,
+    measure_gap,
+    predict,
+    signature_norms,
+)
+from plant_emulator.diagnosis.prediction.trace import traces
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
-    from plant_emulator.diagnosis.execution.pool import Pool, Recipe
+    from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
-    from plant_emulator.diagnosis.machine import Model
-    from plant_emulator.diagnosis.prediction.gap import Prediction
+    from plant_emulator.diagnosis.machine import MeasuredRun
+    from plant_emulator.diagnosis.prediction.gap import Gap, Prediction
+    from plant_emulator.diagnosis.prediction.trace import Trace
 
-# Effects whose held-out gain is computed beside those accepted: the best ones only, each takes a
-# fit a fold.
-TRIED = 3
-# Share of the best one's evidence that another has at least: with less it is no rival, and its fits
-# stop in valleys, so that the share that it closes tells of these.
-NEAR = 0.5
-# The model "as given" among those that are compared by their effects.
+    # Predictions of each hypothesis, by its effects, one a fold.
+    Predictions = Mapping[tuple[str, ...], Sequence[Prediction]]
+
+# At most so many effects are predicted beside the accepted ones: each takes a fit a fold.
+MOST_PREDICTED = 3
+# Share of the best effect's evidence that an effect needs to be predicted. With less it is no
+# alternative, and its fits stop in local minima, so that its gain would tell of these.
+COMPARABLE_EVIDENCE = 0.5
+# Stands for the parameter set as given among the hypotheses, which are named by their effects.
 NOMINAL = ("nominal",)
-# Of every fold the runs that are fitted, and those that are predicted.
+# Of every fold the fitted runs, and the predicted runs.
 Folds = tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """Which runs are fitted and which are predicted; indices of the model's runs.
+    """Which runs of the model are fitted and which are predicted.
 
-    folds : (fitted, predicted); with as_fitted the predicted run is a later part of the fitted one
-        and starts as that does
+    fitted : runs of the diagnosis itself
+    folds : fitted and predicted runs of each cross-validation fold
+    as_fitted : whether the predicted run is a later part of the fitted one, and starts as that does
     """
 
     fitted: tuple[int, ...]
@@ -44,102 +55,165 @@ class Plan:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Gaps:
+    """The held-out gaps of the hypotheses.
+
+    runs : the predicted runs
+    predictions, by_effects : predictions and gap of each hypothesis, by its effects or NOMINAL
+    predictable : whether any run can be predicted with the accepted effects
+    notes : on folds without a prediction and fits that did not converge
+    """
+
+    runs: Sequence[MeasuredRun]
+    predictions: Predictions
+    by_effects: Mapping[tuple[str, ...], Gap]
+    predictable: bool
+    notes: tuple[str, ...]
+
+    @property
+    def nominal(self) -> Gap:
+        """The gap with the nominal parameters."""
+        return self.by_effects[NOMINAL]
+
+    @property
+    def null(self) -> Gap:
+        """The gap without effects."""
+        return self.by_effects[()]
+
+    def gain(self, effect: str) -> float | None:
+        """Closed fraction with this effect alone [1]; None where it was not predicted."""
+        alone = self.by_effects.get((effect,))
+        return None if alone is None else closed_fraction(self.null, alone)
+
+    def traces(self, effects: tuple[str, ...]) -> tuple[Trace, ...]:
+        """Traces of the predicted runs, without and with these effects."""
+        return traces(self.runs, self.predictions[()], self.predictions[effects])
+
+
+@dataclass(frozen=True, kw_only=True)
 class HeldOut:
     """The held-out runs of one diagnosis."""
 
-    pool: Pool
-    recipe: Recipe
-    model: Model
+    runner: TaskRunner
     plan: Plan
 
-    def usable(
+    def gaps(self, explained: Explanation, followed: tuple[str, ...]) -> Gaps:
+        """Predict the held-out runs with every hypothesis that counts, and measure the gaps.
+
+        followed : accepted effects that a simulation can follow
+        Where no run can be predicted with them, all runs show the gap without them.
+        """
+        usable, notes = self.usable_folds(explained, followed)
+        folds = usable or self.plan.folds
+        predictions = self.predictions(explained, followed, folds)
+        runs = [self.runner.model.runs[run] for _, predicted in folds for run in predicted]
+        lengths = block_lengths(predictions[()])
+        return Gaps(
+            runs=runs,
+            predictions=predictions,
+            by_effects={key: measure_gap(runs, one, lengths) for key, one in predictions.items()},
+            predictable=bool(usable),
+            notes=(*notes, *self.convergence_notes(folds, predictions)),
+        )
+
+    def usable_folds(
         self, explained: Explanation, followed: tuple[str, ...]
     ) -> tuple[Folds, tuple[str, ...]]:
-        """The folds whose fitted runs show all named effects, and a note on every other.
+        """Folds whose fitted runs show all these effects, and a note on each other fold.
 
-        Runs that do not show an effect cannot predict it. No fold is left where no choice of runs
-        shows all.
+        Runs that do not show an effect cannot predict it, so that no fold may be left.
         """
-        tasks = [self._fold(explained.final, *fold, refitted=False) for fold in self.plan.folds]
-        if not followed or len(tasks) < 2:
-            return self.plan.folds, ()
+        folds = self.plan.folds
+        if not followed or len(folds) < 2:
+            return folds, ()
+        tasks = [self._fold(explained.final, *fold, refitted=False) for fold in folds]
         usable, notes = [], []
-        for fold, norms in zip(
-            self.plan.folds, self.pool.map(gap.shown, self.recipe, tasks), strict=True
-        ):
+        for fold, norms in zip(folds, self.runner.map(signature_norms, tasks), strict=True):
             hidden = [name for name, norm in norms.items() if norm < DETECTABLE_NORM]
             if not hidden:
                 usable.append(fold)
                 continue
-            lost = ", ".join(self.model.runs[run].source for run in fold[1])
+            lost = self._sources(fold[1])
             notes.append(f"{lost}: shows no shrinkage; the other runs do not show {hidden[0]}")
         return tuple(usable), tuple(notes)
 
     def predictions(
         self, explained: Explanation, followed: tuple[str, ...], folds: Folds
     ) -> dict[tuple[str, ...], list[Prediction]]:
-        """Held-out residuals of every model that is compared, by its effects.
+        """Held-out residuals of every hypothesis by its effects, one prediction a fold.
 
-        ("nominal",) : the parameter set as given, or the fold's own where none is.
+        NOMINAL : the nominal parameters, or those that the fold's own runs tell
         """
-        points: dict[tuple[str, ...], FitResult] = {(): explained.null}
-        for count in range(1, len(followed) + 1):
-            some = followed[:count]
-            points[some] = replace(explained.final, effects=some)
-        for contender in _best(explained, followed):
-            assert contender.fit is not None
-            points.setdefault((contender.effect,), contender.fit)
-        tasks, keys = [], []
-        for key, point in [(NOMINAL, explained.null), *points.items()]:
+        keys, tasks = [], []
+        for key, found in _hypotheses(explained, followed):
             for fitted, predicted in folds:
-                start = point
+                start = found
                 if key == NOMINAL:
-                    start = replace(point, values=self.model.nominal(fitted))
+                    start = replace(found, values=self.runner.model.nominal(fitted))
                 keys.append(key)
                 tasks.append(self._fold(start, fitted, predicted, refitted=key != NOMINAL))
-        found_all: dict[tuple[str, ...], list[Prediction]] = {}
-        answers = self.pool.map(gap.predict, self.recipe, tasks)
-        for key, prediction in zip(keys, answers, strict=True):
-            found_all.setdefault(key, []).append(prediction)
-        return found_all
+        predictions: dict[tuple[str, ...], list[Prediction]] = {}
+        for key, prediction in zip(keys, self.runner.map(predict, tasks), strict=True):
+            predictions.setdefault(key, []).append(prediction)
+        return predictions
 
-    def unsettled(
-        self, folds: Folds, predictions: Mapping[tuple[str, ...], list[Prediction]]
-    ) -> tuple[str, ...]:
-        """A note on every model whose fit for a held-out run ran out of steps."""
+    def convergence_notes(self, folds: Folds, predictions: Predictions) -> tuple[str, ...]:
+        """A note on each hypothesis whose fit for a held-out run did not converge."""
         notes = []
         for key, found in predictions.items():
             pairs = zip(folds, found, strict=True)
             runs = [run for (_, some), one in pairs if not one.converged for run in some]
-            sources = ", ".join(self.model.runs[run].source for run in runs)
             if runs:
                 those = ", ".join(key) or "no effect"
+                sources = self._sources(runs)
                 notes.append(f"{sources}: predicted by a fit with {those} that did not end")
         return tuple(notes)
 
+    def _sources(self, runs: Sequence[int]) -> str:
+        return ", ".join(self.runner.model.runs[run].source for run in runs)
+
     def _fold(
         self,
-        point: FitResult,
+        start: FitResult,
         fitted: tuple[int, ...],
         predicted: tuple[int, ...],
         *,
         refitted: bool,
     ) -> Fold:
-        """A fold that begins where the fit to all runs has ended."""
-        states = tuple(point.states[self.plan.fitted.index(run)] for run in fitted)
+        """A fold that starts from a fit to all runs of the plan."""
+        states = tuple(start.states[self.plan.fitted.index(run)] for run in fitted)
         return Fold(
             fitted=fitted,
             predicted=predicted,
-            start=replace(point, states=states),
+            start=replace(start, states=states),
             refitted=refitted,
             as_fitted=self.plan.as_fitted,
         )
 
 
-def _best(explained: Explanation, followed: Sequence[str]) -> list[Hypothesis]:
-    """Those accepted, and those that count and come somewhere near the best."""
-    fitted = [c for c in explained.hypotheses if c.fit is not None]
+def _hypotheses(
+    explained: Explanation, followed: tuple[str, ...]
+) -> Iterator[tuple[tuple[str, ...], FitResult]]:
+    """Fits to predict from, by their effects.
+
+    They are the parameters as given, the fit without effects, the fits with one accepted effect
+    after the other, and each comparable effect alone.
+    """
+    fits: dict[tuple[str, ...], FitResult] = {(): explained.null}
+    for count in range(1, len(followed) + 1):
+        fits[followed[:count]] = replace(explained.final, effects=followed[:count])
+    for hypothesis in _comparable(explained, followed):
+        if hypothesis.fit is not None:
+            fits.setdefault((hypothesis.effect,), hypothesis.fit)
+    yield NOMINAL, explained.null
+    yield from fits.items()
+
+
+def _comparable(explained: Explanation, followed: Sequence[str]) -> list[Hypothesis]:
+    """The accepted effects, and those whose evidence counts and comes near the best."""
+    fitted = [one for one in explained.hypotheses if one.fit is not None]
     ranked = sorted(fitted, key=explained.evidence, reverse=True)
-    least = max([EVIDENCE_THRESHOLD, *(NEAR * explained.evidence(c) for c in ranked[:1])])
-    near = [c for c in ranked[:TRIED] if explained.evidence(c) > least]
-    return [c for c in ranked if c in near or c.effect in followed]
+    shares = [COMPARABLE_EVIDENCE * explained.evidence(one) for one in ranked[:1]]
+    least = max([EVIDENCE_THRESHOLD, *shares])
+    near = [one for one in ranked[:MOST_PREDICTED] if explained.evidence(one) > least]
+    return [one for one in ranked if one in near or one.effect in followed]

@@ -17,11 +17,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Trace:
-    """A channel of a held-out run, measured and predicted, shape (n,) each [unit].
+    """A channel of a held-out run, measured and predicted [unit], shape (n,) each.
 
-    recalibrated : the same equations, parameters re-estimated; explained : with the effects named
-        NaN where a sample does not count
-    noise : standard deviation of the sensor's noise
+    time : of the samples [s]
+    recalibrated : prediction with the same equations and re-estimated parameters
+    explained : prediction with the named effects
+    noise : standard deviation of the sensor's noise [unit]
+    A prediction is NaN where a sample does not count.
     """
 
     source: str
@@ -37,7 +39,10 @@ class Trace:
 def traces(
     runs: Sequence[MeasuredRun], before: Sequence[Prediction], after: Sequence[Prediction]
 ) -> tuple[Trace, ...]:
-    """Measured and predicted channels of all held-out runs, those with samples that count."""
+    """Traces of all channels of the held-out runs that have samples that count.
+
+    before, after : predictions without and with the named effects, one a fold
+    """
     pairs = zip(
         runs,
         [r for prediction in before for r in prediction.residuals],
@@ -62,9 +67,9 @@ def traces(
 
 
 def _simulated(run: MeasuredRun, channel: int, residual: Array) -> Array:
-    """The prediction behind a whitened residual; NaN where a sample does not count.
+    """Prediction behind a whitened residual [unit]; NaN where a sample does not count.
 
-    Of a voltage it holds what its sensor is off by.
+    The prediction of a voltage contains the error of its sensor.
     """
     whitened = np.where(residual[channel] == 0.0, np.nan, residual[channel])
     return np.asarray(run.measured[channel] - whitened * run.noise[channel])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.prediction.remainder import lies
+from plant_emulator.diagnosis.prediction.remainder import describe_band
 from plant_emulator.diagnosis.report.html_parts import bar, cell, right, row_head, table
 from plant_emulator.diagnosis.report.html_tables import TIMES
 from plant_emulator.diagnosis.report.markup import Markup, join, tag
@@ -20,7 +20,7 @@ def rest_by_band(rest: Remainder) -> Markup:
     words = (
         f"Relative error norm(e)/norm(y) of the held-out {rest.channel}: "
         f"{100.0 * rest.before:.2f} % with parameters re-estimated, {100.0 * rest.after:.2f} % "
-        f"with the effects found. Of that, {lies(rest)}."
+        f"with the effects found. Of that, {describe_band(rest)}."
     )
     heads = ["held-out runs", "share"]
     if rest.fitted is not None:

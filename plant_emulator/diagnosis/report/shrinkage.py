@@ -7,7 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.answer import HeldOutGap
-from plant_emulator.diagnosis.prediction.gap import closed_fraction, combined, interval
+from plant_emulator.diagnosis.prediction.gap import (
+    closed_fraction,
+    closed_fraction_interval,
+    combined_gap,
+)
 from plant_emulator.diagnosis.prediction.held_out import NOMINAL
 from plant_emulator.diagnosis.report.details import Step
 
@@ -37,7 +41,9 @@ def held_out_gap(
         explained=ranged(explained, runs),
         noise_floor=noise_floor(gaps[()], runs),
         closed_fraction=None if reference is None else closed_fraction(reference, explained),
-        closed_fraction_ci95=None if reference is None else interval(reference, explained),
+        closed_fraction_ci95=None
+        if reference is None
+        else closed_fraction_interval(reference, explained),
     )
 
 
@@ -70,6 +76,6 @@ def waterfall(gaps: Mapping[tuple[str, ...], Gap], accepted: Sequence[str]) -> t
     }
     steps = []
     for key, label in labels.items():
-        value, low, high = combined(gaps[key])
+        value, low, high = combined_gap(gaps[key])
         steps.append(Step(label=label, gap=value, low=low, high=high))
     return (*steps, Step(label="noise floor", gap=1.0, low=1.0, high=1.0))

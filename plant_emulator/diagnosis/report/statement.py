@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.answer import ParameterDeviation, Verdict
-from plant_emulator.diagnosis.prediction.remainder import lies, shrinks
+from plant_emulator.diagnosis.prediction.remainder import describe_band, describe_fall
 from plant_emulator.diagnosis.wording import number, percent, spoken
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def statement(
         case "none":
             return "The logs show no gap beyond the noise of the sensors."
     where = "" if place is None else f" It lies in the {spoken(place)}."
-    where = where if rest is None else f" Of the held-out {rest.channel}, {lies(rest)}."
+    where = where if rest is None else f" Of the held-out {rest.channel}, {describe_band(rest)}."
     return f"There is a gap whose cause is unknown: {decision.reason}.{where}"
 
 
@@ -85,7 +85,7 @@ def _effects(
     named = [_named(name, candidates[name], terms.get(name, ())) for name in decision.effects]
     share = "" if closed is None else f"the held-out gap closes by {percent(closed)}"
     if rest is not None:
-        share = f"{shrinks(rest)}; {lies(rest)}"
+        share = f"{describe_fall(rest)}; {describe_band(rest)}"
     them = "it" if len(decision.effects) == 1 else "them"
     more = f"; with {them} {share}" if share else ""
     return f"The machine has what the model lacks: {' and '.join(named)}{more}."

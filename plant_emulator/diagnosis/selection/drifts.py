@@ -13,7 +13,7 @@ from plant_emulator.diagnosis.selection.rules import noise_only
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from plant_emulator.diagnosis.execution.pool import Pool, Recipe
+    from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
 
 # Mean square that a fit to a few runs leaves where its drift is one to start from on all.
@@ -27,13 +27,11 @@ APART = 0.2
 class Drifts:
     """The fits without effects of one diagnosis on its pool; runs : by number."""
 
-    pool: Pool
-    recipe: Recipe
-    runs: tuple[int, ...]
+    runner: TaskRunner
 
     def of_all(self) -> FitResult:
         """The fit to all runs."""
-        (null,) = self.pool.map(start, self.recipe, [self.runs])
+        (null,) = self.runner.map(start, [self.runner.runs])
         return null
 
     def of_some(self, null: FitResult) -> tuple[list[FitResult], bool]:
@@ -45,13 +43,13 @@ class Drifts:
 
         null : the fit to all runs
         """
-        found = self.pool.map(start, self.recipe, [(run,) for run in self.runs])
-        alone = dict(zip(self.runs, found, strict=True))
+        found = self.runner.map(start, [(run,) for run in self.runner.runs])
+        alone = dict(zip(self.runner.runs, found, strict=True))
         for enough in (noise_only, _little):
             runs = tuple(run for run, point in alone.items() if enough(point))
-            if not 1 < len(runs) < len(self.runs):
+            if not 1 < len(runs) < len(self.runner.runs):
                 continue
-            (joint,) = self.pool.map(start, self.recipe, [runs])
+            (joint,) = self.runner.map(start, [runs])
             if enough(joint):
                 return self._spread({runs: joint}), enough is noise_only
         if sum(map(excess, alone.values())) >= APART * excess(null):
@@ -60,8 +58,10 @@ class Drifts:
 
     def _spread(self, points: Mapping[tuple[int, ...], FitResult]) -> list[FitResult]:
         """Fits to some runs as they are on all, by these runs."""
-        tasks = [Task(base=point, runs=self.runs, known=runs) for runs, point in points.items()]
-        return list(self.pool.map(spread, self.recipe, tasks))
+        tasks = [
+            Task(base=point, runs=self.runner.runs, known=runs) for runs, point in points.items()
+        ]
+        return list(self.runner.map(spread, tasks))
 
 
 def _little(point: FitResult) -> bool:

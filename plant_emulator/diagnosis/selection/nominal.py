@@ -14,7 +14,7 @@ from plant_emulator.diagnosis.selection.contenders import better_of, with_point
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from plant_emulator.diagnosis.execution.pool import Pool, Recipe
+    from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.explanation import Hypothesis
     from plant_emulator.diagnosis.selection.restarts import Restarts
@@ -30,10 +30,8 @@ class FromNominal:
     runs : by number
     """
 
-    pool: Pool
-    recipe: Recipe
+    runner: TaskRunner
     restarts: Restarts
-    runs: tuple[int, ...]
     # By the effects before and the last one: the points after a few steps, and at their end.
     _far: dict[tuple[object, str], FitResult] = field(default_factory=dict)
     _near: dict[tuple[object, str], FitResult] = field(default_factory=dict)
@@ -51,14 +49,14 @@ class FromNominal:
         """
         chosen = {(base.key if base.effects else (), c.effect): c for c in with_point(contenders)}
         new = [key for key in chosen if key not in self._far]
-        tasks = [Task(base=base, runs=self.runs, effect=chosen[key].effect) for key in new]
-        found = list(self.pool.map(once_more, self.recipe, tasks))
+        tasks = [Task(base=base, runs=self.runner.runs, effect=chosen[key].effect) for key in new]
+        found = list(self.runner.map(once_more, tasks))
         self._far.update(zip(new, found, strict=True))
         best = sorted(chosen, key=lambda key: self._far[key].cost)[:POLISHED]
         new = [key for key in best if key not in self._near]
         points = self.restarts.sifted([self._far[key] for key in new])
-        tasks = [Task(base=point, runs=self.runs) for point in points]
-        ended = list(self.pool.map(refit, self.recipe, tasks))
+        tasks = [Task(base=point, runs=self.runner.runs) for point in points]
+        ended = list(self.runner.map(refit, tasks))
         self._near.update(zip(new, ended, strict=True))
         return [replace(chosen[key], fit=self._near[key]) for key in best]
 

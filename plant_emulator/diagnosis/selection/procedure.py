@@ -1,4 +1,20 @@
-"""From the logs to a verdict: the contest, and once more where chance makes the logs restless."""
+"""The diagnosis procedure: from the logs to a decision.
+
+1. The noise of measured inputs is made part of the noise (`fitting.input_noise_model`).
+2. The fit without effects leaves the gap. Where the gap is random, a random effect may explain it
+   (`fitting.random_effects`); it is then made part of the noise.
+3. Hypothesis tests find the effects that the logs ask for (`selection.stepwise`):
+   a. The signature of an effect is the change of the residual when the effect comes in. Its part
+      orthogonal to the nuisance parameters says how much the effect can explain.
+   b. A screening fit starts from the size whose signature explains most. The best effects are
+      fitted further, the best of these to convergence.
+   c. The cost has many local minima, because contact comes and goes. Effects that could close the
+      gap therefore start again from alternative starts.
+   d. The fit without effects starts again from the best joint fits. Where it gets as low, no effect
+      is needed.
+4. The evidence decides (`selection.verdict`). Where no effect is named, the runs are fitted one by
+   one: they may each agree with the equations, but not with each other.
+"""
 
 from __future__ import annotations
 
@@ -12,116 +28,118 @@ from plant_emulator.diagnosis.fitting.input_noise_model import whiten_inputs
 from plant_emulator.diagnosis.fitting.random_effects import WeightedRecipe, fit_random_effect
 from plant_emulator.diagnosis.fitting.steps import refit, start
 from plant_emulator.diagnosis.fitting.task import Task
-from plant_emulator.diagnosis.selection import run_consistency, verdict
+from plant_emulator.diagnosis.selection import run_consistency
 from plant_emulator.diagnosis.selection.stepwise import Contest
+from plant_emulator.diagnosis.selection.verdict import decide
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from plant_emulator.diagnosis.execution.pool import Pool, Recipe
+    from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult, VarianceComponent
     from plant_emulator.diagnosis.fitting.explanation import Explanation
-    from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.selection.verdict import Decision
 
-# Structure of a residual, as a share of its squares beyond the noise, up to which it may be chance:
-# that of a dead time that varies from scan to scan was 0.014.
-RANDOM = 0.05
+# Ljung-Box excess of a residual, as a share of its squares beyond the noise, up to which the gap
+# may be random. A dead time that varies at each scan had left 0.014.
+RANDOM_SHARE = 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
 class Procedure:
-    """One diagnosis up to its verdict.
+    """One diagnosis up to its decision.
 
-    runs : that are fitted, by number; null : the fit without effects, if it has been made
+    null : fit without effects; None where it has not been made yet
     """
 
-    pool: Pool
-    recipe: Recipe
-    model: Model
-    runs: tuple[int, ...]
+    runner: TaskRunner
     null: FitResult | None = None
 
-    def with_quiet_inputs(self) -> Procedure:
-        """The same with the noise of fed inputs as part of the noise."""
-        recipe, null = whiten_inputs(self.pool, self.recipe, self.model, self.runs)
-        return replace(self, recipe=recipe, null=null)
+    def with_input_noise(self) -> Procedure:
+        """Give the procedure with the noise of measured inputs as part of the noise."""
+        runner, null = whiten_inputs(self.runner)
+        return replace(self, runner=runner, null=null)
 
-    def found(self) -> tuple[Explanation, Decision, Recipe]:
-        """What the contest came to, the verdict, and the recipe whose noise its costs count in."""
-        if not self.model.reaches_noise:
-            explained = self._contest(self.recipe, self.null)
-            found = verdict.decide(self.model, explained)
-            return explained, self._between(explained, found), self.recipe
-        (null,) = [self.null] if self.null else self.pool.map(start, self.recipe, [self.runs])
-        explained, recipe = self._restless(null) or (self._contest(self.recipe, null), self.recipe)
-        found = verdict.decide(self.model, explained)
-        if found.kind == "unknown" and not explained.random_effects:
-            again = self._by_chance(explained.final, explained.null)
-            explained, recipe = again or (explained, recipe)
-            found = verdict.decide(self.model, explained)
-        if found.kind == "unknown":
-            found = self._between(explained, found)
-        return explained, found, recipe
+    def run(self) -> tuple[Explanation, Decision, TaskRunner]:
+        """Test the hypotheses and decide; give also the runner in whose noise the costs count."""
+        model, runner = self.runner.model, self.runner
+        if not model.reaches_noise:
+            explained = self._test_effects(runner, self.null)
+            return explained, self._check_consistency(explained, decide(model, explained)), runner
+        (null,) = [self.null] if self.null else runner.map(start, [runner.runs])
+        found = self._test_random_gap(null) or (self._test_effects(runner, null), runner)
+        if decide(model, found[0]).kind == "unknown" and not found[0].random_effects:
+            found = self._test_random_effects(found[0].final, found[0].null) or found
+        explained, runner = found
+        decision = decide(model, explained)
+        if decision.kind == "unknown":
+            decision = self._check_consistency(explained, decision)
+        return explained, decision, runner
 
-    def _contest(
-        self, recipe: Recipe, null: FitResult | None, by_chance: float = 0.0
+    def _test_effects(
+        self, runner: TaskRunner, null: FitResult | None, random_evidence: float = 0.0
     ) -> Explanation:
+        """Run the hypothesis tests of the library; random_evidence : see `Contest`."""
+        library = runner.model.candidates
         contest = Contest(
-            self.pool,
-            recipe,
-            tuple(self.model.candidates),
-            self.runs,
-            reaches_noise=self.model.reaches_noise,
-            by_chance=by_chance,
+            runner,
+            tuple(library),
+            reaches_noise=runner.model.reaches_noise,
+            by_chance=random_evidence,
             null=null,
-            exact=[name for name, one in self.model.candidates.items() if one.exact_form],
-            subsystems={name: one.subsystem for name, one in self.model.candidates.items()},
+            exact=[name for name, one in library.items() if one.exact_form],
+            subsystems={name: one.subsystem for name, one in library.items()},
         )
         return contest.explain()
 
-    def _restless(self, null: FitResult) -> tuple[Explanation, Recipe] | None:
-        """The contest with an effect of chance course, where the fit without effects leaves much,
-        but next to nothing that is not random: a contest of others would be in vain.
+    def _test_random_gap(self, null: FitResult) -> tuple[Explanation, TaskRunner] | None:
+        """Test the random effects first where the gap is large and random.
+
+        Other effects would be tested in vain there. None: the gap is small or not random
         """
-        if null.mean_square <= NOISE_MEAN_SQUARE or null.ljung_box_excess > RANDOM * excess(null):
+        small = null.mean_square <= NOISE_MEAN_SQUARE
+        if small or null.ljung_box_excess > RANDOM_SHARE * excess(null):
             return None
-        return self._by_chance(null, null)
+        return self._test_random_effects(null, null)
 
-    def _by_chance(self, base: FitResult, null: FitResult) -> tuple[Explanation, Recipe] | None:
-        """The contest with the unrest of the effect of chance course that explains most on top of
-        a fit, and the recipe with it; None where there is none.
+    def _test_random_effects(
+        self, base: FitResult, null: FitResult
+    ) -> tuple[Explanation, TaskRunner] | None:
+        """Test all effects with the best random effect as part of the noise.
 
-        null : the fit without effects
+        base : fit whose residual shows the random effect
+        null : fit without effects
+        None: no random effect explains the residual
         """
-        found = self._random_effects(base, self.model.candidates)
-        first = max(found, key=lambda one: one.evidence, default=None)
-        if first is None:
+        runs, model = self.runner.runs, self.runner.model
+        found = self._fit_random_effects(base, model.candidates)
+        best = max(found, key=lambda one: one.evidence, default=None)
+        if best is None:
             return None
-        weights = dict(zip(self.runs, first.weights, strict=True))
-        every = tuple(weights.get(k, np.ones(1)) for k in range(len(self.model.runs)))
-        recipe = WeightedRecipe(self.recipe, every)
-        (null,) = self.pool.map(refit, recipe, [Task(base=null, runs=self.runs)])
-        again = self._contest(recipe, null, first.evidence)
-        last = self._random_effects(again.final, [first.effect])
-        return (replace(again, random_effects=tuple(last)), recipe) if last else None
+        weights = dict(zip(runs, best.weights, strict=True))
+        every = tuple(weights.get(k, np.ones(1)) for k in range(len(model.runs)))
+        runner = replace(self.runner, recipe=WeightedRecipe(self.runner.recipe, every))
+        (null,) = runner.map(refit, [Task(base=null, runs=runs)])
+        explained = self._test_effects(runner, null, best.evidence)
+        last = self._fit_random_effects(explained.final, [best.effect])
+        return (replace(explained, random_effects=tuple(last)), runner) if last else None
 
-    def _random_effects(self, base: FitResult, names: Iterable[str]) -> list[VarianceComponent]:
-        """What holds of effects of chance course on top of a fit."""
+    def _fit_random_effects(self, base: FitResult, names: Iterable[str]) -> list[VarianceComponent]:
+        """Fit the random effects among these on top of a fit; give those that count."""
         tasks = [
-            Task(base=base, runs=self.runs, effect=name)
+            Task(base=base, runs=self.runner.runs, effect=name)
             for name in names
-            if self.model.candidates[name].stochastic
+            if self.runner.model.candidates[name].stochastic
         ]
-        found = self.pool.map(fit_random_effect, self.recipe, tasks)
+        found = self.runner.map(fit_random_effect, tasks)
         return [one for one in found if one.consistent and one.evidence > EVIDENCE_THRESHOLD]
 
-    def _between(self, explained: Explanation, found: Decision) -> Decision:
-        """The verdict; unknown with that reason where runs agree each alone, but not together."""
-        runs = self.runs
+    def _check_consistency(self, explained: Explanation, decision: Decision) -> Decision:
+        """Make the decision unknown where each run agrees with the equations, but not together."""
+        runs = self.runner.runs
         if explained.unconverged or len(runs) < 2:
-            return found
+            return decision
         tasks = [Task(base=explained.null, runs=(run,)) for run in runs]
-        points = list(self.pool.map(run_consistency.alone, self.recipe, tasks))
-        reason = run_consistency.between(self.model, runs, points, explained.final)
-        return replace(found, kind="unknown", effects=(), reason=reason) if reason else found
+        fits = list(self.runner.map(run_consistency.fit_alone, tasks))
+        reason = run_consistency.inconsistency(self.runner.model, runs, fits, explained.final)
+        return replace(decision, kind="unknown", effects=(), reason=reason) if reason else decision

@@ -14,7 +14,7 @@ from plant_emulator.diagnosis.selection.rules import noise_only
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.execution.pool import Pool, Recipe
+    from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
 
 # Times that a fit that ran out of steps is taken up again.
@@ -34,13 +34,11 @@ SWAPPED, SIFTS = 2, 3
 class Restarts:
     """The restarts of one diagnosis on its pool; runs : by number."""
 
-    pool: Pool
-    recipe: Recipe
-    runs: tuple[int, ...]
+    runner: TaskRunner
 
     def refitted(self, point: FitResult) -> FitResult:
         """A fit to convergence from where another has come to."""
-        (found,) = self.pool.map(refit, self.recipe, [Task(base=point, runs=self.runs)])
+        (found,) = self.runner.map(refit, [Task(base=point, runs=self.runner.runs)])
         return found
 
     def settled(self, final: FitResult) -> FitResult:
@@ -58,8 +56,8 @@ class Restarts:
         far = {
             k: point for k, point in enumerate(points) if point.mean_square > SUSPECT_MEAN_SQUARE
         }
-        tasks = [Task(base=point, runs=self.runs) for point in far.values()]
-        found = dict(zip(far, self.pool.map(sift, self.recipe, tasks), strict=True))
+        tasks = [Task(base=point, runs=self.runner.runs) for point in far.values()]
+        found = dict(zip(far, self.runner.map(sift, tasks), strict=True))
         return self._ended(points, found)
 
     def shaken(self, points: Sequence[FitResult]) -> list[FitResult]:
@@ -70,8 +68,10 @@ class Restarts:
 
     def _off(self, points: Sequence[FitResult], numbers: Sequence[int]) -> list[list[FitResult]]:
         """Of every fit those from some way off, each number another way; 0: with wide slopes."""
-        tasks = [Task(base=point, runs=self.runs, number=k) for point in points for k in numbers]
-        found = list(self.pool.map(shake, self.recipe, tasks))
+        tasks = [
+            Task(base=point, runs=self.runner.runs, number=k) for point in points for k in numbers
+        ]
+        found = list(self.runner.map(shake, tasks))
         each = len(numbers)
         return [found[each * k : each * (k + 1)] for k in range(len(points))]
 
@@ -80,15 +80,15 @@ class Restarts:
 
         Drift that has followed the wrong effect goes a long way back, through many valleys.
         """
-        tasks = [Task(base=point, runs=self.runs, effect=name) for name in names]
-        found = sorted(self.pool.map(swap, self.recipe, tasks), key=lambda pair: pair[0])
+        tasks = [Task(base=point, runs=self.runner.runs, effect=name) for name in names]
+        found = sorted(self.runner.map(swap, tasks), key=lambda pair: pair[0])
         likely = [start for _, start in found[:SWAPPED]]
         for step in (follow, sift):
-            tasks = [Task(base=p, runs=self.runs) for p in likely]
-            likely = list(self.pool.map(step, self.recipe, tasks))
+            tasks = [Task(base=p, runs=self.runner.runs) for p in likely]
+            likely = list(self.runner.map(step, tasks))
         best = min(likely, key=lambda p: p.cost)
         for step in (*[sift] * SIFTS, refit):
-            (again,) = self.pool.map(step, self.recipe, [Task(base=best, runs=self.runs)])
+            (again,) = self.runner.map(step, [Task(base=best, runs=self.runner.runs)])
             best = min(best, again, key=lambda p: p.cost)
         return best
 
@@ -117,8 +117,8 @@ class Restarts:
 
     def lowest(self, point: FitResult, starts: Sequence[FitResult]) -> FitResult:
         """A fit, or the best of some steps from these starts, where that is better, to the end."""
-        tasks = [Task(base=start, runs=self.runs) for start in starts]
-        found = list(self.pool.map(advance, self.recipe, tasks))
+        tasks = [Task(base=start, runs=self.runner.runs) for start in starts]
+        found = list(self.runner.map(advance, tasks))
         best = min([point, *found], key=lambda p: p.cost)
         return self._ended([point], {0: best})[0]
 
@@ -127,8 +127,8 @@ class Restarts:
     ) -> list[FitResult]:
         """Fits, or what was found in their place where that is better, to convergence."""
         lower = {k: new for k, new in found.items() if new.cost < points[k].cost - WORTHWHILE_FALL}
-        tasks = [Task(base=new, runs=self.runs) for new in lower.values()]
-        ended = dict(zip(lower, self.pool.map(refit, self.recipe, tasks), strict=True))
+        tasks = [Task(base=new, runs=self.runner.runs) for new in lower.values()]
+        ended = dict(zip(lower, self.runner.map(refit, tasks), strict=True))
         return [ended.get(k, point) for k, point in enumerate(points)]
 
 

@@ -30,12 +30,12 @@ from plant_emulator.diagnosis.selection.contenders import (
 from plant_emulator.diagnosis.selection.nominal import POLISHED, FromNominal, could_close
 from plant_emulator.diagnosis.selection.restarts import Restarts
 from plant_emulator.diagnosis.selection.rules import SECOND, noise_only
-from plant_emulator.diagnosis.selection.subsystem import site
+from plant_emulator.diagnosis.selection.subsystem import locate_gap
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from plant_emulator.diagnosis.execution.pool import Pool, Recipe
+    from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.explanation import Hypothesis
     from plant_emulator.diagnosis.fitting.signature import Signature
@@ -64,23 +64,18 @@ LOST = 4.0
 class Rounds:
     """The rounds of one diagnosis on its pool.
 
-    names : of the effects; runs : by number
+    names : of the effects
     restarts : of single fits
     """
 
     def __init__(
         self,
-        pool: Pool,
-        recipe: Recipe,
+        runner: TaskRunner,
         names: Sequence[str],
-        runs: Sequence[int],
     ) -> None:
-        self._pool, self._recipe = pool, recipe
-        self._names, self._runs = tuple(names), tuple(runs)
-        self.restarts = Restarts(pool=pool, recipe=recipe, runs=self._runs)
-        self.nominal = FromNominal(
-            pool=pool, recipe=recipe, restarts=self.restarts, runs=self._runs
-        )
+        self._runner, self._names, self._runs = runner, tuple(names), runner.runs
+        self.restarts = Restarts(runner=runner)
+        self.nominal = FromNominal(runner=runner, restarts=self.restarts)
 
     def from_clear(self, base: FitResult, null: FitResult) -> list[Hypothesis]:
         """All effects on top of the drift of some runs, the best of them fitted.
@@ -147,7 +142,7 @@ class Rounds:
         """Effects whose signature promises nothing, but may be wrong, fitted all the same."""
         wrong = {one.effect: one for one in signatures if one.concentrated}
         tasks = [Task(base=base, runs=self._runs, signature=one) for one in wrong.values()]
-        found = list(self._pool.map(plod, self._recipe, tasks))
+        found = list(self._runner.map(plod, tasks))
         points = dict(zip(wrong, found, strict=True))
         return better_of(contenders, [replace(c, fit=points.get(c.effect)) for c in contenders])
 
@@ -157,7 +152,7 @@ class Rounds:
         """The signatures of all other effects on top of a fit, and these after a first look."""
         names = [name for name in self._names if name not in {*base.effects, *but}]
         tasks = [Task(base=base, runs=self._runs, effect=name) for name in names]
-        found = list(self._pool.map(show, self._recipe, tasks))
+        found = list(self._runner.map(show, tasks))
         shown = dict(zip(names, found, strict=True))
         promising = GLIMPSE if base.mean_square <= NOISE_MEAN_SQUARE else -inf
         tasks = [
@@ -165,7 +160,7 @@ class Rounds:
             for name, one in shown.items()
             if one is not None and one.gain > promising
         ]
-        points = list(self._pool.map(contend, self._recipe, tasks))
+        points = list(self._runner.map(contend, tasks))
         seen = dict(zip((task.effect for task in tasks), points, strict=True))
         return shown, [contender_of(name, one, seen.get(name)) for name, one in shown.items()]
 
@@ -181,7 +176,7 @@ class Rounds:
             for name, one in shown.items()
             if one is not None and could_close(one.total_norm, base)
         ]
-        found = list(self._pool.map(contend_far, self._recipe, large))
+        found = list(self._runner.map(contend_far, large))
         points = dict(zip((task.effect for task in large), found, strict=True))
         again = [
             replace(c, fit=p)
@@ -218,7 +213,7 @@ class Rounds:
 
     def located(self, null: FitResult) -> frozenset[str]:
         """The subsystems that the gap of a fit without effects lies in, by themselves."""
-        (found,) = self._pool.map(site, self._recipe, [Task(base=null, runs=self._runs)])
+        (found,) = self._runner.map(locate_gap, [Task(base=null, runs=self._runs)])
         shares = {} if found is None else found.shares
         return frozenset(name for name, share in shares.items() if share >= PLACED)
 
@@ -276,6 +271,6 @@ class Rounds:
         """The best of a round taken a step further, but for those that are done."""
         best = [c for c in best_few(contenders, base, most) if c not in done]
         tasks = [Task(base=c.fit, runs=self._runs) for c in best if c.fit is not None]
-        fitted = list(self._pool.map(step, self._recipe, tasks))
+        fitted = list(self._runner.map(step, tasks))
         further = {c.effect: replace(c, fit=p) for c, p in zip(best, fitted, strict=True)}
         return [further.get(c.effect, c) for c in contenders]

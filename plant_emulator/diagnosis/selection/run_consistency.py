@@ -1,7 +1,8 @@
-"""Whether runs that no model explains together agree with the equations each alone (pure).
+"""The run consistency test: whether runs that disagree together agree with the equations alone.
 
-A gap without a name may lie between the runs rather than in any of them. Then each run alone comes
-down to the noise, and what no run should change differs. Friction may: oil warms and cools.
+A gap without a name may lie between the runs. Then each run alone comes down to the noise, and a
+parameter that no run should change differs between two of them. Friction may differ, because oil
+warms and cools.
 """
 
 from __future__ import annotations
@@ -21,65 +22,66 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fitting.task import Task
     from plant_emulator.diagnosis.machine import Model
 
-# Standard errors from which on a parameter differs between two runs.
-DIFFERENT = 5.0
+# A parameter differs between two runs from so many standard errors on.
+DIFFERENT_ERRORS = 5.0
 # Mean square up to which a run alone agrees with the equations.
-AGREES = 1.1
-# What oil changes, by a part of its name.
-CHANGES = "friction"
+CONSISTENT_MEAN_SQUARE = 1.1
+# Parameters that oil changes have this in their name.
+CHANGED_BY_OIL = "friction"
 
 
-def alone(model: Model, task: Task) -> FitResult:
-    """Step of a diagnosis: the fit without effects of these runs only."""
+def fit_alone(model: Model, task: Task) -> FitResult:
+    """Fit without effects to the task's runs only (a step)."""
     return fit_null(model, task.runs)
 
 
-def between(
-    model: Model, runs: Sequence[int], found: Sequence[FitResult], together: FitResult
+def inconsistency(
+    model: Model, runs: Sequence[int], alone: Sequence[FitResult], together: FitResult
 ) -> str:
-    """What differs most between two of the runs, each fitted alone; empty: nothing is known to.
+    """The parameter that differs most between two runs, as a sentence; empty where none does.
 
-    together : the best fit of all of them
+    alone : fit of each of these runs alone
+    together : best fit of all of them
     """
-    if any(not point.converged for point in found) or not _agree(model, found, together):
+    if not all(found.converged for found in alone) or not _agree(model, alone, together):
         return ""
-    most, named = DIFFERENT, ("", "", "")
-    for (k, a), (j, b) in combinations(zip(runs, found, strict=True), 2):
-        for name in (u.name for u in model.parameters if CHANGES not in u.name):
-            if _apart(name, a, b) > most:
-                most = _apart(name, a, b)
-                named = (name, _told(model, name, k, a), _told(model, name, j, b))
-    if most <= DIFFERENT:
+    pairs = [
+        (_difference(name, a, b), name, (k, a), (j, b))
+        for (k, a), (j, b) in combinations(zip(runs, alone, strict=True), 2)
+        for name in (u.name for u in model.parameters if CHANGED_BY_OIL not in u.name)
+    ]
+    most, name, first, second = max(pairs, key=lambda pair: pair[0], default=(0.0, "", None, None))
+    if first is None or second is None or most <= DIFFERENT_ERRORS:
         return ""
-    name, first, second = named
     return (
-        f"each log alone fits, but with other values: {name} is {first} and {second}; two "
+        "each log alone fits, but with other values: "
+        f"{name} is {_describe(model, name, *first)} and {_describe(model, name, *second)}; two "
         "machines, a change between, or an unknown effect"
     )
 
 
-def _agree(model: Model, found: Sequence[FitResult], together: FitResult) -> bool:
-    """Whether each run alone agrees with the equations, in so far as the model can tell."""
+def _agree(model: Model, alone: Sequence[FitResult], together: FitResult) -> bool:
+    """Whether each run alone agrees with the equations, as far as the model can tell."""
     if model.reaches_noise:
-        return all(point.mean_square <= AGREES for point in found)
-    return (
-        sum(point.sum_of_squares for point in found) <= UNEXPLAINED_SHARE * together.sum_of_squares
-    )
+        return all(found.mean_square <= CONSISTENT_MEAN_SQUARE for found in alone)
+    left = sum(found.sum_of_squares for found in alone)
+    return left <= UNEXPLAINED_SHARE * together.sum_of_squares
 
 
-def _apart(name: str, a: FitResult, b: FitResult) -> float:
-    """Difference of a parameter of two fits in its standard errors, wider by what they leave."""
+def _difference(name: str, a: FitResult, b: FitResult) -> float:
+    """Difference of a parameter between two fits [standard errors]."""
     error = float((_variance(name, a) + _variance(name, b)) ** 0.5)
     return abs(a.values[name] - b.values[name]) / error if error > 0.0 else 0.0
 
 
-def _variance(name: str, point: FitResult) -> float:
-    """Square of a standard error, by the residual and its autocorrelation."""
-    return point.standard_errors[name] ** 2 * max(1.0, point.mean_square) / point.effective_fraction
+def _variance(name: str, found: FitResult) -> float:
+    """Variance of an estimate [unit^2], enlarged by the misfit and the autocorrelation."""
+    variance = found.standard_errors[name] ** 2
+    return variance * max(1.0, found.mean_square) / found.effective_fraction
 
 
-def _told(model: Model, name: str, run: int, found: FitResult) -> str:
-    """A parameter of a run, whose file is named with its folder."""
+def _describe(model: Model, name: str, run: int, found: FitResult) -> str:
+    """Estimate of a parameter in a run, and the run's file with its folder."""
     value = size(
         Quantity(
             name=name,

@@ -34,7 +34,7 @@ from plant_emulator.diagnosis.selection.rules import MOST_EFFECTS, counts, enoug
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
-    from plant_emulator.diagnosis.execution.pool import Pool, Recipe
+    from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.explanation import Hypothesis
 
@@ -55,10 +55,8 @@ class Contest:
 
     def __init__(
         self,
-        pool: Pool,
-        recipe: Recipe,
+        runner: TaskRunner,
         names: Sequence[str],
-        runs: Sequence[int],
         *,
         reaches_noise: bool = True,
         by_chance: float = 0.0,
@@ -68,9 +66,9 @@ class Contest:
     ) -> None:
         self._reaches_noise, self._by_chance, self._null = reaches_noise, by_chance, null
         self._exact, self._subsystems = frozenset(exact), subsystems or {}
-        self._rounds = Rounds(pool, recipe, names, runs)
+        self._rounds = Rounds(runner, names)
         self._backward = Backward(rounds=self._rounds, counts=self._counts)
-        self._drifts = Drifts(pool=pool, recipe=recipe, runs=tuple(runs))
+        self._drifts = Drifts(runner=runner)
         self._deep, self._from_clear_only = not reaches_noise, False
         # Rounds on top of effects, by the fit: none is made twice.
         self._on_top: dict[object, list[Hypothesis]] = {}

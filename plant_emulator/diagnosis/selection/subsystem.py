@@ -1,4 +1,4 @@
-"""Where the gap lies, as the answer tells it: the verdict's own place, or the gap's."""
+"""The subsystem of the answer: where the verdict's cause lies, or else where the gap lies."""
 
 from __future__ import annotations
 
@@ -19,49 +19,56 @@ if TYPE_CHECKING:
 def evidence_shares(
     explained: Explanation, candidates: Mapping[str, Candidate]
 ) -> dict[str, float]:
-    """Share of each subsystem, by the best fall of the cost that one of its effects brings."""
+    """Share of each subsystem in the falls of the cost that its best effect brings [1]."""
     best: dict[str, float] = {}
-    for contender in explained.hypotheses:
-        if contender.fit is not None:
-            place = candidates[contender.effect].subsystem
-            fall = max(0.0, explained.null.cost - contender.fit.cost)
-            best[place] = max(best.get(place, 0.0), fall)
+    for hypothesis in explained.hypotheses:
+        if hypothesis.fit is not None:
+            subsystem = candidates[hypothesis.effect].subsystem
+            fall = max(0.0, explained.null.cost - hypothesis.fit.cost)
+            best[subsystem] = max(best.get(subsystem, 0.0), fall)
     total = sum(best.values())
-    return {place: fall / total for place, fall in best.items()} if total > 0.0 else {}
+    return {name: fall / total for name, fall in best.items()} if total > 0.0 else {}
 
 
-def subsystem(
+def faulty_subsystem(
     decision: Decision,
     candidates: Mapping[str, Candidate],
     shares: Mapping[str, float],
 ) -> str | None:
-    """The place of the effect with the largest share there, of the most surprising parameter, or of
-    the gap.
+    """Subsystem of the decision's cause, or of the largest share; None where there is no gap.
+
+    shares : of the gap, by subsystem
+    Of several effects the one in the subsystem of the largest share counts. Of several parameters
+    the first one counts.
     """
     if decision.kind == "none":
         return None
     if decision.kind == "parameter":
         return decision.deviations[0].subsystem
     if decision.kind == "effect":
-        places = [candidates[name].subsystem for name in decision.effects]
-        return max(places, key=lambda place: shares.get(place, 0.0))
+        subsystems = [candidates[name].subsystem for name in decision.effects]
+        return max(subsystems, key=lambda name: shares.get(name, 0.0))
     return max(shares, key=shares.__getitem__, default=None)
 
 
-def site(model: Model, task: Task) -> Location | None:
-    """Step of a diagnosis: the block that the gap of a fit lies in."""
+def locate_gap(model: Model, task: Task) -> Location | None:
+    """Find the block that holds the gap of the fit `task.base` (a step)."""
     return model.locate(task.base, task.runs)
 
 
-def location(place: str | None, shares: Mapping[str, float], located: Location | None) -> Location:
-    """The location of the answer.
+def location(
+    subsystem: str | None, shares: Mapping[str, float], located: Location | None
+) -> Location:
+    """Location of the answer.
 
-    place : the verdict's; None: there is no gap
-    located : what the machine's blocks say; None: the shares are those of the evidence
+    subsystem : of the decision; None: there is no gap
+    shares : of the gap, by subsystem
+    located : what the machine's blocks say; None: it has none, and the shares are those of the
+        evidence
     """
     if located is None:
         ordered = dict(sorted(shares.items(), key=lambda pair: -pair[1]))
-        return Location(subsystem=place, channel=None, phase=None, shares=ordered, cells=())
-    if place is None:
+        return Location(subsystem=subsystem, channel=None, phase=None, shares=ordered, cells=())
+    if subsystem is None:
         return replace(located, subsystem=None, channel=None, phase=None)
-    return replace(located, subsystem=place)
+    return replace(located, subsystem=subsystem)

@@ -13,17 +13,21 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fitting.explanation import Explanation
     from plant_emulator.diagnosis.machine import Model
 
-# A parameter has shifted from so many of its own standard errors on.
-SHIFTED = 3.0
-# The same of a shift that is none by chance, of some ten parameters in a hundred diagnoses.
-SURE = 4.0
-# Mean square of the whitened residual up to which a model without effects leaves nothing but noise.
-NOISE_ONLY = 1.1
+# A parameter deviates from its nominal value from so many of its standard errors on.
+DEVIATION_ERRORS = 3.0
+# A deviation of so many standard errors is no chance, among some ten parameters in a hundred
+# diagnoses.
+SIGNIFICANT_DEVIATION_ERRORS = 4.0
+# Mean square up to which a fit without effects leaves nothing but noise.
+NULL_MEAN_SQUARE = 1.1
 
 
 @dataclass(frozen=True, kw_only=True)
 class Deviation:
-    """A parameter that left its nominal value; surprise : in prior standard deviations."""
+    """A parameter that deviates from its nominal value [unit].
+
+    surprise : the deviation in prior standard deviations [1]
+    """
 
     name: str
     nominal: float
@@ -35,15 +39,16 @@ class Deviation:
 
     @property
     def significant(self) -> bool:
-        """Whether chance does not explain it."""
-        return abs(self.estimated - self.nominal) > SURE * self.standard_error
+        """Whether chance does not explain the deviation."""
+        limit = SIGNIFICANT_DEVIATION_ERRORS * self.standard_error
+        return abs(self.estimated - self.nominal) > limit
 
 
 @dataclass(frozen=True, kw_only=True)
 class Decision:
-    """The kind of the verdict, its accepted effects, and the parameters that shifted.
+    """The kind of the verdict, the accepted effects, and the parameters that deviate.
 
-    reason : why the cause is unknown; empty: it is known
+    reason : why the cause is unknown; empty where it is known
     """
 
     kind: Kind
@@ -53,13 +58,14 @@ class Decision:
 
 
 def deviations(model: Model, found: FitResult) -> tuple[Deviation, ...]:
-    """Parameters more than SHIFTED standard errors from nominal: those that chance does not explain
-    first, of these the most surprising.
+    """Parameters more than DEVIATION_ERRORS standard errors from nominal.
+
+    The significant ones come first, among them the most surprising one.
     """
     moved = []
     for unknown in model.parameters:
         value, error = found.values[unknown.name], found.standard_errors[unknown.name]
-        if abs(value - unknown.prior) <= SHIFTED * error:
+        if abs(value - unknown.prior) <= DEVIATION_ERRORS * error:
             continue
         std = unknown.std if unknown.std is not None else abs(unknown.prior)
         moved.append(
@@ -73,49 +79,54 @@ def deviations(model: Model, found: FitResult) -> tuple[Deviation, ...]:
                 surprise=abs(value - unknown.prior) / std,
             )
         )
-    return tuple(sorted(moved, key=lambda shift: (not shift.significant, -shift.surprise)))
+    return tuple(sorted(moved, key=lambda one: (not one.significant, -one.surprise)))
 
 
 def decide(model: Model, explained: Explanation) -> Decision:
-    """The verdict of a contest."""
-    found = _of_contest(model, explained)
-    if explained.random_effects and found.kind != "unknown":
-        return replace(found, kind="effect", effects=explained.named)
-    return found
-
-
-def _of_contest(model: Model, explained: Explanation) -> Decision:
-    null, final = explained.null, explained.final
-    moved = deviations(model, final)
-    if explained.unconverged:
-        return Decision(kind="unknown", effects=(), deviations=moved, reason=explained.unconverged)
-    if model.reaches_noise and _structured(explained):
-        reason = "what is left is as small as the noise, but not as random"
+    """Decide what the hypothesis tests say of the cause."""
+    reason = _reason_against(model, explained)
+    if reason:
+        moved = deviations(model, explained.final)
         return Decision(kind="unknown", effects=(), deviations=moved, reason=reason)
+    decision = _decide_by_fits(model, explained)
+    if explained.random_effects and decision.kind != "unknown":
+        return replace(decision, kind="effect", effects=explained.named)
+    return decision
+
+
+def _reason_against(model: Model, explained: Explanation) -> str:
+    """Why the final fit cannot be trusted; empty where it can."""
+    null, final = explained.null, explained.final
+    if explained.unconverged:
+        return explained.unconverged
+    if model.reaches_noise and _is_structured(explained):
+        return "what is left is as small as the noise, but not as random"
     if final.insignificant and not (len(final.effects) == 1 and significant(final, null)):
         name = final.insignificant[0]
-        reason = f"it differs between the runs; {name} would do, but no size of it is certain"
-        return Decision(kind="unknown", effects=(), deviations=moved, reason=reason)
+        return f"it differs between the runs; {name} would do, but no size of it is certain"
+    return ""
+
+
+def _decide_by_fits(model: Model, explained: Explanation) -> Decision:
+    """Decide by what the fits with and without effects leave."""
+    null, final = explained.null, explained.final
     if final.effects and (adequate(final, null) or not model.reaches_noise):
+        moved = deviations(model, final)
         return Decision(kind="effect", effects=final.effects, deviations=moved, reason="")
     moved = deviations(model, null)
-    if not final.effects and null.mean_square <= NOISE_ONLY:
-        kind: Kind = "parameter" if any(shift.significant for shift in moved) else "none"
+    if not final.effects and null.mean_square <= NULL_MEAN_SQUARE:
+        kind: Kind = "parameter" if any(one.significant for one in moved) else "none"
         return Decision(kind=kind, effects=(), deviations=moved, reason="")
-    return Decision(
-        kind="unknown",
-        effects=(),
-        deviations=moved,
-        reason="no effect of the library, alone or with others, brings the residual to the noise",
-    )
+    reason = "no effect of the library, alone or with others, brings the residual to the noise"
+    return Decision(kind="unknown", effects=(), deviations=moved, reason=reason)
 
 
-def _structured(explained: Explanation) -> bool:
-    """Whether more structure is left than was explained, and more than noise has by chance.
+def _is_structured(explained: Explanation) -> bool:
+    """Whether a small residual has more Ljung-Box excess than was explained and than noise has.
 
-    Of a model that leaves more than the noise the squares tell.
+    A fit that leaves more than the noise is judged by its squares instead.
     """
     null, final = explained.null, explained.final
-    small = adequate(final, null) if final.effects else null.mean_square <= NOISE_ONLY
+    small = adequate(final, null) if final.effects else null.mean_square <= NULL_MEAN_SQUARE
     gained = null.cost - final.cost + sum(one.evidence for one in explained.random_effects)
     return small and final.ljung_box_excess > max(LJUNG_BOX_LIMIT, gained)

@@ -8,7 +8,7 @@ import pytest
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
 from plant_emulator.diagnosis.machine import MeasuredRun
-from plant_emulator.diagnosis.prediction.gap import Prediction, gap
+from plant_emulator.diagnosis.prediction.gap import Prediction, measure_gap
 from plant_emulator.diagnosis.prediction.trace import traces
 from plant_emulator.diagnosis.report.html_traces import path, rms
 from plant_emulator.diagnosis.report.ranking import rank, ranked
@@ -95,7 +95,7 @@ def halves() -> tuple[list[MeasuredRun], list[Prediction]]:
 def test_relative_gap_is_pooled_rms_over_the_range_of_held_out_samples() -> None:
     """Residuals of 6 A and 4 A, 50 each: rms sqrt(26) A; held out lie 400 A to 990 A."""
     runs, predictions = halves()
-    found = gap(runs, predictions, [10, 10])
+    found = measure_gap(runs, predictions, [10, 10])
     assert ranged(found, runs) == {"y": pytest.approx(np.sqrt(26.0) / 590.0)}
     assert noise_floor(found, runs) == {"y": pytest.approx(np.sqrt(2.5) / 590.0)}
 

@@ -23,7 +23,7 @@ def told(nominal: ParameterSet, *logs: Log) -> str:
     model = BenchModel([recording(log) for log in logs], nominal, kernel().effects)
     runs = range(len(logs))
     found = [fit_null(model, (run,)) for run in runs]
-    return run_consistency.between(model, runs, found, found[0])
+    return run_consistency.inconsistency(model, runs, found, found[0])
 
 
 class Outlined(Line):
@@ -59,7 +59,7 @@ def test_runs_of_an_outlined_machine_differ_where_each_alone_leaves_little(
     """
     model = Outlined([TIME, TIME])
     found = [fitted(2.0, squares), fitted(level, squares)]
-    told = run_consistency.between(model, (0, 1), found, fitted(5.0, 10_000.0))
+    told = run_consistency.inconsistency(model, (0, 1), found, fitted(5.0, 10_000.0))
     assert bool(told) == differs
     assert ("a is 2.0" in told) == differs
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.diagnose import Diagnose
-from plant_emulator.diagnosis.execution.pool import InProcess
+from plant_emulator.diagnosis.execution.pool import InProcess, TaskRunner
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.explanation import Explanation
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null, linearise
@@ -294,7 +294,8 @@ def test_nominal_axis_of_a_held_out_run_is_that_of_the_other_runs() -> None:
     null = fit_null(model, (0, 1))
     nothing = Explanation(null=null, final=null, hypotheses=(), alternatives={}, unconverged="")
 
-    held_out = HeldOut(pool=InProcess(), recipe=recipe, model=model, plan=plan)
+    runner = TaskRunner(pool=InProcess(), recipe=recipe, model=model, runs=plan.fitted)
+    held_out = HeldOut(runner=runner, plan=plan)
     found = held_out.predictions(nothing, (), plan.folds)[NOMINAL]
     left = [one.residuals[0][0] * model.runs[k].noise[0] for k, one in enumerate(found)]
     assert [float(e[e != 0.0].mean()) for e in left] == pytest.approx([-20.0, 20.0], abs=1.0)

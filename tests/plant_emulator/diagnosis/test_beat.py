@@ -12,7 +12,7 @@ from plant_emulator.diagnosis.fitting.looks import look
 from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace, gain_at_best_angle
 from plant_emulator.diagnosis.fitting.signature import signature
 from plant_emulator.diagnosis.machine import Candidate
-from plant_emulator.diagnosis.prediction.gap import Fold, refitted
+from plant_emulator.diagnosis.prediction.gap import Fold, refit_fold
 from plant_emulator.estimation.robust_scan import scanned
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.signals.log import Array
@@ -202,8 +202,8 @@ def test_prediction_has_no_more_of_an_effect_than_the_fitted_runs_show() -> None
     """
     model = Line([noisy(2.0 + 3.0 * TIME**3)], ["cube", "kink"])
     start = fit(model, ("cube",), [0], {"a": 0.0, "b": 0.0, "cube_size": 1.0}, [{}])
-    shown = refitted(model, Fold(fitted=(0,), predicted=(), start=start))
+    shown = refit_fold(model, Fold(fitted=(0,), predicted=(), start=start))
     assert shown.values["cube_size"] == pytest.approx(start.values["cube_size"], rel=0.02)
     model.residual = lambda run, effects: Line.residual(model, run, ())  # type: ignore[method-assign]
-    hidden = refitted(model, Fold(fitted=(0,), predicted=(), start=start))
+    hidden = refit_fold(model, Fold(fitted=(0,), predicted=(), start=start))
     assert hidden.values["cube_size"] == pytest.approx(0.0, abs=1e-3)

@@ -13,7 +13,15 @@ from plant_emulator.diagnosis.fitting.steps import show
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.selection.procedure import Procedure
 from plant_emulator.signals.log import Array
-from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, effect, linear, noisy
+from tests.plant_emulator.diagnosis.test_contest import (
+    TIME,
+    Given,
+    Line,
+    effect,
+    linear,
+    noisy,
+    runner,
+)
 
 # How much a shake of the size 1 moves each sample (standard deviation): nothing in the first half.
 SLOPE = np.maximum(0.0, TIME) * 6.0
@@ -135,13 +143,15 @@ def test_unrest_of_a_shape_that_is_not_the_usual_one() -> None:
 def test_effect_beside_an_unrest_is_named_with_it() -> None:
     y = noisy(2.0 + 3.0 * TIME + 0.5 * np.sin(20.0 * TIME)) + shaken(0.8)
     model = Shaken([y])
-    inquiry = Procedure(pool=InProcess(), recipe=Given(model), model=model, runs=(0,))
-    explained, verdict, recipe = inquiry.found()
+    procedure = Procedure(runner=runner(model))
+    explained, verdict, weighted = procedure.run()
     assert (verdict.kind, verdict.effects) == ("effect", ("shake", "wave"))
     assert explained.classes() == [["shake"], ["wave"]]
     assert explained.final.values["wave_size"] == pytest.approx(0.5, abs=0.15)
     # What is compared with these costs has to count in their noise.
-    again = fit(recipe.build(), ("wave",), [0], explained.final.values, explained.final.states)
+    again = fit(
+        weighted.recipe.build(), ("wave",), [0], explained.final.values, explained.final.states
+    )
     assert again.cost == pytest.approx(explained.final.cost, abs=0.1)
 
 
@@ -156,8 +166,8 @@ def test_no_other_effect_is_sought_where_all_is_chance() -> None:
             return super().map(function, recipe, tasks)
 
     model = Shaken([noisy(2.0 + 3.0 * TIME) + shaken(0.8)])
-    inquiry = Procedure(pool=Watched(), recipe=Given(model), model=model, runs=(0,))
-    assert inquiry.found()[1].effects == ("shake",)
+    procedure = Procedure(runner=runner(model, Watched()))
+    assert procedure.run()[1].effects == ("shake",)
     assert looked
     assert all(isinstance(recipe, WeightedRecipe) for recipe in looked)
 
@@ -168,14 +178,14 @@ def test_what_is_little_beside_a_great_unrest_may_be_its_law() -> None:
     """
     y = noisy(2.0 + 3.0 * TIME + 0.5 * np.sin(20.0 * TIME)) + shaken(8.0)
     model = Shaken([y])
-    inquiry = Procedure(pool=InProcess(), recipe=Given(model), model=model, runs=(0,))
-    assert inquiry.found()[1].effects == ("shake",)
+    procedure = Procedure(runner=runner(model))
+    assert procedure.run()[1].effects == ("shake",)
 
 
 def test_unrest_alone_is_an_effect() -> None:
     model = Shaken([noisy(2.0 + 3.0 * TIME) + shaken(0.8)])
-    inquiry = Procedure(pool=InProcess(), recipe=Given(model), model=model, runs=(0,))
-    assert inquiry.found()[1].effects == ("shake",)
+    procedure = Procedure(runner=runner(model))
+    assert procedure.run()[1].effects == ("shake",)
 
 
 def test_weighted_model_is_another_recipe() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.answer import Location, Undetectable
-from plant_emulator.diagnosis.execution.pool import InProcess
+from plant_emulator.diagnosis.execution.pool import InProcess, Pool, TaskRunner
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.elsewhere import (
     from_nominal,
@@ -33,7 +33,7 @@ from plant_emulator.diagnosis.selection.drifts import Drifts
 from plant_emulator.diagnosis.selection.restarts import Restarts
 from plant_emulator.diagnosis.selection.rules import noise_only
 from plant_emulator.diagnosis.selection.stepwise import Contest
-from plant_emulator.diagnosis.selection.subsystem import subsystem
+from plant_emulator.diagnosis.selection.subsystem import faulty_subsystem
 from plant_emulator.diagnosis.selection.verdict import decide
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.recordings.input_noise import NoiseDirections
@@ -148,6 +148,12 @@ class Given:
         return str(self.number)
 
 
+def runner(model: Line, pool: Pool | None = None) -> TaskRunner:
+    """All runs of a model, fitted in this process."""
+    runs = tuple(range(len(model.runs)))
+    return TaskRunner(pool=pool or InProcess(), recipe=Given(model), model=model, runs=runs)
+
+
 def noisy(y: Array, seed: int = 0) -> Array:
     """With noise of 1."""
     return y + np.random.default_rng(seed).standard_normal(len(TIME))
@@ -156,8 +162,7 @@ def noisy(y: Array, seed: int = 0) -> Array:
 def explained(model: Line) -> Explanation:
     """The contest over all runs."""
     exact = [name for name, one in model.candidates.items() if one.exact_form]
-    runs = range(len(model.runs))
-    return Contest(InProcess(), Given(model), tuple(model.candidates), runs, exact=exact).explain()
+    return Contest(runner(model), tuple(model.candidates), exact=exact).explain()
 
 
 def test_signature_is_what_a_line_cannot_follow() -> None:
@@ -211,7 +216,7 @@ def test_two_effects_lie_where_the_larger_share_is() -> None:
     found = decide(model, explained(model))
     for larger, smaller in (("wave", "cube"), ("cube", "wave")):
         shares = {f"part of {larger}": 0.6, f"part of {smaller}": 0.4}
-        assert subsystem(found, model.candidates, shares) == f"part of {larger}"
+        assert faulty_subsystem(found, model.candidates, shares) == f"part of {larger}"
 
 
 def of_runs(model: Line) -> Line:
@@ -309,7 +314,7 @@ def partly(*sizes: float) -> Partly:
 
 def drifts(model: Line) -> tuple[list[FitResult], bool]:
     """What the fit without effects starts from."""
-    found = Drifts(pool=InProcess(), recipe=Given(model), runs=tuple(range(len(model.runs))))
+    found = Drifts(runner=runner(model))
     return found.of_some(found.of_all())
 
 
@@ -384,7 +389,7 @@ def test_second_effect_that_the_first_leaves_is_named_with_both_sizes() -> None:
 def test_faint_second_effect_beside_an_exact_one_is_named() -> None:
     """Its evidence is about 100, and what both leave is noise."""
     model = Line([noisy(CUBE + 0.8 * KINK)], NAMES)
-    found = Contest(InProcess(), Given(model), NAMES, (0,), exact=("cube",)).explain()
+    found = Contest(runner(model), NAMES, exact=("cube",)).explain()
     assert set(found.final.effects) == {"cube", "kink"}
     assert noise_only(found.final)
 
@@ -410,7 +415,7 @@ def test_place_of_the_gap_overrules_no_fit() -> None:
     """The cube closes most, wherever the gap is said to lie."""
     measured = noisy(0.2 * CUBE + 2.0 * KINK + 1.5 * RIPPLE)
     places = {"cube": "there", "wave": "there", "kink": "here"}
-    placed = Contest(InProcess(), Given(Placed([measured], NAMES)), NAMES, (0,), subsystems=places)
+    placed = Contest(runner(Placed([measured], NAMES)), NAMES, subsystems=places)
     found, plain = placed.explain().final, explained(Line([measured], NAMES)).final
     assert found.effects == plain.effects == ("cube",)
     assert found.cost == pytest.approx(plain.cost, rel=1e-6)
@@ -849,7 +854,7 @@ def test_fit_that_stops_on_the_way_down_a_valley_is_followed_further() -> None:
     model = Washboard([noisy(np.zeros_like(TIME))])
     stopped = fit(model, (), [0], {"a": -1.0, "b": -1.0}, [{}])
     assert stopped.values["a"] < 1.5
-    restarts = Restarts(pool=InProcess(), recipe=Given(model), runs=(0,))
+    restarts = Restarts(runner=runner(model))
     assert restarts.followed(stopped).values["a"] == pytest.approx(2.51, abs=0.02)
 
 

@@ -15,7 +15,7 @@ from plant_emulator.diagnosis.prediction.gap import Fold, predict
 from plant_emulator.diagnosis.prediction.held_out import HeldOut, Plan
 from plant_emulator.estimation import least_squares
 from plant_emulator.signals.log import Array
-from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, noisy
+from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, noisy, runner
 
 EACH_IN_TURN = Plan(fitted=(0, 1, 2), folds=(((1, 2), (0,)), ((0, 2), (1,)), ((0, 1), (2,))))
 
@@ -152,10 +152,9 @@ def test_prediction_by_a_fit_that_does_not_end_is_told(monkeypatch: pytest.Monke
     monkeypatch.setattr(least_squares, "MAX_ITERATIONS", 1)
     found = {(): [predict(model, fold)], ("kink",): [predict(model, fold)]}
     folds = (((0,), (1,)),)
-    held_out = HeldOut(
-        pool=InProcess(), recipe=Given(model), model=model, plan=Plan(fitted=(0,), folds=folds)
-    )
-    assert held_out.unsettled(folds, found) == (
+    plan = Plan(fitted=(0,), folds=folds)
+    held_out = HeldOut(runner=runner(model), plan=plan)
+    assert held_out.convergence_notes(folds, found) == (
         "run 1: predicted by a fit with no effect that did not end",
         "run 1: predicted by a fit with kink that did not end",
     )

@@ -11,7 +11,7 @@ import pytest
 from plant_emulator import parameter_sets
 from plant_emulator.diagnosis.answer import Location
 from plant_emulator.diagnosis.design.next_experiment import Advice
-from plant_emulator.diagnosis.execution.pool import InProcess
+from plant_emulator.diagnosis.execution.pool import InProcess, TaskRunner
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
@@ -180,7 +180,7 @@ ROAD = Location(subsystem="road", channel=None, phase="deceleration", shares={},
 
 def advice(model: Slope, explained: Explanation, kind: Any, hidden: Sequence[str] = ()) -> Any:
     found = Decision(kind=kind, effects=explained.final.effects, deviations=(), reason="")
-    asked = Advice(InProcess(), Given(model), model, (0,))
+    asked = Advice(runner=TaskRunner(pool=InProcess(), recipe=Given(model), model=model, runs=(0,)))
     return asked.next_experiment(explained, found, ROAD, hidden)
 
 
@@ -289,7 +289,7 @@ def test_bench_names_the_program_that_has_what_an_effect_needs():
     )
     explained = Explanation(null=null, final=null, hypotheses=(), alternatives={}, unconverged="")
     nothing = Decision(kind="none", effects=(), deviations=(), reason="")
-    asked = Advice(InProcess(), recipe, model, (0, 1, 2))
+    asked = Advice(runner=TaskRunner(pool=InProcess(), recipe=recipe, model=model, runs=(0, 1, 2)))
     for hidden, program in (("wheel_slip", "program6"), ("integrator_windup", "program4 (60 s")):
         told = asked.next_experiment(explained, nothing, ROAD, [hidden])
         assert told is not None

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from plant_emulator.diagnosis.execution.pool import InProcess
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.input_noise_model import InputNoiseRecipe, whiten_inputs
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.selection.procedure import Procedure
 from plant_emulator.recordings.input_noise import NoiseDirections
 from plant_emulator.signals.log import Array
-from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, noisy
+from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, noisy, runner
 
 # What the fed input's noise adds to every sample by its one standard deviation.
 FED = np.where(TIME > 0.95, 20.0, 0.0)
@@ -39,18 +38,18 @@ def test_fits_do_not_follow_the_noise_of_a_fed_input() -> None:
     """By hand: without the fed samples a and b are those of the line, within their errors."""
     y = noisy(2.0 + 3.0 * TIME) + FED
     model = Fed([y])
-    recipe, _ = whiten_inputs(InProcess(), Given(model), model, (0,))
-    there, plain = fit_null(recipe.build(), [0]), fit_null(model, [0])
+    whitened, _ = whiten_inputs(runner(model))
+    there, plain = fit_null(whitened.recipe.build(), [0]), fit_null(model, [0])
     for name, value in (("a", 2.0), ("b", 3.0)):
         assert abs(there.values[name] - value) < 3.0 * there.standard_errors[name]
     assert plain.values["b"] > 4.0
 
 
-def test_inquiry_with_quiet_inputs_finds_no_gap_in_their_noise() -> None:
+def test_procedure_with_input_noise_finds_no_gap_in_their_noise() -> None:
     model = Fed([noisy(2.0 + 3.0 * TIME) + FED])
-    inquiry = Procedure(pool=InProcess(), recipe=Given(model), model=model, runs=(0,))
-    assert inquiry.found()[1].kind == "unknown"
-    assert inquiry.with_quiet_inputs().found()[1].kind == "parameter"
+    procedure = Procedure(runner=runner(model))
+    assert procedure.run()[1].kind == "unknown"
+    assert procedure.with_input_noise().run()[1].kind == "parameter"
 
 
 def test_contest_starts_from_the_fit_that_told_the_noise() -> None:
@@ -67,16 +66,16 @@ def test_contest_starts_from_the_fit_that_told_the_noise() -> None:
             return super().start_values(runs)
 
     model = Once([noisy(2.0 + 3.0 * TIME) + FED])
-    inquiry = Procedure(pool=InProcess(), recipe=Given(model), model=model, runs=(0,))
-    explained, _, _ = inquiry.with_quiet_inputs().found()
+    procedure = Procedure(runner=runner(model))
+    explained, _, _ = procedure.with_input_noise().run()
     for name, value in (("a", 2.0), ("b", 3.0)):
         assert abs(explained.null.values[name] - value) < 3.0 * explained.null.standard_errors[name]
 
 
 def test_machine_that_is_fed_nothing_keeps_its_recipe() -> None:
     model = Line([noisy(2.0 + 3.0 * TIME)])
-    recipe = Given(model)
-    assert whiten_inputs(InProcess(), recipe, model, (0,)) == (recipe, None)
+    plain = runner(model)
+    assert whiten_inputs(plain) == (plain, None)
 
 
 def test_quieted_model_is_another_recipe() -> None:

@@ -5,8 +5,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from plant_emulator.diagnosis.answer import Cell
 from plant_emulator.diagnosis.localisation.operating_phases import CRUISE, phases
-from plant_emulator.diagnosis.localisation.residual_map import Cell, residual_map
+from plant_emulator.diagnosis.localisation.residual_map import residual_map
 from plant_emulator.recordings.recording import Recording, recording
 from plant_emulator.signals.log import Log
 

@@ -9,9 +9,9 @@ from plant_emulator.diagnosis.prediction.gap import (
     Prediction,
     block_lengths,
     closed_fraction,
-    combined,
-    gap,
-    interval,
+    closed_fraction_interval,
+    combined_gap,
+    measure_gap,
 )
 from plant_emulator.signals.log import Array
 
@@ -26,7 +26,7 @@ def constant(*levels: float) -> Prediction:
     return prediction(*(np.full(100, level) for level in levels))
 
 
-def inputs_of(*channels: str, samples: int = 100, noise: float = 1.0) -> MeasuredRun:
+def measured_run(*channels: str, samples: int = 100, noise: float = 1.0) -> MeasuredRun:
     """A run with these channels, each with the same noise."""
     return MeasuredRun(
         source="run",
@@ -38,38 +38,38 @@ def inputs_of(*channels: str, samples: int = 100, noise: float = 1.0) -> Measure
     )
 
 
-NAMES = [inputs_of("a", "b")]
+NAMES = [measured_run("a", "b")]
 
 
 def test_closed_fraction_by_hand() -> None:
     """3 and 2 times the noise before, 1.5 and 1 after: 1 - (1.25 + 0) / (8 + 3)."""
-    before = gap(NAMES, [constant(3.0, 2.0)], [10])
-    after = gap(NAMES, [constant(1.5, 1.0)], [10])
+    before = measure_gap(NAMES, [constant(3.0, 2.0)], [10])
+    after = measure_gap(NAMES, [constant(1.5, 1.0)], [10])
     assert before.by_channel == pytest.approx([3.0, 2.0])
     assert closed_fraction(before, after) == pytest.approx(1 - 1.25 / 11)
 
 
 def test_channel_at_the_noise_before_does_not_count() -> None:
-    before = gap(NAMES, [constant(3.0, 1.05)], [10])
-    after = gap(NAMES, [constant(1.0, 2.0)], [10])
+    before = measure_gap(NAMES, [constant(3.0, 1.05)], [10])
+    after = measure_gap(NAMES, [constant(1.0, 2.0)], [10])
     assert closed_fraction(before, after) == pytest.approx(1.0)
 
 
 def test_no_gap_has_no_closed_fraction() -> None:
-    before = gap(NAMES, [constant(1.0, 1.09)], [10])
+    before = measure_gap(NAMES, [constant(1.0, 1.09)], [10])
     assert closed_fraction(before, before) is None
-    assert interval(before, before) is None
+    assert closed_fraction_interval(before, before) is None
 
 
 def test_worse_prediction_closes_less_than_nothing() -> None:
-    before = gap(NAMES, [constant(2.0, 2.0)], [10])
-    after = gap(NAMES, [constant(3.0, 3.0)], [10])
+    before = measure_gap(NAMES, [constant(2.0, 2.0)], [10])
+    after = measure_gap(NAMES, [constant(3.0, 3.0)], [10])
     assert closed_fraction(before, after) == pytest.approx(1 - 16 / 6)
 
 
 def test_samples_of_all_runs_are_pooled() -> None:
-    both = gap(
-        [inputs_of("a"), inputs_of("a")],
+    both = measure_gap(
+        [measured_run("a"), measured_run("a")],
         [prediction(np.full(100, 3.0)), prediction(np.full(300, 1.0))],
         [10, 10],
     )
@@ -79,13 +79,13 @@ def test_samples_of_all_runs_are_pooled() -> None:
 def test_samples_that_do_not_count_are_left_out() -> None:
     residual = np.full(100, 2.0)
     residual[:50] = 0.0
-    found = gap([inputs_of("a")], [prediction(residual)], [10])
+    found = measure_gap([measured_run("a")], [prediction(residual)], [10])
     assert found.by_channel == pytest.approx([2.0])
 
 
 def test_channel_that_only_one_run_has_counts_there() -> None:
-    found = gap(
-        [inputs_of("a", "b"), inputs_of("a")], [constant(2.0, 3.0), constant(1.0)], [10, 10]
+    found = measure_gap(
+        [measured_run("a", "b"), measured_run("a")], [constant(2.0, 3.0), constant(1.0)], [10, 10]
     )
     assert found.channels == ("a", "b")
     assert found.by_channel == pytest.approx([np.sqrt(2.5), 3.0])
@@ -107,9 +107,9 @@ def test_interval_covers_the_truth_at_its_rate(memory: float, samples: int, leas
     for _ in range(300):
         first, second = (first_order(random, memory, samples) for _ in range(2))
         blocks = block_lengths([prediction(2.0 * first)])
-        before = gap([inputs_of("a")], [prediction(2.0 * first)], blocks)
-        after = gap([inputs_of("a")], [prediction(1.3 * second)], blocks)
-        found = interval(before, after)
+        before = measure_gap([measured_run("a")], [prediction(2.0 * first)], blocks)
+        after = measure_gap([measured_run("a")], [prediction(1.3 * second)], blocks)
+        found = closed_fraction_interval(before, after)
         assert found is not None
         hits += found[0] <= 1 - 0.69 / 3 <= found[1]
     assert least <= hits / 300 <= 0.985
@@ -133,27 +133,27 @@ def test_interval_of_a_channel_that_one_run_of_many_has_is_finite() -> None:
     rare = np.zeros(100)
     rare[:10] = 3.0
     some = [constant(2.0)] * 5 + [prediction(np.full(100, 2.0), rare)]
-    runs = [inputs_of("a")] * 5 + [inputs_of("a", "b")]
-    before = gap(runs, some, [10] * 6)
-    found = interval(before, before)
+    runs = [measured_run("a")] * 5 + [measured_run("a", "b")]
+    before = measure_gap(runs, some, [10] * 6)
+    found = closed_fraction_interval(before, before)
     assert found == pytest.approx((0.0, 0.0))
-    assert np.isfinite(combined(before)).all()
+    assert np.isfinite(combined_gap(before)).all()
 
 
 def test_channel_without_held_out_samples_has_no_gap() -> None:
-    found = gap(NAMES, [constant(2.0, 0.0)], [10])
+    found = measure_gap(NAMES, [constant(2.0, 0.0)], [10])
     assert found.channels == ("a",)
 
 
 def test_gap_over_the_noise_is_that_of_the_pooled_squares() -> None:
     """Residuals of 1 at a noise of 1, and of 6 at a noise of 3: (1 + 36) / (1 + 9)."""
-    runs = [inputs_of("a"), inputs_of("a", noise=3.0)]
-    found = gap(runs, [constant(1.0), constant(2.0)], [10, 10])
+    runs = [measured_run("a"), measured_run("a", noise=3.0)]
+    found = measure_gap(runs, [constant(1.0), constant(2.0)], [10, 10])
     assert found.by_channel == pytest.approx([np.sqrt(3.7)])
     assert found.noise == pytest.approx([np.sqrt(5.0)])
 
 
 def test_combined_gap_is_the_rms_over_all_channels() -> None:
-    value, low, high = combined(gap(NAMES, [constant(3.0, 1.0)], [10]))
+    value, low, high = combined_gap(measure_gap(NAMES, [constant(3.0, 1.0)], [10]))
     assert value == pytest.approx(np.sqrt(5.0))
     assert low == pytest.approx(high)  # nothing varies

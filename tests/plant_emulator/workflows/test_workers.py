@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 from plant_emulator.cli import main
 from plant_emulator.diagnosis.execution import pool
-from plant_emulator.diagnosis.fitting import steps
+from plant_emulator.diagnosis.fitting import nuisance_space, steps
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.machine import Model
 from plant_emulator.errors import EmulatorError, InputError
@@ -121,13 +121,13 @@ def test_model_is_returned_though_another_thread_lets_it_go(
     assert model == 3
 
 
-def test_tangents_are_returned_though_another_thread_lets_them_go(
+def test_nuisance_space_is_returned_though_another_thread_lets_it_go(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     line = Line([noisy(2.0 + 3.0 * TIME + np.abs(TIME), 1)], ["kink"])
     task = Task(base=steps.start(line, (0,)), runs=(0,), effect="kink")
     undisturbed = steps.show(line, task)
-    monkeypatch.setattr(steps, "_last", Cleared())
+    monkeypatch.setattr(nuisance_space, "_LAST", Cleared())
     shown = steps.show(line, task)
     assert shown is not None
     assert undisturbed is not None
