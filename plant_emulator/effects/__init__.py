@@ -2,17 +2,19 @@
 
 An effect is a module with
 
-    SUBSYSTEM    where it sits: drive, motor, motor_shaft, gear, ...
-    NEEDS        the sensor or manoeuvre without which a log hardly shows it, if there is one
-    PARAMETERS   name -> EffectParameter; all at their neutral values = the effect is not there
-    MEMORIES     name -> Memory, if it remembers anything (a lag, a temperature)
-    and one function for each law of `plant_emulator.model.laws` that it changes, of the law's name:
-    law(value, s, p) -> value, value being what the nominal law and the effects before it gave.
+    SUBSYSTEM    where it acts: drive, motor, motor_shaft, gear, ...
+    NEEDS        sensor or manoeuvre without which a log hardly shows it, if there is one
+    EXACT        True if its law can have no other form, as a factor or an offset
+    PARAMETERS   name -> EffectParameter; at all neutral values the effect is absent
+    MEMORIES     name -> Memory, if it has states (a lag, a temperature)
 
-Inside, a parameter is `p.<effect>_<parameter>`, a memory `s.<effect>_<memory>`. At the neutral
-value a function must return `value` itself, so that the run stays bit for bit as it was; the
-conformance tests in tests/plant_emulator/effects/test_every_effect.py see to that for every file in
-this folder.
+and with one function for each law of `plant_emulator.model.laws` that it changes. The function has
+the name of the law: law(value, s, p) -> changed value. `value` is the result of the nominal law and
+of the effects before this one.
+
+In these functions a parameter is `p.<effect>_<parameter>`, a memory is `s.<effect>_<memory>`. At
+the neutral value a function must return `value` itself, so that no bit of a run changes. The tests
+in tests/plant_emulator/effects/test_every_effect.py check every file of this folder.
 """
 
 from __future__ import annotations
@@ -28,8 +30,8 @@ from plant_emulator.effects.declaration import (
     Effect,
     EffectParameter,
     Memory,
-    check_chance,
-    effect_of,
+    check_random_effect,
+    read_effect,
 )
 from plant_emulator.errors import ParameterError, place_in
 
@@ -61,11 +63,11 @@ def load(name: str) -> Effect:
     """The shipped effect of that name; ParameterError where there is none."""
     if name not in names():
         raise ParameterError(f"effect {name}: unknown; known: {', '.join(names())}")
-    return effect_of(name, importlib.import_module(f"{__name__}.{name}"))
+    return read_effect(name, importlib.import_module(f"{__name__}.{name}"))
 
 
 def from_files(paths: Sequence[Path]) -> list[Effect]:
-    """A user's own effects; ParameterError where two would have one name."""
+    """Load a user's own effects; ParameterError where two files would give one name."""
     for first, second in combinations(paths, 2):
         if first.stem == second.stem:
             raise ParameterError(
@@ -76,7 +78,7 @@ def from_files(paths: Sequence[Path]) -> list[Effect]:
 
 
 def from_file(path: Path) -> Effect:
-    """A user's own effect; its name is the file's. A fault in it is told by file and line."""
+    """Load a user's own effect, named after its file; ParameterError names the line of a fault."""
     if not path.stem.isidentifier() or iskeyword(path.stem):
         raise ParameterError(
             f"{path}: an effect is called by its file, and {path.stem!r} is no name in Python; "
@@ -95,15 +97,16 @@ def from_file(path: Path) -> Effect:
         spec.loader.exec_module(module)
     except Exception as error:
         raise ParameterError(place_in([str(path)], error) or f"{path}: {error}") from error
-    effect = effect_of(path.stem, module)
-    check_chance(effect)
+    effect = read_effect(path.stem, module)
+    check_random_effect(effect)
     return effect
 
 
 def parse(texts: tuple[str, ...] | list[str]) -> dict[str, dict[str, float]]:
-    """`NAME[:PARAM=VALUE,...]` as given on the command line -> values by effect and parameter.
+    """Values by effect and parameter [SI] from texts `NAME[:PARAM=VALUE,...]`.
 
-    Without PARAM the effect's plausible size. Raises ParameterError for what is not understood.
+    A parameter that is not given takes its plausible value. Raises ParameterError for a text that
+    is not understood, and for a value outside of its bounds.
     """
     return dict(_parse_one(text) for text in texts)
 
@@ -136,7 +139,7 @@ def _parse_one(text: str) -> tuple[str, dict[str, float]]:
 
 
 def neutral_values(effects: Mapping[str, Effect]) -> dict[str, float]:
-    """The values at which none of the effects is there, by their names in the parameter record."""
+    """Values at which none of the effects is there, by their names in the parameter record."""
     return {
         f"{name}_{key}": parameter.neutral
         for name, effect in effects.items()

@@ -3,9 +3,9 @@
     k Phi = (k Phi)_0 (1 - a (|i| / i_max)^n)
 
 Source: A. E. Fitzgerald, C. Kingsley, S. D. Umans, Electric Machinery, chapter on DC machines
-(armature reaction, its demagnetising effect: in proportion to the current where the pole tips are
-saturated already, n = 1, with its square where they begin to be). i_max is the drive's nominal
-largest current: a is the share of the flux that is lost there.
+(armature reaction and its demagnetising effect). The loss is proportional to the current where the
+pole tips are saturated (n = 1), and to its square where saturation begins (n = 2). i_max is the
+drive's nominal current limit; a is the share of the flux that is lost there.
 """
 
 from __future__ import annotations

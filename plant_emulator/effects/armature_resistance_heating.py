@@ -1,12 +1,12 @@
 """The armature's resistance rises with the temperature of its winding.
 
-    R_a = R_a0 (1 + alpha theta)             theta: rise over the temperature that R_a0 belongs to
+    R_a = R_a0 (1 + alpha theta)             theta: rise above the temperature at which R_a0 holds
     C dtheta/dt = R_a i^2 - G theta          heat of the current, loss to the air
 
 Sources: IEC 60034-1, rise of a winding by its resistance (copper: alpha = 1 / (235 + 20) per K at
 20 degC); the heat balance is that of one lumped body, e.g. W. Leonhard, Control of Electrical
-Drives. alpha = 0: a resistance that does not know the temperature. A current controller hides it;
-the armature voltage shows it.
+Drives. alpha = 0: the resistance is constant. A current controller hides this effect; the armature
+voltage shows it.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ PARAMETERS = {
 
 
 def start(p: Record) -> float:
-    """Rise of the winding's temperature at the start of a run [K]."""
+    """Temperature rise of the winding at the start of a run [K]."""
     return p.armature_resistance_heating_start_rise
 
 
 def advance(base: float, a: float, s: Record, p: Record) -> float:
-    """Rise at the end of an implicit stage of size a [K]."""
+    """Temperature rise of the winding at the end of an implicit stage of size a [K]."""
     if p.armature_resistance_heating_temperature_coefficient == 0.0:
         return base
     capacity = p.armature_resistance_heating_heat_capacity

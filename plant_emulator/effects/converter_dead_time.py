@@ -6,10 +6,10 @@
 
 Sources: W. Leonhard, Control of Electrical Drives, chapter on line-commutated converters (interval
 without torque at reversal, discontinuous current); N. Mohan, T. M. Undeland, W. P. Robbins, Power
-Electronics. The ripple is too quick for speeds and torque; a log of 100 Hz shows it folded down.
-The mains leave 50 Hz by some 0.03 Hz (Regulation (EU) 2017/1485, annex III: a standard range of
-50 mHz), so that the ripple comes back as a beat of up to some 0.3 Hz; f, and the phase phi at the
-start, are of each run, and nobody knows them.
+Electronics. Speeds and torque do not follow the ripple; a log of 100 Hz shows it as an alias. The
+mains frequency f leaves 50 Hz by some 0.03 Hz (Regulation (EU) 2017/1485, annex III: a standard
+range of 50 mHz). The alias is therefore a beat of up to some 0.3 Hz. f, and the phase phi at the
+start, are unknown and belong to one run each.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 SUBSYSTEM = "drive"
 NEEDS = "log armature_voltage_V as the drive asks for it: the current loop hides what is lost"
-# The current after a reversal is steep: of two pauses 1 ms apart each has a valley of its own.
+# The current is steep after a reversal: pauses 1 ms apart lie in different basins of a fit.
 PARAMETERS = {
     "pause": EffectParameter(
         neutral=0.0, lower=0.0, upper=0.1, plausible=0.0066, unit="s", meaning="t_0", step=0.0005
@@ -38,7 +38,7 @@ PARAMETERS = {
     "ripple": EffectParameter(
         neutral=0.0, lower=0.0, upper=10.0, plausible=0.5, unit="A", meaning="I"
     ),
-    # A run of 50 s tells mains apart that are 3 mHz off; a fit finds its valley from half as far.
+    # A run of 50 s tells frequencies apart that differ by 3 mHz. A fit converges from half of that.
     "mains": EffectParameter(
         neutral=50.0,
         lower=49.8,
@@ -67,21 +67,21 @@ OPEN = 1e6
 
 
 def start(p: Record) -> float:
-    """The bridge for driving forwards is ready [1]."""
+    """1: the bridge for driving forwards is ready at the start [1]."""
     return 1.0
 
 
 def sense(s: Record) -> float:
-    """Sign of the current, or of what leaks while it would flow but for the pause [1]."""
+    """Sign of the current, or of the leakage current during a pause [1]."""
     if s.armature_current == 0.0:
         return 0.0
     return 1.0 if s.armature_current > 0.0 else -1.0
 
 
 def advance(base: float, a: float, s: Record, p: Record) -> float:
-    """Which bridge is ready at the end of an implicit stage of size a [1].
+    """State of the bridges at the end of an implicit stage of size a [1].
 
-    1 or -1: that of this sign of the current; it takes the pause from one to the other.
+    1 or -1: the bridge for this sign of the current is ready. Values between count out the pause.
     """
     pause = p.converter_dead_time_pause
     if pause == 0.0:
@@ -93,9 +93,10 @@ MEMORIES = {"bridge": Memory(start, advance)}
 
 
 def resistance(value: float, s: Record, p: Record) -> float:
-    """Resistance of the armature's circuit [ohm], open while no bridge is ready for the current.
+    """Resistance of the armature circuit [ohm]; the circuit is open while no bridge is ready.
 
-    The sign of what leaks is that of the current that would flow: the stage finds one solution.
+    The leakage current has the sign of the current that would flow, so that the stage has one
+    solution.
     """
     if p.converter_dead_time_pause == 0.0 or s.converter_dead_time_bridge * sense(s) >= 1.0:
         return value
@@ -103,13 +104,13 @@ def resistance(value: float, s: Record, p: Record) -> float:
 
 
 def conducting(s: Record, p: Record) -> float:
-    """Share of the mains period in which current flows, with its sign [1]."""
+    """Share of the mains period in which current flows, with the sign of the current [1]."""
     current = s.armature_current
     return current / (abs(current) + p.converter_dead_time_discontinuous_below)
 
 
 def converter_voltage_drop(value: float, s: Record, p: Record) -> float:
-    """What the converter loses [V]."""
+    """Voltage that the converter loses [V]."""
     if p.converter_dead_time_drop == 0.0:
         return value
     return value + p.converter_dead_time_drop * conducting(s, p)

@@ -3,8 +3,8 @@
     |i_ref| <= i_max - R
 
 Source: W. Leonhard, Control of Electrical Drives, chapter on the cascade control of drives: the
-limit of the speed controller's output is the limit of the current. R is how far it is set below
-i_max.
+limit of the speed controller's output is the limit of the current. R is the distance of the limit
+below i_max.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How an effect declares itself; the same declaration serves simulation, fit and report."""
+"""How an effect is declared. One declaration serves simulation, fit and report."""
 
 from __future__ import annotations
 
@@ -29,25 +29,28 @@ SUBSYSTEMS = (
     "wheel_contact",
 )
 
-# Starts that a fit looks through at most, between the bounds of a parameter.
+# Largest number of starts of a fit between the bounds of a parameter.
 MOST_STARTS = 10_000
 
 
 @dataclass(frozen=True, kw_only=True)
 class EffectParameter:
-    """One constant of an effect, SI; `neutral`: there the effect is absent.
+    """One parameter of an effect [SI].
 
-    `plausible` is a size met on real benches, used when none is given and by planning tools.
-    A parameter that only shapes the effect (absent anyway while another is neutral) has neutral =
-    plausible.
-    per_run : its value is one run's own, such as a temperature at the start
-    measured : the signal of a log whose mean is its value in that run, where the log has it
-    std : standard deviation of what is known beforehand of a shape or a value per run; None: a fit
-        leaves it free if it is a size, and else where it is. A value per run without, that no
-        signal tells, makes the effect's course chance; such an effect has one size, and of a shape
-        the likeliest of three values counts: the plausible one and a deviation to either side
-    step : how far apart the starts of a fit may lie so that one of them finds the right valley;
-        None: of a value per run a few over what is known beforehand do, of others one
+    There are three kinds of parameters. A size makes the effect absent at its neutral value. A
+    shape only modifies the effect, and has neutral = plausible. A value per run belongs to one run,
+    such as a temperature at its start.
+
+    neutral : value at which the effect is absent; lower, upper : bounds
+    plausible : value that is met on real benches; it is used where none is given
+    per_run : whether it is a value per run
+    measured : signal of a log whose mean is the value in that run, if the log has the signal
+    std : prior standard deviation of a shape or of a value per run. Without it a fit leaves a size
+        free and fixes a shape. A value per run that has neither std nor a measured signal makes the
+        effect a random effect: it must have one size, and a fit tries three values of each shape,
+        the plausible one and one std to either side.
+    step : largest distance between the starts of a fit such that one start lies in the right basin;
+        None: a value per run has a few starts over its prior, other parameters have one
     """
 
     neutral: float
@@ -63,21 +66,21 @@ class EffectParameter:
 
     @property
     def angle(self) -> bool:
-        """Whether it is an angle of a run, of which a small effect is a cosine."""
+        """Whether it is an angle per run, on which a small effect depends as a cosine."""
         return self.per_run and self.unit == "rad"
 
 
 @dataclass(frozen=True)
 class Memory:
-    """A state that an effect adds.
+    """A state that an effect adds to the model.
 
     start   : p -> value at the start of a run
-    advance : (base, a, s, p) -> the solution x of x = base + a * rate(x), the memory's own
-              implicit stage; it must be finite for a time constant of 0
-    follows : name of a law of which the memory takes in the value, as the effects before this one
-              leave it (a filter, a lag); advance then is (base, a, value, s, p) -> x
-    beside  : another memory of the effect whose base it takes in, before s, where the two stages
-              have to be solved together (an oscillation)
+    advance : (base, a, s, p) -> solution x of x = base + a * rate(x), the implicit stage of this
+              memory; it must be finite for a time constant of 0
+    follows : name of a law whose value the memory follows, as a filter does; the value is that of
+              the effects before this one, and advance is (base, a, value, s, p) -> x
+    beside  : another memory of the effect whose stage is solved together with this one, as in an
+              oscillation; advance takes the base of that memory before s
     """
 
     start: Callable[[Record], float]
@@ -86,13 +89,14 @@ class Memory:
     beside: str | None = None
 
 
-@dataclass(frozen=True, eq=False)  # compared and hashed as the one object that was loaded
+@dataclass(frozen=True, eq=False)  # compared and hashed by identity: it is loaded once
 class Effect:
-    """An effect as the kernel and the commands see it.
+    """An effect: a change of laws of the nominal model, with its parameters and memories.
 
-    needs : the sensor or the manoeuvre without which a log hardly shows it; empty: nothing special
-    exact : its law can have no other form, as that of a factor or an offset; others are a law among
-        several that a machine may follow
+    subsystem : where it acts, one of SUBSYSTEMS; description : docstring of its file
+    laws : law's name -> (value, s, p) -> changed value; file : path of its file
+    needs : sensor or manoeuvre without which a log hardly shows the effect; empty: nothing special
+    exact : whether its law can have no other form, as a factor or an offset
     """
 
     name: str
@@ -106,7 +110,7 @@ class Effect:
     exact: bool = False
 
     def plausible(self) -> dict[str, float]:
-        """A plausible size of the effect, by parameter."""
+        """Plausible values of all parameters, by name [SI]."""
         return {key: parameter.plausible for key, parameter in self.parameters.items()}
 
     def complete(self, values: Mapping[str, float]) -> dict[str, float]:
@@ -130,8 +134,8 @@ class Effect:
         return f"<Effect {self.name} ({self.subsystem}): {', '.join(self.parameters)}>"
 
 
-def effect_of(name: str, module: ModuleType) -> Effect:
-    """The effect that a module declares; ParameterError names what is missing or wrong."""
+def read_effect(name: str, module: ModuleType) -> Effect:
+    """The effect that a module declares; ParameterError names what is missing or wrong in it."""
     for needed in ("SUBSYSTEM", "PARAMETERS"):
         if not hasattr(module, needed):
             raise ParameterError(f"effect {name}: {module.__file__} declares no {needed}")
@@ -140,8 +144,8 @@ def effect_of(name: str, module: ModuleType) -> Effect:
             f"effect {name}: {module.__file__}: SUBSYSTEM is {module.SUBSYSTEM!r}; one of "
             f"{', '.join(SUBSYSTEMS)} is expected"
         )
-    own = {law.__name__: getattr(module, law.__name__, None) for law in laws.LAWS}
-    changed = {key: function for key, function in own.items() if function is not None}
+    found = {law.__name__: getattr(module, law.__name__, None) for law in laws.LAWS}
+    changed = {key: function for key, function in found.items() if function is not None}
     if not changed:
         raise ParameterError(f"effect {name}: {module.__file__} changes no law of the bench")
     for key, function in changed.items():
@@ -167,7 +171,7 @@ def effect_of(name: str, module: ModuleType) -> Effect:
 
 
 def _check_table(name: str, module: ModuleType, table: str, kind: type) -> None:
-    """Refuse a table that is no mapping of names to such records."""
+    """Raise ParameterError for a table that is no dict of names to such records."""
     found: Any = getattr(module, table, {})
     if not isinstance(found, dict) or not all(isinstance(one, kind) for one in found.values()):
         raise ParameterError(
@@ -176,7 +180,7 @@ def _check_table(name: str, module: ModuleType, table: str, kind: type) -> None:
 
 
 def _check_numbers(name: str, module: ModuleType) -> None:
-    """Refuse a parameter whose values are no numbers within its bounds, or whose name is taken."""
+    """Raise ParameterError for a parameter with a wrong number, or with a name in use."""
     for key, one in module.PARAMETERS.items():
         place = f"effect {name}: {module.__file__}: parameter {key}"
         if not str(key).isidentifier() or f"{name}_{key}" in UNITS:
@@ -201,34 +205,35 @@ def _check_numbers(name: str, module: ModuleType) -> None:
             raise ParameterError(f"{place}: step is {one.step:g}; more than {least:g} is expected")
 
 
-def check_chance(effect: Effect) -> None:
-    """Refuse values of a run that nothing tells in an effect that has not one size: it cannot be
-    diagnosed.
+def check_random_effect(effect: Effect) -> None:
+    """Raise ParameterError for a random effect that has not one size: it cannot be diagnosed.
+
+    A random effect has a value per run that has neither a prior nor a measured signal.
     """
     table = effect.parameters
-    untold = [k for k, p in table.items() if p.per_run and p.std is None and p.measured is None]
+    random = [k for k, p in table.items() if p.per_run and p.std is None and p.measured is None]
     sizes = [
         key
         for key, p in table.items()
         if not p.per_run and p.std is None and p.plausible != p.neutral
     ]
-    if untold and len(sizes) != 1:
+    if random and len(sizes) != 1:
         raise ParameterError(
-            f"effect {effect.name}: {effect.file}: parameter {untold[0]} is each run's own; give "
-            "it a std (a fit finds it) or the signal that is measured; without either the effect's "
-            f"course is chance, and it needs one size, not {len(sizes)}"
+            f"effect {effect.name}: {effect.file}: parameter {random[0]} is each run's own; give "
+            "it a std (a fit finds it) or the signal that is measured; without either the effect "
+            f"is a random effect, and it needs one size, not {len(sizes)}"
         )
 
 
 def _check_memories(name: str, module: ModuleType) -> None:
-    """Refuse a memory that follows what is no law, or is beside what is no other memory."""
+    """Raise ParameterError for a memory that follows no law, or is beside no other memory."""
     memories: dict[str, Memory] = getattr(module, "MEMORIES", {})
-    known = [law.__name__ for law in laws.LAWS]
+    names = [law.__name__ for law in laws.LAWS]
     for key, memory in memories.items():
-        if memory.follows not in (None, *known):
+        if memory.follows not in (None, *names):
             raise ParameterError(
                 f"effect {name}: {module.__file__}: memory {key} follows {memory.follows!r}, "
-                f"which is no law; known: {', '.join(known)}"
+                f"which is no law; known: {', '.join(names)}"
             )
         if memory.beside is not None and memory.beside not in memories.keys() - {key}:
             raise ParameterError(

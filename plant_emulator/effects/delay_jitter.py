@@ -3,8 +3,8 @@
     b_k = b + A u_k,   u_k in [-1, 1], evenly spread, one for each scan of length T_s
 
 Source: J. Nilsson, Real-Time Control Systems with Delays, thesis, Lund 1998 (random delays in loops
-closed over a network). u_k is a sequence of the scan's number and `sequence`: a run can be
-repeated. The one of a real drive is another: its log shows A by the spread, not by the course.
+closed over a network). u_k is computed from the scan's number and `sequence`, so that a run can be
+repeated. A real drive has another sequence: its log shows A by the spread of the dead times.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from plant_emulator.model.records import Record
 
 SUBSYSTEM = "drive"
-NEEDS = "a known course of the dead time: a drive's own cannot be reproduced, it shows as unrest"
+NEEDS = "the sequence of dead times: a drive's own cannot be reproduced, only its spread shows"
 PARAMETERS = {
     "amplitude": EffectParameter(
         neutral=0.0, lower=0.0, upper=0.05, plausible=0.005, unit="s", meaning="A"
@@ -39,7 +39,7 @@ PARAMETERS = {
 
 
 def even(number: float) -> float:
-    """A number in [0, 1) that looks drawn: digits far behind the point of a polynomial in it."""
+    """Pseudo-random number in [0, 1): late digits of a polynomial in the argument."""
     drawn = 0.7548776662 * number + 0.3
     for _ in range(3):
         drawn = drawn - floor(drawn)
@@ -48,11 +48,11 @@ def even(number: float) -> float:
 
 
 def dead_time(value: float, s: Record, p: Record) -> float:
-    """Dead time in the scan that runs [s]."""
+    """Dead time in the present scan [s]."""
     amplitude = p.delay_jitter_amplitude
     if amplitude == 0.0:
         return value
-    # A scan begins at its time also where that is rounded below it.
+    # 1e-6: a scan begins at its time, also where rounding puts the time just below.
     scan = floor(s.time / p.delay_jitter_scan_period + 1e-6)
     drawn = 2.0 * even(scan + 1e4 * p.delay_jitter_sequence) - 1.0
     return max(0.0, value + amplitude * drawn)

@@ -2,10 +2,9 @@
 
     T_dw = T_c sgn omega_d + b omega_d (|omega_d| / 1 rad/s)^(n - 1)
 
-Source: SKF, Rolling Bearings catalogue, chapter on bearing friction: a load-dependent torque that
-hardly knows the speed (with that of the seals), and a torque of the lubricant that rises with it:
-in proportion (n = 1) where it is thick, with n = 2/3 where it is a thin film (A. Palmgren, Ball and
-Roller Bearing Engineering, 1959).
+Sources: SKF, Rolling Bearings catalogue, chapter on bearing friction: the torque by load and seals
+hardly depends on the speed; the torque of the lubricant rises with it. A thick lubricant gives
+n = 1, a thin film n = 2/3 (A. Palmgren, Ball and Roller Bearing Engineering, 1959).
 """
 
 from __future__ import annotations
@@ -30,17 +29,17 @@ PARAMETERS = {
     ),
 }
 
-# Below this speed the lubricant's torque is proportional [rad/s]; its slope stays finite at rest.
+# Below this speed the lubricant's torque is proportional to it, with a finite slope [rad/s].
 SLOW = 0.02
 
 
 def drum_coulomb_friction(value: float, s: Record, p: Record) -> float:
-    """Level of the bearings' Coulomb friction [N m]."""
+    """Coulomb friction of the bearings [N m]."""
     return value + p.drum_bearing_friction_coulomb
 
 
 def drum_viscous_friction(value: float, s: Record, p: Record) -> float:
-    """Torque of the lubricant over the drum speed [N m s/rad]."""
+    """Torque of the lubricant divided by the drum speed [N m s/rad]."""
     if p.drum_bearing_friction_viscous == 0.0:
         return value
     speed = abs(s.drum_speed) + SLOW

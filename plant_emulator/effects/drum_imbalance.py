@@ -2,8 +2,8 @@
 
     T_d = ... - M sin theta_d,   M = m g e
 
-Source: ISO 1940-1 / ISO 21940-11 (imbalance U = m e of a rotor). theta_d is counted from where the
-centre of mass is lowest; at the start of a run it is `start_angle`.
+Source: ISO 1940-1 / ISO 21940-11 (imbalance U = m e of a rotor). theta_d = 0 where the centre of
+mass is lowest. At the start of a run theta_d is `start_angle`.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ MEMORIES = {"angle": Memory(start, advance)}
 
 
 def drum_torque(value: float, s: Record, p: Record) -> float:
-    """Torque on the drum from outside [N m]."""
+    """Torque on the drum, its own weight included [N m]."""
     if p.drum_imbalance_moment == 0.0:
         return value
     return value - p.drum_imbalance_moment * sin(s.drum_imbalance_angle)

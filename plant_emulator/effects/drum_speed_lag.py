@@ -40,7 +40,7 @@ MEMORIES = {"shown": Memory(start, advance, follows="measured_drum_speed")}
 
 
 def measured_drum_speed(value: float, s: Record, p: Record) -> float:
-    """What is shown [rad/s]."""
+    """Drum speed that is shown [rad/s]."""
     if p.drum_speed_lag_time_constant == 0.0:
         return value
     return s.drum_speed_lag_shown

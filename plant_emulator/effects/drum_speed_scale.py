@@ -1,6 +1,6 @@
-"""The measuring wheel has another radius than its evaluation takes.
+"""The measuring wheel has another radius than its evaluation assumes.
 
-    omega_meas = (1 + e) omega_d,   1 + e = r_taken / r_true of the wheel
+    omega_meas = (1 + e) omega_d,   1 + e = r_assumed / r_true of the wheel
 
 Source: JCGM 200, International Vocabulary of Metrology, on the sensitivity of a measuring system; a
 wheel that rolls on the drum turns by the ratio of the radii.
@@ -25,5 +25,5 @@ PARAMETERS = {
 
 
 def measured_drum_speed(value: float, s: Record, p: Record) -> float:
-    """What the measuring wheel shows [rad/s]."""
+    """Drum speed that the measuring wheel shows [rad/s]."""
     return value * (1.0 + p.drum_speed_scale_error)

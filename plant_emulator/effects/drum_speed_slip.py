@@ -2,11 +2,11 @@
 
     omega_meas = (1 - k omega_d' (|omega_d'| / (1 rad/s^2))^(n - 1)) omega_d
 
-Source: H. B. Pacejka, Tyre and Vehicle Dynamics, on longitudinal slip: small slip is in proportion
-to the force (n = 1), here the one that accelerates the wheel's own inertia J_w, so that
-k = J_w r_d / (C r_w^2) with its radius r_w and slip stiffness C; a larger one grows faster where
-the contact slides (n > 1), slower where the tread stiffens (n < 1). While the drum brakes the wheel
-runs ahead.
+Source: H. B. Pacejka, Tyre and Vehicle Dynamics, on longitudinal slip. Small slip is proportional
+to the force (n = 1). The force here accelerates the wheel's own inertia J_w, so that
+k = J_w r_d / (C r_w^2), with the wheel's radius r_w and its slip stiffness C. Larger slip grows
+faster where the contact slides (n > 1), and slower where the tread stiffens (n < 1). While the drum
+slows down, the wheel runs ahead of it.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ PARAMETERS = {
     ),
 }
 
-# Below this acceleration slip is in proportion [rad/s^2]; its slope stays finite.
+# Below this acceleration the slip is proportional to it, so that its slope stays finite [rad/s^2].
 SLOW = 0.02
 
 
 def acceleration(s: Record, p: Record) -> float:
-    """Acceleration of the turning drum [rad/s^2]."""
+    """Acceleration of the drum while it turns [rad/s^2]."""
     friction = s.drum_viscous_friction * s.drum_speed
     if s.drum_speed != 0.0:
         friction += s.drum_coulomb_friction if s.drum_speed > 0.0 else -s.drum_coulomb_friction
@@ -41,7 +41,7 @@ def acceleration(s: Record, p: Record) -> float:
 
 
 def measured_drum_speed(value: float, s: Record, p: Record) -> float:
-    """What the measuring wheel shows [rad/s]."""
+    """Drum speed that the measuring wheel shows [rad/s]."""
     k = p.drum_speed_slip_slip_per_acceleration
     if k == 0.0:
         return value

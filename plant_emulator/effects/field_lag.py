@@ -3,8 +3,8 @@
     tau d(k Phi)/dt = (k Phi)_0(omega_m) - k Phi
 
 Source: W. Leonhard, Control of Electrical Drives, chapter on the separately excited DC machine in
-the field-weakening range. (k Phi)_0 is the flux that the field regulator asks for at the speed. At
-tau = 0 the flux is that.
+the field-weakening range. (k Phi)_0 is the flux that the field regulator demands at the speed. At
+tau = 0 the flux is (k Phi)_0.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ MEMORIES = {"flux": Memory(start, advance, follows="flux")}
 
 
 def flux(value: float, s: Record, p: Record) -> float:
-    """Flux that acts [N m/A]."""
+    """Flux behind the lag of the field [N m/A]."""
     if p.field_lag_time_constant == 0.0:
         return value
     return s.field_lag_flux

@@ -3,8 +3,8 @@
     T_f(omega_g) = (1 + a sgn omega_g) (f_gc + f_g |omega_g|^delta_g) sgn omega_g
 
 Source: B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083, section 2,
-on left-right asymmetry of Coulomb and viscous friction. a > 0: more of it forwards; at rest the
-level is that of the direction in which the gear is driven.
+on left-right asymmetry of Coulomb and viscous friction. a > 0: more friction forwards. At rest the
+friction is that of the direction in which the gear is driven.
 """
 
 from __future__ import annotations
@@ -26,5 +26,5 @@ PARAMETERS = {
 
 
 def gear_direction_factor(value: float, s: Record, p: Record) -> float:
-    """Friction in the direction of the gear, over that of the table [1]."""
+    """Factor on the friction of the table in the direction of the gear [1]."""
     return value * (1.0 + p.friction_asymmetry_asymmetry * s.gear_direction)

@@ -5,7 +5,7 @@
 Source: M. R. Popovic, A. A. Goldenberg, IEEE Trans. Robotics and Automation 14 (1998) 114, friction
 as a Fourier series in the angle, here its first harmonic; B. Armstrong, Proc. IEEE Int. Conf.
 Robotics and Automation (1988) 1422, measured it on geared joints. theta_g is the angle since the
-start of the run and phi the one at the start, which nobody knows: a value of each run.
+start of the run. phi is the angle at the start; it is unknown and belongs to one run.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from plant_emulator.model.records import Record
 
 SUBSYSTEM = "gear"
-# a < 0 is a phase of half a turn more: so a fit may start on the wrong side. The phase may leave
-# [-pi, pi] for the same reason; its deviation is that of an angle anywhere on the circle.
+# a < 0 equals a phase of half a turn more, so that a fit may start on the wrong side. The phase may
+# leave [-pi, pi] for the same reason. Its std is that of an angle anywhere on the circle.
 PARAMETERS = {
     "amplitude": EffectParameter(
         neutral=0.0, lower=-0.9, upper=0.9, plausible=0.05, unit="1", meaning="a"
@@ -39,7 +39,7 @@ PARAMETERS = {
 
 
 def start(p: Record) -> float:
-    """Angle of the gear output at the start of a run, from there [rad]."""
+    """Angle of the gear output at the start of a run, counted from there [rad]."""
     return 0.0
 
 
@@ -52,7 +52,7 @@ MEMORIES = {"angle": Memory(start, advance)}
 
 
 def gear_direction_factor(value: float, s: Record, p: Record) -> float:
-    """Friction at the angle of the gear output, over that of the table [1]."""
+    """Factor on the friction of the table at the angle of the gear output [1]."""
     amplitude = p.gear_eccentricity_amplitude
     if amplitude == 0.0:
         return value

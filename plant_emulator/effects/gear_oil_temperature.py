@@ -4,9 +4,9 @@
     C dT/dt = T_f omega_g - G (T - T_shell)       heat of the friction, loss through the shell
 
 Sources: O. Reynolds, Phil. Trans. R. Soc. 177 (1886) 157 for the exponential viscosity; the heat
-balance is the lumped one of a gearbox (ISO/TR 14179-1). T is the oil's temperature, T_n the one
-that the nominal friction belongs to; the shell holds T_shell during a run (it lags by minutes).
-beta = 0 is a friction that does not know the temperature.
+balance is the lumped balance of a gearbox (ISO/TR 14179-1). T is the temperature of the oil. The
+nominal friction holds at T_n. The shell keeps T_shell during a run, since it lags by minutes.
+beta = 0: the friction does not depend on the temperature.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ MEMORIES = {"oil": Memory(start, advance)}
 
 
 def gear_viscous_friction(value: float, s: Record, p: Record) -> float:
-    """Factor of the viscous friction at the oil's temperature [N m (s/rad)^delta_g]."""
+    """Coefficient of the viscous friction at the temperature of the oil [N m (s/rad)^delta_g]."""
     beta = p.gear_oil_temperature_viscosity_coefficient
     if beta == 0.0:
         return value
@@ -84,7 +84,7 @@ def gear_viscous_friction(value: float, s: Record, p: Record) -> float:
 
 
 def shell_temperature(value: float, s: Record, p: Record) -> float:
-    """What the thermocouples show [K]."""
+    """Shell temperature that the thermocouples show [K]."""
     if p.gear_oil_temperature_viscosity_coefficient == 0.0:
         return value
     return p.gear_oil_temperature_shell_temperature

@@ -3,8 +3,8 @@
     d(integral)/dt = k error while the output is at its limit and the error leads further outwards
 
 Source: K. J. Astrom, T. Hagglund, PID Controllers: Theory, Design, and Tuning, chapter on
-integrator windup. k = 0 is conditional integration, the nominal drive; k = 1 no measure against
-windup.
+integrator windup. k = 0 is conditional integration, as in the nominal drive. k = 1 is no measure
+against windup.
 """
 
 from __future__ import annotations
@@ -26,5 +26,5 @@ PARAMETERS = {
 
 
 def integration_at_limit(value: float, s: Record, p: Record) -> float:
-    """Share of its error that a limited integrator takes in [1]."""
+    """Share of its error that an integrator at its limit takes in [1]."""
     return value + (1.0 - value) * p.integrator_windup_share

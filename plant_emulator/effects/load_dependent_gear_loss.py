@@ -2,11 +2,12 @@
 
     T_l = a (1 + d) |T_gd| driving,   a (1 - d) |T_gd| driven,   friction = that of the table + T_l
 
-Source: ISO/TR 14179-1 (2001), load-dependent losses: sliding in the meshes takes a share of the
-transmitted power; G. Niemann, H. Winter, Maschinenelemente, vol. 2: not the same share in both
-directions of the power. The loss is against the motion, whichever side drives: at d = 0 the motor
-side gives (1 + a) T_gd driving, an efficiency of 1 / (1 + a), and receives (1 - a) |T_gd| driven
-back. One mesh of ground teeth takes 0.01 to 0.02; this gear has three, and its bearings.
+Sources: ISO/TR 14179-1 (2001), load-dependent losses: sliding in the meshes takes a share of the
+transmitted power; G. Niemann, H. Winter, Maschinenelemente, vol. 2: the share differs between the
+two directions of the power. The loss acts against the motion, whichever side drives. At d = 0 the
+motor side gives (1 + a) T_gd while it drives, an efficiency of 1 / (1 + a), and receives
+(1 - a) |T_gd| while it is driven. One mesh of ground teeth takes 0.01 to 0.02. This gear has three
+meshes, and bearings.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ PARAMETERS = {
 
 
 def gear_load_friction(value: float, s: Record, p: Record) -> float:
-    """Friction beyond that of the table at the torque to the drum [N m]."""
+    """Friction beyond that of the table, by the torque to the drum [N m]."""
     share = p.load_dependent_gear_loss_share
     if share == 0.0:
         return value

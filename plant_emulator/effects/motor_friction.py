@@ -4,7 +4,7 @@
 
 Sources: B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083, section 2,
 for Coulomb friction; A. E. Fitzgerald, C. Kingsley, S. D. Umans, Electric Machinery, on the
-mechanical losses of machines, for windage: turbulent drag goes with the square of the speed.
+mechanical losses of machines, for windage: turbulent drag rises with the square of the speed.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ PARAMETERS = {
 
 
 def motor_coulomb_friction(value: float, s: Record, p: Record) -> float:
-    """Level of the motor's Coulomb friction [N m]."""
+    """Coulomb friction of the motor [N m]."""
     return value + p.motor_friction_coulomb
 
 
 def motor_viscous_friction(value: float, s: Record, p: Record) -> float:
-    """Windage over the motor speed [N m s/rad]."""
+    """Windage divided by the motor speed [N m s/rad]."""
     return value + p.motor_friction_windage * abs(s.motor_speed)

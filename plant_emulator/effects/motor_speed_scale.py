@@ -3,7 +3,8 @@
     omega_read = (1 + e) omega_m
 
 Source: JCGM 200, International Vocabulary of Metrology, on the sensitivity of a measuring system.
-The speed controller holds what it reads at the reference: the motor turns the slower, the larger e.
+The speed controller holds the speed that it reads at the reference. A larger e makes the motor turn
+more slowly.
 """
 
 from __future__ import annotations
@@ -25,5 +26,5 @@ PARAMETERS = {
 
 
 def tachometer_gain(value: float, s: Record, p: Record) -> float:
-    """Motor speed that is read, over the true one [1]."""
+    """Ratio of the measured to the true motor speed [1]."""
     return value * (1.0 + p.motor_speed_scale_error)

@@ -28,7 +28,7 @@ PARAMETERS = {
 
 
 def start(p: Record) -> float:
-    """The bench starts at rest: no reference, no slope of it."""
+    """The bench starts at rest: reference [rad/s] and its slope [rad/s^2] are zero."""
     return 0.0
 
 
@@ -38,7 +38,7 @@ def advance(base: float, a: float, s: Record, p: Record) -> float:
 
 
 def advance_slope(base: float, a: float, value: float, s: Record, p: Record) -> float:
-    """Its slope [rad/s^2]; comes after `advance`, whose base it takes back out of its result."""
+    """Slope of the filtered reference [rad/s^2]; it runs after `advance` and recovers its base."""
     t = p.reference_filter_time_constant
     if t == 0.0:
         return base

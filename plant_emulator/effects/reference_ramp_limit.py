@@ -3,9 +3,8 @@
     |domega_r/dt| <= omega_max / T,   omega_r follows the reference within that
 
 Source: W. Leonhard, Control of Electrical Drives, chapter on the cascade control of drives
-(reference generators in front of the speed controller). omega_max is the drive's largest speed; T,
-the setting that drives call ramp-up time, is what the reference takes from standstill to it.
-T = 0: no limit.
+(reference generators in front of the speed controller). omega_max is the drive's largest speed. T
+is the time from standstill to omega_max, which drives call ramp-up time. T = 0: no limit.
 """
 
 from __future__ import annotations

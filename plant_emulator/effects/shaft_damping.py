@@ -1,9 +1,9 @@
-"""The shaft between motor and gear has damping, of its material and its couplings.
+"""The shaft between motor and gear has damping, from its material and its couplings.
 
     T_mg = k_mg q + d (omega_m - xi omega_g)
 
 Source: W. Leonhard, Control of Electrical Drives, chapter on drives with elastic coupling. d = 0 is
-the spring of the nominal bench.
+the undamped spring of the nominal bench.
 """
 
 from __future__ import annotations

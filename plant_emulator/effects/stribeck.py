@@ -3,8 +3,8 @@
     T_s(omega_g) = dT exp(-(omega_g / omega_s)^2),   friction = that of the table + T_s
 
 Source: B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083, section 2
-(Stribeck friction, exponential form, exponent 2). dT is what the gear holds at rest beyond its
-Coulomb friction.
+(Stribeck friction, exponential form, exponent 2). dT is the friction at rest beyond the Coulomb
+friction.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ PARAMETERS = {
 
 
 def gear_speed_friction(value: float, s: Record, p: Record) -> float:
-    """Friction beyond that of the table at the gear's speed [N m]."""
+    """Friction beyond that of the table, by the gear's speed [N m]."""
     rise = p.stribeck_rise
     if rise == 0.0:
         return value

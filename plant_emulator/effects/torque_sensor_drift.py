@@ -2,9 +2,9 @@
 
     T_meas = T + r (1 - exp(-lambda t)) / lambda,   r t at lambda = 0
 
-Source: JCGM 200, International Vocabulary of Metrology, on instrumental drift; lambda > 0: of a
-sensor that warms, and settles. t is the time since the start of the run: the sensor was set to zero
-there.
+Source: JCGM 200, International Vocabulary of Metrology, on instrumental drift. lambda > 0 describes
+a sensor that warms up and settles. t is the time since the start of the run, where the sensor was
+set to zero.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ PARAMETERS = {
 
 
 def measured_shaft_torque(value: float, s: Record, p: Record) -> float:
-    """What the sensor shows [N m]."""
+    """Shaft torque that the sensor shows [N m]."""
     settling = p.torque_sensor_drift_settling
     lasting = s.time if settling == 0.0 else -expm1(-settling * s.time) / settling
     return value + p.torque_sensor_drift_rate * lasting

@@ -25,5 +25,5 @@ PARAMETERS = {
 
 
 def measured_shaft_torque(value: float, s: Record, p: Record) -> float:
-    """What the sensor shows [N m]."""
+    """Shaft torque that the sensor shows [N m]."""
     return value * (1.0 + p.torque_sensor_gain_error)

@@ -1,14 +1,14 @@
 """The torque sensor follows the shaft's torque as a first-order lag.
 
-With a term of second order where it is not quite of first:
+A term of second order describes a sensor that is not quite of first order:
 
     q >= 0:   q tau^2 T_meas'' + tau T_meas' + T_meas = T
     q < 0:    (1 - q) tau T_meas' + T_meas = T - q tau T'
 
 Source: K. Ogata, Modern Control Engineering, on systems of first and second order and on lead and
-lag. tau is the delay of a slow change, whatever q is. q = 0: first order; 0.25: two equal lags;
-more: the sensor begins to swing; less than 0: the share -q / (1 - q) of the torque shows at once.
-To first order in q both forms are the same. tau = 0: the torque itself.
+lag. tau is the delay of a slow change for every q. q = 0: first order. q = 0.25: two equal lags.
+q > 0.25: the sensor oscillates. q < 0: the share -q / (1 - q) of the torque shows at once. Both
+forms agree to first order in q. tau = 0: the sensor shows the torque without a lag.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ PARAMETERS = {
 
 
 def start(p: Record) -> float:
-    """The bench starts at rest: no torque [N m], no slope of it [N m/s]."""
+    """The bench starts at rest: torque [N m] and its slope [N m/s] are zero."""
     return 0.0
 
 
@@ -47,7 +47,7 @@ def slope_of(shown: float, slope: float, a: float, value: float, p: Record) -> f
 
 
 def advance(base: float, a: float, value: float, slope: float, s: Record, p: Record) -> float:
-    """Shown torque at the end of an implicit stage [N m]; at tau = 0 of no use."""
+    """Shown torque at the end of an implicit stage [N m]; not used at tau = 0."""
     tau, q = p.torque_sensor_lag_time_constant, p.torque_sensor_lag_second_order
     if tau == 0.0:
         return base
@@ -58,7 +58,7 @@ def advance(base: float, a: float, value: float, slope: float, s: Record, p: Rec
 
 
 def advance_slope(base: float, a: float, value: float, shown: float, s: Record, p: Record) -> float:
-    """Its slope at the end of an implicit stage [N m/s]; for q > 0 only."""
+    """Slope of the shown torque at the end of an implicit stage [N m/s]; used for q > 0."""
     if p.torque_sensor_lag_time_constant == 0.0 or p.torque_sensor_lag_second_order <= 0.0:
         return base
     return slope_of(shown, base, a, value, p)
@@ -71,7 +71,7 @@ MEMORIES = {
 
 
 def measured_shaft_torque(value: float, s: Record, p: Record) -> float:
-    """What the sensor shows [N m]."""
+    """Shaft torque that the sensor shows [N m]."""
     if p.torque_sensor_lag_time_constant == 0.0:
         return value
     at_once = max(0.0, -p.torque_sensor_lag_second_order)

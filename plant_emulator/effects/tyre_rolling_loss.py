@@ -1,10 +1,10 @@
-"""The truck's tyre takes a rolling loss from the drum, which it deforms on.
+"""The truck's tyre takes a rolling loss from the drum, on which it deforms.
 
     T_d = ... - r_d F (1 + c |v|) sgn omega_d,   v = r_d omega_d
 
 Source: ISO 28580 (rolling resistance of tyres, measured on a drum); SAE J2452 for its rise with the
-speed. F is the force at the tyre's tread, about 1 % of the load on the wheel; the truck's torque
-does not contain it. Only with a truck.
+speed. F is the force at the tyre's tread, about 1 % of the load on the wheel. The truck's torque
+does not contain it. The effect exists only with a truck.
 """
 
 from __future__ import annotations
@@ -34,6 +34,6 @@ def drum_coulomb_friction(value: float, s: Record, p: Record) -> float:
 
 
 def drum_viscous_friction(value: float, s: Record, p: Record) -> float:
-    """Speed-proportional friction on the drum [N m s/rad]."""
+    """Viscous friction coefficient on the drum [N m s/rad]."""
     per_speed = p.drum_radius * p.drum_radius * p.tyre_rolling_loss_rise
     return value + s.truck * p.tyre_rolling_loss_force * per_speed

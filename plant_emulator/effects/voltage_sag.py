@@ -2,10 +2,10 @@
 
     |u_a| <= u_max - U_s,   tau dU_s/dt = R_s |i| - U_s
 
-Source: N. Mohan, T. M. Undeland, W. P. Robbins, Power Electronics, chapter on line-frequency
-controlled rectifiers: their direct voltage falls in proportion to the current, for commutation and
-supply; R_s is that ratio. W. Leonhard, Control of Electrical Drives, chapter on line-commutated
-converters: the supply's inductance delays it by tau. tau = 0: it falls at once.
+Sources: N. Mohan, T. M. Undeland, W. P. Robbins, Power Electronics, chapter on line-frequency
+controlled rectifiers: commutation and supply let their direct voltage fall in proportion to the
+current, by R_s; W. Leonhard, Control of Electrical Drives, chapter on line-commutated converters:
+the supply's inductance delays the fall by tau. tau = 0: the voltage falls at once.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ def start(p: Record) -> float:
 
 
 def drop(s: Record, p: Record) -> float:
-    """Sag under a current that lasts [V]."""
+    """Sag under a constant current [V]."""
     return p.voltage_sag_source_resistance * abs(s.armature_current)
 
 
 def advance(base: float, a: float, s: Record, p: Record) -> float:
-    """Sag at the end of an implicit stage of size a [V]; at tau = 0 of no use."""
+    """Sag at the end of an implicit stage of size a [V]; not used at tau = 0."""
     tau = p.voltage_sag_time_constant
     if tau == 0.0:
         return base

@@ -2,10 +2,10 @@
 
     tau dT/dt = T_w - T,   tau = c J_w |v| / r_w^2,   v = r_d omega_d
 
-Source: H. B. Pacejka, Tyre and Vehicle Dynamics, on longitudinal slip: small slip is in proportion
-to the force, kappa = c F. The wheel, inertia J_w with the truck's drive, has to reach the speed
-v (1 + kappa) / r_w first; the torque that this takes is missing at the drum. T_w is the torque that
-a wheel without slip passes on. c = 0: no slip. Only with a truck.
+Source: H. B. Pacejka, Tyre and Vehicle Dynamics, on longitudinal slip: small slip is proportional
+to the force, kappa = c F. The wheel has the inertia J_w, the truck's drive included. It first has
+to reach the speed v (1 + kappa) / r_w, and the torque that this takes is missing at the drum. T_w
+is the torque of a wheel without slip. c = 0: no slip. The effect exists only with a truck.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ MEMORIES = {"torque": Memory(start, advance, follows="drum_torque")}
 
 
 def drum_torque(value: float, s: Record, p: Record) -> float:
-    """Torque on the drum from outside [N m]."""
+    """Torque of the truck on the drum, delayed by the slip [N m]."""
     if p.wheel_slip_slip_per_force == 0.0:
         return value
     return s.wheel_slip_torque

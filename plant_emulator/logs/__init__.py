@@ -1,7 +1,7 @@
-"""Log formats: one module each with recognises(head), read(path) and write(log, path).
+"""Log formats: modules with NAME, SUFFIXES, recognises(head), read(path) and write(log, path).
 
-`read` finds the format by the file's first bytes, `write` by the file's name; a new format is a new
-file here. A leading underscore makes it no format.
+`read` finds the format by the first bytes of the file, `write` by the name of the file. A new
+format is a new file in this folder. A module whose name begins with an underscore is not a format.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def formats() -> list[ModuleType]:
 
 
 def read(path: str | Path) -> Log:
-    """The log in that file; LogError says file, line, column and what was expected."""
+    """Read the log in a file, SI; LogError names file, line, column and what would be right."""
     path = Path(path)
     if not path.is_file():
         raise LogError(f"{path}: no such file; a log file is needed")
@@ -46,7 +46,7 @@ def read(path: str | Path) -> Log:
 
 
 def write(log: Log, path: str | Path) -> None:
-    """Write the log in the format that the file's name asks for."""
+    """Write a log in the format of the file's suffix; LogError where the suffix is unknown."""
     path = Path(path)
     for module in formats():
         if path.name.endswith(module.SUFFIXES):
@@ -57,9 +57,9 @@ def write(log: Log, path: str | Path) -> None:
 
 
 def rehearse(log: Log, path: str | Path) -> None:
-    """Write the log somewhere else and forget it: LogError where it could not be written at `path`.
+    """Raise LogError if a log could not be written at `path`; the log is written elsewhere.
 
-    For a log that is written at the end of a long run, which is too late to learn it.
+    A log at the end of a long run calls for this check at the start of the run.
     """
     with TemporaryDirectory() as folder:
         trial = Path(folder) / Path(path).name

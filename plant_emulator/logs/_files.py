@@ -1,4 +1,4 @@
-"""What the formats share: a file's bytes as a log, and a log's signals in the units of files."""
+"""Code that the formats share: from bytes to a log, and from a log to columns with units."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def read(path: Path, parse: Callable[[bytes], LogTable]) -> Log:
-    """The log in that file; LogError names file, place and column."""
+    """Read the log in a file, SI; LogError names file, place and column."""
     try:
         found = parse(path.read_bytes())
         check_sampling(found.signals["time"])
@@ -29,7 +29,7 @@ def read(path: Path, parse: Callable[[bytes], LogTable]) -> Log:
 
 
 def write(log: Log, path: Path, encode: Callable[[Sequence[Column]], bytes]) -> None:
-    """Write the signals under their names, each with its unit, the numbers in full."""
+    """Write the signals with their names and units, in full precision."""
     columns = [
         Column(name=column.signal, unit=column.unit, values=values)
         for column, values in in_units(log)
@@ -41,7 +41,7 @@ def write(log: Log, path: Path, encode: Callable[[Sequence[Column]], bytes]) -> 
 
 
 def in_units(log: Log) -> list[tuple[LogColumn, Array]]:
-    """The columns that a log fills, each with its values in its own unit."""
+    """Columns that a log fills, each with its values in the unit of the column."""
     signals = {"time": log.time, **log.signals}
     return [
         (column, (signals[column.signal] - UNITS[column.unit].shift) / UNITS[column.unit].factor)

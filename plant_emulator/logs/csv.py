@@ -1,4 +1,4 @@
-"""CSV logs on disk; what one may hold is told in `register_maps.csv_log`."""
+"""Reads and writes CSV logs; `register_maps.csv_log` defines the format."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: Path) -> Log:
-    """The log of a CSV file; LogError names file, line and column."""
+    """Read the log of a CSV file, SI; LogError names file, line and column."""
     return _files.read(path, parse)
 
 
 def text(log: Log) -> str:
-    """The signals of a log with their units in the column names, as the text of a CSV file."""
+    """Text of a CSV file with the signals of a log, their units in the names of the columns."""
     columns, values = zip(*_files.in_units(log), strict=True)
     lines = [",".join(column.column for column in columns)]
     formats = [f"{{:.{column.decimals}f}}".format for column in columns]
@@ -45,6 +45,6 @@ def text(log: Log) -> str:
 
 
 def write(log: Log, path: Path) -> None:
-    """Write a log; a name that ends in .gz is compressed."""
+    """Write a log as CSV, compressed if the file's name ends in .gz."""
     data = text(log).encode()
     path.write_bytes(gzip.compress(data, mtime=0) if path.name.endswith(".gz") else data)

@@ -1,4 +1,4 @@
-"""MDF4 logs on disk; what one may hold is told in `register_maps.mdf4_log`."""
+"""Reads and writes MDF4 logs; `register_maps.mdf4_log` defines the format."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: Path) -> Log:
-    """The log of an MDF4 file; LogError names file, row and column."""
+    """Read the log of an MDF4 file, SI; LogError names file, row and column."""
     return _files.read(path, mdf4_log.parse)
 
 
 def write(log: Log, path: Path) -> None:
-    """Write a log."""
+    """Write a log as MDF4."""
     _files.write(log, path, mdf4_log.encode)

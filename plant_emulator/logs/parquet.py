@@ -1,4 +1,4 @@
-"""Parquet logs on disk; what one may hold is told in `register_maps.parquet_log`."""
+"""Reads and writes Parquet logs; `register_maps.parquet_log` defines the format."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: Path) -> Log:
-    """The log of a Parquet file; LogError names file, row and column."""
+    """Read the log of a Parquet file, SI; LogError names file, row and column."""
     return _files.read(path, parquet_log.parse)
 
 
 def write(log: Log, path: Path) -> None:
-    """Write a log."""
+    """Write a log as Parquet."""
     _files.write(log, path, parquet_log.encode)

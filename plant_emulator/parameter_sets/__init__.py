@@ -1,4 +1,4 @@
-"""Parameter sets as TOML files: the shipped ones beside this file, or a path of the user's."""
+"""Reads and writes parameter sets: shipped TOML files beside this file, and files of the user."""
 
 from __future__ import annotations
 
@@ -24,7 +24,10 @@ def names() -> list[str]:
 
 
 def load(name: str | Path = DEFAULT) -> ParameterSet:
-    """The shipped set of that name, or the set in the TOML file of that path."""
+    """Load the shipped set of that name, or the set in the TOML file of that path.
+
+    Raises ParameterError with file and key for a set that cannot be used.
+    """
     shipped = FOLDER / f"{name}.toml"
     path = shipped if str(name) in names() else Path(name)
     if not path.is_file():
@@ -39,12 +42,12 @@ def load(name: str | Path = DEFAULT) -> ParameterSet:
 
 
 def save(parameters: ParameterSet, path: str | Path) -> None:
-    """Write a set as the TOML file that `load` reads."""
+    """Write a set as a TOML file that `load` reads."""
     Path(path).write_text(text(parameters), encoding="utf-8")
 
 
 def text(parameters: ParameterSet) -> str:
-    """A set as TOML: its origin, then one table a parameter."""
+    """TOML text of a set: its origin, one table for each parameter, one for each effect."""
     tables = [_table(p.name, _entries(p)) for p in parameters]
     if parameters.origin is not None:
         tables.insert(0, _table(ORIGIN, dict(parameters.origin)))
@@ -53,8 +56,9 @@ def text(parameters: ParameterSet) -> str:
 
 
 def _entries(parameter: Parameter) -> dict[str, object]:
-    """What the file says of a parameter; a calculated value is left to be calculated, and an error
-    that is infinite is no information.
+    """Entries of the table of a parameter.
+
+    A calculated value is left out, and so is an infinite error, which carries no information.
     """
     calculated = parameter.kind == "calculated"
     entries = {

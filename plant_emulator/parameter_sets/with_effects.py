@@ -1,4 +1,4 @@
-"""A parameter set whose effects are known, as the commands take it."""
+"""Loads parameter sets and checks the effects in them."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 
 def load(name: str | Path = parameter_sets.DEFAULT, own: Sequence[str] = ()) -> ParameterSet:
-    """The set of that name or file; ParameterError also where an effect of it, or a parameter of
-    that, is unknown.
+    """Load the set of that name or path and check its effects.
 
-    own : files of a user's own effects
+    own : files of a user's own effects, which the set may have
+    Raises ParameterError with file and key, also for an unknown effect or effect parameter.
     """
     found = parameter_sets.load(name)
     if found.effects:

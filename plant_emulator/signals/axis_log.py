@@ -11,9 +11,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class AxisLog:
-    """A run of an axis, SI, shape (n,) each: linear [s, m, N] or rotary [s, rad, N m].
+    """The samples of an axis, shape (n,) each: linear [s, m, N] or rotary [s, rad, N m].
 
-    other : columns of the file that were not used
+    source : name of the log in messages and answers
+    other : columns of its file that were not used
     """
 
     time: Array

@@ -1,8 +1,8 @@
-"""Where in frequency a residual lies (pure).
+"""Power of a residual in frequency bands (P. D. Welch, IEEE Trans. Audio Electroac. 15 (1967) 70).
 
-Friction leaves its residual at the rate of the motion itself, below some hertz; elasticity, delays
-and ripple leave theirs above. Compared with another run of the same machine, a band tells what that
-run excites and the other does not (P. D. Welch, IEEE Trans. Audio Electroacoustics 15 (1967) 70).
+An error in the friction leaves a residual at the rate of the motion, below a few hertz. Errors in
+elasticity, delays and ripple leave residuals above. The bands of two runs of one machine show what
+one run excites and the other does not.
 """
 
 from __future__ import annotations
@@ -17,15 +17,16 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 BANDS = ((0.2, 2.0), (2.0, 5.0), (5.0, 10.0), (10.0, 20.0), (20.0, 35.0), (35.0, 45.0))
-"""[Hz]"""
+"""Frequency bands [Hz]."""
 SEGMENT = 5.0
-"""[s] of a segment of the mean."""
+"""Length of the segments that the spectra are averaged over [s]."""
 
 
 def power(residual: Array, period: float, bands: Sequence[tuple[float, float]] = BANDS) -> Array:
     """Mean power density of a residual in each band [its unit^2/Hz], shape (bands,).
 
-    residual : shape (n,); period : between its samples [s]; a band it cannot hold gives 0
+    residual : shape (n,); period : time between its samples [s]
+    A band above the Nyquist frequency has the power 0.
     """
     from scipy.signal import welch
 

@@ -1,8 +1,7 @@
-"""A log of the bench: time and one column a signal, SI.
+"""A log of the bench: time, and one array for each signal, SI.
 
-The columns of a file carry their unit in their name (`register_maps.signals.LOG_COLUMNS`); inside
-the unit is SI and the name is the signal's. Nothing here reads a file: `logs` has one module a
-format.
+The columns of a log file carry a unit in their name (`register_maps.signals.LOG_COLUMNS`). Here the
+name is that of the signal and the unit is SI. `logs` reads and writes files.
 """
 
 from __future__ import annotations
@@ -19,18 +18,19 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-# Channels that a simulation is compared on, and one more where a log has it.
+# Channels on which a simulation is compared with a log, and a further one that a log may have.
 COMPARED = ("motor_speed", "drum_speed", "armature_current", "shaft_torque")
 VOLTAGE = "armature_voltage"
-# Share of a channel's largest value below which it does not move, but is rounded.
+# A channel that moves by less than this share of its largest value shows rounding only [1].
 STILL = 1e-9
 
 
 @dataclass(frozen=True)
 class Log:
-    """Samples of a run: time [s], shape (n,), and signals [SI], shape (n,) each.
+    """The samples of a run: time [s] and signals by name [SI], shape (n,) each.
 
-    source : what errors and answers call it; other : columns of the file that are no signals
+    source : name of the log in messages and answers
+    other : columns of its file that are not signals
     """
 
     time: Array
@@ -51,9 +51,9 @@ class Log:
 
 
 def compared_channels(log: Log) -> tuple[str, ...]:
-    """Channels of a log that a simulation is compared on.
+    """Names of the channels on which a simulation is compared with this log.
 
-    The voltage only where it moves: a column of it that nobody feeds stays where it is.
+    The voltage is one of them only if it moves: an unconnected channel is constant.
     """
     given = tuple(name for name in COMPARED if name in log)
     if VOLTAGE not in log:
@@ -63,6 +63,6 @@ def compared_channels(log: Log) -> tuple[str, ...]:
 
 
 def without_voltage(log: Log) -> Log:
-    """The log as it would be if nobody had connected the voltage."""
+    """The log without its voltage."""
     signals = {name: values for name, values in log.signals.items() if name != VOLTAGE}
     return replace(log, signals=signals)

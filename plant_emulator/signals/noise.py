@@ -1,10 +1,10 @@
-"""Noise of a measured channel, from its third differences.
+"""Estimates the noise of a measured channel from its third differences.
 
-A third difference of white noise of standard deviation s has the standard deviation s sqrt(20)
-(1 + 9 + 9 + 1), and none of a signal that is smooth over four samples. Spikes and steps of the
-signal lie outside the bulk and are left out: the deviation is that of the differences within
-CLIP deviations, repeated until nothing changes, and corrected for what the cut takes of a normal
-distribution. A median would do, but quantised sensors make it jump from level to level.
+The third difference of white noise with standard deviation s has the standard deviation s sqrt(20),
+since 1 + 9 + 9 + 1 = 20. The third difference of a smooth signal is small. Spikes and steps of the
+signal are outliers. Differences beyond CLIP standard deviations are left out until nothing changes,
+and the result is corrected for the truncated normal distribution. A median would jump from level to
+level with a quantised sensor.
 """
 
 from __future__ import annotations
@@ -19,17 +19,18 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 CLIP = 3.0
-# Standard deviation left of a normal distribution cut at 3 deviations.
+# Standard deviation of a standard normal distribution that is truncated at 3 deviations.
 LEFT = 0.986578
-# A log without noise still has digits: at least this share of the channel's range.
+# Least noise as a share of the channel's range: a log without noise still has rounding.
 FLOOR = 2e-4
 
 
 def noise(channel: Array, use: NDArray[np.bool_] | None = None) -> float:
     """Standard deviation of a channel's noise [its unit], shape (n,).
 
-    use : samples that count; a difference counts if all of its samples do. Of a channel that is
-        slower than its log no four in a row do, and those that do are taken as neighbours
+    use : samples that count, shape (n,). A difference counts if all of its four samples count. In
+        a channel that is slower than its log no four samples in a row count; the samples that
+        count are then taken as neighbours.
     """
     counted = np.ones(len(channel), bool) if use is None else use
     whole = counted[3:] & counted[2:-1] & counted[1:-2] & counted[:-3]

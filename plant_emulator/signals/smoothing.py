@@ -1,4 +1,4 @@
-"""Channels and their derivatives without their noise (A. Savitzky, M. Golay, 1964; pure)."""
+"""Smooths channels and differentiates them (A. Savitzky, M. Golay, Anal. Chem. 36 (1964) 1627)."""
 
 from __future__ import annotations
 
@@ -11,13 +11,16 @@ if TYPE_CHECKING:
 
 
 def window(time: Array, seconds: float) -> int:
-    """Odd number of samples nearest to a length of time, at least 5."""
+    """Odd number of samples that is closest to a length of time [s], at least 5."""
     interval = float(np.median(np.diff(time)))
     return max(5, 2 * round(seconds / interval / 2) + 1)
 
 
 def smooth(time: Array, channel: Array, seconds: float, order: int = 0) -> Array:
-    """A channel, or its derivative of an order, from parabolas over windows of a length [s]."""
+    """Smooth a channel, or its derivative, by parabolas over windows of so many seconds.
+
+    order : of the derivative, 0 for the channel itself; the result has the shape of the channel
+    """
     from scipy.signal import savgol_filter
 
     length = min(window(time, seconds), len(time) - (1 - len(time) % 2))

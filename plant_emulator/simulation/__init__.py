@@ -1,1 +1,1 @@
-"""What is simulated with the model: logs, drive programs, a truck's travel, the running bench."""
+"""Simulations with the model: logs, drive programs, a truck's travel cycle, the running bench."""

@@ -3,8 +3,8 @@
     NRMSD = sqrt(mean e^2) / (max y - min y)    Val1 = 100 (1 - NRMSD)     (thesis, eq. 3.37-3.39)
     Val2  = 100 (1 - sum |e| / sum |y|)                                    (thesis, eq. 3.40-3.41)
 
-e = y measured minus y simulated. Eq. 3.40 as printed divides by y sample by sample, which is
-undefined at standstill; the ratio of sums is the reading that fits the thesis's tables.
+e = y measured minus y simulated. Eq. 3.40 as printed divides by y in every sample, which is
+undefined at standstill. The ratio of sums agrees with the thesis's tables.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from plant_emulator.signals.log import COMPARED, VOLTAGE, Array, Log, compared_c
 
 @dataclass(frozen=True)
 class Fit:
-    """Measures of one channel; val1 and val2 in percent, nrmsd as a fraction, rms in its unit."""
+    """Measures of one channel: val1 and val2 [%], nrmsd [1], rms of the residual [its unit]."""
 
     val1: float
     val2: float
@@ -30,7 +30,8 @@ class Fit:
 def fit(measured: Array, simulated: Array, place: str = "channel") -> Fit:
     """Measures of a simulated channel against the measured one, shape (n,) each.
 
-    Raises LogError where the measured channel is constant or all zero: nothing to normalise by.
+    place : name of the channel in an error
+    Raises LogError for a measured channel that is constant or zero: its range is the divisor.
     """
     residual = measured - simulated
     span, total = float(np.ptp(measured)), float(np.abs(measured).sum())
@@ -42,7 +43,7 @@ def fit(measured: Array, simulated: Array, place: str = "channel") -> Fit:
 
 
 def validate(measured: Log, simulated: Log) -> dict[str, Fit]:
-    """Measures of every compared channel that the measured log has."""
+    """Measures of every channel on which the logs are compared, by its name."""
     return {
         name: fit(measured[name], simulated[name], f"{measured.source}: {name}")
         for name in compared_channels(measured)
@@ -50,12 +51,14 @@ def validate(measured: Log, simulated: Log) -> dict[str, Fit]:
 
 
 def zero_phase(log: Log, cutoff: float) -> Log:
-    """The log with its compared channels low-passed forwards and backwards, its edges dropped.
+    """Low-pass the compared channels of a log without phase shift, and drop its edges.
 
-    cutoff : frequency at which the two passes together leave half of the amplitude [Hz]; a
-        Butterworth filter of second order each way. One period of it is dropped at either end.
-    Measured and simulated logs must go through the same one: filtering only one of them changes
-    the spikes of the backlash. Raises LogError for a log that is too short, or not evenly sampled.
+    A Butterworth filter of second order runs forwards and backwards. Measured and simulated logs
+    need the same filter: filtering only one of them changes the spikes of the backlash.
+
+    cutoff : frequency at which both passes together leave half of the amplitude [Hz]; one period of
+        it is dropped at either end
+    Raises LogError for a log that is too short or not evenly sampled.
     """
     from scipy.signal import butter, sosfiltfilt
 

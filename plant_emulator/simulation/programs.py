@@ -1,10 +1,11 @@
-"""The drive programs of the bench as data.
+"""The drive programs of the bench, as data.
 
-Programs 1-4: corner points of the motor's speed reference, linear between them; program 4 adds
-three sweeps of rising frequency. Corner times read off the logged references of the independent
-bench; programs 1-3 are shaped after the thesis, Fig. 3.8. Programs 6 and 6L are a forklift's
-travel cycle (thesis, Figs 4.7-4.10): 14 km/h, start at 2 s, brake at 22 s, without load and with
-1600 kg.
+Programs 1 to 4 are corner points of the motor's speed reference, linear between them. Program 4
+adds three sweeps of rising frequency. The times of the corners are read off the logged references
+of the independent bench. Programs 1 to 3 follow the thesis, Fig. 3.8.
+
+Programs 6 and 6L are a forklift's travel cycle (thesis, Figs 4.7-4.10): 14 km/h, start at 2 s,
+brake at 22 s. The truck has no load in program 6 and 1600 kg in program 6L.
 """
 
 from __future__ import annotations
@@ -24,13 +25,18 @@ SAMPLE_PERIOD = 0.01
 
 
 def sample_times(duration: float, period: float = SAMPLE_PERIOD) -> Array:
-    """Times of the samples of a run, both ends included [s]."""
+    """Times of the samples of a run [s], shape (n,), both ends included; duration, period [s]."""
     return np.arange(round(duration / period) + 1, dtype=np.float64) * period
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep:
-    """amplitude sin(2 pi (f_0 tau + (f_1 - f_0) tau^2 / 2L)), faded in and out linearly."""
+    """A sine of linearly rising frequency that is added to the speed reference.
+
+    amplitude sin(2 pi (f_0 tau + (f_1 - f_0) tau^2 / 2L)), faded in and out linearly
+
+    start, end, fade : times [s], L = end - start; amplitude [rad/s]; frequencies f_0, f_1 [Hz]
+    """
 
     start: float
     end: float
@@ -40,7 +46,7 @@ class Sweep:
     fade: float = 0.5
 
     def values(self, time: Array) -> Array:
-        """What the sweep adds to the reference [rad/s]; 0 outside of it. time [s]"""
+        """Value of the sweep [rad/s] at times [s], 0 before and after it; shape (n,) each."""
         length = self.end - self.start
         tau = np.clip(time - self.start, 0.0, length)
         envelope = np.minimum(1.0, np.minimum(tau, length - tau) / self.fade)
@@ -51,7 +57,7 @@ class Sweep:
 
 @dataclass(frozen=True, kw_only=True)
 class SpeedProgram:
-    """A reference of the motor speed: corner points (time [s], speed [rad/s]) and sweeps."""
+    """A speed reference of the motor: corner points (time [s], speed [rad/s]) and sweeps."""
 
     name: str
     duration: float
@@ -70,7 +76,7 @@ class SpeedProgram:
 
 @dataclass(frozen=True, kw_only=True)
 class TravelProgram:
-    """A forklift's travel cycle on the drum: mass of the truck with its load [kg]."""
+    """A forklift's travel cycle on the drum; mass : of the truck with its load [kg]."""
 
     name: str
     duration: float
@@ -165,7 +171,7 @@ PROGRAMS: dict[str, Program] = {
 
 
 def describe(program: Program) -> str:
-    """A program as one plans it: name, length, what it reaches or carries."""
+    """Describe a program in words: name, length, and its largest speed or its truck."""
     if isinstance(program, TravelProgram):
         return f"{program.name} (a truck of {program.mass:.0f} kg on the drum)"
     fastest = max(speed for _, speed in program.corners)
@@ -174,7 +180,7 @@ def describe(program: Program) -> str:
 
 
 def program(name: str) -> Program:
-    """The program of that name; ParameterError where there is none."""
+    """The drive program of that name; ParameterError where there is none."""
     if name not in PROGRAMS:
         raise ParameterError(f"{name}: no such program; known: {', '.join(PROGRAMS)}")
     return PROGRAMS[name]

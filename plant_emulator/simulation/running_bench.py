@@ -1,4 +1,4 @@
-"""The running bench: the model advanced in fixed steps, a few at a time, for the emulator."""
+"""The running bench of the emulator: the model, advanced by a few fixed steps at a time."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 STEP = 1e-3
-# How much longer than nominal effects may make the dead time [s]; the bench remembers that much.
+# How much longer than nominal effects may make the dead time [s]: the history reaches that far.
 LONGER_DEAD_TIME = 0.5
 (
     MOTOR_SPEED,
@@ -35,10 +35,11 @@ LONGER_DEAD_TIME = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class BenchSamples:
-    """What the sensors showed at the end of every step, shape (steps,) each, and where it stands.
+    """Sensor values of some steps [SI]: arrays have one value a step, shape (steps,).
 
-    wheel_torque : torque of the truck at its wheel incl. the brake's reaction, mean [N m]
-    shell_temperature [K]; motor_angle, drum_angle: since the start [rad]
+    wheel_torque : mean torque of the truck at its wheel, reaction of the brake included [N m]
+    shell_temperature : after the last step [K]
+    motor_angle, drum_angle : since the start of the bench, after the last step [rad]
     """
 
     motor_speed: Array
@@ -53,10 +54,12 @@ class BenchSamples:
 
 
 class Bench:
-    """Drive, motor, gear and drum at rest, waiting for references.
+    """Drive, motor, gear and drum. The bench is at rest until it is advanced.
 
-    effects : effect -> parameter -> value [SI]; gap_position: see `simulate`; step [s]
-    truck : whether one stands on the drum
+    effects : effect -> parameter -> value [SI]
+    gap_position : start in the backlash gap, -1 to 1; step : length of a step [s]
+    truck : whether a truck stands on the drum
+    kernel : the kernel to use; None: the smallest that has these effects
     """
 
     def __init__(
@@ -77,7 +80,7 @@ class Bench:
         self._x = self._kernel.state(self._p, gap_position * self._p.backlash_half_gap)
         self._work = self._kernel.work()
         self._longest_dead_time = self._p.dead_time + LONGER_DEAD_TIME
-        # The last step's first stage looks less than one step further back.
+        # The first stage of a step looks back less than one step further than its end.
         self._history = vector([0.0] * (ceil(self._longest_dead_time / step) + 3))
         self._newest = 0
         self._step = step
@@ -93,18 +96,20 @@ class Bench:
 
     @property
     def unsettled(self) -> int:
-        """Implicit stages so far whose equations were not solved: what follows is not the model."""
+        """Number of implicit stages so far whose equations were not solved."""
         return int(self._stage.unsettled)
 
     def advance(
         self, references: Sequence[float], *, wheel_torque: float = 0.0, brake_torque: float = 0.0
     ) -> BenchSamples:
-        """Advance by one step for each reference and return what the sensors showed.
+        """Advance by one step for each reference and return the values of the sensors.
 
-        references : what the PLC asks of the drive at the end of each step, before its dead time,
-            linear between them [rad/s]
-        wheel_torque : the truck's drive at its own wheel [N m]
-        brake_torque : its brake, >= 0, holds a standing drum up to that torque [N m at the wheel]
+        references : reference of the PLC at the end of each step, before the dead time of the
+            drive, linear between the steps [rad/s]
+        wheel_torque : drive torque of the truck at its wheel [N m]
+        brake_torque : largest torque that its brake holds, >= 0 [N m at the wheel]
+        Raises EmulatorError where the dead time lies outside of the history, and UnsettledError
+        where the state is not finite any more.
         """
         self._load(wheel_torque, brake_torque)
         out = np.zeros((len(references), len(CHANNELS)))
@@ -142,11 +147,11 @@ class Bench:
         )
 
     def limit_current(self, limit: float) -> None:
-        """Let the drive ask for no more armature current than that, nor than its own limit [A]."""
+        """Limit the current reference of the drive to the lesser of this and its own limit [A]."""
         self._p.armature_current_limit = min(limit, self._own_current_limit)
 
     def _load(self, wheel_torque: float, brake_torque: float) -> None:
-        """Set the truck's torques; writing a record costs more than a step of the bench."""
+        """Set the truck's torques if they changed: writing to a record costs more than a step."""
         if (wheel_torque, brake_torque) != self._truck:
             self._stage.wheel_torque, self._stage.brake_torque = wheel_torque, brake_torque
             self._truck = (wheel_torque, brake_torque)

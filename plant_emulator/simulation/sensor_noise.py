@@ -1,8 +1,8 @@
-"""Noise and resolution of the bench's sensors, for logs that should look measured.
+"""Adds noise and quantisation of the bench's sensors to a simulated log.
 
-White noise of the standard deviations and steps of quantisation that the independent bench's noisy
-logs have; those have no voltage, whose figures are assumed: 0.2 % of 500 V. The reference is not
-measured and stays exact.
+The noise is white. Standard deviations and quantisation steps are those of the independent bench's
+noisy logs. These logs have no voltage: its values are assumed, 0.2 % of 500 V. The speed reference
+is not measured and stays exact.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SENSORS: dict[str, tuple[float, float]] = {
 
 
 def add_noise(log: Log, seed: int) -> Log:
-    """The log as the sensors would show it, noise drawn from `seed`."""
+    """Add noise, drawn from `seed`, and quantisation to every measured signal of a log."""
     random = np.random.default_rng(seed)
     signals = dict(log.signals)
     for name, (deviation, step) in SENSORS.items():

@@ -27,25 +27,27 @@ if TYPE_CHECKING:
 
 Hold = Literal["linear", "staircase"]
 
-# Error per step over the range of a full-speed run; the figures are in the README's table.
+# Error per step over the range of a run at full speed [1].
 TOLERANCE = 1e-6
-# At most one sample by default: the step control watches the nominal states only, not the memories
-# of effects, and a run then changes smoothly with its parameters, which a fit needs. A log slower
-# than 100 Hz is stepped as one of 100 Hz.
+# Largest step [s], or one sample if that is shorter. The step control watches the nominal states,
+# but not the memories of effects. With such steps a run also changes smoothly with its parameters,
+# which a fit needs.
 LARGEST_STEP = 0.01
-# A kink of the reference that is stepped onto [rad/s^2]; smaller ones are left to the error
-# control.
+# Least change of the slope of the reference that ends a step [rad/s^2]. The error control handles
+# smaller ones.
 CORNER = 1.0
-# The truck starts when its torque leaves the noise of a parked one [N m at the wheel].
+# A truck has started when its torque exceeds the noise of a parked truck [N m at the wheel].
 WHEEL_TORQUE_STARTS = 10.0
 
 
 @dataclass(frozen=True)
 class RunInputs:
-    """The inputs of one run as the kernel takes them, shape (n,) each but `corners`.
+    """The inputs of one run as the kernel takes them, shape (n,) each except `corners`.
 
-    truck : whether there is one; without it the drum is free and the log has no wheel torque
-    interval : between most samples [s]
+    The arrays are those of `stepper.Inputs`.
+
+    truck : whether a truck is on the drum; without a truck the log has no wheel torque
+    source : name of the run in messages; interval : median time between samples [s]
     """
 
     time: Array
@@ -60,9 +62,9 @@ class RunInputs:
 
 
 def inputs_of(log: Log, hold: Hold | None = None) -> RunInputs:
-    """The inputs in a log.
+    """The inputs of a run, from the speed reference and the wheel torque of its log.
 
-    hold : what holds between samples of the reference; None: staircase with a truck, else linear
+    hold : form of the reference between samples; None: staircase in a log with a truck, else linear
     """
     time, reference = log.time, log["speed_reference"]
     truck = "wheel_torque" in log
@@ -88,7 +90,7 @@ def inputs_of(log: Log, hold: Hold | None = None) -> RunInputs:
 
 
 def _parked(wheel_torque: Array) -> Array:
-    """1 for the intervals before the truck's first start, in which the drum is held."""
+    """1 for the intervals before the truck's first start, in which it holds the drum; else 0."""
     started = np.abs(wheel_torque) > WHEEL_TORQUE_STARTS
     first = int(np.argmax(started)) if started.any() else len(started)
     return (np.arange(len(wheel_torque)) < first).astype(float)
@@ -104,14 +106,18 @@ def simulate(
     step: float | None = None,
     kernel: Kernel | None = None,
 ) -> Log:
-    """Simulate a run; the log has the inputs and the channels of the bench.
+    """Simulate a run; the resulting log has the inputs and all channels of the bench [SI].
 
-    values : parameters, and those of effects as <effect>_<parameter> [SI]
-    gap_position : (theta_g - theta_d) / alpha at the start, -1 to 1; +1: driving flank in contact
-    largest_step : of adapted steps [s]; None: one sample of the log, at most 10 ms. Longer ones
-        pass over samples: two to three times faster where reference and truck are smooth, for a
-        bench without effects
-    step : a fixed step [s] instead of adapted ones
+    values : parameters of the bench, and of effects as <effect>_<parameter> [SI]
+    gap_position : start in the backlash gap (theta_g - theta_d) / alpha, -1 to 1 [1]; at +1 the
+        driving flank is in contact
+    tolerance : error per step over the range of a run at full speed [1]
+    largest_step : largest adapted step [s]; None: one sample of the log, at most 10 ms. Longer
+        steps pass over samples. Without effects they make smooth runs two to three times faster.
+    step : a fixed step in place of adapted steps [s]
+    kernel : the kernel to use; None: the smallest that has the effects
+    Raises ParameterError for a name in `values` that is no parameter, and UnsettledError where the
+    equations were not solved.
     """
     model, values = (kernel, values) if kernel is not None else kernel_for(values)
     out = np.zeros((len(run.time), len(CHANNELS)))
@@ -139,7 +145,7 @@ def simulate(
 
 
 def _refuse_unsolved(run: RunInputs, unsettled: float, out: Array) -> None:
-    """Raise UnsettledError for a result that is not the model's."""
+    """Raise UnsettledError for a run whose equations were not solved, or that is not finite."""
     if unsettled > 0.0:
         raise UnsettledError(
             f"{run.source}: {unsettled:.0f} implicit stages did not settle; the result is not the "
@@ -156,15 +162,16 @@ def _refuse_unsolved(run: RunInputs, unsettled: float, out: Array) -> None:
 def values_of(
     parameters: ParameterSet, effects: Mapping[str, Mapping[str, float]] | None = None
 ) -> dict[str, float]:
-    """One flat mapping of all values, as `simulate` takes it; the set's own effects first."""
+    """All values as `simulate` takes them [SI]; `effects` replace effects of the set."""
     both = {**parameters.effects, **(effects or {})}
     flat = {f"{e}_{key}": v for e, own in both.items() for key, v in own.items()}
     return {**parameters.values(), **flat}
 
 
 def mean_square_residual(measured: Log, simulated: Log) -> float:
-    """Mean square of the residual in units of the sensors' noise, over the compared channels but
-    the voltage, whose sensor may be off.
+    """Mean square of the residual in units of the sensors' noise [1].
+
+    The mean is over the compared channels except the voltage, whose sensor may have an offset.
     """
     squares = [
         np.mean(((measured[name] - simulated[name]) / SENSORS[name][0]) ** 2)
@@ -175,10 +182,10 @@ def mean_square_residual(measured: Log, simulated: Log) -> float:
 
 
 def fit_start(log: Log, run: RunInputs, values: Mapping[str, float], points: int = 41) -> float:
-    """Gap position at the start that fits the log best, -1 to 1.
+    """Fit the gap position at the start of a run to its log, -1 to 1 [1].
 
-    A scan, because the timing of the first contact makes the cost many-valleyed, then a bounded
-    search in the best valley.
+    The cost has many local minima, because the gap position decides when the first contact comes.
+    Therefore a scan over `points` positions finds the best basin, and a bounded search its minimum.
     """
     from scipy.optimize import minimize_scalar
 

@@ -1,13 +1,13 @@
-"""Programs 6 and 6L without a network: a forklift on the drum, the reference from its own torque.
+"""Simulates programs 6 and 6L: a forklift on the drum, and a regulator that emulates the road.
 
-The reference is the thesis's (eq. 4.4, 4.8, 4.9, 4.12) in the PLC's cycle, from the mean torque
-over the cycle, with the inertia term integrated exactly:
+The speed reference is that of the thesis (eq. 4.4, 4.8, 4.9, 4.12), once in each cycle of the PLC,
+from the mean torque over the cycle. The inertia term is integrated exactly:
 
     omega_ref = rho omega_d + 1/(m r_d^2) integral (T_f(omega_d) + xi T_meas - T_RL) dt,
     rho = (J_g + J_d) / (m r_d^2)
 
-It stands here so that a travel program can be simulated (with effects) by the emulator alone; the
-gateway has regulators of its own and shares nothing with this.
+With this regulator the emulator simulates travel programs, with effects, without a network. The
+gateway has its own regulators and shares no code with this one.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ if TYPE_CHECKING:
 
     from plant_emulator.model.parameters import ParameterSet
 
-# The bench takes the reference as linear within a step, the log as a staircase: a step so short
-# that the difference hides in the noise [s].
+# Step of the bench [s]. The bench takes the reference as linear within a step, a log takes it as a
+# staircase: with this step the difference is below the noise.
 STEP = 1e-5
 
 
 @dataclass
 class ThesisReference:
-    """The thesis's speed regulator as a PLC script; `update` once a cycle."""
+    """The thesis's speed regulator; `update` is called once in each cycle."""
 
     parameters: ParameterSet
     truck: Forklift
@@ -44,7 +44,10 @@ class ThesisReference:
     _drum_speed: float = 0.0
 
     def update(self, shaft_torque: float, drum_speed: float) -> float:
-        """Motor speed reference [rad/s] from the mean torque [N m] and the drum speed [rad/s]."""
+        """Update and return the motor speed reference [rad/s].
+
+        shaft_torque : measured, mean over the cycle [N m]; drum_speed : at its end [rad/s]
+        """
         value = self.parameters.value
         inertia = self.truck.mass * self.truck.drum_radius**2
         rho = (value("gear_inertia") + value("drum_inertia")) / inertia
@@ -56,8 +59,7 @@ class ThesisReference:
         self.drum_reference += (
             rho * (drum_speed - self._drum_speed) + torque / inertia * self.period
         )
-        # The PLC takes no negative speed: the sum starts anew where it is limited, so that it does
-        # not wind up.
+        # The PLC takes no negative speed. The limited sum is kept, so that it does not wind up.
         self.drum_reference = max(0.0, self.drum_reference)
         self._drum_speed = drum_speed
         return value("gear_ratio") * self.drum_reference
@@ -71,7 +73,11 @@ def simulate_travel(
     gap_position: float = 0.0,
     driver: Driver | None = None,
 ) -> Log:
-    """The log of a travel program: truck on the drum, reference in a loop around the bench."""
+    """Simulate a travel program in closed loop: truck, bench and regulator; all signals SI.
+
+    effects : effect -> parameter -> value [SI]; gap_position : start in the backlash gap, -1 to 1
+    driver : the truck's driver; None: the torque that the cycle takes on the road
+    """
     truck = Forklift(mass=program.mass)
     who = driver or ReplayedTorque(truck)
     bench = Bench(parameters, effects, gap_position=gap_position, truck=True, step=STEP)
@@ -101,7 +107,7 @@ def simulate_travel(
 
 
 def _last(samples: BenchSamples) -> tuple[float, ...]:
-    """What a log keeps of one cycle."""
+    """Signals of the log at the end of one cycle, after the speed reference [SI]."""
     return (
         float(samples.motor_speed[-1]),
         float(samples.drum_speed[-1]),

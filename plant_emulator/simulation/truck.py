@@ -1,12 +1,12 @@
-"""A forklift on the drum and on the road: cycle, road load, driver, and the road as the target.
+"""A forklift on the drum and on the road: travel cycle, road load, driver, target speed.
 
     m dv/dt = T_w / r_w - F_RL(v)                                   (thesis, eq. 4.1, 4.13)
     F_RL = m g (C_rr + C_rr,v |v| / r_d) sgn v                      (thesis, eq. 4.11, level road)
 
-On the drum the wheel torque acts through r_d / r_w (eq. 4.5). The cycle is the one of programs 6
-and 6L: 14 km/h, start at 2 s, brake at 22 s, 30 s, accelerations with linear flanks of 0.6 s; read
-off the logged wheel torque of the independent bench. m is the translating mass alone: what spins
-in the truck spins on the drum as it does on the road.
+On the drum the wheel torque acts through r_d / r_w (eq. 4.5). The travel cycle is that of programs
+6 and 6L: 14 km/h, start at 2 s, brake at 22 s, end at 30 s. Its accelerations have linear flanks of
+0.6 s. It is read off the logged wheel torque of the independent bench. m is the translating mass
+alone, because the truck's rotating parts turn on the drum as they do on the road.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ KMH = 1.0 / 3.6
 
 @dataclass(frozen=True, kw_only=True)
 class Forklift:
-    """A truck; masses [kg], radii [m], rolling resistance [1], [s/rad] on the drum's speed."""
+    """A truck: mass [kg], radii [m], rolling resistance crr [1] and crr_v [s/rad of the drum]."""
 
     mass: float = 3640.0
     wheel_radius: float = 0.1715
@@ -34,7 +34,7 @@ class Forklift:
     crr_v: float = 9.3882e-6
 
     def road_load(self, speed: float) -> float:
-        """Rolling resistance against the motion [N]; 0 at rest. speed [m/s] (eq. 4.11)"""
+        """Rolling resistance against the motion [N], 0 at rest (thesis, eq. 4.11); speed [m/s]."""
         weight = self.mass * GRAVITY
         sign = float(np.sign(speed))
         return weight * (self.crr + self.crr_v * abs(speed) / self.drum_radius) * sign
@@ -42,9 +42,10 @@ class Forklift:
 
 @dataclass(frozen=True, kw_only=True)
 class Cycle:
-    """A travel cycle: up to `speed` from `start`, down to rest from `brake` [m/s, s].
+    """A travel cycle: it accelerates to `speed` [m/s] at `start` and to rest at `brake` [s].
 
-    up, down : time that a constant acceleration would take [s]; its flanks add `flank` [s]
+    up, down : times that constant accelerations would take [s]; flank : time of a linear flank,
+        which adds to them [s]; duration : of the cycle [s]
     """
 
     speed: float = 14.0 * KMH
@@ -56,17 +57,17 @@ class Cycle:
     duration: float = 30.0
 
     def acceleration(self, time: float) -> float:
-        """Acceleration of the profile [m/s^2]."""
+        """Acceleration of the cycle at a time [m/s^2]; time [s]."""
         up = self.speed / self.up * self._trapezoid(time - self.start, self.up)
         return up - self.speed / self.down * self._trapezoid(time - self.brake, self.down)
 
     def velocity(self, time: float) -> float:
-        """Speed of the profile [m/s], the integral of its acceleration."""
+        """Speed of the cycle at a time [m/s], the integral of its acceleration; time [s]."""
         up = self._area(time - self.start, self.up) / self.up
         return self.speed * (up - self._area(time - self.brake, self.down) / self.down)
 
     def _trapezoid(self, tau: float, length: float) -> float:
-        """1 between flanks of a trapezoid whose area is `length`."""
+        """Height of a trapezoid at the time tau: 1 between its flanks, its area is `length` [s]."""
         return max(0.0, min(tau / self.flank, 1.0, (length + self.flank - tau) / self.flank))
 
     def _area(self, tau: float, length: float) -> float:
@@ -77,31 +78,31 @@ class Cycle:
         return rising**2 / (2 * self.flank) + flat + falling - falling**2 / (2 * self.flank)
 
 
-# Below this speed of the braking profile the truck's parking brake takes over [m/s].
+# Speed of the cycle below which the parking brake takes over while braking [m/s].
 PARKING_SPEED = 0.05
-# Torque that the parking brake holds [N m at the wheel].
+# Largest torque that the parking brake holds [N m at the wheel].
 PARKING_TORQUE = 300.0
-# A parked truck's wheel does not let the drum move before the start [N m at the wheel].
+# Torque that holds the drum under the parked truck before the start [N m at the wheel].
 PARKED_TORQUE = 1e6
 
 
 class Driver(Protocol):
-    """Whoever asks the truck for torque, once per cycle of its controller."""
+    """A driver, who sets the truck's torque once in each cycle of its controller."""
 
     def torques(self, time: float, speed: float) -> tuple[float, float]:
-        """Drive torque and brake level at the wheel [N m], at that speed of its tread [m/s]."""
+        """Drive torque and brake torque at the wheel [N m]; time [s], speed of its tread [m/s]."""
         ...
 
 
 @dataclass(frozen=True)
 class ReplayedTorque:
-    """Driver "none": the torque that the cycle takes on the road, whatever the bench does."""
+    """Driver "none": replays the torque of the cycle on the road, whatever the bench does."""
 
     truck: Forklift
     cycle: Cycle = field(default_factory=Cycle)
 
     def torques(self, time: float, speed: float) -> tuple[float, float]:  # noqa: ARG002 - protocol
-        """m a(t) + F_RL(v(t)) at the wheel, then the parking brake."""
+        """Torques at the wheel [N m]: m a(t) + F_RL(v(t)) times r_w, then the parking brake."""
         cycle, truck = self.cycle, self.truck
         if time <= cycle.start:
             return 0.0, PARKED_TORQUE
@@ -114,10 +115,10 @@ class ReplayedTorque:
 
 @dataclass
 class PiDriver:
-    """Driver "pi": the truck's speed controller holds the cycle's profile.
+    """Driver "pi": the truck's speed controller follows the speed of the cycle.
 
-    gain [1/s] per truck mass, integral_time [s]; the torque is limited to what the drive has,
-    while limited the integral waits.
+    gain : per mass of the truck [1/s]; integral_time, period : [s]
+    torque_limit : largest drive torque [N m at the wheel]; at the limit the integral stops
     """
 
     truck: Forklift
@@ -129,7 +130,7 @@ class PiDriver:
     _integral: float = 0.0
 
     def torques(self, time: float, speed: float) -> tuple[float, float]:
-        """PI on the speed error with the profile's acceleration fed forward."""
+        """Torques at the wheel [N m]: PI on the speed error, acceleration fed forward."""
         cycle, truck = self.cycle, self.truck
         if time <= cycle.start:
             return 0.0, PARKED_TORQUE
@@ -147,7 +148,7 @@ class PiDriver:
 
 
 def driver_of(name: str, truck: Forklift, cycle: Cycle | None = None) -> Driver:
-    """The driver of that name, "none" or "pi"."""
+    """Make the driver of that name, "none" or "pi"; cycle None: that of programs 6 and 6L."""
     kinds: dict[str, type[ReplayedTorque] | type[PiDriver]] = {
         "none": ReplayedTorque,
         "pi": PiDriver,
@@ -158,7 +159,8 @@ def driver_of(name: str, truck: Forklift, cycle: Cycle | None = None) -> Driver:
 def road_step(truck: Forklift, speed: float, torque: float, brake: float, period: float) -> float:
     """Speed of the truck on the level road one period later [m/s].
 
-    torque, brake : at the wheel [N m]; rolling resistance and brake stop it and hold it at rest.
+    torque, brake : at the wheel [N m]; rolling resistance and brake stop the truck and hold it.
+    speed [m/s], period [s]
     """
     drive = torque / truck.wheel_radius
     hold = truck.road_load(max(abs(speed), 1e-9)) + brake / truck.wheel_radius
@@ -170,11 +172,11 @@ def road_step(truck: Forklift, speed: float, torque: float, brake: float, period
 
 
 def road_speed(truck: Forklift, time: Array, wheel_torque: Array) -> Array:
-    """The target: speed of the same truck on the road under a logged wheel torque [m/s].
+    """Target speed: that of the truck on the level road under a logged wheel torque [m/s].
 
-    wheel_torque : in force during the interval that ends at its sample [N m], shape (n,). A
-    negative torque on the standing truck is its brake's reaction, which does not drive it
-    backwards.
+    time : of the samples [s]; wheel_torque : torque during the interval before each sample [N m].
+    Both have shape (n,), as the result. A negative torque on the standing truck is the reaction of
+    its brake, which does not drive it backwards.
     """
     speed = np.zeros(len(time))
     for k in range(1, len(time)):
@@ -185,7 +187,7 @@ def road_speed(truck: Forklift, time: Array, wheel_torque: Array) -> Array:
 
 
 def drive_on_road(driver: Driver, truck: Forklift, time: Array) -> tuple[Array, Array]:
-    """The same driver with the same truck on the road: speed [m/s] and drive torque [N m]."""
+    """Drive a truck on the road: speed [m/s] and drive torque [N m] at the times, shape (n,)."""
     speed, torque = np.zeros(len(time)), np.zeros(len(time))
     for k in range(1, len(time)):
         torque[k], brake = driver.torques(float(time[k - 1]), float(speed[k - 1]))

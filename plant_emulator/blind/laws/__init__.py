@@ -10,7 +10,7 @@ import importlib
 import pkgutil
 from typing import TYPE_CHECKING
 
-from plant_emulator.effects.declaration import effect_of
+from plant_emulator.effects.declaration import read_effect
 
 if TYPE_CHECKING:
     from plant_emulator.effects import Effect
@@ -23,4 +23,4 @@ def names() -> list[str]:
 
 def load(name: str) -> Effect:
     """Load the law of that name."""
-    return effect_of(name, importlib.import_module(f"{__name__}.{name}"))
+    return read_effect(name, importlib.import_module(f"{__name__}.{name}"))
