@@ -15,14 +15,18 @@ if TYPE_CHECKING:
     from gateway.config_file import load as load_config
     from gateway.configuration.config import Config
     from gateway.errors import GatewayError
+    from gateway.review.finding import Review
+    from gateway.workflows.check import check
     from gateway.workflows.replay import Replay, replay
 
-__all__ = ["Config", "GatewayError", "Replay", "load_config", "replay"]
+__all__ = ["Config", "GatewayError", "Replay", "Review", "check", "load_config", "replay"]
 
 _PLACES = {
     "Config": ("gateway.configuration.config", "Config"),
     "GatewayError": ("gateway.errors", "GatewayError"),
     "Replay": ("gateway.workflows.replay", "Replay"),
+    "Review": ("gateway.review.finding", "Review"),
+    "check": ("gateway.workflows.check", "check"),
     "load_config": ("gateway.config_file", "load"),
     "replay": ("gateway.workflows.replay", "replay"),
 }

@@ -25,6 +25,11 @@ def load(path: str | Path) -> Config:
     return _refuse_unknown_regulator(from_document(document, place=place), place)
 
 
+def given(config: Config | str | Path) -> Config:
+    """The configuration itself, or the configuration in the file of this path."""
+    return config if isinstance(config, Config) else load(config)
+
+
 def with_values(config: Config, values: Mapping[str, object]) -> Config:
     """`Config.with_values` where `regulator.friction` may also be the path of a friction file."""
     try:

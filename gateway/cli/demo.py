@@ -1,17 +1,19 @@
 """Drive a forklift over the emulated bench, and show how much its drum feels like the road."""
 
-import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
+from gateway.cli._options import write_json
 from register_maps.command_line.parameters import Command, Number, OutputFile
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from rich.console import Console
+
+    from gateway.offline.figures import CruiseForce, Latency, RunFigures
 
 EXAMPLE = """
 \b
@@ -129,32 +131,29 @@ def command(
         ),
         console,
     )
-    _show(console, shown.summary, out)
-    text = json.dumps(shown.summary, indent=2)
-    if json_file == "-":
-        click.echo(text)
-    elif json_file:
-        Path(json_file).write_text(text + "\n", encoding="utf-8")
+    _show(console, shown.figures, out)
+    if json_file is not None:
+        write_json(json_file, shown.to_json(), indent=2)
     if shown.failures:
         raise GatewayError("; ".join(shown.failures))
 
 
-def _show(console: "Console", summary: dict[str, Any], out: Path) -> None:
+def _show(console: "Console", runs: "Sequence[RunFigures]", out: Path) -> None:
+    """Print the key figures of all runs, one column a truck."""
     from rich.table import Table
 
-    runs = summary["runs"]
     table = Table(title="Does the drum feel like the road?", title_justify="left")
     table.add_column("")
     for run in runs:
-        table.add_column(f"{run['truck_kg']:.0f} kg", justify="right")
-    rows: tuple[tuple[str, Callable[[dict[str, Any]], str]], ...] = (
-        ("speed, Val1", lambda run: f"{run['velocity']['val1']:.2f} %"),
-        ("speed, Val2", lambda run: f"{run['velocity']['val2']:.2f} %"),
-        ("force in cruise, error", lambda run: _force(run["force"])),
-        ("traction energy, error", lambda run: f"{run['energy']['error_percent']:+.2f} %"),
-        ("latency p50 / p99 / max", lambda run: _latency(run["latency_ms"])),
-        ("missed deadlines", lambda run: f"{run['missed_deadlines']} of {run['cycles']}"),
-        ("stopped by", lambda run: run["stop_reason"]),
+        table.add_column(f"{run.truck_mass:.0f} kg", justify="right")
+    rows: tuple[tuple[str, Callable[[RunFigures], str]], ...] = (
+        ("speed, Val1", lambda run: _percent(run.velocity.val1 if run.velocity else None)),
+        ("speed, Val2", lambda run: _percent(run.velocity.val2 if run.velocity else None)),
+        ("force in cruise, error", lambda run: _force(run.force)),
+        ("traction energy, error", lambda run: _percent(_energy_error(run), sign="+")),
+        ("latency p50 / p99 / max", lambda run: _latency(run.latency)),
+        ("missed deadlines", lambda run: f"{run.missed_deadlines} of {run.cycles}"),
+        ("stopped by", lambda run: run.stop_reason),
     )
     for name, show in rows:
         table.add_row(name, *(show(run) for run in runs))
@@ -162,15 +161,20 @@ def _show(console: "Console", summary: dict[str, Any], out: Path) -> None:
     console.print(f"picture, logs, recordings and summary.json: {out}", highlight=False)
 
 
-def _force(force: dict[str, float | None]) -> str:
-    error, target = force["mean_error_newton"], force["target_newton"]
-    if error is None or target is None:
-        return "no cruise"
-    return f"{error:+.1f} N of {target:.0f} N"
+def _percent(value: float | None, sign: str = "") -> str:
+    return "-" if value is None else f"{value:{sign}.2f} %"
 
 
-def _latency(latency: dict[str, float | None]) -> str:
-    values = [latency[name] for name in ("p50", "p99", "max")]
-    if any(value is None for value in values):
+def _energy_error(run: "RunFigures") -> float | None:
+    return run.energy.error_percent if run.energy else None
+
+
+def _force(force: "CruiseForce | None") -> str:
+    return "no cruise" if force is None else f"{force.mean_error:+.1f} N of {force.target:.0f} N"
+
+
+def _latency(latency: "Latency | None") -> str:
+    if latency is None:
         return "not measured"
-    return " / ".join(f"{value:.2f}" for value in values) + " ms"
+    values = (latency.p50, latency.p99, latency.max)
+    return " / ".join(f"{1e3 * value:.2f}" for value in values) + " ms"

@@ -1,6 +1,5 @@
 """Look at a register map on paper and on a live device: list, read, watch, verify, write."""
 
-import json
 import time
 from collections.abc import Callable
 from typing import Any
@@ -8,6 +7,7 @@ from typing import Any
 import click
 
 import register_maps
+from gateway.cli._options import write_json
 from gateway.cli._register_rows import (
     FOUND,
     LIVE,
@@ -28,7 +28,7 @@ from gateway.link.device import (
     writable,
     write_value,
 )
-from gateway.link.inspection import Reading, Row, Words, value_text, verify
+from gateway.link.inspection import Reading, Words, value_text, verify
 from register_maps.command_line.parameters import LONGEST, Command, Number, OutputFile
 from register_maps.register_map import Register, RegisterMap
 from register_maps.signals import RESERVED
@@ -143,27 +143,13 @@ def _changes(
 def verify_device(name: str, json_file: str | None, **where: Any) -> int:
     """Compare the map with the device; exit code 1 when it does not hold."""
     register_map, device = register_maps.load(name), Device(**where)
-    rows = verify(register_map, two_readings(device, register_map))
-    holds = all(row.holds for row in rows)
+    found = verify(register_map, two_readings(device, register_map))
     if json_file is not None:
-        answer = {"schema": "register-map/1", "holds": holds, "registers": list(map(_entry, rows))}
-        with click.open_file(json_file, "w", encoding="utf-8") as target:
-            target.write(json.dumps(answer) + "\n")
+        write_json(json_file, found.to_json())
     if json_file != "-":
-        table(FOUND, [comparison_row(row, device) for row in rows])
-        click.echo("the map holds" if holds else "the map does not hold")
-    return 0 if holds else 1
-
-
-def _entry(row: Row) -> dict[str, Any]:
-    return {
-        "name": row.register.name,
-        "address": row.register.address,
-        "raw": list(row.words),
-        "value": row.value,
-        "unit": row.register.unit,
-        "finding": row.finding,
-    }
+        table(FOUND, [comparison_row(row, device) for row in found.rows])
+        click.echo("the map holds" if found.holds else "the map does not hold")
+    return 0 if found.holds else 1
 
 
 @command.command(context_settings={"ignore_unknown_options": True})

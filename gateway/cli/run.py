@@ -1,7 +1,6 @@
 """The daemon: make the bench feel like the road, over Modbus TCP."""
 
 import shlex
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -39,7 +38,7 @@ def command(config: Path, *, shadow: bool, duration: float | None, values: tuple
     """
     settings = with_values(load(config), assignments(values))
     register_map = register_maps.load(settings.plc.map)
-    refused = list(refusals(settings, register_map))
+    refused = refusals(settings, register_map)
     told = shlex.join(["gateway", "check", "-c", str(config), *_repeated("--set", values)])
     for line in refused:
         click.echo(f"{'warning' if shadow else 'error'}: {config}: {line}; see {told}", err=True)
@@ -50,13 +49,14 @@ def command(config: Path, *, shadow: bool, duration: float | None, values: tuple
     return 0 if ended.reason is None else 1
 
 
-def refusals(config: "Config", register_map: "RegisterMap") -> Iterator[str]:
-    """What the review holds to be an error: place, value, and what would be right, one a line."""
+def refusals(config: "Config", register_map: "RegisterMap") -> list[str]:
+    """Errors that the review finds, one line each: place, value found, value expected."""
     from gateway.review.review import review
 
-    for one in review(config, register_map):
-        if one.severity == "error":
-            yield f"{one.where}: {one.what}: found {one.value}, expected {one.allowed}"
+    return [
+        f"{one.where}: {one.what}: found {one.value}, expected {one.allowed}"
+        for one in review(config, register_map).errors
+    ]
 
 
 def _repeated(option: str, values: tuple[str, ...]) -> list[str]:

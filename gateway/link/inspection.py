@@ -8,7 +8,7 @@ bench may show is named too, but does not fail.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, get_args
+from typing import Any, Final, get_args
 
 from register_maps.codec import CodecError, decode_value, scaled
 from register_maps.conversion import conversion, raw_words
@@ -27,13 +27,46 @@ Reading = Mapping[str, Words | str]
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One register as found: its words (none: unreadable), value in its unit, what is wrong."""
+    """One register as the device shows it.
+
+    words : empty where the register cannot be read
+    value : in the unit of the register; None where the words hold no value
+    finding : what is wrong or unusual; empty: nothing
+    """
 
     register: Register
     words: Words
     value: float | None
     finding: str
     holds: bool
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the register as an entry of the document register-map/1."""
+        return {
+            "name": self.register.name,
+            "address": self.register.address,
+            "raw": list(self.words),
+            "value": self.value,
+            "unit": self.register.unit,
+            "finding": self.finding,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verification:
+    """Comparison of a register map with a device, register by register."""
+
+    rows: tuple[Row, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether the map holds for every register."""
+        return all(row.holds for row in self.rows)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the comparison as the document register-map/1."""
+        registers = [row.to_json() for row in self.rows]
+        return {"schema": "register-map/1", "holds": self.holds, "registers": registers}
 
 
 def value_text(register: Register, words: Words) -> str:
@@ -92,13 +125,15 @@ def mbpoll(
     )
 
 
-def verify(register_map: RegisterMap, readings: Sequence[Reading]) -> list[Row]:
-    """What is found at each register, from two or more readings some tens of ms apart."""
-    return [
-        _row(register, [reading[register.name] for reading in readings])
-        for register in register_map.registers
-        if register.signal != RESERVED
-    ]
+def verify(register_map: RegisterMap, readings: Sequence[Reading]) -> Verification:
+    """Compare a map with two or more readings of a device that are some tens of ms apart."""
+    return Verification(
+        rows=tuple(
+            _row(register, [reading[register.name] for reading in readings])
+            for register in register_map.registers
+            if register.signal != RESERVED
+        )
+    )
 
 
 def _row(register: Register, seen: Sequence[Words | str]) -> Row:

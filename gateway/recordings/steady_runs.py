@@ -24,7 +24,7 @@ TRUCK: Final = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Source:
+class SteadyRun:
     """A run in a file.
 
     date : of the recording, or of the log's last change; sha256 : of the file
@@ -38,7 +38,7 @@ class Source:
     config: Config | None = None
 
 
-def read(path: Path) -> Source:
+def read(path: Path) -> SteadyRun:
     """The run in a log or a recording; refused where a truck drives the drum."""
     try:
         is_recording = recording.is_recording(path)
@@ -49,9 +49,9 @@ def read(path: Path) -> Source:
         ) from error
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     if not is_recording:
-        return Source(path=path, date=changed, sha256=digest, trace=_of_log(log.read(path)))
+        return SteadyRun(path=path, date=changed, sha256=digest, trace=_of_log(log.read(path)))
     found = recording.read(path)
-    return Source(
+    return SteadyRun(
         path=path,
         date=datetime.fromisoformat(found.header["date"]),
         sha256=digest,

@@ -1,13 +1,13 @@
-"""What a configuration lets expect of the bench, before any start: findings, worst first."""
+"""The review of a configuration before any start: what it lets one expect of the bench."""
 
 from gateway.configuration.config import Config
 from gateway.review import bounds, limits, loop, registers
-from gateway.review.finding import SEVERITIES, Finding
+from gateway.review.finding import SEVERITIES, Review
 from register_maps.register_map import RegisterMap
 
 
-def review(config: Config, register_map: RegisterMap) -> list[Finding]:
-    """Everything there is to say, worst first."""
+def review(config: Config, register_map: RegisterMap) -> Review:
+    """Review limits, times, loop stability and register map; the worst finding comes first."""
     found = [
         *registers.measurements(config, register_map),
         *registers.commands(config, register_map),
@@ -20,4 +20,5 @@ def review(config: Config, register_map: RegisterMap) -> list[Finding]:
         *bounds.limits(config),
         *bounds.bench(config),
     ]
-    return sorted(found, key=lambda finding: SEVERITIES.index(finding.severity))
+    found.sort(key=lambda finding: SEVERITIES.index(finding.severity))
+    return Review(findings=tuple(found))

@@ -4,7 +4,7 @@ A recording under its own configuration has to come out bit for bit. Under other
 for a log of the bench, the replay's setpoint is compared with the setpoint of the run.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -95,17 +95,11 @@ def replay(
     path, changes = Path(log_or_recording), dict(values or {})
     if recording.is_recording(path):
         found = recording.read(path)
-        settings = _config(config, default=lambda: config_of(found.header))
-        settings = config_file.with_values(settings, changes)
+        own = config_of(found.header) if config is None else config_file.given(config)
+        settings = config_file.with_values(own, changes)
         return _replay_recording(found, settings, is_exact=config is None and not changes)
-    settings = config_file.with_values(_config(config, default=Config), changes)
+    settings = config_file.with_values(config_file.given(config or Config()), changes)
     return _replay_log(log.read(path), settings)
-
-
-def _config(config: Config | str | Path | None, default: Callable[[], Config]) -> Config:
-    if config is None:
-        return default()
-    return config if isinstance(config, Config) else config_file.load(config)
 
 
 def _replay_recording(found: Recording, config: Config, *, is_exact: bool) -> Replay:

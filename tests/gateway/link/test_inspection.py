@@ -38,7 +38,7 @@ def reading(heartbeat: int, **changed: float) -> dict[str, tuple[int, ...]]:
 
 
 def rows(*readings: Reading, register_map: RegisterMap = MAP) -> dict[str, Row]:
-    return {row.register.name: row for row in verify(register_map, readings)}
+    return {row.register.name: row for row in verify(register_map, readings).rows}
 
 
 def register(name: str):  # type: ignore[no-untyped-def]

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import pytest
 
+import gateway
 from gateway.cli import main
 from gateway.config_file import load
 from gateway.configuration.config import Config, from_document
 from gateway.link.device import Device
-from gateway.review.finding import holds
 from gateway.review.loop import rho_of
 from gateway.review.review import review
 from plant_emulator.emulator.process import EmulatorProcess
@@ -22,14 +22,14 @@ RHO_ONE = 312.71242 / 0.645**2
 def found(where, what="", **values):
     """Severities of the findings at a place, for a configuration with `section__key=value`."""
     names = {name.replace("__", "."): str(value) for name, value in values.items()}
-    findings = review(Config().with_values(names), MAP)
+    findings = review(Config().with_values(names), MAP).findings
     return [one.severity for one in findings if one.where == where and what in one.what]
 
 
 def test_the_default_configuration_holds_without_a_warning():
-    findings = review(Config(), MAP)
-    assert holds(findings)
-    assert {one.severity for one in findings} == {"info"}
+    found = review(Config(), MAP)
+    assert found.holds
+    assert {one.severity for one in found.findings} == {"info"}
 
 
 def test_rho_of_the_forklift_is_the_share_of_drum_and_gear_in_its_mass():
@@ -146,13 +146,13 @@ def test_a_limit_that_the_cycle_would_meet_is_refused(where, values):
 
 
 def test_torque_limit_at_14_km_h_is_that_of_e24():
-    limits = [one for one in review(Config(), MAP) if one.where == "truck.braking_m_s2"]
+    limits = [one for one in review(Config(), MAP).findings if one.where == "truck.braking_m_s2"]
     assert limits[0].allowed == "<= 4289"
 
 
 def test_torque_limit_below_base_speed_is_that_of_e24():
     slow = Config().with_values({"truck.top_speed_km_h": "5"})
-    limits = [one for one in review(slow, MAP) if one.where == "truck.braking_m_s2"]
+    limits = [one for one in review(slow, MAP).findings if one.where == "truck.braking_m_s2"]
     assert limits[0].allowed == "<= 8341"
 
 
@@ -192,7 +192,7 @@ def test_limits_have_to_fit_each_other_and_the_bench(where, values, severity):
     held = "against the limit"
     findings = review(
         Config().with_values({k.replace("__", "."): str(v) for k, v in values.items()}), MAP
-    )
+    ).findings
     assert [
         one.severity for one in findings if one.where == where and held not in one.what
     ] == severity
@@ -236,9 +236,7 @@ def with_range(signal, low, high, **changes):
     ],
 )
 def test_a_map_that_cannot_hold_what_the_limits_allow_is_refused(signal, low, high, needs, key):
-    findings = [
-        one for one in review(Config(), with_range(signal, low, high)) if one.severity == "error"
-    ]
+    findings = review(Config(), with_range(signal, low, high)).errors
     assert findings
     assert {one.where for one in findings} == {"plc.map"}
     assert needs in [one.value for one in findings]
@@ -249,8 +247,8 @@ def test_a_map_that_cannot_hold_what_the_limits_allow_is_refused(signal, low, hi
 
 
 def test_a_count_of_commands_that_ends_is_refused():
-    findings = review(Config(), with_range("command_sequence", 0, 65535, wraps=False))
-    assert ["CMD_SEQ" in one.what for one in findings if one.severity == "error"] == [True]
+    findings = review(Config(), with_range("command_sequence", 0, 65535, wraps=False)).errors
+    assert ["CMD_SEQ" in one.what for one in findings] == [True]
 
 
 def test_a_narrow_map_holds_for_narrow_limits():
@@ -260,18 +258,18 @@ def test_a_narrow_map_holds_for_narrow_limits():
         "limits.overspeed_rpm": "1100",
         "truck.top_speed_km_h": "3",
     }
-    assert holds(review(Config().with_values(slow), with_range("speed_setpoint", 0, 1000)))
+    assert review(Config().with_values(slow), with_range("speed_setpoint", 0, 1000)).holds
 
 
 def test_a_map_without_a_register_is_asked_nothing_of_it():
     kept = tuple(one for one in MAP.registers if one.signal != "speed_rate")
-    assert holds(review(Config(), replace(MAP, registers=kept)))
+    assert review(Config(), replace(MAP, registers=kept)).holds
 
 
 def test_a_sweep_needs_the_mode_of_speed():
     sweep = from_document({"sweep": {"speeds_rpm": [1000.0], "hold_s": 5.0, "rate_rpm_s": 200.0}})
     only_road_load = with_range("mode", 4, 5)
-    values = [one.value for one in review(sweep, only_road_load) if one.where == "plc.map"]
+    values = [one.value for one in review(sweep, only_road_load).findings if one.where == "plc.map"]
     assert values == ["1 1", "3 1"]
 
 
@@ -294,6 +292,7 @@ def test_the_command_answers_in_the_form_check_1(capsys, file):
     told = json.loads(said.out)
     assert (code, told["schema"], told["holds"]) == (0, "check/1", True)
     assert set(told["findings"][0]) == {"severity", "where", "what", "value", "allowed"}
+    assert gateway.check(file).to_json() == told
 
 
 def test_the_command_exits_with_one_when_it_does_not_hold(capsys, file):

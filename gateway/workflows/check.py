@@ -1,0 +1,62 @@
+"""The check before a start: review of the configuration, and of the live device where asked."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import register_maps
+from gateway import config_file
+from gateway.configuration.config import Config
+from gateway.configuration.sections import PlcConfig
+from gateway.link import device, inspection
+from gateway.link.plc import LinkError
+from gateway.review.finding import Finding, Review
+from gateway.review.review import review
+from register_maps.register_map import RegisterMap
+
+
+def check(
+    config: Config | str | Path, *, values: Mapping[str, object] | None = None, live: bool = False
+) -> Review:
+    """Review a configuration before anything turns.
+
+    config : configuration, or path of its TOML file
+    values : keys to change, `{"truck.load_kg": 1600}`; a text is read as TOML
+    live : also compare the register map with the device
+
+    Raises ConfigError for a configuration and MapError for a register map that cannot be used.
+    """
+    settings = config_file.with_values(config_file.given(config), values or {})
+    register_map = register_maps.load(settings.plc.map)
+    found = review(settings, register_map)
+    if not live:
+        return found
+    return Review(findings=(*compare_with_device(settings.plc, register_map), *found.findings))
+
+
+def compare_with_device(plc: PlcConfig, register_map: RegisterMap) -> list[Finding]:
+    """Errors that the registers of the live device show in the register map."""
+    peer = device.Device(host=plc.host, port=plc.port, unit=plc.unit, timeout=plc.timeout)
+    try:
+        rows = inspection.verify(register_map, device.two_readings(peer, register_map)).rows
+    except LinkError as error:
+        return [_error("plc.host", str(error), f"{plc.host}:{plc.port}", "a PLC that answers")]
+    findings = [
+        _error(row.register.name, row.finding, _value(row), row.register.description)
+        for row in rows
+        if not row.holds
+    ]
+    return findings + [
+        _error("plc.map", "map version of the command block", row.value, str(register_map.version))
+        for row in rows
+        if row.register.signal == "map_version"
+        and row.value not in {None, 0.0, float(register_map.version)}
+    ]
+
+
+def _value(row: inspection.Row) -> float | str:
+    return " ".join(f"0x{word:04x}" for word in row.words) if row.value is None else row.value
+
+
+def _error(where: str, what: str, value: float | str | None, allowed: str) -> Finding:
+    shown = "nothing" if value is None else value
+    return Finding(severity="error", where=where, what=what, value=shown, allowed=allowed)
