@@ -25,7 +25,7 @@ from plant_emulator.blind import draw, laws, score
 from plant_emulator.blind.generate import measure, simulate_truth
 from plant_emulator.diagnosis.execution.pool import InProcess, TaskRunner, build_model
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
-from plant_emulator.diagnosis.report.ranking import rank
+from plant_emulator.diagnosis.report.ranking import ranked_effect
 from plant_emulator.diagnosis.selection.procedure import Procedure
 from plant_emulator.recordings.recording import recording
 from plant_emulator.solver.kernel import kernel, use_own_effects
@@ -61,7 +61,7 @@ def sizes(seed: int, only: tuple[str, ...], number: int) -> list[dict[str, Any]]
         return []
     (contender,) = found.hypotheses
     candidate = model.candidates[hidden.effect]
-    sized = rank(contender, found, found.named, candidate).parameters
+    sized = ranked_effect(contender, found, found.named, candidate).parameters
     pairs = score.sizes(case.hidden, [hidden.effect], {hidden.effect: sized}, known)
     # An effect with an estimated size of 0 was found by its other parameters.
     return [asdict(one) for one in pairs if one.estimated != 0.0]

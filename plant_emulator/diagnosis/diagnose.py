@@ -23,8 +23,8 @@ from plant_emulator.diagnosis.prediction.held_out import HeldOut
 from plant_emulator.diagnosis.prediction.remainder import unmodelled_remainder
 from plant_emulator.diagnosis.report.details import Details
 from plant_emulator.diagnosis.report.ranking import (
-    rank,
-    ranked,
+    hypotheses_to_rank,
+    ranked_effect,
     undetectable,
     with_random_effects,
 )
@@ -154,7 +154,7 @@ class Diagnose:
                 waterfall=waterfall(gaps.by_effects, tests.effects),
                 settings={**self.settings, **THRESHOLDS},
                 notes=(*self.notes, *gaps.notes),
-                rest=remainder,
+                remainder=remainder,
             ),
             final=tests.final,
             fixed={name: self._fixed(name) for name in tests.decision.effects},
@@ -186,7 +186,7 @@ class Diagnose:
             gap=gap,
             ranking=tuple(
                 self._ranked(one, tests, gaps.gain(one.effect), derived.get(one.effect, ()))
-                for one in ranked(tests.explained)
+                for one in hypotheses_to_rank(tests.explained)
             ),
             undetectable=hidden,
         )
@@ -206,7 +206,7 @@ class Diagnose:
             gap.closed_fraction,
             location.subsystem,
             terms=derived,
-            rest=remainder,
+            remainder=remainder,
         )
         next_experiment = Advice(runner=tests.runner).next_experiment(
             tests.explained, tests.decision, location, [one.effect for one in hidden]
@@ -236,7 +236,7 @@ class Diagnose:
         gain: float | None,
         derived: tuple[Quantity, ...],
     ) -> RankedEffect:
-        entry = rank(
+        entry = ranked_effect(
             hypothesis,
             tests.explained,
             tests.decision.effects,

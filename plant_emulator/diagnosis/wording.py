@@ -35,19 +35,19 @@ EXPLAINED_GAP = "explained"
 LARGE, SMALL = 1e6, 1e-4
 
 
-def printable(text: str) -> str:
+def replace_unprintable(text: str) -> str:
     """The text without control characters, half characters and marks that turn its direction."""
     return "".join(c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in text)
 
 
-def spoken(name: str | None) -> str:
+def in_words(name: str | None) -> str:
     """A name of the vocabulary as words."""
-    return printable(name).replace("_", " ") if name else UNKNOWN
+    return replace_unprintable(name).replace("_", " ") if name else UNKNOWN
 
 
-def listed(items: Sequence[str], most: int, between: str = ", ") -> str:
+def join_items(items: Sequence[str], most: int, between: str = ", ") -> str:
     """The first `most` items in a row, and the number of the others."""
-    shown = [printable(item) for item in items[:most]]
+    shown = [replace_unprintable(item) for item in items[:most]]
     rest = len(items) - len(shown)
     return between.join([*shown, f"and {rest} more"] if rest else shown)
 
@@ -68,7 +68,7 @@ def _power(value: float, digits: int) -> int:
     return int(f"{value:.{digits - 1}e}".partition("e")[2])
 
 
-def with_error(value: float | None, standard_error: float | None, sign: str = "+-") -> str:
+def value_with_error(value: float | None, standard_error: float | None, sign: str = "+-") -> str:
     """A value and its standard error, both rounded to the second digit of the error."""
     if value is None or not isfinite(value):
         return UNKNOWN
@@ -94,9 +94,9 @@ def percent(share: float | None) -> str:
 
 def size(quantity: Quantity, sign: str = "+-") -> str:
     """A value with its standard error and unit."""
-    text = with_error(quantity.value, quantity.standard_error, sign)
+    text = value_with_error(quantity.value, quantity.standard_error, sign)
     unit = quantity.unit
-    return text if unit in WITHOUT_UNIT else f"{text} {printable(unit)}"
+    return text if unit in WITHOUT_UNIT else f"{text} {replace_unprintable(unit)}"
 
 
 def quantity(value: float | None, unit: str | None, digits: int = 3) -> str:
@@ -107,7 +107,7 @@ def quantity(value: float | None, unit: str | None, digits: int = 3) -> str:
 
 def own_name(parameter: str, effect: str) -> str:
     """A parameter's name without the effect's in front of it."""
-    return printable(parameter.removeprefix(f"{effect}_"))
+    return replace_unprintable(parameter.removeprefix(f"{effect}_"))
 
 
 def gap_rows(gap: HeldOutGap) -> dict[str, Mapping[str, float]]:
@@ -142,7 +142,7 @@ def logs_used(logs: Logs) -> str:
     return ", ".join(f"{n} log{'' if n == 1 else 's'} {words}" for n, words in counts)
 
 
-def closed(gap: HeldOutGap) -> str | None:
+def closed_share(gap: HeldOutGap) -> str | None:
     """The closed fraction with its interval; None where the answer has no closed fraction."""
     if gap.closed_fraction is None:
         return None
@@ -152,17 +152,17 @@ def closed(gap: HeldOutGap) -> str | None:
     return f"{text} (95 % interval {percent(interval[0])} to {percent(interval[1])})"
 
 
-def place(location: Location, units: Mapping[str, str]) -> str | None:
+def describe_location(location: Location, units: Mapping[str, str]) -> str | None:
     """Where the gap lies, in one line; None where there is none."""
     if location.subsystem is None:
         return None
-    parts = [spoken(location.subsystem)]
+    parts = [in_words(location.subsystem)]
     if location.subsystem in location.shares:
         parts[0] += f" ({percent(location.shares[location.subsystem])} {share_of(location)})"
     channel, phase = location.channel, location.phase
     if channel is None:
         return parts[0]
-    parts.append(spoken(channel) + (f" in {spoken(phase)}" if phase else ""))
+    parts.append(in_words(channel) + (f" in {in_words(phase)}" if phase else ""))
     for cell in location.cells:
         if (cell.channel, cell.axis, cell.bin) == (channel, "phase", phase):
             unit = units.get(channel)
@@ -178,10 +178,10 @@ def share_of(location: Location) -> str:
     return RESIDUAL if location.cells else EXPLAINED
 
 
-def deviation(parameter: ParameterDeviation, sign: str = "+-") -> str:
+def describe_deviation(parameter: ParameterDeviation, sign: str = "+-") -> str:
     """A parameter deviation: nominal value, estimated value, standard error and unit."""
     estimated = size(parameter.quantity, sign)
-    return f"{printable(parameter.name)} {number(parameter.nominal, 4)} -> {estimated}"
+    return f"{replace_unprintable(parameter.name)} {number(parameter.nominal, 4)} -> {estimated}"
 
 
 def indistinguishable(verdict: Verdict) -> dict[str, tuple[str, ...]]:

@@ -1,4 +1,4 @@
-"""Runs that were recorded, or are only planned, ready for the question what they can show."""
+"""Recorded and planned runs in one model, for the question what they can show."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 def planned_run(
     name: str, parameters: ParameterSet, channels: tuple[str, ...] = COMPARED
 ) -> Recording:
-    """A drive program as it would be recorded, without noise but judged by the sensors' noise."""
+    """The recording of a drive program without noise, which the sensors' noise judges."""
     log = simulate(name, parameters=parameters, start="middle")
     return Recording(
         log,

@@ -1,4 +1,4 @@
-"""The steps of a diagnosis on local processes, or on a Dask cluster."""
+"""Pools that run the steps of a diagnosis on local processes or on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ Item = TypeVar("Item")
 Answer = TypeVar("Answer")
 
 
-def _step(function: Callable[[Model, Any], Any], recipe: Recipe, item: Any) -> Any:
-    with threadpool_limits(1):  # side by side, threads of one wait for those of the others
+def _run_step(function: Callable[[Model, Any], Any], recipe: Recipe, item: Any) -> Any:
+    with threadpool_limits(1):  # the threads of several workers would wait for each other
         return function(build_model(recipe), item)
 
 
 @contextmanager
-def _lost(errors: tuple[type[Exception], ...], advice: str) -> Iterator[None]:
-    """Tell in one line of a worker that ended before its answer."""
+def _report_loss(errors: tuple[type[Exception], ...], advice: str) -> Iterator[None]:
+    """Turn the errors of a lost worker into an EmulatorError of one line."""
     try:
         yield
     except errors as error:
@@ -40,9 +40,9 @@ def _lost(errors: tuple[type[Exception], ...], advice: str) -> Iterator[None]:
 
 
 def end_with_parent() -> None:
-    """Let this worker process end as soon as its parent has ended, however that ended.
+    """Let this worker process end when its parent process ends.
 
-    A killed parent closes no queue, so that a worker would compute or wait for ever.
+    A killed parent closes no queue. Without this its workers would compute or wait for ever.
     """
     Thread(target=_exit_after_parent, name="end with parent", daemon=True).start()
 
@@ -57,12 +57,12 @@ class Processes:
     """Runs steps on several processes of this machine."""
 
     def __init__(self, workers: int) -> None:
-        # spawned, not forked: a fork copies the locks of threads that it does not copy
+        # Spawned and not forked, because a fork copies the locks of threads but not the threads.
         self._executor = ProcessPoolExecutor(
             workers, get_context("spawn"), initializer=end_with_parent
         )
-        self._told = partial(
-            _lost,
+        self._watched = partial(
+            _report_loss,
             (BrokenExecutor,),
             f"one of {workers} processes ended before its answer, as when memory runs out; fewer "
             "--workers need less",
@@ -73,12 +73,12 @@ class Processes:
     ) -> Iterator[Answer]:
         """See `Pool`."""
         count = len(items)
-        with self._told():
-            answers = self._executor.map(_step, [function] * count, [recipe] * count, items)
+        with self._watched():
+            answers = self._executor.map(_run_step, [function] * count, [recipe] * count, items)
         return self._each(answers)
 
     def _each(self, answers: Iterator[Answer]) -> Iterator[Answer]:
-        with self._told():
+        with self._watched():
             yield from answers
 
     def close(self) -> None:
@@ -87,7 +87,10 @@ class Processes:
 
 
 class Cluster:
-    """On the workers of a Dask scheduler at that address."""
+    """Runs steps on the workers of a Dask scheduler; address : such as tcp://host:8786.
+
+    Raises InputError for an address that cannot be, and EmulatorError where no scheduler answers.
+    """
 
     def __init__(self, address: str) -> None:
         try:
@@ -99,7 +102,7 @@ class Cluster:
             raise EmulatorError(
                 f"--scheduler {address}: {error}; pip install 'road-load-bench[cluster]' brings it"
             ) from error
-        try:  # before a client starts its thread, which an error would leave behind
+        try:  # before the client starts its thread, which an error would leave behind
             scheme, place = parse_address(address)
             get_backend(scheme)
             parse_host_port(place)
@@ -112,8 +115,8 @@ class Cluster:
         except OSError as error:
             raise EmulatorError(f"--scheduler {address}: no scheduler answers ({error})") from error
         self._recipes: dict[str, Any] = {}
-        self._told = partial(
-            _lost,
+        self._watched = partial(
+            _report_loss,
             (distributed.KilledWorker, CommClosedError, CancelledError),
             f"--scheduler {address}: a worker or the scheduler ended before its answer",
         )
@@ -122,23 +125,23 @@ class Cluster:
         self, function: Callable[[Model, Item], Answer], recipe: Recipe, items: Sequence[Item]
     ) -> Iterator[Answer]:
         """See `Pool`."""
-        with self._told():
-            shared = self._given(recipe)
+        with self._watched():
+            shared = self._share(recipe)
             futures = [
-                self._client.submit(_step, function, shared, item, pure=False) for item in items
+                self._client.submit(_run_step, function, shared, item, pure=False) for item in items
             ]
         return self._each(futures)
 
     def _each(self, futures: Sequence[Any]) -> Iterator[Any]:
-        with self._told():
+        with self._watched():
             for future in futures:
                 yield future.result()
 
-    def _given(self, recipe: Recipe) -> Any:
-        """The recipe on the workers, sent once and kept there.
+    def _share(self, recipe: Recipe) -> Any:
+        """Send the recipe to the workers once, and keep it there.
 
-        Let go after a step and sent again for the next one under the same name, it can be freed
-        late, with the steps that wait for it.
+        A recipe that is freed after a step and sent again for the next step has the same name. Dask
+        may then free it late, with the steps that wait for it.
         """
         key = recipe.digest()
         if key not in self._recipes:
@@ -146,13 +149,13 @@ class Cluster:
         return self._recipes[key]
 
     def close(self) -> None:
-        """Leave the cluster, and nothing on it."""
+        """Free the recipes and leave the cluster."""
         self._recipes.clear()
         self._client.close()
 
 
-def pool_of(workers: int, scheduler: str | None = None) -> Pool:
-    """The pool that the options --workers and --scheduler ask for."""
+def make_pool(workers: int, scheduler: str | None = None) -> Pool:
+    """Make a pool of so many processes, or of a Dask scheduler's workers where one is given."""
     if scheduler is not None:
         return Cluster(scheduler)
     return Processes(workers) if workers > 1 else InProcess()

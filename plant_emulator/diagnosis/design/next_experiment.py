@@ -23,7 +23,7 @@ from plant_emulator.diagnosis.design.experiment_value import (
 )
 from plant_emulator.diagnosis.execution.pool import build_model
 from plant_emulator.diagnosis.fitting.evidence import DETECTABLE_NORM
-from plant_emulator.diagnosis.wording import listed, spoken
+from plant_emulator.diagnosis.wording import in_words, join_items
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -125,7 +125,7 @@ class Advice:
         if source and shown[source]:
             return f"Drive {source}: it would show {shown_of(shown[source], len(hidden))}."
         needs = self._needs(hidden)
-        what = listed(needs, MOST_NAMED, "; ")
+        what = join_items(needs, MOST_NAMED, "; ")
         return f"To see what these logs could not show: {what}." if needs else None
 
     def _narrow(self, explained: Explanation, location: Location) -> str | None:
@@ -152,7 +152,7 @@ class Advice:
             f"add what these logs lack: {', '.join(lacking)}" if lacking else "",
         )
         advised = "; ".join(part for part in parts if part)
-        return f"To narrow it down in the {spoken(subsystem)}: {advised}." if advised else None
+        return f"To narrow it down in the {in_words(subsystem)}: {advised}." if advised else None
 
     def _steady(self, null: FitResult) -> str:
         """Advise the run that determines the nuisance parameters best."""
@@ -206,7 +206,7 @@ def shown_of(names: Sequence[str], hidden: int) -> str:
     """Name the effects that a run shows, of so many that the logs could not."""
     if hidden == 1:
         return f"{names[0]}, which these logs could not"
-    shown = listed(names, MOST_NAMED)
+    shown = join_items(names, MOST_NAMED)
     return f"{len(names)} of the {hidden} effects that these logs could not: {shown}"
 
 
@@ -227,7 +227,7 @@ def separated(source: str, pairs: Sequence[tuple[str, str]], norms: Sequence[flo
 def undecided(pairs: Sequence[tuple[str, str]], needs: Sequence[str], *, tried: bool) -> str | None:
     """Say what would tell effects apart that no planned run does; None where nothing is known."""
     which = ", ".join(f"{name} from {other}" for name, other in pairs)
-    what = listed(needs, MOST_NAMED, "; ")
+    what = join_items(needs, MOST_NAMED, "; ")
     if tried:
         return f"No drive program tells {which}{f'; what would: {what}' if what else ''}."
     return f"What would tell {which}: {what}." if what else None

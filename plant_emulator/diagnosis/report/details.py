@@ -32,11 +32,11 @@ class Details:
 
     settings : what repeats the diagnosis: command, version, date, hashes of files, thresholds
     notes : what was noticed about the logs, a sentence each
-    rest : the unmodelled remainder; None for a machine that is modelled down to its noise
+    remainder : the unmodelled remainder; None for a machine that is modelled down to its noise
     """
 
     traces: tuple[Trace, ...]
     waterfall: tuple[Step, ...]
     settings: Mapping[str, str]
     notes: tuple[str, ...]
-    rest: Remainder | None = None
+    remainder: Remainder | None = None

@@ -12,19 +12,19 @@ from plant_emulator.diagnosis.report import html_tables as tables
 from plant_emulator.diagnosis.report import html_traces
 from plant_emulator.diagnosis.report.html_parts import code, scrolled
 from plant_emulator.diagnosis.report.html_pictures import line, waterfall
-from plant_emulator.diagnosis.report.html_remainder import rest_by_band
+from plant_emulator.diagnosis.report.html_remainder import remainder_by_band
 from plant_emulator.diagnosis.report.html_style import STYLE
 from plant_emulator.diagnosis.report.html_tables import PLUS_MINUS
 from plant_emulator.diagnosis.report.markup import Markup, join, tag
 from plant_emulator.diagnosis.wording import (
     KINDS,
     UNITS,
-    closed,
+    closed_share,
+    describe_location,
+    in_words,
     indistinguishable,
     logs_used,
     percent,
-    place,
-    spoken,
 )
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def html(answer: Answer, details: Details) -> str:
         _verdict(answer, units),
         _shrinkage(answer.gap, details),
         _location(answer.location, units),
-        _rest(details.rest),
+        _remainder(details.remainder),
         _effects(answer),
         _parameters(verdict.parameters),
         _limits(answer.undetectable),
@@ -90,8 +90,8 @@ def _verdict(answer: Answer, units: Mapping[str, str]) -> Markup:
     verdict = answer.verdict
     facts = {
         "Effects": ", ".join(verdict.effects),
-        "Where": place(answer.location, units),
-        "Gap closed on held-out runs": closed(answer.gap),
+        "Where": describe_location(answer.location, units),
+        "Gap closed on held-out runs": closed_share(answer.gap),
         "Confidence": _confidence(verdict.confidence),
         "Logs": logs_used(answer.logs),
     }
@@ -128,7 +128,7 @@ def _shrinkage(gap: HeldOutGap, details: Details) -> Markup:
         )
         drawn = scrolled(waterfall(details.waterfall), "Waterfall")
         parts.append(tag("figure", drawn, tag("figcaption", caption)))
-    share = closed(gap)
+    share = closed_share(gap)
     if share:
         parts.append(tag("p", tag("strong", f"Closed: {share}"), " of the gap above the noise."))
     if gap.noise_floor:
@@ -146,8 +146,10 @@ def _location(location: Location, units: Mapping[str, str]) -> Markup:
     return _section("Where the gap lies", *(parts or [tag("p", "No residual exceeds the noise.")]))
 
 
-def _rest(rest: Remainder | None) -> Markup:
-    return Markup("") if rest is None else _section("Unmodelled remainder", rest_by_band(rest))
+def _remainder(remainder: Remainder | None) -> Markup:
+    if remainder is None:
+        return Markup("")
+    return _section("Unmodelled remainder", remainder_by_band(remainder))
 
 
 def _effects(answer: Answer) -> Markup:
@@ -221,7 +223,7 @@ def _legend(traces: Sequence[Trace]) -> Markup:
 
 
 def _figure(trace: Trace, columns: int) -> Markup:
-    name = f"{spoken(trace.channel)} [{trace.unit}]"
+    name = f"{in_words(trace.channel)} [{trace.unit}]"
     drawn = scrolled(html_traces.draw(trace, columns), name)
     words = tag("figcaption", tag("strong", name), f": {html_traces.summary(trace)}")
     return tag("figure", words, drawn)

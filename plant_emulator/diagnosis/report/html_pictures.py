@@ -10,7 +10,7 @@ from math import ceil, floor, isfinite, log10
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.report.markup import Markup, join, tag
-from plant_emulator.diagnosis.wording import number, printable
+from plant_emulator.diagnosis.wording import number, replace_unprintable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -103,7 +103,7 @@ def _reading(step: Step) -> str:
 
 
 def _step(step: Step, before: Step | None, y: float, x: Callable[[float], float]) -> Markup:
-    label = printable(step.label)
+    label = replace_unprintable(step.label)
     if len(label) > LONGEST_LABEL:
         label = label[: LONGEST_LABEL - 1] + "\N{HORIZONTAL ELLIPSIS}"
     middle, ends = y + ROW / 2.0, _interval(step)

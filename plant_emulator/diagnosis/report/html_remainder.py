@@ -1,4 +1,4 @@
-"""The part of a report on what a machine modelled in outline leaves: power by frequency."""
+"""The unmodelled remainder in a report: its power by frequency."""
 
 from __future__ import annotations
 
@@ -15,30 +15,31 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.prediction.remainder import Remainder
 
 
-def rest_by_band(rest: Remainder) -> Markup:
-    """How much is left, and in which band."""
+def remainder_by_band(remainder: Remainder) -> Markup:
+    """How much a machine that is modelled in outline leaves, and in which bands."""
+    before, after = 100.0 * remainder.before, 100.0 * remainder.after
     words = (
-        f"Relative error norm(e)/norm(y) of the held-out {rest.channel}: "
-        f"{100.0 * rest.before:.2f} % with parameters re-estimated, {100.0 * rest.after:.2f} % "
-        f"with the effects found. Of that, {describe_band(rest)}."
+        f"Relative error norm(e)/norm(y) of the held-out {remainder.channel}: {before:.2f} % with "
+        f"re-estimated parameters, {after:.2f} % with the accepted effects. Of that, "
+        f"{describe_band(remainder)}."
     )
     heads = ["held-out runs", "share"]
-    if rest.fitted is not None:
+    if remainder.fitted is not None:
         heads[1:1] = ["fitted runs", "ratio"]
     by_band = table(
-        f"Power of the residual by frequency [{rest.unit}^2], with the effects found.",
+        f"Power of the residual by frequency [{remainder.unit}^2], with the accepted effects.",
         ["band [Hz]", *map(right, heads)],
-        [_band(rest, k) for k in range(len(BANDS))],
+        [_band(remainder, k) for k in range(len(BANDS))],
     )
     return join(tag("p", words), by_band)
 
 
-def _band(rest: Remainder, k: int) -> Markup:
+def _band(remainder: Remainder, k: int) -> Markup:
     low, high = BANDS[k]
-    power, whole = float(rest.held_out[k]), float(rest.held_out.sum())
+    power, whole = float(remainder.held_out[k]), float(remainder.held_out.sum())
     compared = []
-    if rest.fitted is not None:
-        own = float(rest.fitted[k])
+    if remainder.fitted is not None:
+        own = float(remainder.fitted[k])
         ratio = f"{power / own:.1f} {TIMES}" if own > 0.0 else ""
         compared = [cell(number(own)), cell(ratio)]
     share = power / whole if whole > 0.0 else 0.0

@@ -15,13 +15,13 @@ from plant_emulator.diagnosis.wording import (
     EXPLAINED,
     RESIDUAL,
     gap_rows,
+    in_words,
     number,
     own_name,
     percent,
     quantity,
     share_of,
     size,
-    spoken,
 )
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def gap_by_channel(gap: HeldOutGap, traces: Sequence[Trace]) -> Markup:
     rows = [
         tag(
             "tr",
-            row_head(spoken(channel)),
+            row_head(in_words(channel)),
             *(cell(_range_share(step.get(channel, nan))) for step in steps.values()),
             *(cell(text) for text in _pooled([t for t in traces if t.channel == channel], both)),
         )
@@ -131,7 +131,7 @@ def _map(
     rows = [
         tag(
             "tr",
-            row_head(spoken(channel)),
+            row_head(in_words(channel)),
             *(
                 _map_cell(cells.get((channel, name)), units.get(channel), (channel, name) == here)
                 for name in bins
@@ -139,7 +139,7 @@ def _map(
         )
         for channel in channels
     ]
-    return table(caption, ["channel", *(right(spoken(name)) for name in bins)], rows, "map")
+    return table(caption, ["channel", *(right(in_words(name)) for name in bins)], rows, "map")
 
 
 def _map_cell(found: Cell | None, unit: str | None, here: bool) -> Markup:
@@ -155,7 +155,7 @@ def _map_cell(found: Cell | None, unit: str | None, here: bool) -> Markup:
 def subsystems(location: Location) -> Markup:
     """The share of every subsystem in the residual, or in what the effects explain."""
     rows = [
-        tag("tr", row_head(spoken(name)), bar(percent(share), share))
+        tag("tr", row_head(in_words(name)), bar(percent(share), share))
         for name, share in location.shares.items()
     ]
     whole = share_of(location)
@@ -197,7 +197,7 @@ def _ranked(entry: RankedEffect, most: float) -> Markup:
     return tag(
         "tr",
         row_head(code(entry.effect)),
-        tag("td", spoken(entry.subsystem)),
+        tag("td", in_words(entry.subsystem)),
         tag("td", "yes" if entry.accepted else "no"),
         bar(evidence, entry.evidence / most if known else 0.0),
         cell("not computed" if entry.held_out_gain is None else percent(entry.held_out_gain)),

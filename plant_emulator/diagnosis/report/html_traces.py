@@ -20,7 +20,7 @@ from plant_emulator.diagnosis.report.html_pictures import (
     ticks,
 )
 from plant_emulator.diagnosis.report.markup import Markup, join, tag
-from plant_emulator.diagnosis.wording import number, printable, quantity, spoken
+from plant_emulator.diagnosis.wording import in_words, number, quantity, replace_unprintable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -94,8 +94,8 @@ def draw(trace: Trace, columns: int) -> Markup:
     marks = ticks(float(times[0]), float(times[-1]), 10)
     return picture(
         bottom + BELOW,
-        f"{spoken(trace.channel)} of {printable(trace.source)} over time, measured and predicted; "
-        + summary(trace),
+        f"{in_words(trace.channel)} of {replace_unprintable(trace.source)} over time, measured and "
+        f"predicted; {summary(trace)}",
         *(line(_at(x, t), TOP, _at(x, t), bottom, "grid") for t in marks),
         _panel(trace, found, x, columns),
         *strips,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from html import escape
 
-from plant_emulator.diagnosis.wording import printable
+from plant_emulator.diagnosis.wording import replace_unprintable
 
 EMPTY = frozenset({"meta", "line", "rect", "path", "circle", "br", "col"})
 
@@ -39,10 +39,10 @@ def join(*content: str) -> Markup:
 
 
 def _text(text: str) -> str:
-    return escape(printable(text), quote=False)
+    return escape(replace_unprintable(text), quote=False)
 
 
 def _attribute(value: str | float) -> str:
     if isinstance(value, str):
-        return escape(printable(value))
+        return escape(replace_unprintable(value))
     return f"{value:.2f}".rstrip("0").rstrip(".")

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 SHOWN = 5
 
 
-def ranked(explained: Explanation) -> list[Hypothesis]:
+def hypotheses_to_rank(explained: Explanation) -> list[Hypothesis]:
     """The effects to show, the best first: at least SHOWN, and all that count or are accepted.
 
     An effect that is accepted beside another one may have little evidence alone.
@@ -47,7 +47,7 @@ def with_random_effects(explained: Explanation) -> FitResult:
     )
 
 
-def rank(
+def ranked_effect(
     hypothesis: Hypothesis,
     explained: Explanation,
     accepted: Sequence[str],

@@ -36,9 +36,9 @@ def held_out_gap(
     """
     explained = gaps[effects]
     return HeldOutGap(
-        nominal=ranged(gaps[NOMINAL], runs),
-        recalibrated=ranged(gaps[()], runs),
-        explained=ranged(explained, runs),
+        nominal=nrmsd(gaps[NOMINAL], runs),
+        recalibrated=nrmsd(gaps[()], runs),
+        explained=nrmsd(explained, runs),
         noise_floor=noise_floor(gaps[()], runs),
         closed_fraction=None if reference is None else closed_fraction(reference, explained),
         closed_fraction_ci95=None
@@ -47,13 +47,13 @@ def held_out_gap(
     )
 
 
-def ranged(gap: Gap, runs: Sequence[MeasuredRun]) -> dict[str, float]:
+def nrmsd(gap: Gap, runs: Sequence[MeasuredRun]) -> dict[str, float]:
     """NRMSD of every channel: its rms over its measured range, held-out samples of all runs."""
     return dict(zip(gap.channels, _shares(gap, runs, gap.by_channel), strict=True))
 
 
 def noise_floor(gap: Gap, runs: Sequence[MeasuredRun]) -> dict[str, float]:
-    """The noise of every channel over its measured range, as `ranged`."""
+    """The noise of every channel over its measured range, as `nrmsd`."""
     return dict(zip(gap.channels, _shares(gap, runs, np.ones(len(gap.channels))), strict=True))
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.answer import ParameterDeviation, Verdict
 from plant_emulator.diagnosis.prediction.remainder import describe_band, describe_fall
-from plant_emulator.diagnosis.wording import number, percent, spoken
+from plant_emulator.diagnosis.wording import in_words, number, percent, quantity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -52,26 +52,30 @@ def statement(
     decision: Decision,
     candidates: Mapping[str, Candidate],
     closed: float | None,
-    place: str | None,
+    subsystem: str | None,
     *,
     terms: Terms | None = None,
-    rest: Remainder | None = None,
+    remainder: Remainder | None = None,
 ) -> str:
     """The verdict in one sentence.
 
-    closed : closed fraction of the held-out gap; place : subsystem that the gap lies in
+    closed : closed fraction of the held-out gap; subsystem : where the gap lies
     terms : by effect, the quantities that the field knows it by
-    rest : what a machine modelled in outline leaves beyond the noise
+    remainder : of a machine that is modelled in outline
     """
     match decision.kind:
         case "effect":
-            return _effects(decision, candidates, closed, terms or {}, rest)
+            return _effects(decision, candidates, closed, terms or {}, remainder)
         case "parameter":
             return _other_values(decision)
         case "none":
             return "The logs show no gap beyond the noise of the sensors."
-    where = "" if place is None else f" It lies in the {spoken(place)}."
-    where = where if rest is None else f" Of the held-out {rest.channel}, {describe_band(rest)}."
+    where = "" if subsystem is None else f" It lies in the {in_words(subsystem)}."
+    where = (
+        where
+        if remainder is None
+        else f" Of the held-out {remainder.channel}, {describe_band(remainder)}."
+    )
     return f"There is a gap whose cause is unknown: {decision.reason}.{where}"
 
 
@@ -80,12 +84,12 @@ def _effects(
     candidates: Mapping[str, Candidate],
     closed: float | None,
     terms: Terms,
-    rest: Remainder | None,
+    remainder: Remainder | None,
 ) -> str:
     named = [_named(name, candidates[name], terms.get(name, ())) for name in decision.effects]
     share = "" if closed is None else f"the held-out gap closes by {percent(closed)}"
-    if rest is not None:
-        share = f"{describe_fall(rest)}; {describe_band(rest)}"
+    if remainder is not None:
+        share = f"{describe_fall(remainder)}; {describe_band(remainder)}"
     them = "it" if len(decision.effects) == 1 else "them"
     more = f"; with {them} {share}" if share else ""
     return f"The machine has what the model lacks: {' and '.join(named)}{more}."
@@ -95,16 +99,19 @@ def _named(name: str, candidate: Candidate, terms: Sequence[Quantity]) -> str:
     """An effect, what it is, and its terms."""
     title = f"{candidate.title[:1].lower()}{candidate.title[1:]}"
     values = ", ".join(f"{number(t.value, 4)} {t.unit} {t.name}" for t in terms)
-    chance = ", by chance, so that no simulation follows it" if candidate.stochastic else ""
+    chance = ", random, so that no simulation can follow it" if candidate.stochastic else ""
     return f"{name} ({title}{chance}{': ' if values else ''}{values})"
 
 
 def _other_values(decision: Decision) -> str:
     first = decision.deviations[0]
-    change = 100.0 * (first.estimated / first.nominal - 1.0)
+    if first.nominal:
+        change = f"{100.0 * (first.estimated / first.nominal - 1.0):+.1f} %"
+    else:
+        change = quantity(first.estimated, first.unit, 4)
     others = len(decision.deviations) - 1
     more = "" if others == 0 else f" and {others} other parameters"
     return (
-        f"The equations hold with other values: {first.name} is {change:+.1f} %{more}; "
+        f"The equations hold with other values: {first.name} is {change}{more}; "
         "no unmodelled effect is needed."
     )

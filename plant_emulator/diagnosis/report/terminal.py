@@ -15,16 +15,16 @@ from plant_emulator.diagnosis.wording import (
     EXPLAINED_GAP,
     KINDS,
     UNITS,
-    closed,
-    deviation,
+    closed_share,
+    describe_deviation,
+    describe_location,
     gap_rows,
     indistinguishable,
     logs_used,
     number,
     own_name,
     percent,
-    place,
-    printable,
+    replace_unprintable,
     size,
     times_noise,
 )
@@ -76,7 +76,7 @@ def _paragraph(text: str, width: int, most: int, label: str = "") -> list[str]:
     """A text behind a label in at most `most` lines; three dots end a text that is cut."""
     first = f"{label:9}" if label else ""
     rows = wrap(
-        WITHIN_QUANTITY.sub(UNBROKEN, printable(text)),
+        WITHIN_QUANTITY.sub(UNBROKEN, replace_unprintable(text)),
         width,
         initial_indent=first,
         subsequent_indent=" " * len(first),
@@ -109,7 +109,7 @@ def _verdict(answer: Answer, width: int, most: int = STATEMENT) -> list[str]:
     if verdict.confidence is not None:
         parts.append(f"confidence {percent(verdict.confidence)}")
     parts.append(logs_used(answer.logs))
-    where = place(answer.location, UNITS)
+    where = describe_location(answer.location, UNITS)
     return [
         ", ".join(parts),
         *_paragraph(verdict.statement, width, most),
@@ -146,7 +146,7 @@ def _row(entry: RankedEffect) -> str:
     gain = "" if entry.held_out_gain is None else percent(entry.held_out_gain)
     evidence = f"{entry.evidence:.{EVIDENCE_DECIMALS}f}" if isfinite(entry.evidence) else ""
     first = size(entry.parameters[0]) if entry.parameters else ""
-    name = printable(entry.effect)[: NAME - 2]
+    name = replace_unprintable(entry.effect)[: NAME - 2]
     return f"{mark} {name:{NAME - 2}}{evidence:>{CELL}}{gain:>7}  {first}"
 
 
@@ -177,7 +177,7 @@ def _shrinkage(gap: HeldOutGap, width: int) -> list[str]:
         marks = "#" * max(1, round(bar * (ratio or 0.0) / most))
         cells = "".join(f"{_range_share(row.get(c, nan)):>{CELL}}" for c in channels)
         drawn.append(f"{name:{LABEL}}{number(ratio):>5} {marks:{bar + 1}}{cells}")
-    share = closed(gap)
+    share = closed_share(gap)
     return drawn + ([f"closed: {share}"] if share else [])
 
 
@@ -189,7 +189,7 @@ def _short(channels: Sequence[str]) -> list[str]:
     """One word for each channel: its last word, or its first where two channels end alike."""
     last = [name.rpartition("_")[2] for name in channels]
     return [
-        printable(end if last.count(end) == 1 else name.partition("_")[0])[: CELL - 1]
+        replace_unprintable(end if last.count(end) == 1 else name.partition("_")[0])[: CELL - 1]
         for name, end in zip(channels, last, strict=True)
     ]
 
@@ -197,7 +197,7 @@ def _short(channels: Sequence[str]) -> list[str]:
 def _rest(answer: Answer, width: int) -> list[str]:
     """Parameter deviations, effects that these logs cannot show, and the next experiment."""
     verdict = answer.verdict
-    deviations = [deviation(p) for p in verdict.parameters]
+    deviations = [describe_deviation(p) for p in verdict.parameters]
     names = [p.name for p in verdict.parameters]
     rows = _listed(deviations, width, 2 if verdict.kind == "parameter" else 1, "deviates", names)
     rows += _unseen(answer.undetectable, width, 1 if len(verdict.effects) > 1 else 2)

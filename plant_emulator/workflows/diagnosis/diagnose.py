@@ -19,7 +19,7 @@ from plant_emulator.parameter_sets import DEFAULT, with_effects
 from plant_emulator.workflows.diagnosis.calibration import relative_law_errors, trial_cases
 from plant_emulator.workflows.diagnosis.runs import axis_runs, bench_runs
 from plant_emulator.workflows.diagnosis.saved_set import parameter_set
-from plant_emulator.workflows.workers import pool_of
+from plant_emulator.workflows.workers import make_pool
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -126,7 +126,7 @@ def diagnose(
         runs = axis_runs(logs, hold_out, without=without)
     else:
         runs = bench_runs(logs, hold_out, given, without=without, own=effects, reference=reference)
-    pool = pool_of(workers, scheduler)
+    pool = make_pool(workers, scheduler)
     try:
         with threadpool_limits(1):
             findings = Diagnose(

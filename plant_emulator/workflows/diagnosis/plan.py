@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 FITTED_SHARE = 0.6
 
 
-def plan_of(runs: int, count: int) -> Plan:
+def plan_of_runs(runs: int, count: int) -> Plan:
     """Plan to predict the runs after the first `count`; without any, each run in turn."""
     fitted = tuple(range(count))
     if runs > count:
@@ -32,14 +32,14 @@ def plan_of(runs: int, count: int) -> Plan:
     return Plan(fitted=fitted, folds=turns)
 
 
-def planned(recordings: Sequence[Recording], count: int) -> tuple[list[Recording], Plan]:
+def plan_recordings(recordings: Sequence[Recording], count: int) -> tuple[list[Recording], Plan]:
     """The runs of a diagnosis and the plan for them; the first `count` recordings are to be fitted.
 
     The recordings after these are predicted. Without any, each of several recordings is predicted
     in turn. A single recording is fitted on its first part and predicted on the rest.
     """
     if len(recordings) > 1:
-        return list(recordings), plan_of(len(recordings), count)
+        return list(recordings), plan_of_runs(len(recordings), count)
     (whole,) = recordings
     end = whole.log.time[0] + FITTED_SHARE * float(np.ptp(whole.log.time))
     first = whole.log.time <= end

@@ -16,7 +16,7 @@ from plant_emulator.errors import DiagnosisError
 from plant_emulator.signals.axis_log import AxisLog
 from plant_emulator.signals.log import Log
 from plant_emulator.workflows import axis_reader
-from plant_emulator.workflows.diagnosis.plan import plan_of, planned
+from plant_emulator.workflows.diagnosis.plan import plan_of_runs, plan_recordings
 from plant_emulator.workflows.loading import admitted, distinct, unlabelled
 from plant_emulator.workflows.provenance import file_hash, program_version, today
 
@@ -69,7 +69,7 @@ def bench_runs(
     recordings, notes = admitted(
         [_bench_source(one) for one in (*logs, *held_out)], parameters, reference
     )
-    recordings, plan = planned(recordings, len(logs))
+    recordings, plan = plan_recordings(recordings, len(logs))
     settings = {
         "parameters": parameters.name,
         "without": ", ".join(without) or "-",
@@ -98,7 +98,7 @@ def axis_runs(
             f"{read[0].source}: one run of an axis cannot be held out; give another with --hold-out"
         )
     _check_names(without, AXIS_EFFECTS)
-    plan = plan_of(len(read), len(logs))
+    plan = plan_of_runs(len(read), len(logs))
     return Runs(
         recipe=AxisRecipe(tuple(read), fitted=plan.fitted, without=tuple(without)),
         plan=plan,

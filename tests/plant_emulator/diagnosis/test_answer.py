@@ -11,8 +11,8 @@ from plant_emulator.diagnosis.machine import MeasuredRun
 from plant_emulator.diagnosis.prediction.gap import Prediction, measure_gap
 from plant_emulator.diagnosis.prediction.trace import traces
 from plant_emulator.diagnosis.report.html_traces import path, rms
-from plant_emulator.diagnosis.report.ranking import rank, ranked
-from plant_emulator.diagnosis.report.shrinkage import noise_floor, ranged
+from plant_emulator.diagnosis.report.ranking import hypotheses_to_rank, ranked_effect
+from plant_emulator.diagnosis.report.shrinkage import noise_floor, nrmsd
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.test_contest import effect
 
@@ -50,7 +50,7 @@ def explanation(falls: dict[str, float], accepted: tuple[str, ...]) -> Explanati
 def test_accepted_effect_without_evidence_alone_is_ranked() -> None:
     """f shows beside a only: alone it lowers the cost least of all."""
     falls = {"f": 1.0, "a": 300.0, "b": 20.0, "c": 15.0, "d": 10.0, "e": 5.0}
-    names = [c.effect for c in ranked(explanation(falls, ("a", "f")))]
+    names = [c.effect for c in hypotheses_to_rank(explanation(falls, ("a", "f")))]
     assert names == ["a", "b", "c", "d", "e", "f"]
 
 
@@ -61,14 +61,14 @@ def test_standard_error_of_a_size_holds_that_of_its_law(size: float, law: float)
     sized = {"values": {"cube_size": size}, "standard_errors": {"cube_size": 0.3}}
     found = replace(found, final=replace(found.final, **sized))
     (one,) = found.hypotheses
-    row = rank(one, found, found.named, effect("cube"), law_errors={"cube_size": 0.5})
+    row = ranked_effect(one, found, found.named, effect("cube"), law_errors={"cube_size": 0.5})
     (told,) = row.parameters
     assert told.standard_error == pytest.approx((0.3**2 + law**2) ** 0.5)
 
 
 def test_effects_of_no_account_beyond_a_few_are_not_ranked() -> None:
     falls = {"f": 1.0, "a": 300.0, "b": 20.0, "c": 15.0, "d": 10.0, "e": 5.0}
-    names = [c.effect for c in ranked(explanation(falls, ("a",)))]
+    names = [c.effect for c in hypotheses_to_rank(explanation(falls, ("a",)))]
     assert names == ["a", "b", "c", "d", "e"]
 
 
@@ -96,7 +96,7 @@ def test_relative_gap_is_pooled_rms_over_the_range_of_held_out_samples() -> None
     """Residuals of 6 A and 4 A, 50 each: rms sqrt(26) A; held out lie 400 A to 990 A."""
     runs, predictions = halves()
     found = measure_gap(runs, predictions, [10, 10])
-    assert ranged(found, runs) == {"y": pytest.approx(np.sqrt(26.0) / 590.0)}
+    assert nrmsd(found, runs) == {"y": pytest.approx(np.sqrt(26.0) / 590.0)}
     assert noise_floor(found, runs) == {"y": pytest.approx(np.sqrt(2.5) / 590.0)}
 
 

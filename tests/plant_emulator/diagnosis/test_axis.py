@@ -24,7 +24,7 @@ from plant_emulator.diagnosis.prediction.held_out import NOMINAL, HeldOut, Plan
 from plant_emulator.errors import LogError
 from plant_emulator.signals.axis_log import AxisLog
 from plant_emulator.signals.frequency_bands import power
-from plant_emulator.workflows.diagnosis.plan import plan_of
+from plant_emulator.workflows.diagnosis.plan import plan_of_runs
 
 spec = importlib.util.spec_from_file_location(
     "axis_truth", Path(__file__).with_name("axis_truth.py")
@@ -305,7 +305,7 @@ def test_two_machines_are_told_and_no_effect_is_named() -> None:
     """80 kg, and 20 kg of which each log alone agrees with the equations."""
     lighter = truth.log(lambda _q, _v, a: -60.0 * a, phase=0.7, seed=2)
     recipe = AxisRecipe((truth.log(), lighter), fitted=(0, 1))
-    found = Diagnose(InProcess(), recipe, plan_of(2, 2), settings={}).diagnose().answer.verdict
+    found = Diagnose(InProcess(), recipe, plan_of_runs(2, 2), settings={}).diagnose().answer.verdict
     assert (found.kind, found.effects) == ("unknown", ())
     masses = r"inertia is (\S+) .* kg in axis 1 and (\S+) .* kg in axis 2"
     told = re.search(masses, found.statement)

@@ -4,7 +4,7 @@ import pytest
 
 from plant_emulator.diagnosis.report import terminal
 from plant_emulator.diagnosis.report.document import from_json
-from plant_emulator.diagnosis.wording import number, percent, with_error
+from plant_emulator.diagnosis.wording import number, percent, value_with_error
 from tests.plant_emulator.diagnosis import answers
 
 
@@ -181,7 +181,7 @@ def test_logs_held_out_in_turn_are_told_as_such():
     ],
 )
 def test_value_is_written_to_the_second_digit_of_its_error(value, error, text):
-    assert with_error(value, error) == text
+    assert value_with_error(value, error) == text
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from plant_emulator.errors import DiagnosisError
 from plant_emulator.recordings.preflight import preflight
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
-from plant_emulator.workflows.diagnosis.plan import planned
+from plant_emulator.workflows.diagnosis.plan import plan_recordings
 from plant_emulator.workflows.loading import unlabelled
 from register_maps.signals import LOG_COLUMNS
 
@@ -96,10 +96,10 @@ def test_single_log_of_which_a_part_stands_still_is_refused(
     whole = Log(time, signals, "run.csv")
     use = preflight(whole, 62.6).use
     with pytest.raises(DiagnosisError, match=f"run.csv: no held-out run is possible: {told}"):
-        planned([recording(whole, use=use)], 1)
+        plan_recordings([recording(whole, use=use)], 1)
 
 
 def test_single_log_that_moves_in_both_parts_is_taken(bench_log: BenchLog) -> None:
-    runs, plan = planned([recording(bench_log("bench_practice/practice_004/program2"))], 1)
+    runs, plan = plan_recordings([recording(bench_log("bench_practice/practice_004/program2"))], 1)
     assert len(runs) == 2
     assert plan.as_fitted

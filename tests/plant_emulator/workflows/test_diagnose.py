@@ -12,7 +12,7 @@ from plant_emulator.cli import main
 from plant_emulator.errors import DiagnosisError
 from plant_emulator.signals.log import Log
 from plant_emulator.workflows.diagnosis.diagnose import Diagnosis, diagnose
-from plant_emulator.workflows.diagnosis.plan import plan_of
+from plant_emulator.workflows.diagnosis.plan import plan_of_runs
 from tests.plant_emulator.diagnosis import axis_truth
 
 HIDDEN = "torque_sensor_offset"
@@ -95,5 +95,5 @@ def test_axis_has_no_parameter_set() -> None:
 
 
 def test_each_of_several_logs_is_predicted_from_the_others() -> None:
-    assert plan_of(3, 3).folds == (((1, 2), (0,)), ((0, 2), (1,)), ((0, 1), (2,)))
-    assert plan_of(3, 2).folds == (((0, 1), (2,)),)
+    assert plan_of_runs(3, 3).folds == (((1, 2), (0,)), ((0, 2), (1,)), ((0, 1), (2,)))
+    assert plan_of_runs(3, 2).folds == (((0, 1), (2,)),)
