@@ -113,7 +113,7 @@ class Diagnose:
 
     settings : lines for the report on how to repeat the diagnosis, by name
     cases : of a blind trial, for the confidence; None: there are none of this machine
-    law_errors : relative standard errors of sizes by name, see `calibration.model_form_error`
+    model_form_errors : relative, of the sizes by name; see `calibration.model_form_error`
     notes : on the logs, for the report
     progress : called with the label of each step and its done share [1]
     """
@@ -126,7 +126,7 @@ class Diagnose:
         *,
         settings: Mapping[str, str],
         cases: Sequence[Case] | None = None,
-        law_errors: Mapping[str, float] | None = None,
+        model_form_errors: Mapping[str, float] | None = None,
         notes: Sequence[str] = (),
         progress: Progress | None = None,
     ) -> None:
@@ -139,7 +139,7 @@ class Diagnose:
         self.model, self.plan = self.runner.model, plan
         self.settings, self.notes = settings, tuple(notes)
         self.cases = None if cases is None else tuple(cases)
-        self.law_errors = law_errors or {}
+        self.model_form_errors = model_form_errors or {}
 
     def diagnose(self) -> Findings:
         """Test the hypotheses, predict the held-out runs, locate the gap; give the findings."""
@@ -242,7 +242,7 @@ class Diagnose:
             tests.decision.effects,
             self.model.candidates[hypothesis.effect],
             gain=gain,
-            law_errors=self.law_errors,
+            model_form_errors=self.model_form_errors,
         )
         return replace(entry, parameters=(*entry.parameters, *derived))
 

@@ -1,4 +1,4 @@
-"""How often an answer of so much evidence was right, among simulated cases of known truth."""
+"""The confidence in a verdict: how often one like it was right, among cases of known truth."""
 
 from __future__ import annotations
 
@@ -11,28 +11,30 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A verdict of a blind trial: its kind, its evidence, whether it was right."""
+    """A verdict of a blind trial: its kind, its evidence, and whether it was right."""
 
     kind: str
     evidence: float
     right: bool
 
 
-# Cases that a share is taken of at least, if there are so many of a kind.
-FEWEST = 20
+# A share is taken of at least so many cases, if there are so many of a kind.
+FEWEST_CASES = 20
 
 
 def confidence(cases: Sequence[Case], kind: str, evidence: float) -> float | None:
-    """Share of right answers among the cases of this kind with at least this evidence; None: there
-    are none of this kind.
+    """Share of right verdicts of this kind with at least this evidence [1].
 
-    Laplace's rule of succession, (right + 1) / (cases + 2): few cases give no certainty. Of an
-    effect with more evidence than FEWEST cases had, these count. The evidence of a verdict that
-    names nothing says nothing: all cases of its kind count.
+    (right + 1) / (cases + 2)                                    (Laplace's rule of succession)
+
+    Few cases thus give no certainty. If fewer than FEWEST_CASES effects had so much evidence, the
+    FEWEST_CASES with the most count. The evidence of a verdict that names no effect says nothing:
+    all cases of its kind count.
+    None: there are no cases of this kind
     """
     same = sorted((c for c in cases if c.kind == kind), key=lambda c: -c.evidence)
     if not same:
         return None
     if kind == "effect":
-        same = [c for k, c in enumerate(same) if k < FEWEST or c.evidence >= evidence]
+        same = [c for k, c in enumerate(same) if k < FEWEST_CASES or c.evidence >= evidence]
     return (sum(c.right for c in same) + 1.0) / (len(same) + 2.0)

@@ -1,9 +1,13 @@
-"""How far the size of an effect may be off because the machine follows another law of it.
+"""The model-form error: how far a size may be off because the machine follows another law.
 
-A standard error of a fit holds the noise, not that the machine's oil or tyre may follow another
-equation than the library's. How much that matters shows where the truth is known: effects hidden
-by other laws, fitted by the library's. Their deviation joins the standard error, as the error of a
-method joins that of a reading (JCGM 100:2008, 5.1.2 and G.3).
+The standard error of a fit contains the noise only. The machine's oil or tyre may follow another
+equation than the library's. Cases of known truth show how much that matters: effects that are
+hidden by other laws and fitted by the library's. Their deviation joins the standard error,
+
+    s^2 = s_fit^2 + (e * reference size)^2
+
+as the error of a method joins that of a reading (JCGM 100:2008, 5.1.2 and G.3); e is the relative
+error of `model_form_errors`.
 """
 
 from __future__ import annotations
@@ -17,15 +21,17 @@ from scipy.special import ndtri, stdtrit
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-# Of the intervals that are to hold.
+# Quantile up to which the widened intervals hold.
 PROBABILITY = 0.975
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sized:
-    """A size hidden by another law, and what the library's law took it for, both in its unit.
+class EstimatedSize:
+    """A size of an effect that another law hides, and its estimate by the library's law.
 
-    name : of the parameter, the effect's name before it; plausible : size that is usual for it
+    name : of the parameter, behind the name of its effect
+    true, estimated, standard_error : [its unit]
+    plausible : usual size of the effect [its unit]
     """
 
     name: str
@@ -35,31 +41,28 @@ class Sized:
     plausible: float
 
 
-def law_errors(cases: Sequence[Sized]) -> dict[str, float]:
-    """Standard error of each size that other laws make, relative to `scale` of the estimate.
+def model_form_errors(cases: Sequence[EstimatedSize]) -> dict[str, float]:
+    """Standard error of each size that other laws make, relative to its reference size [1].
 
-    The root mean square of what deviates beyond the noise, widened by Student's t over the normal
-    quantile: it is known from a few cases only.
+    It is the root mean square of what deviates beyond the noise. Few cases are known, so it is
+    widened by the ratio of Student's quantile to the normal one.
     """
-    return {name: _relative([c for c in cases if c.name == name]) for name in _names(cases)}
+    names = sorted({c.name for c in cases})
+    return {name: _relative_error([c for c in cases if c.name == name]) for name in names}
 
 
-def scale(estimated: float, plausible: float) -> float:
-    """What a law's error is relative to: the estimate, but no less than the plausible size.
+def reference_size(estimated: float, plausible: float) -> float:
+    """Size that a model-form error is relative to: the estimate, or the larger plausible size.
 
-    What another law takes from a size it may take nearly all of.
+    Another law may take nearly all of a size, so that the estimate alone would be too small.
     """
     return max(abs(estimated), plausible)
 
 
-def _names(cases: Sequence[Sized]) -> list[str]:
-    return sorted({c.name for c in cases})
-
-
-def _relative(cases: Sequence[Sized]) -> float:
+def _relative_error(cases: Sequence[EstimatedSize]) -> float:
     squares = [
         max(0.0, (c.true - c.estimated) ** 2 - c.standard_error**2)
-        / scale(c.estimated, c.plausible) ** 2
+        / reference_size(c.estimated, c.plausible) ** 2
         for c in cases
     ]
     widened = stdtrit(len(cases), PROBABILITY) / ndtri(PROBABILITY)

@@ -22,7 +22,7 @@ import numpy as np
 from plant_emulator.diagnosis.fitting.evidence import CLASS_MARGIN, DETECTABLE_NORM
 from plant_emulator.diagnosis.fitting.joint_fit import linearise
 from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
-from plant_emulator.diagnosis.fitting.signature import SIZES, bounded, signature
+from plant_emulator.diagnosis.fitting.signature import SIZES, bounded_size, signature
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -139,7 +139,7 @@ def smallest(norms: Sequence[tuple[float, float]]) -> float:
 def reached(candidate: Candidate, factor: float) -> float:
     """What of so many plausible sizes the bounds of an effect leave, in plausible sizes."""
     return max(
-        (bounded(u, neutral, factor) - neutral) / (u.start - neutral)
+        (bounded_size(u, neutral, factor) - neutral) / (u.start - neutral)
         for u in candidate.sizes
         for neutral in (candidate.neutral[u.name],)
     )
@@ -167,7 +167,7 @@ def effect_detectability(found: DetectionLimit, candidate: Candidate) -> EffectD
     """Turn the limits of an effect into its own units."""
     seen = isfinite(found.smallest_size)
     least = {
-        u.name: bounded(u, candidate.neutral[u.name], found.smallest_size) if seen else None
+        u.name: bounded_size(u, candidate.neutral[u.name], found.smallest_size) if seen else None
         for u in candidate.sizes
     }
     return EffectDetectability(
@@ -189,8 +189,8 @@ def _own_names(values: Mapping[str, Value], candidate: Candidate) -> dict[str, V
 
 def _hidden_up_to(found: DetectionLimit, candidate: Candidate) -> dict[str, float]:
     """The largest sizes that were tried of an effect that acts, where its bounds allow more."""
-    tried = {u.name: bounded(u, candidate.neutral[u.name], SIZES[-1]) for u in candidate.sizes}
-    ends = {u.name: bounded(u, candidate.neutral[u.name], inf) for u in candidate.sizes}
+    tried = {u.name: bounded_size(u, candidate.neutral[u.name], SIZES[-1]) for u in candidate.sizes}
+    ends = {u.name: bounded_size(u, candidate.neutral[u.name], inf) for u in candidate.sizes}
     return {
         name: value
         for name, value in tried.items()

@@ -29,7 +29,7 @@ import numpy as np
 from plant_emulator.diagnosis.fitting.evidence import DETECTABLE_NORM
 from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
 from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
-from plant_emulator.diagnosis.fitting.signature import bounded, signs
+from plant_emulator.diagnosis.fitting.signature import bounded_size, signs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -153,7 +153,7 @@ def _signature_norm(
     own = {u.name: u.start for u in (*candidate.states, *candidate.shapes)}
     norms = []
     for sign in signs(candidate.sizes):
-        sizes = {u.name: bounded(u, candidate.neutral[u.name], sign) for u in candidate.sizes}
+        sizes = {u.name: bounded_size(u, candidate.neutral[u.name], sign) for u in candidate.sizes}
         rows = [
             model.residual(k, (*fitted.effects, name))({**fitted.values, **state, **own, **sizes})
             for k, state in zip(runs, fitted.states, strict=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.fitting.joint_fit import fit, joint_unknowns, linearise
 from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
-from plant_emulator.diagnosis.fitting.signature import signs, sized
+from plant_emulator.diagnosis.fitting.signature import signs, values_at_size
 from plant_emulator.diagnosis.fitting.valleys import best_states, loss_of, whole
 from plant_emulator.estimation.robust_scan import cauchy_loss
 
@@ -116,7 +116,7 @@ def in_place(
     states = [{**state, **own} for state in place.states]
     tries = []
     for size in (sign * z for z in PLACES for sign in signs(candidate.sizes)):
-        values = {**place.values, **sized(candidate, size)}
+        values = {**place.values, **values_at_size(candidate, size)}
         there = whole(model, effects, runs, values, states)
         tries.append((cauchy_loss(there), values, states))
         moved, after = tangents.shifted(tangents.projection(there - before), len(states))
@@ -144,7 +144,7 @@ def from_nominal(model: Model, effect: str, base: FitResult, runs: Sequence[int]
     own = {u.name: u.start for u in candidate.states}
     states = [{**state, **own} for state in base.states]
     starts = [
-        {**nominal, **sized(candidate, sign * size)}
+        {**nominal, **values_at_size(candidate, sign * size)}
         for size in FAR_SIZES
         for sign in signs(candidate.sizes)
     ]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from plant_emulator.diagnosis.fitting.elsewhere import smoothed
 from plant_emulator.diagnosis.fitting.evidence import excess
 from plant_emulator.diagnosis.fitting.joint_fit import WORTHWHILE_FALL, fit
-from plant_emulator.diagnosis.fitting.signature import FAR, signs, sized
+from plant_emulator.diagnosis.fitting.signature import FAR, signs, values_at_size
 from plant_emulator.diagnosis.fitting.valleys import best_sizes, best_states
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def glance(
 def glance_far(
     model: Model, found: Signature, base: FitResult, runs: Sequence[int], near: Estimate
 ) -> FitResult | None:
-    """The same from a larger size; None where the signature has none.
+    """A first look at the joint fit of one more effect, from a larger size; None: it has none.
 
     On with wide slopes where it stops on the way, for the way back from where the drift has gone to
     imitate an effect is rough; not where nothing is in the way, nor from where none leads back.
@@ -86,7 +86,14 @@ def patient(model: Model, found: Signature, base: FitResult, runs: Sequence[int]
     ]
     effects = (*base.effects, found.effect)
     tries = [
-        fit(model, effects, runs, {**base.values, **sized(candidate, sign * FAR)}, states, PATIENT)
+        fit(
+            model,
+            effects,
+            runs,
+            {**base.values, **values_at_size(candidate, sign * FAR)},
+            states,
+            PATIENT,
+        )
         for sign in signs(candidate.sizes)
     ]
     return min(tries, key=lambda p: p.cost)

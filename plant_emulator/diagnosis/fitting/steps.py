@@ -62,14 +62,14 @@ def contend(model: Model, task: Task) -> FitResult:
 
 
 def contend_far(model: Model, task: Task) -> FitResult | None:
-    """The same from a larger size."""
+    """A first look at the joint fit of an effect, from the larger size of its signature."""
     assert task.signature is not None
     near = _tangents(model, task).estimate
     return glance_far(model, task.signature, task.base, task.runs, near)
 
 
 def plod(model: Model, task: Task) -> FitResult:
-    """The same with more steps, from a size on either side."""
+    """The joint fit of an effect with more steps, from a size on either side."""
     assert task.signature is not None
     return patient(model, task.signature, task.base, task.runs)
 

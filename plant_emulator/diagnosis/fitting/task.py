@@ -1,4 +1,4 @@
-"""One fit of a diagnosis as plain data, for a pool to run."""
+"""One task of a diagnosis as plain data, for a pool to run."""
 
 from __future__ import annotations
 
@@ -12,11 +12,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """One step: an effect, or none, on top of a fit, on these runs.
+    """What a step of the diagnosis is asked to do.
 
-    signature : where a joint fit starts from, if it has been computed
-    number : of several starts
-    known : runs that `base` is a fit of, where it is not one of all
+    base : fit that the step begins with
+    runs : that the step fits
+    effect : that comes in on top of the base; empty: none
+    signature : of the effect, which gives a start; None: it has not been computed
+    number : of the start, where there are several
+    known : runs that the base was fitted to, where these are not all
     """
 
     base: FitResult

@@ -7,7 +7,7 @@ from math import hypot
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.answer import Quantity, RankedEffect, Undetectable
-from plant_emulator.diagnosis.calibration.model_form_error import scale
+from plant_emulator.diagnosis.calibration.model_form_error import reference_size
 from plant_emulator.diagnosis.fitting.evidence import DETECTABLE_NORM, EVIDENCE_THRESHOLD
 
 if TYPE_CHECKING:
@@ -54,16 +54,16 @@ def ranked_effect(
     candidate: Candidate,
     *,
     gain: float | None = None,
-    law_errors: Mapping[str, float] | None = None,
+    model_form_errors: Mapping[str, float] | None = None,
 ) -> RankedEffect:
     """One effect of the ranking; an accepted effect has its sizes from the final fit.
 
     gain : closed fraction with this effect alone; None: not predicted
-    law_errors : relative standard error of every size by name, see `law_errors`
+    model_form_errors : relative, of every size by name; see `calibration.model_form_error`
     """
     name = hypothesis.effect
     point = with_random_effects(explained) if name in accepted else hypothesis.fit
-    sizes = () if point is None else _sizes(point, candidate, law_errors or {})
+    sizes = () if point is None else _sizes(point, candidate, model_form_errors or {})
     return RankedEffect(
         effect=name,
         subsystem=candidate.subsystem,
@@ -75,7 +75,7 @@ def ranked_effect(
 
 
 def _sizes(
-    point: FitResult, candidate: Candidate, law_errors: Mapping[str, float]
+    point: FitResult, candidate: Candidate, model_form_errors: Mapping[str, float]
 ) -> Iterator[Quantity]:
     """Sizes and shapes of an effect in a fit; the standard errors hold the model-form error."""
     usual = {u.name: abs(u.start - candidate.neutral[u.name]) for u in candidate.sizes}
@@ -83,11 +83,11 @@ def _sizes(
     shapes = () if candidate.stochastic else candidate.shapes
     for name in (u.name for u in (*candidate.sizes, *shapes)):
         value = point.values[name]
-        law_error = law_errors.get(name, 0.0) * scale(value, usual.get(name, 0.0))
+        form_error = model_form_errors.get(name, 0.0) * reference_size(value, usual.get(name, 0.0))
         yield Quantity(
             name=name.removeprefix(f"{candidate.name}_"),
             value=value,
-            standard_error=hypot(point.standard_errors[name], law_error),
+            standard_error=hypot(point.standard_errors[name], form_error),
             unit=candidate.units[name],
         )
 

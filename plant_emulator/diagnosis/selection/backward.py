@@ -64,7 +64,7 @@ class Backward:
         return self._needed(self.rounds.restarts.followed(found, to_noise=False), null)
 
     def _needed(self, final: FitResult, null: FitResult) -> tuple[FitResult, dict[str, float]]:
-        """The same of a fit as it is."""
+        """A fit without an effect that another has made needless, as `missed` gives it."""
         costs: dict[str, float] = {}
         if len(final.effects) < 2:
             return final, costs

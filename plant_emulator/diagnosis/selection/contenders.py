@@ -53,7 +53,7 @@ def beside(point: FitResult, base: FitResult) -> Hypothesis:
 
 
 def better_of(first: Sequence[Hypothesis], second: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Of two fits of the same effect the better one."""
+    """Each effect with the better of its two fits."""
     others = {c.effect: c for c in second if c.fit is not None}
     return [min(c, others.get(c.effect, c), key=cost_of) for c in first]
 
@@ -70,12 +70,12 @@ def best_few(contenders: Sequence[Hypothesis], base: FitResult, most: int) -> li
 
 
 def cost_of(contender: Hypothesis) -> float:
-    """Of its fit; infinite where it does not show."""
+    """Cost of an effect's fit; infinite where the effect does not show."""
     return contender.fit.cost if contender.fit is not None else float("inf")
 
 
 def least_cost(contenders: Sequence[Hypothesis]) -> float:
-    """Of all; infinite where none shows."""
+    """Least cost of all fits; infinite where no effect shows."""
     return min(map(cost_of, contenders), default=float("inf"))
 
 

@@ -67,7 +67,7 @@ class Restarts:
         return self._ended(points, dict(enumerate(best)))
 
     def _off(self, points: Sequence[FitResult], numbers: Sequence[int]) -> list[list[FitResult]]:
-        """Of every fit those from some way off, each number another way; 0: with wide slopes."""
+        """For every fit, those from some way off, each number another way; 0: with wide slopes."""
         tasks = [
             Task(base=point, runs=self.runner.runs, number=k) for point in points for k in numbers
         ]

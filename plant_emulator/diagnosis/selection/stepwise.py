@@ -178,7 +178,9 @@ class Contest:
         return null, contenders, half and null.cost - least_cost(contenders) > EVIDENCE_THRESHOLD
 
     def _from_all(self, null: FitResult) -> tuple[FitResult, list[Hypothesis]]:
-        """The same from the fit without effects to all runs, started again where it leaves much."""
+        """The first round on the fit without effects to all runs; that fit starts again where it
+        leaves much.
+        """
         if null.mean_square > NOISE_MEAN_SQUARE:
             (null,) = self._rounds.restarts.shaken([null])
         return null, self._searched(null)

@@ -8,7 +8,7 @@ from pathlib import Path
 from plant_emulator import effects
 from plant_emulator.diagnosis import calibration
 from plant_emulator.diagnosis.calibration.confidence import Case
-from plant_emulator.diagnosis.calibration.model_form_error import Sized, law_errors
+from plant_emulator.diagnosis.calibration.model_form_error import EstimatedSize, model_form_errors
 
 FOLDER = Path(calibration.__file__).parent
 
@@ -21,12 +21,12 @@ def trial_cases() -> list[Case]:
     ]
 
 
-def relative_law_errors() -> dict[str, float]:
-    """Relative standard error that other laws make in every size, by name; see `law_errors`."""
+def load_model_form_errors() -> dict[str, float]:
+    """Read the table of model-form errors; give the relative error of every size by name."""
     numbers = ("true", "estimated", "standard_error")
-    return law_errors(
+    return model_form_errors(
         [
-            Sized(
+            EstimatedSize(
                 name=f"{row['effect']}_{row['parameter']}",
                 plausible=_plausible(row["effect"], row["parameter"]),
                 **{key: float(row[key]) for key in numbers},

@@ -16,7 +16,7 @@ from plant_emulator.diagnosis.wording import KINDS, percent
 from plant_emulator.errors import DiagnosisError
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.parameter_sets import DEFAULT, with_effects
-from plant_emulator.workflows.diagnosis.calibration import relative_law_errors, trial_cases
+from plant_emulator.workflows.diagnosis.calibration import load_model_form_errors, trial_cases
 from plant_emulator.workflows.diagnosis.runs import axis_runs, bench_runs
 from plant_emulator.workflows.diagnosis.saved_set import parameter_set
 from plant_emulator.workflows.workers import make_pool
@@ -135,7 +135,7 @@ def diagnose(
                 runs.plan,
                 settings={**(settings or {}), **runs.settings},
                 cases=None if axis else trial_cases(),
-                law_errors=None if axis else relative_law_errors(),
+                model_form_errors=None if axis else load_model_form_errors(),
                 notes=runs.notes,
                 progress=progress,
             ).diagnose()

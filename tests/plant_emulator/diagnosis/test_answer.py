@@ -61,7 +61,9 @@ def test_standard_error_of_a_size_holds_that_of_its_law(size: float, law: float)
     sized = {"values": {"cube_size": size}, "standard_errors": {"cube_size": 0.3}}
     found = replace(found, final=replace(found.final, **sized))
     (one,) = found.hypotheses
-    row = ranked_effect(one, found, found.named, effect("cube"), law_errors={"cube_size": 0.5})
+    row = ranked_effect(
+        one, found, found.named, effect("cube"), model_form_errors={"cube_size": 0.5}
+    )
     (told,) = row.parameters
     assert told.standard_error == pytest.approx((0.3**2 + law**2) ** 0.5)
 

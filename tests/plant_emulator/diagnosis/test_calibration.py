@@ -2,7 +2,7 @@
 
 import pytest
 
-from plant_emulator.diagnosis.calibration.confidence import FEWEST, Case, confidence
+from plant_emulator.diagnosis.calibration.confidence import FEWEST_CASES, Case, confidence
 
 
 def cases(kind: str, *rights: bool) -> list[Case]:
@@ -21,7 +21,9 @@ def test_only_cases_of_at_least_the_evidence_count() -> None:
 
 def test_evidence_beyond_most_cases_is_not_punished_for_their_number() -> None:
     known = cases("effect", *[True] * 30)
-    assert confidence(known, "effect", 1e9) == pytest.approx((FEWEST + 1) / (FEWEST + 2))
+    assert confidence(known, "effect", 1e9) == pytest.approx(
+        (FEWEST_CASES + 1) / (FEWEST_CASES + 2)
+    )
 
 
 def test_evidence_of_a_verdict_without_a_name_says_nothing() -> None:
