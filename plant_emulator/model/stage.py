@@ -80,7 +80,6 @@ STAGE = (
     "motor_shaft_torque",
     "gear_friction_torque",
     "drum_shaft_torque",
-    "drum_friction_torque",
     # coefficients of the linear elements, written by `implicit_stage.prepare_motor`
     "motor_compliance",
     "motor_offset",
