@@ -29,8 +29,10 @@ if TYPE_CHECKING:
     from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram
     from plant_emulator.workflows.detectability import Detectability, detectability
     from plant_emulator.workflows.diagnosis.diagnose import Diagnosis, diagnose
+    from plant_emulator.workflows.identification import IdentificationResult, identify
     from plant_emulator.workflows.simulation import simulate
     from plant_emulator.workflows.truck_identification import TruckIdentification, identify_truck
+    from plant_emulator.workflows.validation import ValidationResult, validate
 
 # Where each public name stands: module, and its name there. The imports above say the same to type
 # checkers and editors.
@@ -40,6 +42,7 @@ _PLACES: dict[str, tuple[str, str]] = {
     "Effect": ("plant_emulator.effects", "Effect"),
     "EffectParameter": ("plant_emulator.effects", "EffectParameter"),
     "EmulatorError": ("plant_emulator.errors", "EmulatorError"),
+    "IdentificationResult": ("plant_emulator.workflows.identification", "IdentificationResult"),
     "InputError": ("plant_emulator.errors", "InputError"),
     "Log": ("plant_emulator.signals.log", "Log"),
     "PROGRAMS": ("plant_emulator.simulation.programs", "PROGRAMS"),
@@ -47,13 +50,16 @@ _PLACES: dict[str, tuple[str, str]] = {
     "ParameterSet": ("plant_emulator.model.parameters", "ParameterSet"),
     "SpeedProgram": ("plant_emulator.simulation.programs", "SpeedProgram"),
     "TruckIdentification": ("plant_emulator.workflows.truck_identification", "TruckIdentification"),
+    "ValidationResult": ("plant_emulator.workflows.validation", "ValidationResult"),
     "detectability": ("plant_emulator.workflows.detectability", "detectability"),
     "diagnose": ("plant_emulator.workflows.diagnosis.diagnose", "diagnose"),
+    "identify": ("plant_emulator.workflows.identification", "identify"),
     "identify_truck": ("plant_emulator.workflows.truck_identification", "identify_truck"),
     "load_parameters": ("plant_emulator.parameter_sets.with_effects", "load"),
     "read_log": ("plant_emulator.logs", "read"),
     "save_parameters": ("plant_emulator.parameter_sets", "save"),
     "simulate": ("plant_emulator.workflows.simulation", "simulate"),
+    "validate": ("plant_emulator.workflows.validation", "validate"),
     "write_log": ("plant_emulator.logs", "write"),
 }
 
@@ -64,20 +70,24 @@ __all__ = [
     "Effect",
     "EffectParameter",
     "EmulatorError",
+    "IdentificationResult",
     "InputError",
     "Log",
     "Parameter",
     "ParameterSet",
     "SpeedProgram",
     "TruckIdentification",
+    "ValidationResult",
     "detectability",
     "diagnose",
     "effects",
+    "identify",
     "identify_truck",
     "load_parameters",
     "read_log",
     "save_parameters",
     "simulate",
+    "validate",
     "write_log",
 ]
 

@@ -22,7 +22,7 @@ class ParameterError(InputError):
 
 
 class LogError(InputError):
-    """A log file cannot be read. The message names line and column."""
+    """A log cannot be read or used. The message names line and column, or time and value."""
 
 
 class UnsettledError(EmulatorError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import click
 
@@ -41,7 +42,7 @@ def command(
     free: tuple[str, ...],
     held_out: tuple[str, ...],
     effect_texts: tuple[str, ...],
-    reference: str | None,
+    reference: Literal["linear", "staircase"] | None,
     save: str | None,
     table: str | None,
     plot: str | None,
@@ -49,45 +50,38 @@ def command(
 ) -> None:
     """Fit the bench's parameters to LOGs, all at once.
 
-    Without --free all parameters that the set calls estimated, except gear_inertia, and with a
-    logged voltage also armature_resistance and flux_constant. The start
-    position in the backlash gap is fitted for every log. Standard errors come from the residuals,
-    with their autocorrelation.
+    Without --free, all parameters that the set calls estimated are fitted, except gear_inertia. A
+    logged voltage adds armature_resistance and flux_constant. Every log has its own start position
+    in the backlash gap. Standard errors come from the residuals and their autocorrelation.
     """
-    from plant_emulator import effects, parameter_sets
+    from plant_emulator import parameter_sets
     from plant_emulator.cli._progress import progress
-    from plant_emulator.identification.report import spreadsheet
-    from plant_emulator.parameter_sets import with_effects
-    from plant_emulator.workflows.identification import identified
+    from plant_emulator.workflows.identification import identify
 
-    own = effects.parse(effect_texts)
-    with progress() as tell:
-        result = identified(
+    with progress() as report:
+        found = identify(
             logs,
-            held_out,
-            with_effects.load(parameters),
-            free,
-            effects=own,
-            hold=reference,
-            progress=tell,
+            parameters=parameters,
+            free=free,
+            hold_out=held_out,
+            effects=effect_texts,
+            reference=reference,
+            progress=report,
         )
-    for note in result.notes:
+    for note in found.notes:
         click.echo(f"note: {note}", err=True)
     if save:
-        parameter_sets.save(result.parameter_set(), save)
+        parameter_sets.save(found.parameter_set, save)
     if table:
-        Path(table).write_text(spreadsheet(result.found), encoding="utf-8")
+        Path(table).write_text(found.to_csv(), encoding="utf-8")
     if plot:
-        from plant_emulator.workflows.validation_plot import draw_validation
-
-        draw_validation(result.pairs, plot)
+        found.plot(plot)
     if json_file:
-        _options.write_json(result.answer(), json_file)
+        _options.write_json(found.to_json(), json_file)
     if json_file != "-":
-        click.echo("\n".join(result.lines()))
-    estimate = result.found.estimate
-    if not estimate.converged:
+        click.echo(found.to_text())
+    if not found.converged:
         raise click.ClickException(
-            f"the fit did not converge ({estimate.message}); fewer free parameters, or runs that "
-            "excite them, may help"
+            f"the fit did not converge ({found.fit.estimate.message}); fewer free parameters, or "
+            "runs that excite them, may help"
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import click
 
@@ -48,28 +48,21 @@ def command(
 
     Val1 = 100 (1 - NRMSD), Val2 = 100 (1 - sum|e| / sum|y|), percent.
     """
-    from plant_emulator import effects
-    from plant_emulator import logs as log_files
-    from plant_emulator.identification.report import measures, table_of, table_rows
-    from plant_emulator.parameter_sets import with_effects
-    from plant_emulator.simulation.fit_metrics import validate, zero_phase
-    from plant_emulator.workflows.simulation import simulate_log
+    from plant_emulator.workflows.validation import validate
 
-    values, effect_values = with_effects.load(parameters), effects.parse(effect_texts)
-    measured = [log_files.read(path) for path in logs]
-    pairs = [(log, simulate_log(log, values, effect_values, reference, start)) for log in measured]
-    if cutoff is not None:
-        pairs = [(zero_phase(log, cutoff), zero_phase(other, cutoff)) for log, other in pairs]
-    fits = {log.source: validate(log, simulation) for log, simulation in pairs}
-    answer: dict[str, Any] = {"schema": "validation/1", "logs": measures(fits)}
+    found = validate(
+        logs,
+        parameters=parameters,
+        effects=effect_texts,
+        reference=reference,
+        start=start,
+        cutoff=cutoff,
+    )
     if plot:
-        from plant_emulator.workflows.validation_plot import draw_validation
-
-        draw_validation(pairs, plot)
+        found.plot(plot)
     if table:
-        Path(table).write_text(table_of(fits), encoding="utf-8")
+        Path(table).write_text(found.to_csv(), encoding="utf-8")
     if json_file:
-        _options.write_json(answer, json_file)
+        _options.write_json(found.to_json(), json_file)
     if json_file != "-":
-        for source, channels in fits.items():
-            click.echo("\n".join([source, *table_rows(channels)]))
+        click.echo(found.to_text())

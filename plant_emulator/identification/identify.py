@@ -50,7 +50,7 @@ RETRIES = 3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameter:
+class EstimatedParameter:
     """An estimated parameter [unit].
 
     data_error : standard error that the data alone give; infinite: they say nothing
@@ -78,7 +78,7 @@ class Identification:
     """The fit of one bench; states : of every run, by name."""
 
     parameter_set: ParameterSet
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[EstimatedParameter, ...]
     states: tuple[Mapping[str, float], ...]
     estimate: Estimate
     chi_squared: float
@@ -227,11 +227,11 @@ def answer(
     )
 
 
-def _parameter(found: Estimate, k: int, parameters: ParameterSet) -> Parameter:
+def _parameter(found: Estimate, k: int, parameters: ParameterSet) -> EstimatedParameter:
     unknown = found.unknowns[k]
     value = unknown.value(float(found.z[k]))
     std = parameters[unknown.name].std
-    return Parameter(
+    return EstimatedParameter(
         name=unknown.name,
         value=value,
         standard_error=unknown.error(value, float(found.standard_errors[k])),

@@ -11,11 +11,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.identification.experiment_design import Experiment
-    from plant_emulator.identification.identify import Identification, Parameter
+    from plant_emulator.identification.identify import EstimatedParameter, Identification
     from plant_emulator.model.parameters import ParameterSet
-    from plant_emulator.simulation.fit_metrics import Fit
-
-    Fits = Mapping[str, Mapping[str, Fit]]
+    from plant_emulator.simulation.fit_metrics import Comparison, Fit
 
 # Pairs of parameters worth a word: their values can hardly be told apart.
 CORRELATED = 0.95
@@ -23,16 +21,16 @@ CORRELATED = 0.95
 BEYOND = 1e15
 
 
-def answer(
+def to_json(
     found: Identification,
-    estimation: Fits,
-    held_out: Fits,
+    fitted: Sequence[Comparison],
+    held_out: Sequence[Comparison],
     *,
     experiments: Sequence[Experiment],
     notes: Sequence[str],
     cpu_seconds: float,
 ) -> dict[str, Any]:
-    """The machine-readable answer, schema identification/1."""
+    """The document `identification/1`."""
     return {
         "schema": "identification/1",
         "parameters": [
@@ -59,8 +57,8 @@ def answer(
             }
             for e in experiments
         ],
-        "estimation": measures(estimation),
-        "held_out": measures(held_out),
+        "estimation": fits_to_json(fitted),
+        "held_out": fits_to_json(held_out),
         "notes": list(notes),
         "simulations": found.estimate.simulations,
         "cpu_seconds": cpu_seconds,
@@ -73,14 +71,14 @@ def finite(value: float) -> float | None:
     return value if value < BEYOND else None
 
 
-def measures(fits: Fits) -> dict[str, dict[str, dict[str, float]]]:
-    """Val1, Val2 and NRMSD by log and channel, as the command validate answers them."""
+def fits_to_json(comparisons: Sequence[Comparison]) -> dict[str, dict[str, dict[str, float]]]:
+    """Val1, Val2 and NRMSD by log and channel, as in the documents of both commands."""
     return {
-        source: {
+        one.source: {
             name: {"val1": fit.val1, "val2": fit.val2, "nrmsd": fit.nrmsd}
-            for name, fit in channels.items()
+            for name, fit in one.fits.items()
         }
-        for source, channels in fits.items()
+        for one in comparisons
     }
 
 
@@ -97,8 +95,8 @@ def correlated(found: Identification) -> list[tuple[str, str, float]]:
 
 def lines(
     found: Identification,
-    estimation: Fits,
-    held_out: Fits,
+    fitted: Sequence[Comparison],
+    held_out: Sequence[Comparison],
     experiments: Sequence[Experiment],
 ) -> list[str]:
     """The answer for the terminal."""
@@ -112,13 +110,13 @@ def lines(
     rows += [f"residual: {found.chi_squared**0.5:.2f} times the noise of the logs"]
     if found.chi_squared > 1.5:
         rows += ["  the model lacks something that these logs show: see plant-emulator diagnose"]
-    for title, fits in (("fitted", estimation), ("held out", held_out)):
-        for source, channels in fits.items():
-            rows += [f"{source} ({title})", *table_rows(channels)]
+    for title, comparisons in (("fitted", fitted), ("held out", held_out)):
+        for one in comparisons:
+            rows += [f"{one.source} ({title})", *fit_rows(one.fits)]
     return rows
 
 
-def _row(p: Parameter) -> str:
+def _row(p: EstimatedParameter) -> str:
     change = 100.0 * (p.value / p.nominal - 1.0)
     row = f"{p.name:24}{p.value:12.5g}{p.standard_error:12.3g}{change:+8.2f}%  {p.unit}"
     if p.at_bound:
@@ -135,27 +133,27 @@ def _advice(e: Experiment) -> str:
     )
 
 
-def table_rows(channels: Mapping[str, Fit]) -> list[str]:
+def fit_rows(fits: Mapping[str, Fit]) -> list[str]:
     """Val1, Val2, NRMSD and rms of every channel of a log, for the terminal."""
     rows = [f"  {'channel':18}{'Val1 %':>9}{'Val2 %':>9}{'NRMSD %':>10}{'rms':>11}"]
     return rows + [
         f"  {name:18}{fit.val1:9.3f}{fit.val2:9.3f}{100 * fit.nrmsd:10.4f}{fit.rms:11.4g}"
-        for name, fit in channels.items()
+        for name, fit in fits.items()
     ]
 
 
-def table_of(fits: Fits) -> str:
+def fit_table(comparisons: Sequence[Comparison]) -> str:
     """The measures as CSV text, a row a channel of a log."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(["log", "channel", "val1_percent", "val2_percent", "nrmsd_percent", "rms_SI"])
-    for source, channels in fits.items():
-        for name, fit in channels.items():
-            writer.writerow([source, name, fit.val1, fit.val2, 100.0 * fit.nrmsd, fit.rms])
+    for one in comparisons:
+        for name, fit in one.fits.items():
+            writer.writerow([one.source, name, fit.val1, fit.val2, 100.0 * fit.nrmsd, fit.rms])
     return out.getvalue()
 
 
-def spreadsheet(found: Identification) -> str:
+def parameter_table(found: Identification) -> str:
     """The parameters as CSV text."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")

@@ -67,6 +67,17 @@ class Recording:
             white[row] = forgiven(white[row], errors * self.use[row][:, None])
         return white
 
+    def without_voltage(self) -> Recording:
+        """The recording as it would be if nobody had connected the voltage."""
+        kept = [k for k, name in enumerate(self.channels) if name != VOLTAGE]
+        return replace(
+            self,
+            log=without_voltage(self.log),
+            channels=tuple(self.channels[k] for k in kept),
+            noise=self.noise[kept],
+            use=self.use[kept],
+        )
+
     def fed(self, wheel_torque: Array) -> Recording:
         """The same log simulated with another wheel torque [N m], shape (n,)."""
         return replace(self, inputs=replace(self.inputs, wheel_torque=wheel_torque))

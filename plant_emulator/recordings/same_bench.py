@@ -64,8 +64,8 @@ class Scale:
     error: float
 
 
-def one_bench(logs: Sequence[Log], values: Mapping[str, float]) -> None:
-    """Raise LogError where two logs cannot be of one bench; values : all parameters [SI]."""
+def check_same_bench(logs: Sequence[Log], values: Mapping[str, float]) -> None:
+    """Raise LogError if two logs cannot be of one bench; values : all parameters [SI]."""
     found = [scale for log in logs if (scale := scale_of(log, values)) is not None]
     for first, second in combinations(found, 2):
         error = float(np.sqrt(first.error**2 + second.error**2 + PICTURE**2))

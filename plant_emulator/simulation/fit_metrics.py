@@ -10,11 +10,15 @@ undefined at standstill. The ratio of sums agrees with the thesis's tables.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from plant_emulator.errors import LogError
 from plant_emulator.signals.log import COMPARED, VOLTAGE, Array, Log, compared_channels
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,25 @@ def fit(measured: Array, simulated: Array, place: str = "channel") -> Fit:
     rms = float(np.sqrt(np.mean(residual**2)))
     val2 = 100.0 * (1.0 - float(np.abs(residual).sum()) / total)
     return Fit(100.0 * (1.0 - rms / span), val2, rms / span, rms)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """A log beside its simulation; fits : measures by channel."""
+
+    measured: Log
+    simulated: Log
+    fits: Mapping[str, Fit]
+
+    @property
+    def source(self) -> str:
+        """Name of the log."""
+        return self.measured.source
+
+
+def compare(measured: Log, simulated: Log) -> Comparison:
+    """Measure how well a simulation follows a log; errors as those of `fit`."""
+    return Comparison(measured=measured, simulated=simulated, fits=validate(measured, simulated))
 
 
 def validate(measured: Log, simulated: Log) -> dict[str, Fit]:

@@ -1,60 +1,76 @@
-"""From log files to an identified bench: reading, preflight, fit, held-out runs, the answer."""
+"""The identification as a library call: logs in, parameters with standard errors out."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from time import process_time
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
-from plant_emulator import logs
-from plant_emulator.errors import IdentificationError
 from plant_emulator.estimation.initial_states import fit_states, states_of, with_own
 from plant_emulator.identification import report
 from plant_emulator.identification.experiment_design import experiments
-from plant_emulator.identification.identify import identify
+from plant_emulator.identification.identify import identify as identify_bench
 from plant_emulator.model.stage import split_gap_position
-from plant_emulator.recordings.preflight import preflight
-from plant_emulator.recordings.recording import recording
-from plant_emulator.simulation.fit_metrics import validate
-from plant_emulator.simulation.simulate import Hold, simulate, values_of
-from plant_emulator.workflows.provenance import file_hash, program_version, today
+from plant_emulator.parameter_sets import DEFAULT
+from plant_emulator.simulation.fit_metrics import Comparison, compare
+from plant_emulator.simulation.simulate import simulate, values_of
+from plant_emulator.workflows.loading import load_recordings
+from plant_emulator.workflows.provenance import log_hash, program_version, today
+from plant_emulator.workflows.simulation import effect_values, parameter_set
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from pathlib import Path
 
     from plant_emulator.estimation.start_search import Progress
     from plant_emulator.identification.experiment_design import Experiment
-    from plant_emulator.identification.identify import Identification
+    from plant_emulator.identification.identify import EstimatedParameter, Identification
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
-    from plant_emulator.signals.log import Log
-    from plant_emulator.simulation.fit_metrics import Fit
+    from plant_emulator.simulation.simulate import Hold
+    from plant_emulator.workflows.loading import Source
+    from plant_emulator.workflows.simulation import Effects
 
-    Pair = tuple[Log, Log]
 
+@dataclass(frozen=True, kw_only=True, repr=False)
+class IdentificationResult:
+    """The result of an identification; `print` shows it as the command `identify` does.
 
-@dataclass(frozen=True, kw_only=True)
-class Result:
-    """An identification with its measures.
-
-    pairs : (measured, simulated) of every log, fitted ones first
-    hashes : SHA-256 by log
+    fit : the estimate with its covariance
+    fitted, held_out : every log beside its simulation with the fitted parameters
+    experiments : for every parameter that the logs leave open, the program that would tell most
+    hashes : SHA-256 of every fitted log, by its name
+    notes : what was noticed about the logs, a sentence each
+    cpu_seconds : processor time of the fit [s]
     """
 
-    found: Identification
-    pairs: tuple[Pair, ...]
-    fitted: Mapping[str, Mapping[str, Fit]]
-    held_out: Mapping[str, Mapping[str, Fit]]
+    fit: Identification
+    fitted: tuple[Comparison, ...]
+    held_out: tuple[Comparison, ...]
     experiments: tuple[Experiment, ...]
     hashes: Mapping[str, str]
     notes: tuple[str, ...]
     cpu_seconds: float
 
-    def answer(self) -> dict[str, Any]:
-        """The machine-readable answer."""
-        return report.answer(
-            self.found,
+    @property
+    def parameters(self) -> tuple[EstimatedParameter, ...]:
+        """The estimated parameters with their standard errors."""
+        return self.fit.parameters
+
+    @property
+    def converged(self) -> bool:
+        """Whether the fit reached a minimum; use the parameters only then."""
+        return self.fit.estimate.converged
+
+    @property
+    def parameter_set(self) -> ParameterSet:
+        """The given set with the estimated values, their standard errors and their origin."""
+        return report.parameter_set(self.fit, self.hashes, date=today(), version=program_version())
+
+    def to_json(self) -> dict[str, Any]:
+        """The document `identification/1`."""
+        return report.to_json(
+            self.fit,
             self.fitted,
             self.held_out,
             experiments=self.experiments,
@@ -62,104 +78,80 @@ class Result:
             cpu_seconds=self.cpu_seconds,
         )
 
-    def lines(self) -> list[str]:
-        """The answer for the terminal."""
-        return report.lines(self.found, self.fitted, self.held_out, self.experiments)
+    def to_text(self) -> str:
+        """Values, standard errors, open parameters and the fit of every log, as lines."""
+        rows = report.lines(self.fit, self.fitted, self.held_out, self.experiments)
+        return "\n".join(rows)
 
-    def parameter_set(self) -> ParameterSet:
-        """The set to save."""
-        return report.parameter_set(
-            self.found,
-            {log: self.hashes[log] for log in self.fitted},
-            date=today(),
-            version=program_version(),
+    def to_csv(self) -> str:
+        """The parameters as CSV text, a row each."""
+        return report.parameter_table(self.fit)
+
+    def plot(self, path: str | Path) -> None:
+        """Plot every log beside its simulation to a file."""
+        from plant_emulator.workflows.validation_plot import draw_validation
+
+        draw_validation([(c.measured, c.simulated) for c in (*self.fitted, *self.held_out)], path)
+
+    def __str__(self) -> str:
+        return self.to_text()
+
+    def __repr__(self) -> str:
+        found = [p.name for p in self.parameters if p.identifiable]
+        state = "" if self.converged else "; not converged"
+        return (
+            f"<IdentificationResult: {len(found)} of {len(self.parameters)} parameters determined "
+            f"by {len(self.fitted)} logs; residual {self.fit.chi_squared**0.5:.2f} times the noise"
+            f"{state}>"
         )
 
 
-def identified(
-    paths: Sequence[str],
-    held_out: Sequence[str],
-    parameters: ParameterSet,
-    free: Sequence[str],
+def identify(
+    logs: Sequence[Source],
     *,
-    effects: Mapping[str, Mapping[str, float]],
-    hold: str | None = None,
+    parameters: ParameterSet | str | Path = DEFAULT,
+    free: Sequence[str] = (),
+    hold_out: Sequence[Source] = (),
+    effects: Effects | Sequence[str] = (),
+    reference: Hold | None = None,
     progress: Progress | None = None,
-) -> Result:
-    """Fit the logs of `paths`, predict those of `held_out`.
+) -> IdentificationResult:
+    """Estimate parameters of the bench from its logs, all at once, and predict further logs.
 
-    hold : as the option --reference; effects : those that the bench is known to have
+    logs : logs, or the paths of their files, all of one bench
+    parameters : the set that the fit starts from and that holds the priors: a parameter set, the
+        name of a shipped one, or the path of its file
+    free : names of the parameters to estimate; without any, all that the set calls estimated but
+        gear_inertia, and with a logged voltage armature_resistance and flux_constant as well
+    hold_out : logs to predict; only their initial states are fitted
+    effects : effects that the bench is known to have, with given sizes; as for `simulate`
+    reference : what holds between samples of the speed reference; None: as the log says
+    progress : function that is called with a step's name and its done share, 0 to 1
+    Raises InputError for a log, a set, an effect or a name that cannot be used.
     """
-    hashes = _hashes([*paths, *held_out])
-    estimation, notes = _load(paths, parameters, hold)
-    prediction, more = _load(held_out, parameters, hold)
-    _different([*estimation, *prediction])
-    estimation = [with_own(r, effects) for r in estimation]
-    prediction = [with_own(r, effects) for r in prediction]
-    given = values_of(parameters, effects)
-    simulate(estimation[0].inputs, given)  # compiling is not part of the fit's time
+    bench, own = parameter_set(parameters), effect_values(effects)
+    recordings, notes = load_recordings([*logs, *hold_out], bench, reference)
+    recordings = [with_own(r, own) for r in recordings]
+    estimation, prediction = recordings[: len(logs)], recordings[len(logs) :]
+    simulate(estimation[0].inputs, values_of(bench, own))  # compiling is not part of the fit's time
     begin = process_time()
-    found = identify(estimation, parameters, free, effects=effects, progress=progress)
+    found = identify_bench(estimation, bench, free, effects=own, progress=progress)
     spent = process_time() - begin
-    values = values_of(found.parameter_set, effects)
-    states = states_of(effects)
-    fitted = [_simulated(r, values, s) for r, s in zip(estimation, found.states, strict=True)]
-    predicted = [_simulated(r, values, fit_states(r, values, states)) for r in prediction]
-    return Result(
-        found=found,
-        pairs=(*fitted, *predicted),
-        fitted={log.source: validate(log, simulated) for log, simulated in fitted},
-        held_out={log.source: validate(log, simulated) for log, simulated in predicted},
+    values, states = values_of(found.parameter_set, own), states_of(own)
+    return IdentificationResult(
+        fit=found,
+        fitted=tuple(_compare(r, values, s) for r, s in zip(estimation, found.states, strict=True)),
+        held_out=tuple(_compare(r, values, fit_states(r, values, states)) for r in prediction),
         experiments=tuple(experiments(found, estimation, values)),
-        hashes=hashes,
-        notes=(*notes, *more),
+        hashes={r.log.source: log_hash(s) for r, s in zip(estimation, logs, strict=True)},
+        notes=tuple(notes),
         cpu_seconds=spent,
     )
 
 
-def _simulated(
+def _compare(
     recording: Recording, values: Mapping[str, float], states: Mapping[str, float]
-) -> Pair:
-    """A run as measured and as simulated."""
+) -> Comparison:
+    """A log beside its simulation; states : initial states of the run, by name."""
     own, gap = split_gap_position({**values, **recording.own, **states})
-    return recording.log, simulate(recording.inputs, own, gap_position=gap)
-
-
-def _hashes(paths: Sequence[str]) -> dict[str, str]:
-    """SHA-256 of every file; IdentificationError where two are the same run."""
-    found: dict[str, str] = {}
-    for path in paths:
-        if not Path(path).is_file():
-            logs.read(path)  # says what is wrong
-        digest = file_hash(path)
-        for other, known in found.items():
-            if digest == known:
-                raise IdentificationError(f"{path}: the same run as {other}; give every run once")
-        found[path] = digest
-    return found
-
-
-def _different(recordings: Sequence[Recording]) -> None:
-    """Refuse the same run in two forms: its samples tell, whatever file holds them."""
-    seen: dict[bytes, str] = {}
-    for log in (r.log for r in recordings):
-        key = log.time.tobytes() + log["motor_speed"].tobytes()
-        if key in seen:
-            raise IdentificationError(
-                f"{log.source}: the same run as {seen[key]}; give every run once"
-            )
-        seen[key] = log.source
-
-
-def _load(
-    paths: Sequence[str], parameters: ParameterSet, hold: str | None
-) -> tuple[list[Recording], list[str]]:
-    """Logs ready to be fitted, and what the user should know of them."""
-    recordings: list[Recording] = []
-    notes: list[str] = []
-    for path in paths:
-        log = logs.read(path)
-        checked = preflight(log, parameters.value("gear_ratio"))
-        recordings.append(recording(log, cast("Hold | None", hold), checked.use))
-        notes += checked.notes
-    return recordings, notes
+    return compare(recording.log, simulate(recording.inputs, own, gap_position=gap))

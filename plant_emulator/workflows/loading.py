@@ -1,4 +1,8 @@
-"""Which logs are taken together: read, without their own answer, each run once, of one bench."""
+"""Loading of the logs of a bench, for every analysis in one way: read, check, weigh by the noise.
+
+A log is refused that carries its own answer, that the preflight refuses, that shows the same run as
+another one, or that is of another bench.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +13,10 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from plant_emulator import logs
-from plant_emulator.errors import DiagnosisError
+from plant_emulator.errors import LogError
 from plant_emulator.recordings.preflight import NAMES, preflight
 from plant_emulator.recordings.recording import recording
-from plant_emulator.recordings.same_bench import one_bench
+from plant_emulator.recordings.same_bench import check_same_bench
 from plant_emulator.signals.log import VOLTAGE, Log
 
 if TYPE_CHECKING:
@@ -27,81 +31,83 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
     from plant_emulator.simulation.simulate import Hold
 
-    Used = Mapping[str, NDArray[np.bool_]]
+    # A log, or the path of its file.
+    Source = str | Path | Log
 
-# Columns that tell the answer, by how a word of their name begins: nobody may see them before.
+# Columns that tell the answer, by how a word of their name begins.
 TELLING = re.compile(
     "label|effect(?!ive)|fault|class|answer|anomal|scenario|cause|truth|drift|verdict|diagnos"
 )
-# Words of a name: parted by what is no letter, or by a capital.
+# Words of a name: separated by what is no letter, or by a capital.
 WORD = re.compile("[A-Z]?[a-z]+|[A-Z]+")
-# What formats may round off a sample [SI].
+# Rounding of a sample by a file format, at most [SI].
 ROUNDED = 1e-4
 # Signals that every log of the bench has.
 NEEDED = ("speed_reference", "motor_speed", "drum_speed", "shaft_torque")
 
 
-def admitted(
-    sources: Sequence[str | Path | Log], parameters: ParameterSet, hold: str | None
+def load_recordings(
+    sources: Sequence[Source], parameters: ParameterSet, reference: str | None = None
 ) -> tuple[list[Recording], list[str]]:
-    """The logs of one bench ready to be fitted, and what the user should know of them.
+    """Load the logs of one bench; return the recordings, and notes on what the user should know.
 
     sources : logs, or the paths of their files
-
-    DiagnosisError or LogError says what cannot be used.
+    reference : what holds between samples of the speed reference; None: as the log says
+    Raises LogError for a log that cannot be used.
     """
     taken: list[Log] = []
-    uses: list[Used] = []
+    uses: list[Mapping[str, NDArray[np.bool_]]] = []
     notes: list[str] = []
     for source in sources:
         log = source if isinstance(source, Log) else logs.read(source)
-        unlabelled(log)
+        check_unlabelled(log)
         checked = preflight(log, parameters.value("gear_ratio"))
         taken.append(log)
         uses.append(checked.use)
         notes += checked.notes
-    uses, told = alike(taken, uses)
-    distinct([(log.source, samples(log)) for log in taken])
-    one_bench(taken, parameters.values())
-    recordings = [
-        recording(log, cast("Hold | None", hold), use) for log, use in zip(taken, uses, strict=True)
-    ]
-    return recordings, notes + told
+    check_distinct([(log.source, samples(log)) for log in taken])
+    check_same_bench(taken, parameters.values())
+    hold = cast("Hold | None", reference)
+    recordings = [recording(log, hold, use) for log, use in zip(taken, uses, strict=True)]
+    return recordings, notes
 
 
-def alike(read: Sequence[Log], uses: Sequence[Used]) -> tuple[list[Used], list[str]]:
-    """The samples of every log that count, all with their voltage or none: what it shows could else
-    be neither fitted where it is not, nor predicted from there. And a note where one is left out.
+def with_common_voltage(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
+    """The recordings, all with their voltage or all without it; and a note if one loses it.
+
+    A diagnosis could neither fit what only some voltages show, nor predict it in the other runs.
     """
-    having = [VOLTAGE in use for use in uses]
-    if all(having) or not any(having):
-        return list(uses), []
-    first = read[having.index(False)].source
-    note = f"{first}: no {NAMES[VOLTAGE]} that can be used; it is left out of the other logs too"
-    return [{n: counted for n, counted in use.items() if n != VOLTAGE} for use in uses], [note]
+    lacking = [r for r in recordings if VOLTAGE not in r.channels]
+    if not lacking or len(lacking) == len(recordings):
+        return list(recordings), []
+    note = (
+        f"{lacking[0].log.source}: no {NAMES[VOLTAGE]} that can be used; it is left out of the "
+        "other logs too"
+    )
+    return [r.without_voltage() for r in recordings], [note]
 
 
-def unlabelled(log: Log | AxisLog) -> None:
-    """Refuse a log that carries its own answer."""
+def check_unlabelled(log: Log | AxisLog) -> None:
+    """Raise LogError for a log with a column that looks like the answer."""
     where = "variable" if log.source.endswith(".mat") else "line 1: column"
     for name in log.other:
         if any(TELLING.match(word.lower()) for word in WORD.findall(name)):
-            raise DiagnosisError(
-                f"{log.source}: {where} {name} looks like the answer; a diagnosis must "
-                "not see it: take it out"
+            raise LogError(
+                f"{log.source}: {where} {name} looks like the answer; an analysis must not see "
+                "it: take it out"
             )
 
 
 def samples(log: Log) -> Array:
-    """What makes a log of the bench the run that it is, shape (signals, samples)."""
+    """Samples by which a run of the bench is recognised, shape (signals, samples)."""
     return np.stack([log.time - log.time[0], *(log[name] for name in NEEDED)])
 
 
-def distinct(runs: Sequence[tuple[str, Array]]) -> None:
-    """Refuse the same run twice: its samples tell, whatever file holds them.
+def check_distinct(runs: Sequence[tuple[str, Array]]) -> None:
+    """Raise LogError if two logs show the same run, whatever files hold them.
 
-    runs : what errors call it, and its samples
+    runs : name and samples of each
     """
     for (name, first), (other, second) in combinations(runs, 2):
         if first.shape == second.shape and np.allclose(first, second, rtol=0.0, atol=ROUNDED):
-            raise DiagnosisError(f"{other}: the same run as {name}; give every run once")
+            raise LogError(f"{other}: the same run as {name}; give every run once")

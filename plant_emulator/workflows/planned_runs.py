@@ -23,7 +23,7 @@ from plant_emulator.signals.log import COMPARED, Log
 from plant_emulator.simulation.programs import PROGRAMS
 from plant_emulator.simulation.sensor_noise import SENSORS
 from plant_emulator.simulation.simulate import inputs_of
-from plant_emulator.workflows.loading import admitted
+from plant_emulator.workflows.loading import load_recordings, with_common_voltage
 from plant_emulator.workflows.simulation import simulate
 
 if TYPE_CHECKING:
@@ -57,7 +57,8 @@ def prepare(
     Raises ParameterError for a name that is neither a log file nor a program.
     """
     recorded = [run for run in runs if not _is_program(run)]
-    recordings, notes = admitted(recorded, parameters, reference)
+    recordings, notes = load_recordings(recorded, parameters, reference)
+    recordings, more = with_common_voltage(recordings)
     states: tuple[Mapping[str, float], ...] = ()
     if recordings:
         fitted = fit_null(
@@ -69,7 +70,7 @@ def prepare(
     recordings += [planned_run(name, parameters, channels) for name in programs]
     model = BenchRecipe(tuple(recordings), parameters).build()
     states = (*states, *({GAP_POSITION: 0.0} for _ in programs))
-    return model, _result_at(model, parameters.values(), states), tuple(notes)
+    return model, _result_at(model, parameters.values(), states), (*notes, *more)
 
 
 def _is_program(run: str | Path | Log) -> bool:

@@ -17,7 +17,12 @@ from plant_emulator.signals.axis_log import AxisLog
 from plant_emulator.signals.log import Log
 from plant_emulator.workflows import axis_reader
 from plant_emulator.workflows.diagnosis.plan import plan_of_runs, plan_recordings
-from plant_emulator.workflows.loading import admitted, distinct, unlabelled
+from plant_emulator.workflows.loading import (
+    check_distinct,
+    check_unlabelled,
+    load_recordings,
+    with_common_voltage,
+)
 from plant_emulator.workflows.provenance import file_hash, program_version, today
 
 if TYPE_CHECKING:
@@ -66,9 +71,10 @@ def bench_runs(
     files = tuple(Path(file).absolute() for file in own)
     named = [effect.name for effect in effects.from_files(files)]
     _check_names(without, [*effects.names(), *named])
-    recordings, notes = admitted(
+    recordings, notes = load_recordings(
         [_bench_source(one) for one in (*logs, *held_out)], parameters, reference
     )
+    recordings, more = with_common_voltage(recordings)
     recordings, plan = plan_recordings(recordings, len(logs))
     settings = {
         "parameters": parameters.name,
@@ -78,7 +84,7 @@ def bench_runs(
     return Runs(
         recipe=BenchRecipe(tuple(recordings), parameters, tuple(without), files),
         plan=plan,
-        notes=tuple(notes),
+        notes=(*notes, *more),
         settings=_settings(settings, [*logs, *held_out, parameters.name, *own]),
         fitted=tuple(recordings[k] for k in plan.fitted),
     )
@@ -91,8 +97,8 @@ def axis_runs(
     given = (*logs, *held_out)
     read = [_axis_log(one) for one in given]
     for log in read:
-        unlabelled(log)
-    distinct([(log.source, np.stack([log.time, log.position, log.force])) for log in read])
+        check_unlabelled(log)
+    check_distinct([(log.source, np.stack([log.time, log.position, log.force])) for log in read])
     if len(read) < 2:
         raise DiagnosisError(
             f"{read[0].source}: one run of an axis cannot be held out; give another with --hold-out"

@@ -11,7 +11,7 @@ from plant_emulator import effects
 from plant_emulator.cli import main
 from plant_emulator.errors import LogError
 from plant_emulator.model.parameters import ParameterSet
-from plant_emulator.recordings.same_bench import DIFFERENT, PICTURE, one_bench, scale_of
+from plant_emulator.recordings.same_bench import DIFFERENT, PICTURE, check_same_bench, scale_of
 from plant_emulator.signals.log import Log
 from plant_emulator.workflows.simulation import simulate
 
@@ -39,10 +39,10 @@ def logs_of(bench: str, bench_log: BenchLog) -> list[Log]:
 
 
 @pytest.mark.parametrize("bench", BENCHES)
-def test_runs_of_one_bench_are_taken(
+def test_runs_of_check_same_bench_are_taken(
     bench: str, bench_log: BenchLog, values: Mapping[str, float]
 ) -> None:
-    one_bench(logs_of(bench, bench_log), values)
+    check_same_bench(logs_of(bench, bench_log), values)
 
 
 @pytest.mark.parametrize("bench", BENCHES)
@@ -54,7 +54,7 @@ def test_run_of_a_bench_whose_drum_shows_less_is_refused_beside_every_other(
         if "wheel_torque" in log:
             continue
         with pytest.raises(LogError, match=r"program2.*: drum speed over motor speed is 98\.8\d %"):
-            one_bench([log, other], values)
+            check_same_bench([log, other], values)
 
 
 def test_scale_that_was_hidden_is_found(bench_log: BenchLog, values: Mapping[str, float]) -> None:
@@ -83,9 +83,9 @@ def test_difference_of_a_sensors_scale_is_told_from_six_errors_on(
         pair = [log, replace(log, signals=signals)]
         if refused:
             with pytest.raises(LogError, match=r"100\.\d\d %"):
-                one_bench(pair, values)
+                check_same_bench(pair, values)
         else:
-            one_bench(pair, values)
+            check_same_bench(pair, values)
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ def test_twice_an_effect_in_every_run_is_no_second_bench(
         simulate(program, parameters=nominal, effects={name: sizes}, seed=seed)
         for seed, program in enumerate(("program1", "program2", "program3", "program4"))
     ]
-    one_bench(logs, values)
+    check_same_bench(logs, values)
 
 
 def test_run_with_a_truck_tells_nothing(bench_log: BenchLog, values: Mapping[str, float]) -> None:

@@ -29,7 +29,7 @@ from plant_emulator.signals.log import COMPARED, VOLTAGE, Log, compared_channels
 from plant_emulator.simulation.sensor_noise import SENSORS, add_noise
 from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
 from plant_emulator.solver.kernel import kernel
-from plant_emulator.workflows.loading import alike
+from plant_emulator.workflows.loading import with_common_voltage
 
 Reader = Callable[[str], Log]
 HEATING = "armature_resistance_heating"
@@ -123,15 +123,16 @@ def test_voltage_at_the_end_of_its_range_for_most_of_a_run_is_left_out(
 def test_runs_have_their_voltage_all_or_none(bench_log: Reader, nominal: ParameterSet) -> None:
     logs = [driven(bench_log(f"bench_nominal/program{k}"), nominal) for k in (1, 2)]
     one = replace(without_voltage(logs[0]), source="one.csv")
-    uses = [preflight(log, 62.6).use for log in (one, logs[1])]
-    kept, notes = alike([one, logs[1]], uses)
-    assert [set(use) for use in kept] == [set(COMPARED), set(COMPARED)]
-    assert recording(logs[1], use=kept[1]).channels == COMPARED
+    recordings = [recording(log, use=preflight(log, 62.6).use) for log in (one, *logs)]
+    kept, notes = with_common_voltage(recordings[:2])
+    assert [r.channels for r in kept] == [COMPARED, COMPARED]
+    assert [VOLTAGE in r.log for r in kept] == [False, False]
+    assert [r.noise.shape for r in kept] == [r.use.shape[:1] for r in kept] == [(4,), (4,)]
     assert notes == [
         "one.csv: no armature_voltage_V that can be used; it is left out of the other logs too"
     ]
-    kept, notes = alike(logs, [uses[1], uses[1]])
-    assert all(VOLTAGE in use for use in kept)
+    kept, notes = with_common_voltage(recordings[1:])
+    assert all(VOLTAGE in r.channels for r in kept)
     assert notes == []
 
 

@@ -11,12 +11,12 @@ from click.testing import CliRunner
 
 from plant_emulator import logs
 from plant_emulator.cli import main
-from plant_emulator.errors import DiagnosisError
+from plant_emulator.errors import DiagnosisError, LogError
 from plant_emulator.recordings.preflight import preflight
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
 from plant_emulator.workflows.diagnosis.plan import plan_recordings
-from plant_emulator.workflows.loading import unlabelled
+from plant_emulator.workflows.loading import check_unlabelled
 from register_maps.signals import LOG_COLUMNS
 
 DATA = Path(__file__).parents[2] / "data"
@@ -39,18 +39,18 @@ def refused(*arguments: str | Path) -> str:
 )  # fmt: skip
 def test_column_that_tells_the_answer_is_refused(column: str) -> None:
     log = Log(np.zeros(1), {}, "run.csv", other=(column,))
-    with pytest.raises(DiagnosisError, match=f"run.csv: line 1: column {column} looks like"):
-        unlabelled(log)
+    with pytest.raises(LogError, match=f"run.csv: line 1: column {column} looks like"):
+        check_unlabelled(log)
 
 
 @pytest.mark.parametrize(
     "column", [*LOG_COLUMNS, "effective_voltage_V", "brake_defined", "clock_s"]
 )
 def test_measured_column_is_no_answer(column: str) -> None:
-    unlabelled(Log(np.zeros(1), {}, "run.csv", other=(column,)))
+    check_unlabelled(Log(np.zeros(1), {}, "run.csv", other=(column,)))
 
 
-@pytest.mark.parametrize("command", ["diagnose", "detectability"])
+@pytest.mark.parametrize("command", ["diagnose", "detectability", "identify"])
 @pytest.mark.parametrize("packing", ["plain", "packed again", "later clock"])
 def test_same_run_in_another_packing_is_refused(tmp_path: Path, command: str, packing: str) -> None:
     text = gzip.decompress(PROGRAM1.read_bytes())
@@ -65,19 +65,21 @@ def test_same_run_in_another_packing_is_refused(tmp_path: Path, command: str, pa
     )
 
 
-def test_plan_is_not_made_from_a_log_that_tells_its_answer(tmp_path: Path) -> None:
+@pytest.mark.parametrize("command", ["diagnose", "detectability", "identify"])
+def test_log_that_tells_its_answer_is_refused(tmp_path: Path, command: str) -> None:
     head, *rows = gzip.decompress(PROGRAM1.read_bytes()).decode().splitlines()
     told = tmp_path / "told.csv"
     told.write_text("\n".join([f"{head},label", *(f"{row},1" for row in rows), ""]))
-    assert f"{told}: line 1: column label looks like the answer" in refused("detectability", told)
+    assert f"{told}: line 1: column label looks like the answer" in refused(command, told)
 
 
-def test_plan_is_not_made_from_logs_of_two_benches() -> None:
+@pytest.mark.parametrize("command", ["diagnose", "detectability", "identify"])
+def test_logs_of_two_benches_are_refused(command: str) -> None:
     practice = DATA / "bench_practice"
     first, second = (
         practice / f"{name}.csv.gz" for name in ("practice_002/program1", "practice_001/program2")
     )
-    assert "give logs of one bench" in refused("detectability", first, second)
+    assert "give logs of one bench" in refused(command, first, second)
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from plant_emulator.errors import DiagnosisError, LogError
+from plant_emulator.errors import LogError
 from plant_emulator.workflows import axis_reader
-from plant_emulator.workflows.loading import unlabelled
+from plant_emulator.workflows.loading import check_unlabelled
 
 TIME = np.arange(5) * 1e-3
 LINEAR = "time_s,position_m,force_N,label\n0,0.1,5,1\n0.001,0.2,-6.5,1\n0.002,0.3,7,1\n"
@@ -146,5 +146,5 @@ def test_a_variable_that_looks_like_the_answer_is_refused(tmp_path: Path) -> Non
     path = tmp_path / "run.mat"
     time = np.arange(100.0) * 1e-3
     savemat(path, {"t": time, "qm": time, "vir": time, "gtau": 2.0, "true_effect": "friction"})
-    with pytest.raises(DiagnosisError, match=r"run\.mat: variable true_effect looks like"):
-        unlabelled(axis_reader.read(path))
+    with pytest.raises(LogError, match=r"run\.mat: variable true_effect looks like"):
+        check_unlabelled(axis_reader.read(path))
