@@ -1,4 +1,4 @@
-"""Say beforehand what such runs can and cannot show of every effect."""
+"""Tell before a test what its runs can and cannot show of every effect."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def command(
 ) -> None:
     """Tell the smallest size of every effect that recorded or planned RUNS show together.
 
-    The table also names the effects that the RUNS cannot tell apart, and what they lack to show an
+    The table also names the effects that the RUNS cannot distinguish, and what they lack to show an
     effect at all.
     """
     from plant_emulator.workflows.detectability import detectability

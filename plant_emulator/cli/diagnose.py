@@ -1,4 +1,4 @@
-"""Say where a gap between model and bench lies, which effect causes it, how far it shrinks."""
+"""Locate the sim-to-real gap, name the effect that causes it, and tell how far it shrinks."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ Examples:
     "held_out",
     multiple=True,
     metavar="LOG",
-    help="A run to predict; may be repeated. Without it every log is held out in turn.",
+    help="A log to predict; may be repeated. Without it every log is held out in turn.",
 )
 @_options.parameters
 @click.option(
@@ -40,7 +40,7 @@ Examples:
     type=click.Choice(["bench", "axis"]),
     default="bench",
     show_default=True,
-    help="The machine: this bench, or a single motor-driven axis (CSV or MATLAB logs).",
+    help="The machine: the bench, or a single motor-driven axis (CSV or MATLAB logs).",
 )
 @click.option(
     "--without", multiple=True, metavar="EFFECT", help="Take an effect out of the library."
@@ -50,15 +50,17 @@ Examples:
     "own",
     multiple=True,
     metavar="FILE.py",
-    help="An effect of your own beside the library; may be repeated.",
+    help="File of your own effect beside the library; may be repeated.",
 )
 @_options.reference
-@_options.workers("Processes that fit side by side.")
-@click.option("--scheduler", metavar="ADDRESS", help="A Dask scheduler instead, tcp://host:port.")
+@_options.workers("Processes that run fits side by side.")
+@click.option(
+    "--scheduler", metavar="ADDRESS", help="Use the workers of a Dask scheduler, tcp://host:port."
+)
 @click.option(
     "--save", type=OutputFile(), help="Write the parameter set with the accepted effects."
 )
-@click.option("--report", type=OutputFile(), help="Write a self-contained report.")
+@click.option("--report", type=OutputFile(), help="Write a report as one HTML file.")
 @_options.json_file
 def command(
     logs: tuple[str, ...],
@@ -76,8 +78,9 @@ def command(
 ) -> None:
     """Diagnose the gap that LOGs show against the model.
 
-    The verdict is an effect, a class of effects that these logs cannot tell apart, other
-    parameters, nothing, or unknown; how far the gap shrinks is measured on runs not fitted.
+    The verdict is an effect, a class of effects that these logs cannot distinguish, parameter
+    deviations only, no gap, or an unknown cause. Runs that were not fitted tell how far the gap
+    shrinks.
     """
     from plant_emulator.cli._progress import progress
     from plant_emulator.workflows.diagnosis.diagnose import diagnose

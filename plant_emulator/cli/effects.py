@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -23,14 +23,13 @@ Example:
 @click.argument("name", required=False)
 @_options.json_file
 def command(name: str | None, json_file: str | None) -> None:
-    """Show equation, parameters, units and source of the effect NAME; without it list all."""
+    """Show equation, parameters, units and source of the effect NAME; without NAME list all."""
     from plant_emulator import effects
 
     found = [effects.load(key) for key in ([name] if name else effects.names())]
     if json_file:
-        _options.write_json(
-            {"schema": "effects/1", "effects": [_entry(e) for e in found]}, json_file
-        )
+        document = {"schema": "effects/1", "effects": [effect.to_json() for effect in found]}
+        _options.write_json(document, json_file)
     if json_file == "-":
         return
     for effect in found:
@@ -40,28 +39,8 @@ def command(name: str | None, json_file: str | None) -> None:
             click.echo(f"{effect.name:29}{effect.subsystem:15}{effect.description.splitlines()[0]}")
 
 
-def _entry(effect: Effect) -> dict[str, Any]:
-    return {
-        "effect": effect.name,
-        "subsystem": effect.subsystem,
-        "description": effect.description,
-        "laws": sorted(effect.laws),
-        "parameters": [
-            {
-                "name": key,
-                "unit": p.unit,
-                "neutral": p.neutral,
-                "lower": p.lower,
-                "upper": p.upper,
-                "plausible": p.plausible,
-                "meaning": p.meaning,
-            }
-            for key, p in effect.parameters.items()
-        ],
-    }
-
-
 def _page(effect: Effect) -> str:
+    """The description of an effect, and a table of its parameters."""
     head = f"{effect.name} ({effect.subsystem})\n\n{effect.description}\n"
     columns = f"\n{'parameter':24}{'unit':8}{'neutral':>10}{'plausible':>11}{'from':>10}{'to':>10}"
     rows = [

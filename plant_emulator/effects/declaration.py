@@ -130,6 +130,27 @@ class Effect:
                 )
         return {**self.plausible(), **values}
 
+    def to_json(self) -> dict[str, Any]:
+        """The effect as an entry of the document `effects/1`."""
+        return {
+            "effect": self.name,
+            "subsystem": self.subsystem,
+            "description": self.description,
+            "laws": sorted(self.laws),
+            "parameters": [
+                {
+                    "name": key,
+                    "unit": p.unit,
+                    "neutral": p.neutral,
+                    "lower": p.lower,
+                    "upper": p.upper,
+                    "plausible": p.plausible,
+                    "meaning": p.meaning,
+                }
+                for key, p in self.parameters.items()
+            ],
+        }
+
     def __repr__(self) -> str:
         return f"<Effect {self.name} ({self.subsystem}): {', '.join(self.parameters)}>"
 

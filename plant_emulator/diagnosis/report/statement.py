@@ -71,11 +71,8 @@ def statement(
         case "none":
             return "The logs show no gap beyond the noise of the sensors."
     where = "" if subsystem is None else f" It lies in the {in_words(subsystem)}."
-    where = (
-        where
-        if remainder is None
-        else f" Of the held-out {remainder.channel}, {describe_band(remainder)}."
-    )
+    if remainder is not None:
+        where = f" Of the held-out {remainder.channel}, {describe_band(remainder)}."
     return f"There is a gap whose cause is unknown: {decision.reason}.{where}"
 
 
@@ -110,7 +107,7 @@ def _other_values(decision: Decision) -> str:
     else:
         change = quantity(first.estimated, first.unit, 4)
     others = len(decision.deviations) - 1
-    more = "" if others == 0 else f" and {others} other parameters"
+    more = f" and {others} other parameter{'s' if others > 1 else ''}" if others else ""
     return (
         f"The equations hold with other values: {first.name} is {change}{more}; "
         "no unmodelled effect is needed."
