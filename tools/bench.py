@@ -1,13 +1,17 @@
 #!/usr/bin/env python3
-"""How fast the emulator is, next to general solvers at the same error: a table, and bench/1.
+"""Compare the emulator's speed with general solvers at the same error: a table, and bench/1.
 
-Every row is measured in this run, interleaved with what it is compared to, as CPU time, after
-everything is compiled and warm. Errors are the worst channel's NRMSD on program 1 against a
-converged solution, on which the independent solver has to agree. We run at the loosest tolerance
-from which on our error stays below a bound; a peer at the one where it is fastest of all at which
-it errs at most a quarter more than we do. ratio = peers / ours, and holds where it reaches the
-target; target 0: for information. The diagnosis is the whole command on all cores, run once,
-against its budget on the clock; its growth with logs and effects is CPU time of all processes.
+Each row is processor time, measured in this run, in turns with its peer. Everything is compiled
+beforehand. ratio = peer / ours. A row holds where its ratio reaches its target. A row with target 0
+is for information.
+
+The error of a solution is the NRMSD of its worst channel on program 1, against a converged
+solution. An independent solver has to agree with that one. We run at the loosest tolerance from
+which on our error stays below a bound. The peer runs at its fastest tolerance, among those at which
+its error is at most a quarter larger than ours.
+
+The diagnosis is the whole command on all cores, run once, against a budget of wall time. Its growth
+with logs and effects is the processor time of all its processes.
 """
 
 from __future__ import annotations
@@ -24,7 +28,7 @@ SCHEMA = "bench/1"
 
 
 def figure(value: float | None, unit: str) -> str:
-    """A number with its unit, three digits."""
+    """A number of three digits with its unit."""
     if value is None:
         return "-"
     if unit == "s" and value < 1.0:
@@ -33,7 +37,7 @@ def figure(value: float | None, unit: str) -> str:
 
 
 def line(row: Row) -> str:
-    """One row of the table."""
+    """The text of a row."""
     errors = [f"{e:.4f}" for e in (row.ours_error, row.peers_error) if e is not None]
     ratio = "-" if row.ratio is None else f"{row.ratio:.4g}"
     target = f">= {row.target:g}" if row.target else ""

@@ -1,4 +1,4 @@
-"""What tools/bench.py measures: the emulator next to general solvers and to its own budgets."""
+"""The comparisons of tools/bench.py: the emulator with general solvers and with its budgets."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from plant_emulator.solver import kernel
 if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
-# How far the converged solutions may differ.
+# Tolerance of the independent solver that has to agree with our converged solution.
 INDEPENDENT = 1e-6
 FIXED_STEP = 1e-3
 SCAN = 10
@@ -50,7 +50,7 @@ simulate(inputs_of(Log(time, {"speed_reference": reference})), parameter_sets.lo
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One comparison; errors are the worst channel's NRMSD [%] where there are such."""
+    """One comparison; an error is the NRMSD of the worst channel [%], None where there is none."""
 
     name: str
     ours: float | None
@@ -65,7 +65,7 @@ class Row:
 
 
 def row(name: str, ours: float, peer: str, their: float, target: float, **more: object) -> Row:
-    """A row from its two figures."""
+    """The row of two figures."""
     ratio = their / ours
     return Row(
         name=name,
@@ -80,17 +80,17 @@ def row(name: str, ours: float, peer: str, their: float, target: float, **more: 
 
 
 def missing(name: str, peer: str, target: float) -> Row:
-    """A row that could not be measured."""
+    """The row of a peer that is not installed."""
     return Row(name=name, ours=None, peer=peer, peers=None, ratio=None, target=target, holds=False)
 
 
 Rows = Iterator[Row]
 
 
-def compared(
+def compare(
     study: Study, name: str, peer: str, solve: Callable[[float], Array], target: float
 ) -> Rows:
-    """The kernel, then `simulate`, against one general solver at the same error."""
+    """Compare the kernel, then `simulate`, with a general solver at the same error."""
     tolerance, error = study.ours
     theirs, their_error = study.fastest(solve)
     label = f"{peer}, rtol {theirs:g}"
@@ -104,7 +104,7 @@ def compared(
 
 
 def reference(study: Study) -> Rows:
-    """Whether an independent solver converges to the same."""
+    """The difference between our converged solution and that of an independent solver."""
     solve = peers.Lsoda(study.time, peers.tuned(study.corners, study.values), study.values)
     apart = study.error(solve(INDEPENDENT))
     label = f"difference from LSODA at {INDEPENDENT:g}; a tenth of the error bound"
@@ -112,19 +112,19 @@ def reference(study: Study) -> Rows:
 
 
 def lsoda(study: Study) -> Rows:
-    """scipy, right-hand side as one writes it."""
+    """scipy's LSODA with a right-hand side as one writes it."""
     solve = peers.Lsoda(study.time, peers.plain(study.corners, study.values), study.values)
-    yield from compared(study, "lsoda", "scipy LSODA, right-hand side in Python", solve, 80.0)
+    yield from compare(study, "lsoda", "scipy LSODA, right-hand side in Python", solve, 80.0)
 
 
 def lsoda_tuned(study: Study) -> Rows:
-    """scipy, right-hand side as fast as Python gets."""
+    """scipy's LSODA with a right-hand side as fast as Python gets."""
     solve = peers.Lsoda(study.time, peers.tuned(study.corners, study.values), study.values)
-    yield from compared(study, "lsoda_tuned", "scipy LSODA, the same tuned by hand", solve, 80.0)
+    yield from compare(study, "lsoda_tuned", "scipy LSODA, the same tuned by hand", solve, 80.0)
 
 
 def cvodes(study: Study) -> Rows:
-    """CasADi, where it is installed."""
+    """CVODES of CasADi, where CasADi is installed."""
     try:
         import casadi  # noqa: F401
     except ImportError as error:
@@ -132,11 +132,11 @@ def cvodes(study: Study) -> Rows:
         yield missing("cvodes", "CasADi CVODES: not installed", 8.0)
         return
     solve = peers.Cvodes(study.time, study.corners, study.values)
-    yield from compared(study, "cvodes", "CasADi CVODES", solve, 8.0)
+    yield from compare(study, "cvodes", "CasADi CVODES", solve, 8.0)
 
 
 def realtime(study: Study) -> Rows:
-    """Simulated over CPU time, adaptive and with fixed steps."""
+    """Simulated time over processor time, with adaptive and with fixed steps."""
     tolerance, error = study.ours
     model = kernel.plain_kernel()
     adaptive = alone(study.raw(model, tolerance))
@@ -149,7 +149,7 @@ def realtime(study: Study) -> Rows:
 
 
 def tick(_: Study) -> Rows:
-    """The running bench: one step, and the steps of one PLC scan, in one call."""
+    """One call of the running bench: a single step, and the steps of one PLC scan."""
     bench = Bench(parameter_sets.load())
     for steps in (1, SCAN):
         time = alone(lambda steps=steps: bench.advance([100.0] * steps))  # type: ignore[misc]
@@ -157,7 +157,7 @@ def tick(_: Study) -> Rows:
 
 
 def effects(study: Study) -> Rows:
-    """What all effects cost while none is there, and how much of it a kernel with some saves."""
+    """The cost of all effects at their neutral values, and of some of them."""
     tolerance, _ = study.ours
     every, none = kernel.kernel(), kernel.build({})
     times = side_by_side(
@@ -173,7 +173,7 @@ def effects(study: Study) -> Rows:
 
 
 def thousand(study: Study) -> Rows:
-    """A thousand simulations, each with its own parameters."""
+    """A thousand simulations with different parameters."""
     random, (tolerance, _) = np.random.default_rng(1), study.ours
 
     def action() -> None:
@@ -188,7 +188,7 @@ def thousand(study: Study) -> Rows:
 
 
 def first_result(study: Study) -> Rows:
-    """A fresh process up to its first simulation, without and with a cache on disk."""
+    """A new process up to its first result, without and with compiled kernels on the disk."""
     with tempfile.TemporaryDirectory() as folder:
         for name in ("first_result_cold", "first_result_warm"):
             before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -203,7 +203,7 @@ def first_result(study: Study) -> Rows:
 
 
 def identification(_: Study) -> Rows:
-    """A fit of nine parameters and a start state to one log, from the nominal parameters."""
+    """A fit of nine parameters and an initial state to one log, from the nominal parameters."""
     try:
         import lmfit  # noqa: F401
     except ImportError as error:
@@ -221,17 +221,17 @@ def identification(_: Study) -> Rows:
 
 
 def diagnosis(_: Study) -> Rows:
-    """Programs 1 to 3 over the whole library, and how it grows with logs and effects."""
+    """A diagnosis of programs 1 to 3 with the whole library; its growth with logs and effects."""
     every = len(effect_names())
     few = diagnoses.SMALL
-    diagnoses.diagnosis(1, few)  # compiles what is not in the cache yet
-    whole = diagnoses.diagnosis(3, every)
-    label = f"budget on the clock; here {diagnoses.cores()}"
+    diagnoses.diagnose(1, few)  # compiles what is not in the cache yet
+    whole = diagnoses.diagnose(3, every)
+    label = f"budget of wall time; here {diagnoses.cores()}"
     yield row("diagnosis", whole.clock, label, DIAGNOSIS_BUDGET, 1.0)
-    yield row("diagnosis_processor", whole.processors, "its time on the clock", whole.clock, 0.0)
+    yield row("diagnosis_processor", whole.processors, "its wall time", whole.clock, 0.0)
     fewer = [(logs, every) for logs in (1, 2)] + [(3, count) for count in (few, 2 * few)]
     for logs, count in fewer:
-        cost = diagnoses.diagnosis(logs, count)
+        cost = diagnoses.diagnose(logs, count)
         label = f"3 logs, {every} effects; processor time of both"
         yield row(f"logs_{logs}_effects_{count}", cost.processors, label, whole.processors, 0.0)
 

@@ -1,4 +1,4 @@
-"""What the diagnosis of the gap costs: the whole command, as an operator calls it."""
+"""Measure the cost of a diagnosis: the whole command, as an operator calls it."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ LOGS = [str(CASE / f"program{k}.csv.gz") for k in (1, 2, 3)]
 
 @dataclass(frozen=True, kw_only=True)
 class Cost:
-    """Time on the clock, from the start of the process to its end, and of all processors [s]."""
+    """Wall time from start to end of the process, and processor time of all processes [s]."""
 
     clock: float
     processors: float
 
 
 def library(count: int) -> list[str]:
-    """So many effects evenly from the whole library, the logs' own cause among them."""
+    """This many effects, evenly from the whole library; the cause in the logs is one of them."""
     others = [name for name in effects.names() if name != CAUSE]
     return [CAUSE, *(others[k * len(others) // (count - 1)] for k in range(count - 1))]
 
 
-def diagnosis(logs: int, count: int) -> Cost:
-    """`plant-emulator diagnose` of so many logs with a library of so many effects, all cores.
+def diagnose(logs: int, count: int) -> Cost:
+    """Run `plant-emulator diagnose` on this many logs with this many effects, and measure it.
 
-    An answer that does not name the logs' own cause has no price: it ends the measurement.
+    Raises ClickException for an answer that does not name the cause in the logs.
     """
     left_out = sorted(set(effects.names()) - set(library(count)))
     options = [word for name in left_out for word in ("--without", name)]
@@ -51,12 +51,14 @@ def diagnosis(logs: int, count: int) -> Cost:
         cost = Cost(clock=perf_counter() - started, processors=_processors() - before)
         named = json.loads(file.read_text())["verdict"]["class"]
     if not any(CAUSE in names for names in named):
-        raise click.ClickException(f"{logs} logs, {count} effects: {CAUSE} not found, but {named}")
+        raise click.ClickException(
+            f"{logs} logs, {count} effects: {named} is named instead of {CAUSE}"
+        )
     return cost
 
 
 def cores() -> str:
-    """How many cores the diagnosis has."""
+    """The number of cores that a diagnosis uses, as words."""
     count = len(os.sched_getaffinity(0))
     return f"{count} core{'' if count == 1 else 's'}"
 

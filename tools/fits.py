@@ -1,4 +1,4 @@
-"""The same fit by a general estimator on a general solver: lmfit on scipy's LSODA."""
+"""One fit done twice: by our identification, and by lmfit on scipy's LSODA."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ if TYPE_CHECKING:
 
 LOG = Path(__file__).resolve().parent.parent / "tests/data/bench_practice/practice_008"
 PROGRAM = "program1"
-# Tolerance at which the solver's error is far below the noise, and the step of lmfit's differences
-# that stands out of it: epsfcn is its square.
+# At this tolerance the solver's error is far below the noise. The step of lmfit's differences has
+# to be larger than that error. lmfit's epsfcn is the square of the step.
 TOLERANCE, DIFFERENCE = 1e-6, 1e-8
-# Bounds of the search, the same as ours.
+# Bounds of the search over the nominal values, as in our identification.
 FACTOR = 5.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fitted:
-    """An optimum: values by name [SI], and the sum of squared whitened residuals."""
+    """An optimum: parameter values by name [SI], and the sum of squared whitened residuals."""
 
     values: Mapping[str, float]
     cost: float
 
 
 class Fits:
-    """One log of the independent bench, to be fitted both ways from the nominal parameters."""
+    """One log of the independent bench; both fits start from the nominal parameters."""
 
     def __init__(self, log: Path = LOG / f"{PROGRAM}.csv.gz") -> None:
         self.nominal = parameter_sets.load()
@@ -52,11 +52,11 @@ class Fits:
         self.corners = ((0.0, program.corners[0][1]), *program.corners, (program.duration, last))
 
     def ours(self) -> Identification:
-        """The fit as users get it."""
+        """Fit as a user does."""
         return identify([self.recording], self.nominal)
 
     def residual(self, values: Mapping[str, float], gap_position: float) -> Array:
-        """Whitened residual of the log by LSODA, shape (channels, samples)."""
+        """Whitened residual of the log, simulated by LSODA, shape (channels, n)."""
         p = {**self.nominal.values(), **values}
         solver = peers.Lsoda(self.recording.log.time, peers.plain(self.corners, p), p)
         found = solver(TOLERANCE, gap_position * p["backlash_half_gap"])
@@ -65,7 +65,7 @@ class Fits:
         return np.asarray((measured - found.T[names]) / self.recording.noise[:, None])
 
     def lmfit(self, start: Mapping[str, float] | None = None, gap: float = 0.0) -> Fitted:
-        """lmfit's leastsq (MINPACK) on logarithms of the parameters and the start in the gap."""
+        """Fit by lmfit's leastsq (MINPACK): log parameters and the backlash gap position."""
         import lmfit
 
         unknowns = lmfit.Parameters()

@@ -1,9 +1,9 @@
-"""How far an effect's size is off where the machine follows another law of it than the library.
+"""Measure the error of an effect's size where the machine has another law than the library.
 
     .venv/bin/python tools/law_errors.py --seed 11 --cases 300 > sizes.csv
 
-Each single effect of the blind trial's cases is fitted alone, by the contest of a diagnosis, to
-logs made with the trial's own law of it.
+The logs are those of the blind trial's cases with a single effect, made with the trial's own law
+of that effect. The search of a diagnosis fits the library's law of the effect to them.
 """
 
 from __future__ import annotations
@@ -42,7 +42,10 @@ COLUMNS = ("effect", "parameter", "true", "estimated", "standard_error")
 
 
 def sizes(seed: int, only: tuple[str, ...], number: int) -> list[dict[str, Any]]:
-    """True and estimated sizes of a case's effect; none of a case without one of another law."""
+    """True and estimated sizes of a case's effect.
+
+    Empty for a case without an effect, or with an effect that has no other law.
+    """
     if draw.kinds(seed, number + 1)[-1] != "effect":
         return []
     use_own_effects(*(laws.load(name) for name in laws.names()))
@@ -59,16 +62,16 @@ def sizes(seed: int, only: tuple[str, ...], number: int) -> list[dict[str, Any]]
         found, _, _ = Procedure(runner=runner).with_input_noise().run()
     if not found.named:
         return []
-    (contender,) = found.hypotheses
+    (hypothesis,) = found.hypotheses
     candidate = model.candidates[hidden.effect]
-    sized = ranked_effect(contender, found, found.named, candidate).parameters
+    sized = ranked_effect(hypothesis, found, found.named, candidate).parameters
     pairs = score.sizes(case.hidden, [hidden.effect], {hidden.effect: sized}, known)
     # An effect with an estimated size of 0 was found by its other parameters.
     return [asdict(one) for one in pairs if one.estimated != 0.0]
 
 
 def _recordings(case: Case, nominal: ParameterSet) -> Iterator[Recording]:
-    """The logs of a case as a diagnosis reads them."""
+    """The logs of a case, as a diagnosis reads them."""
     with TemporaryDirectory() as folder:
         for run, log in enumerate(simulate_truth(case, nominal)):
             path = f"{folder}/{case.programs[run]}.csv.gz"
@@ -78,11 +81,15 @@ def _recordings(case: Case, nominal: ParameterSet) -> Iterator[Recording]:
 
 @click.command()
 @click.option("--seed", type=click.IntRange(min=0), required=True)
-@click.option("--cases", type=click.IntRange(min=1), required=True, help="So many of the seed.")
+@click.option(
+    "--cases", type=click.IntRange(min=1), required=True, help="Number of cases of the seed."
+)
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True)
-@click.option("--only", multiple=True, type=click.Choice(effects.names()), help="Of these effects.")
+@click.option(
+    "--only", multiple=True, type=click.Choice(effects.names()), help="Only these effects."
+)
 def main(seed: int, cases: int, workers: int, only: tuple[str, ...]) -> None:
-    """Print a table of true and estimated sizes under other laws."""
+    """Print a table of true and estimated sizes of effects that follow another law."""
     table = csv.DictWriter(sys.stdout, COLUMNS, extrasaction="ignore", lineterminator="\n")
     table.writeheader()
     with ProcessPoolExecutor(workers, get_context("spawn"), end_with_parent) as pool:

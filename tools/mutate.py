@@ -1,12 +1,11 @@
 #!/usr/bin/env python3
-"""Mutation test of the files that stand between an error and the drum.
+"""Mutation test of the modules that stand between an error and the drum.
 
-Every comparison, number, truth value, boolean operator, sign, sum and min/max of the TARGETS is
-changed, one at a time, and the file's own tests are run against it. A change that no test notices
-is a survivor: the tests do not say what that place is for. Exit 1 then. What decorators,
-annotations and texts hold is not behaviour and stays as it is.
+A mutant is a module with one change: in a comparison, number, truth value, boolean operator, sign,
+sum or min/max. Decorators, annotations and texts stay as they are. The tests of the module run on
+every mutant. A mutant that no test notices is a survivor: exit code 1.
 
-A mutant lives in a forked process only: the sources on disk are never touched.
+A mutant lives in a forked process. The sources on disk stay as they are.
 """
 
 import ast
@@ -34,12 +33,12 @@ TARGETS = {
     "gateway.regulators.thesis": (EVERY, "tests/gateway/regulators/test_thesis.py"),
     "gateway.regulators.compensated": (EVERY, "tests/gateway/regulators/test_compensated.py"),
 }
-"""Each module's tests, the quick ones first."""
+"""The tests of each module, the quick ones first."""
 OPTIONS = ("-x", "-q", "-p", "no:cacheprovider", "-W", "ignore", "--tb=no", "--assert=plain")
-"""The first failure is enough, and nobody reads of it."""
+"""One failure is enough, and nobody reads it."""
 WORKERS = 2
 PATIENCE = 60
-"""[s] after which a mutant that hangs counts as noticed."""
+"""Time after which a mutant that hangs counts as noticed [s]."""
 
 COMPARISONS: dict[type[ast.cmpop], tuple[type[ast.cmpop], ...]] = {
     ast.Lt: (ast.LtE, ast.GtE),
@@ -66,7 +65,7 @@ NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 @dataclass(frozen=True, kw_only=True)
 class Mutant:
-    """A changed module: where, what was there, what is there now."""
+    """A changed module: line, text before and after the change, syntax tree."""
 
     module: str
     line: int
@@ -76,7 +75,7 @@ class Mutant:
 
 
 def variants(node: ast.AST) -> Iterator[ast.AST]:
-    """Every node that may stand in the place of this one."""
+    """Every node that may replace this one."""
     if isinstance(node, ast.Compare):
         for place, operator in enumerate(node.ops):
             for other in COMPARISONS[type(operator)]:
@@ -97,7 +96,7 @@ def variants(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def constants(value: object) -> tuple[object, ...]:
-    """Other values for a constant; texts and None have none."""
+    """Other values for a constant; none for a text and None."""
     if isinstance(value, bool):
         return (not value,)
     if isinstance(value, int | float):
@@ -106,7 +105,7 @@ def constants(value: object) -> tuple[object, ...]:
 
 
 def places(node: ast.AST) -> Iterator[tuple[ast.AST, str, int | None]]:
-    """Every place of a node that holds behaviour: parent, field, index in it."""
+    """Every place below a node that holds behaviour: parent, field, index in the field."""
     skipped = {"decorator_list", "annotation", "returns"}
     for field, value in ast.iter_fields(node):
         if field in skipped:
@@ -118,18 +117,18 @@ def places(node: ast.AST) -> Iterator[tuple[ast.AST, str, int | None]]:
 
 
 def unchanged(module: str) -> Mutant:
-    """The module as it is."""
-    return Mutant(module=module, line=0, was="", now="", tree=parsed(module))
+    """A mutant without a change."""
+    return Mutant(module=module, line=0, was="", now="", tree=parse(module))
 
 
-def parsed(module: str) -> ast.Module:
-    """Tree of a module."""
+def parse(module: str) -> ast.Module:
+    """Syntax tree of a module."""
     return ast.parse((ROOT / (module.replace(".", "/") + ".py")).read_text(encoding="utf-8"))
 
 
 def mutants(module: str) -> Iterator[Mutant]:
     """Every mutant of a module."""
-    tree = parsed(module)
+    tree = parse(module)
     for parent, field, index in list(places(tree)):
         held = getattr(parent, field)
         node = held if index is None else held[index]
@@ -155,7 +154,7 @@ def _put(parent: ast.AST, field: str, index: int | None, node: ast.AST) -> None:
 
 
 def is_noticed(mutant: Mutant) -> bool:
-    """Whether the module's tests fail on a mutant; they run in a process of their own."""
+    """Whether the tests of the module fail on a mutant; they run in a process of their own."""
     child = os.fork()
     if child:
         return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) != 0
@@ -171,7 +170,7 @@ def is_noticed(mutant: Mutant) -> bool:
 
 
 def run_tests(mutant: Mutant) -> int:
-    """Exit code of the tests with the mutant in the place of its module."""
+    """Run the tests with the mutant in the place of its module; their exit code."""
     import pytest  # loaded by the parent, so that a child does not wait for it
 
     changed = types.ModuleType(mutant.module)
@@ -183,7 +182,7 @@ def run_tests(mutant: Mutant) -> int:
 
 
 def main() -> int:
-    """Try every mutant and print the survivors."""
+    """Try every mutant and print the survivors; the exit code."""
     os.chdir(ROOT)
     sys.path.insert(0, str(ROOT))
     importlib.import_module("hypothesis")

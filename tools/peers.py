@@ -1,9 +1,9 @@
-"""The nominal bench once more, for general solvers: scipy's LSODA and CasADi's CVODES.
+"""A second model of the nominal bench, for general solvers: scipy's LSODA and CasADi's CVODES.
 
-Written from the thesis's equations (LiTH-ISY-EX--17/5092--SE, chapter 3), independent of the
-emulator's own laws, drive and plant: it shares the parameter values with them and nothing else. A
-general solver needs a right-hand side without jumps, so the sign in the gear's friction is a tanh
-of 1e-4 rad/s width; limits, conditional integration and dead zone stand as they are.
+This model is written from the equations of the thesis (LiTH-ISY-EX--17/5092--SE, chapter 3). It is
+independent of the emulator's own laws, drive and plant: both share only the parameter values. A
+general solver needs a right-hand side without jumps. Hence the sign in the gear's friction is a
+tanh with a width of 1e-4 rad/s. Limits, conditional integration and dead zone are exact.
 
 States: 0 integral of the speed error [rad], 1 integral of the current error [A s], 2 armature
 current [A], 3 motor speed, 4 twist of the motor shaft, 5 gear speed, 6 twist of the drum shaft
@@ -30,35 +30,35 @@ STATES = 8
 SMOOTHED_OVER = 1e-4
 # The power |omega_g|^delta_g has no finite slope at rest; a Jacobian needs one [rad/s].
 REST = 1e-9
-# At rest all derivatives vanish, and a solver free to choose its steps leaps over the whole run.
+# Longest step [s]: at rest all derivatives vanish, and a free step would leap over the whole run.
 LARGEST_STEP = 0.5
-# Below this share of the relative tolerance a state counts as zero [its unit].
+# Absolute tolerance over relative tolerance [the unit of each state].
 ABSOLUTE = 1e-2
-# columns of what the solvers return
+# Columns of the result of each solver.
 CHANNELS = ("motor_speed", "drum_speed", "armature_current", "shaft_torque")
 
 
 def channels(states: Array, p: Values) -> Array:
-    """What the sensors show, (samples, CHANNELS), from (samples, STATES)."""
+    """The measured channels, shape (n, CHANNELS), of the states, shape (n, STATES)."""
     torque = -p["motor_shaft_stiffness"] * states[:, 4]
     return np.column_stack((states[:, 3], states[:, 7], states[:, 2], torque))
 
 
 def delayed(corners: Corners, p: Values) -> tuple[Array, Array]:
-    """Corner times and speeds of the reference after the drive's dead time [s, rad/s]."""
+    """Times [s] and speeds [rad/s] of the corners of the reference, after the drive's dead time."""
     time, speed = np.array(corners).T
     return time + p["dead_time"], speed
 
 
 def plain(corners: Corners, p: Values) -> RightHandSide:
-    """f(t, x) as one writes it with NumPy: np.interp, the elements of x as they come."""
+    """f(t, x) as one writes it with NumPy."""
     times, speeds = delayed(corners, p)
     f = right_hand_side(p)
     return lambda t, x: f(np.interp(t, times, speeds), *x)
 
 
 def tuned(corners: Corners, p: Values) -> RightHandSide:
-    """f(t, x) as fast as plain Python gets: floats throughout, the reference found by bisection."""
+    """f(t, x) as fast as plain Python gets: floats only, and a bisection for the reference."""
     times, speeds = (column.tolist() for column in delayed(corners, p))
     points = zip(times, speeds, strict=True)
     slopes = [(v1 - v0) / (t1 - t0) for (t0, v0), (t1, v1) in pairwise(points)]
@@ -72,7 +72,7 @@ def tuned(corners: Corners, p: Values) -> RightHandSide:
 
 
 def right_hand_side(p: Values) -> Callable[..., list[float]]:
-    """(reference, states) -> derivatives, the constants bound beforehand."""
+    """A function (reference, states) -> derivatives, with its constants bound beforehand."""
     r_a, l_a, j_m = p["armature_resistance"], p["armature_inductance"], p["motor_inertia"]
     k_m, k_1, k_2 = p["flux_constant"], p["flux_constant_1"], p["flux_constant_2"]
     k_mg, xi, j_g = p["motor_shaft_stiffness"], p["gear_ratio"], p["gear_inertia"]
@@ -132,9 +132,9 @@ class Lsoda:
         self._f = right_hand_side
 
     def __call__(self, tolerance: float, backlash_angle: float = 0.0) -> Array:
-        """The channels at the sample times, solved to that relative tolerance.
+        """The channels at the sample times, shape (n, CHANNELS), at this relative tolerance.
 
-        backlash_angle : gear minus drum at the start [rad]
+        backlash_angle : angle of the gear minus angle of the drum at the start [rad]
         """
         from scipy.integrate import solve_ivp
 
@@ -161,7 +161,7 @@ class Cvodes:
         self._solvers: dict[float, Any] = {}
 
     def __call__(self, tolerance: float) -> Array:
-        """The channels at the sample times, solved to that relative tolerance."""
+        """The channels at the sample times, shape (n, CHANNELS), at this relative tolerance."""
         if tolerance not in self._solvers:
             self._solvers[tolerance] = self._solver(tolerance)
         states = np.array(self._solvers[tolerance](x0=np.zeros(STATES))["xf"]).T
@@ -176,7 +176,7 @@ class Cvodes:
 
 
 def symbolic(corners: Corners, p: Values) -> dict[str, Any]:
-    """The same equations as a CasADi problem: time, states, derivatives."""
+    """The equations as a CasADi problem: time, states and derivatives."""
     import casadi as ca
 
     t, x = ca.SX.sym("t"), ca.SX.sym("x", STATES)

@@ -1,12 +1,12 @@
-"""Labelled cases diagnosed by the command, and its answers beside the labels.
+"""Diagnose labelled cases by the command, and print its answers beside the labels.
 
     .venv/bin/python tools/practice.py FOLDER
     .venv/bin/python tools/practice.py FOLDER --withhold
     .venv/bin/python tools/practice.py FOLDER --only practice_003
 
 FOLDER holds labels.tsv (columns case, label, kind, subsystem) and the logs of each case as
-CASE/program*.csv.gz. --withhold takes the effect of every single-effect case out of the library:
-the right answer is then unknown, or an effect that leaves nothing but noise, and the right place.
+CASE/program*.csv.gz. --withhold runs the cases with a single effect, and takes that effect out of
+the library. The right answer is then `unknown` or another effect that leaves only noise.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ import click
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-# What is held out may leave so many times the noise, all channels together, and be noise.
+# A held-out gap counts as noise up to this multiple of the noise floor, all channels together.
 NOISE = 1.2
-# Effects of a class beyond which it says nothing.
+# A class with more effects than this says nothing.
 LARGEST_CLASS = 3
 
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A labelled case: the effects in it, the kind of its answer, and where its gap lies."""
+    """A labelled case: its effects, the kind of its right answer, and the subsystems of its gap."""
 
     name: str
     effects: frozenset[str]
@@ -60,15 +60,15 @@ def cases_of(folder: Path) -> list[Case]:
 
 
 def left(answer: Mapping[str, Any]) -> dict[str, float]:
-    """The held-out gap that the answer leaves over the noise, by channel."""
+    """The held-out gap that the answer leaves, over the noise floor, by channel."""
     gap = answer["gap"]
     return {name: gap["explained"][name] / floor for name, floor in gap["noise_floor"].items()}
 
 
 def right(case: Case, answer: Mapping[str, Any], *, withheld: bool) -> bool:
-    """Whether the answer names what is there at class level.
+    """Whether the answer names every effect of the case, at the level of classes, and no other.
 
-    withheld : whether it is unknown, or names another effect that leaves nothing but noise
+    withheld : the effect is not in the library; right is `unknown`, or an effect that leaves noise
     """
     verdict = answer["verdict"]
     if withheld:
@@ -84,12 +84,12 @@ def right(case: Case, answer: Mapping[str, Any], *, withheld: bool) -> bool:
 
 
 def placed(case: Case, answer: Mapping[str, Any]) -> bool:
-    """Whether the answer's place is one of the label's; a label without one asks for none."""
+    """Whether the answer's subsystem is one of the label's; a label may ask for none."""
     return not case.places or answer["location"]["subsystem"] in case.places
 
 
-def diagnosed(folder: Path, case: Case, withheld: str | None) -> tuple[dict[str, Any], float]:
-    """The answer of `plant-emulator diagnose` on one core, and its time on the clock [s]."""
+def diagnose(folder: Path, case: Case, withheld: str | None) -> tuple[dict[str, Any], float]:
+    """The answer of `plant-emulator diagnose` on one core, and its wall time [s]."""
     logs = sorted(str(path) for path in (folder / case.name).glob("program*.csv.gz"))
     options = ["--without", withheld] if withheld else []
     begun = perf_counter()
@@ -126,11 +126,13 @@ def line(case: Case, answer: Mapping[str, Any], seconds: float, *, withheld: boo
 @click.command()
 @click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
 @click.option(
-    "--withhold", is_flag=True, help="Single effects only, each taken out of the library."
+    "--withhold",
+    is_flag=True,
+    help="Take the effect of each case with a single effect out of the library.",
 )
-@click.option("--only", metavar="CASE", help="One case.")
+@click.option("--only", metavar="CASE", help="Diagnose this case only.")
 def main(folder: Path, *, withhold: bool, only: str | None) -> None:
-    """Diagnose the labelled cases of FOLDER, as many side by side as there are cores."""
+    """Diagnose the labelled cases of FOLDER, one a core at a time."""
     if not (folder / "labels.tsv").is_file():
         raise click.UsageError(f"{folder}/labels.tsv: no such file; it says what each case hides")
     cases = [c for c in cases_of(folder) if only in (None, c.name)]
@@ -144,7 +146,7 @@ def main(folder: Path, *, withhold: bool, only: str | None) -> None:
     with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
         names = [next(iter(c.effects)) if withhold else None for c in cases]
         for case, (answer, seconds) in zip(
-            cases, pool.map(lambda c, name: diagnosed(folder, c, name), cases, names), strict=True
+            cases, pool.map(lambda c, name: diagnose(folder, c, name), cases, names), strict=True
         ):
             click.echo(line(case, answer, seconds, withheld=withhold))
             found.append((right(case, answer, withheld=withhold), placed(case, answer)))

@@ -1,4 +1,4 @@
-"""The program that tools/bench.py measures on, and at which tolerance each solver errs alike."""
+"""The program of tools/bench.py, and the tolerance at which each solver has the same error."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ if TYPE_CHECKING:
     from plant_emulator.solver import kernel
 
 PROGRAM = "program1"
-# Worst channel's NRMSD that we may have [%], and how many times ours a peer may have.
+# Largest error that we may have, NRMSD of the worst channel [%]; largest ratio of a peer's to ours.
 ERROR_BOUND, MORE_ERROR = 0.015, 1.25
 CONVERGED = 1e-8
-# Steps may pass over samples, as those of the general solvers do [s].
+# Longest step [s]: steps may pass over samples, as in the general solvers.
 LONG_STEP = 0.1
-# Relative tolerances, eight a decade.
+# Relative tolerances: eight in each decade.
 LADDER = tuple(float(f"{tolerance:.3g}") for tolerance in np.geomspace(1e-2, 1e-5, 25))
 TRIAL_ROUNDS = 3
 
 
 class Study:
-    """The emulator on the program, prepared, and what its errors are measured against."""
+    """The emulator with the inputs of the program, and the converged solution for its errors."""
 
     def __init__(self) -> None:
         program = programs.PROGRAMS[PROGRAM]
@@ -47,7 +47,7 @@ class Study:
         self.values = parameter_sets.load().values()
 
     def raw(self, model: kernel.Kernel, tolerance: float, step: float = LONG_STEP) -> Action:
-        """The kernel's own call on inputs prepared beforehand; returns the channels."""
+        """An action: call the kernel with prepared inputs; gives the channels, (n, channels)."""
         run, p = self.run, model.parameter_record(self.values)
         stage, work = model.stage_record(), model.work()
         out = np.zeros((len(self.time), len(CHANNELS)))
@@ -62,23 +62,23 @@ class Study:
         return action
 
     def simulated(self, tolerance: float, largest_step: float = LONG_STEP) -> Array:
-        """The compared channels as users get them."""
+        """Simulate as a user does; the compared channels, shape (n, channels)."""
         log = simulate(self.run, self.values, tolerance=tolerance, largest_step=largest_step)
         return np.column_stack([log[name] for name in peers.CHANNELS])
 
     @cached_property
     def converged(self) -> Array:
-        """The compared channels at a tolerance far below all others."""
+        """The compared channels at a tolerance far below all others, shape (n, channels)."""
         return self.simulated(CONVERGED, LARGEST_STEP)
 
     def error(self, found: Array) -> float:
-        """NRMSD of the worst channel against the converged solution [%]."""
+        """NRMSD of the worst channel [%], against the converged solution."""
         rms = np.sqrt(np.mean((found - self.converged) ** 2, axis=0))
         return float(100.0 * np.max(rms / np.ptp(self.converged, axis=0)))
 
     @cached_property
     def ours(self) -> tuple[float, float]:
-        """Our loosest tolerance from which on every error is within the bound, and its error."""
+        """Our loosest tolerance with all errors from there on in the bound; its error [%]."""
         found, error = 0.0, inf
         for tolerance in reversed(LADDER):
             now = self.error(self.simulated(tolerance))
@@ -90,10 +90,10 @@ class Study:
         return found, error
 
     def fastest(self, solve: Callable[[float], Array]) -> tuple[float, float]:
-        """Tolerance at which a peer is fastest among those where it errs as we do, and its error.
+        """The peer's fastest tolerance, among those with an error like ours, and the error [%].
 
-        A peer's error does not fall evenly with its tolerance, so that every one is tried; and as
-        none gives just our error, a peer may err by MORE_ERROR times ours.
+        The error of a peer does not fall evenly with its tolerance. Hence every tolerance is tried.
+        No tolerance gives exactly our error. Hence the peer may have MORE_ERROR times our error.
         """
         errors = {tolerance: self.error(solve(tolerance)) for tolerance in LADDER}
         good = {k: error for k, error in errors.items() if error <= MORE_ERROR * self.ours[1]}

@@ -1,4 +1,4 @@
-"""CPU time of two ways to do the same, measured side by side."""
+"""Measure the processor time of an action, alone or in turns with another one."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from time import process_time
 Action = Callable[[], object]
 
 ROUNDS = 15
-# One measurement lasts about this long [s], far above the clock's resolution.
+# Duration of one measurement [s]: far above the resolution of the clock.
 LASTING = 0.02
 
 
 def repetitions(action: Action) -> int:
-    """How often to run it in one measurement; runs it, which also warms it up."""
+    """Number of runs in one measurement; this also warms the action up."""
     action()
     return max(1, round(LASTING / max(duration(action, 1), 1e-7)))
 
 
 def duration(action: Action, times: int) -> float:
-    """CPU time of one run, mean over so many in a row [s]."""
+    """Mean processor time of a run [s], over this many runs in a row."""
     started = process_time()
     for _ in range(times):
         action()
@@ -29,7 +29,7 @@ def duration(action: Action, times: int) -> float:
 
 
 def side_by_side(ours: Action, peers: Action, rounds: int = ROUNDS) -> tuple[float, float]:
-    """Median CPU times of one run [s], measured in turns so that both see the same machine."""
+    """Median processor times of both actions [s], in turns, so that both see the same machine."""
     counts = repetitions(ours), repetitions(peers)
     gc.collect()
     gc.disable()
@@ -42,6 +42,6 @@ def side_by_side(ours: Action, peers: Action, rounds: int = ROUNDS) -> tuple[flo
 
 
 def alone(action: Action, rounds: int = ROUNDS) -> float:
-    """Median CPU time of one run [s]."""
+    """Median processor time of a run [s]."""
     times = repetitions(action)
     return median(duration(action, times) for _ in range(rounds))
