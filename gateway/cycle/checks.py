@@ -1,6 +1,7 @@
-"""What must hold before the bench is armed and while it runs: the first reason that it does not.
+"""The checks that must hold before the bench is armed and while it runs.
 
-The PLC guards itself with its own limits and interlocks; the gateway reads what it says of them.
+The PLC guards itself with its own limits and interlocks. The gateway reads what the PLC reports of
+them, and checks that motor and drum belong together.
 """
 
 from gateway.configuration.config import Config
@@ -10,11 +11,11 @@ from register_maps.signals import Alarm, Interlock, Measurement, Status
 
 ALL_CLOSED = Interlock(sum(Interlock))
 ALARMS_OF_LAST_RUN = Alarm.COMMUNICATION | Alarm.SETPOINT_REJECTED
-"""Alarms that stand until they are acknowledged; before a run they tell of the last one."""
+"""Alarms that stay until they are acknowledged; before a run they belong to the last run."""
 APART_AT_REST, APART_RUNNING = 0.5, 3.0
-"""[rad/s] that motor / ratio and drum may differ: in the backlash the drum runs ahead by 1.3."""
+"""[rad/s] Allowed difference of motor / ratio and drum; in the backlash the drum gains 1.3."""
 QUIET = 1.0
-"""[s] for which no other master may have written."""
+"""[s] Time without a write of another master, before the bench may run."""
 
 
 def check(
@@ -26,10 +27,11 @@ def check(
     echo_age: float,
     other_age: float,
 ) -> Reason | None:
-    """The first check that does not hold, None: all hold.
+    """Reason of the first check that does not hold; None: all checks hold.
 
-    overruns : deadlines missed in a row; echo_age : since the PLC last took a command over [s]
-    other_age : since it last took over one that is not ours [s]
+    overruns : deadlines missed in a row
+    echo_age : time since the PLC last accepted a command [s]
+    other_age : time since the PLC last accepted a command of another master [s]
     """
     running = state is State.RUN
     problem = (
@@ -47,7 +49,7 @@ def check(
 
 
 def _bench(config: Config, measurement: Measurement) -> Reason | None:
-    """Emergency stop, overspeed, interlocks."""
+    """Reason by emergency stop, overspeed or interlocks."""
     status, interlock = measurement.status, measurement.interlock
     closed = ALL_CLOSED if interlock is None else interlock
     if Status.EMERGENCY_STOP_OK not in status or Interlock.EMERGENCY_STOP not in closed:
@@ -77,7 +79,7 @@ def _running(config: Config, overruns: int, echo_age: float) -> Reason | None:
 
 
 def _speeds_apart(config: Config, measurement: Measurement, allowed: float) -> Reason | None:
-    """Whether motor and drum turn as one gear joins them: wiring, scaling, word order."""
+    """Reason where motor and drum do not turn as one gear: wiring, scaling or word order."""
     gear_speed = measurement.motor_speed / config.bench.gear_ratio
     far = abs(gear_speed - measurement.drum_speed) > allowed
     return Reason.IMPLAUSIBLE if far else None

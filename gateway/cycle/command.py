@@ -1,7 +1,7 @@
-"""The command block: its number, its bits, whether it got through and the PLC has taken it over.
+"""The command block: its number, its bits, its arrival, and its acceptance by the PLC.
 
-Writing begins in ARMED, with enable off, because the PLC starts on its rising edge; it goes on in
-SAFE, so that a last command that got lost does not stay in force.
+Writing begins in ARMED with enable off, because the PLC starts on the rising edge of enable.
+Writing continues in SAFE, because a lost last command would leave the command before it in force.
 """
 
 from dataclasses import dataclass, replace
@@ -18,24 +18,28 @@ from register_maps.signals import Control, Measurement, Mode, Setpoint, Status
 WRITING = frozenset({State.ARMED, State.RUN, State.RAMPDOWN, State.SAFE})
 ENABLING = frozenset({State.RUN, State.RAMPDOWN})
 NOT_BY_WAITING = LINK_IS_DOWN | {Reason.NOT_ENCODABLE}
-"""Faults that the next write will meet as well."""
+"""Faults that the next write will meet again."""
 RECENT, JITTER = 0.25, 0.1
-"""[s] Age of a command that somebody still writes: the slowest gateway does so every 0.2 s; and by
-how much it has to be younger than our last one."""
+"""[s] Greatest age of a command that some master still writes; the slowest gateway writes every 0.2
+s. The second number is by how much such a command must be younger than our last one."""
 MICRO, NUMBERS = 1e6, 30011
-"""Parts of a second, and how many first numbers there are: a prime, so that no period shows."""
+"""Parts of a second, and the count of possible first numbers. The count is a prime, so that two
+gateways with periodic starts still get different numbers."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
-    """What was last written: number of the block, setpoint [rad/s], when [s]; and the PLC's echo.
+    """The last command block, and what the PLC has echoed. Times are those of our clock [s].
 
-    number : None: nothing written yet
-    sent : when a block was last written [s]; unanswered : how many since the one echoed last
-    echo_moved : when the echo last changed, or the run began [s]
-    other_wrote : when the PLC last took over a block that is not ours [s]
-    got_through : when the last block was written that is known to have arrived [s]
-    fault : of the first write since then that failed; down : the last, and waiting does not help
+    number : number of the last block, None: no block has been written
+    speed, written : last setpoint [rad/s] and its time; a tick without a block counts as setpoint 0
+    sent : time of the last block
+    unanswered : count of blocks after the block that was echoed last
+    echo, echo_moved : the last echo, and the time of its last change or of the start of the run
+    other_wrote : time at which the PLC last accepted a block of another master
+    got_through : time of the last block that has certainly arrived
+    fault : of the first write that failed after `got_through`
+    down : the last write failed in a way that waiting does not cure
     """
 
     number: int | None = None
@@ -54,7 +58,7 @@ class Command:
 def note_echo(
     register_map: RegisterMap, command: Command, sample: Measurement | None, now: float
 ) -> Command:
-    """Note which command the PLC has taken over by a new sample, and whether it was one of ours."""
+    """Note which command the PLC accepted up to a new sample, and whether the command was ours."""
     if sample is None:
         return command
     if _other_master_wrote(command, sample.command_age, now):
@@ -70,12 +74,12 @@ def note_echo(
 
 
 def _other_master_wrote(command: Command, age: float | None, now: float) -> bool:
-    """Whether the PLC has taken a command over after our last one, of `age` [s] now."""
+    """Whether the PLC accepted a command after our last one; `age` is that of its command [s]."""
     return age is not None and age < RECENT and now - command.sent > age + JITTER
 
 
 def _blocks_since(register_map: RegisterMap, command: Command, echo: int) -> int | None:
-    """How many blocks have been written after the one that is echoed; None: it is not ours."""
+    """Count of our blocks after the block with this echo; None: that block is not ours."""
     if command.number is None:
         return None
     since = command.number - echo
@@ -85,9 +89,9 @@ def _blocks_since(register_map: RegisterMap, command: Command, echo: int) -> int
 
 
 def note_reply(command: Command, measurement: Measurement | None, fault: Reason | None) -> Command:
-    """Note what became of the last block: a fault beside a good reading is that of the write.
+    """Note what became of the last block. A fault beside a good reading is a fault of the write.
 
-    Without a reading the fault is the reading's, and tells nothing of the write before it.
+    Without a reading, the fault belongs to the reading and says nothing about the write before it.
     """
     if measurement is None:
         return command
@@ -97,22 +101,23 @@ def note_reply(command: Command, measurement: Measurement | None, fault: Reason 
 
 
 def fault(command: Command, now: float, stale: float) -> Reason | None:
-    """Why no block has got through for too long, or will; None: they do."""
+    """Fault that has kept every block from arriving for too long; None: blocks arrive."""
     late = now - command.got_through > stale
     return command.fault if command.down or late else None
 
 
 def reset(command: Command, now: float) -> Command:
-    """Nothing is written: the setpoint counts as zero."""
+    """Note that this tick writes nothing, so that the setpoint counts as zero."""
     return replace(command, speed=0.0, written=now)
 
 
 def next_command(
     register_map: RegisterMap, command: Command, limited: Limited, now: float
 ) -> Command:
-    """The next block: one number up. The first is that of the moment, but not the echo's.
+    """Return the next command, one number up. The first number follows from the time and the echo.
 
-    The PLC ignores repeats; and of two gateways that begin together each knows its numbers.
+    The PLC ignores a repeated number. Two gateways that start together get different numbers, so
+    that each knows its own.
     """
     if command.number is None:
         number = (command.echo or 0) + 1 + int(now * MICRO) % NUMBERS
@@ -131,12 +136,12 @@ def next_command(
 
 
 def run_mode(config: Config) -> Mode:
-    """The PLC's mode of a run: in a sweep of steady speeds nobody may drive a truck."""
+    """Mode of the PLC for a run: road load; for a sweep without a truck: speed."""
     return Mode.ROAD_LOAD if config.sweep is None else Mode.SPEED
 
 
 def is_confirmed(config: Config, status: Status) -> bool:
-    """Whether the PLC is enabled, and in the mode of the run."""
+    """Whether the PLC is enabled and in the mode of the run."""
     road_load = run_mode(config) is Mode.ROAD_LOAD
     return Status.ENABLED in status and (Status.ROAD_LOAD in status) is road_load
 
@@ -144,7 +149,7 @@ def is_confirmed(config: Config, status: Status) -> bool:
 def block(
     config: Config, register_map: RegisterMap, command: Command, limited: Limited, *, enable: bool
 ) -> Setpoint:
-    """The command block in SI."""
+    """Command block of a command and its limited setpoint, in SI."""
     number = command.number or 0
     return Setpoint(
         command_sequence=number,

@@ -1,13 +1,12 @@
 """One tick of the gateway, pure: observation -> supervisor -> regulator -> limits -> command block.
 
-`step` knows no clock and no chance: the same configuration, map and observations give the same
-outputs, bit for bit. That is how a recording is replayed.
+`step` has no clock and no randomness. The same configuration, map and observations give the same
+outputs, bit for bit, so that a recording can be replayed.
 
-The regulator runs in every state that has samples, so that shadow shows what it would do; what it
-wants is used in RUN only. Until the PLC has confirmed the start it is seeded anew at every sample,
-so that the first setpoint is the measured speed. In RAMPDOWN the setpoint goes from the last one to
-zero without asking any measurement. Writing begins in ARMED, with enable off, because the PLC
-starts on its rising edge; it goes on in SAFE, so that a lost last command does not stay in force.
+The regulator runs in every state that has samples, so that shadow mode shows its demand. The demand
+is used in RUN only. Until the PLC confirms the start, every sample seeds the regulator anew, so
+that the first setpoint is the measured speed. In RAMPDOWN the setpoint goes from its last value to
+zero and needs no measurement. `command.py` says when a command block is written.
 """
 
 from dataclasses import dataclass, field, replace
@@ -30,10 +29,11 @@ from register_maps.signals import Measurement, Setpoint, Status
 
 UNLINKED = frozenset({State.OFF, State.CONNECT})
 FOLLOWED = Limit.NOT_FINITE | Limit.DEVIATION
-"""Limits that the regulator must know of, or it goes on from where the bench never was. The slope
-limit is not among them: what it delays is caught up with. Nor are stale data: they end the run."""
+"""Limits after which the regulator continues from the setpoint instead of its demand, because the
+bench never reached the demand. After the slope limit the setpoint catches up by itself. Stale data
+end the run."""
 BRIDGED = 2.0
-"""Periods for which a demand goes on along its slope without a new sample."""
+"""Periods for which a demand continues along its slope without a new sample."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,9 +41,10 @@ class Observation:
     """What one tick has seen.
 
     now : monotonic time of the reading [s]
-    measurement : the decoded block, None: there is none, and `fault` says why
-    fault : what was wrong with this tick's reading, or else with the write before it
-    shadow : never write; stop_requested : SIGTERM, Ctrl-C or the end of the demo
+    measurement : the decoded block, None: no good block, `fault` says why
+    fault : of this tick's reading, otherwise of the write before it
+    shadow : never write
+    stop_requested : a signal or the end of the duration asks for a stop
     overruns : deadlines missed in a row up to this tick
     """
 
@@ -61,8 +62,9 @@ class Output:
 
     setpoint : the command block to write, None: write nothing
     demand : motor speed that the regulator wants, before the limits [rad/s]; None: no sample yet
-    age : of the newest sample [s], None: there was none
+    state : of the supervisor
     reason : why the last run ended, or why the bench cannot be armed
+    age : of the newest sample [s], None: no sample yet
     """
 
     setpoint: Setpoint | None
@@ -74,9 +76,10 @@ class Output:
 
 @dataclass(frozen=True, kw_only=True)
 class CycleState:
-    """All that one tick hands to the next.
+    """State that one tick hands to the next.
 
-    regulator : its state, None: no sample yet; demand : what it wanted at `demanded` [s]
+    params, regulator : parameters of the regulator, and its state (None: no sample yet)
+    demand, demanded : last demand, and its time [s]
     """
 
     params: Any
@@ -90,7 +93,7 @@ class CycleState:
 
 
 def initial(config: Config, register_map: RegisterMap) -> CycleState:
-    """State before the first tick; raises ConfigError where map and configuration do not fit."""
+    """State before the first tick. Raises ConfigError where map and configuration do not fit."""
     needed = samples.NEEDS[config.regulator.torque]
     if register_map.register(needed) is None:
         raise ConfigError(
@@ -114,7 +117,7 @@ def initial(config: Config, register_map: RegisterMap) -> CycleState:
 
 
 def _regulator(config: Config) -> Regulator:
-    """What decides on the demand: the configured regulator, or the sweep where there is one."""
+    """The regulator that makes the demand: the configured one, or the sweep of a configuration."""
     if config.sweep is not None:
         return cast("Regulator", sweep)
     return regulators.load(config.regulator.name)
@@ -123,7 +126,7 @@ def _regulator(config: Config) -> Regulator:
 def step(
     config: Config, register_map: RegisterMap, state: CycleState, observation: Observation
 ) -> tuple[CycleState, Output]:
-    """One tick."""
+    """Return state and output after one tick."""
     now = observation.now
     read = samples.take(state.samples, observation.measurement, observation.fault, now)
     read = samples.windowed(config, register_map, read)
@@ -173,7 +176,7 @@ def _facts(config: Config, state: CycleState, observation: Observation) -> Facts
 
 
 def _start_bumpless(state: CycleState, now: float) -> CycleState:
-    """A run begins: the measured speed counts as the last setpoint, the wait for an echo starts."""
+    """Begin a run: the measured speed counts as the last setpoint, the wait for an echo starts."""
     newest = state.samples.newest
     measured = 0.0 if newest is None else newest.motor_speed
     speed = min(max(measured, 0.0), state.limits.speed_max)
@@ -182,7 +185,7 @@ def _start_bumpless(state: CycleState, now: float) -> CycleState:
 
 
 def _regulate(config: Config, state: CycleState, now: float) -> CycleState:
-    """State after the regulator has seen this tick's window, if there is one."""
+    """Let the regulator see the window of this tick, if there is one."""
     newest, supervisor = state.samples.newest, state.supervisor
     if newest is None or supervisor.state in UNLINKED:
         return replace(state, regulator=None, demand=None)
@@ -201,7 +204,7 @@ def _regulate(config: Config, state: CycleState, now: float) -> CycleState:
 
 
 def _limit(config: Config, state: CycleState, now: float) -> Limited:
-    """What the limits pass of what this state wants."""
+    """The setpoint that the limits pass."""
     last, newest = state.command, state.samples.newest
     wanted = _demand_now(config, state, now)
     stopping = newest is None or state.supervisor.state is not State.RUN
@@ -217,7 +220,7 @@ def _limit(config: Config, state: CycleState, now: float) -> Limited:
 
 
 def _demand_now(config: Config, state: CycleState, now: float) -> Demand:
-    """Motor speed that this state wants: in RUN the regulator's, on along its slope for a while."""
+    """The demand at this moment: in RUN that of the regulator along its slope, otherwise zero."""
     demand = state.demand
     if state.supervisor.state is not State.RUN or demand is None:
         return Demand(speed=0.0)
@@ -226,10 +229,10 @@ def _demand_now(config: Config, state: CycleState, now: float) -> Demand:
 
 
 def _follow_limits(config: Config, state: CycleState, limited: Limited, now: float) -> CycleState:
-    """State after the regulator has been told, once, what the limits did to a demand of its."""
+    """Let the regulator continue from the setpoint where the limits changed its newest demand."""
     newest, demand = state.samples.newest, state.demand
-    is_told = state.supervisor.state is State.RUN and state.demanded == now
-    if not (is_told and limited.by & FOLLOWED) or newest is None or demand is None:
+    is_newest = state.supervisor.state is State.RUN and state.demanded == now
+    if not (is_newest and limited.by & FOLLOWED) or newest is None or demand is None:
         return state
     regulator = _regulator(config)
     if not isfinite(demand.speed):
@@ -242,7 +245,7 @@ def _follow_limits(config: Config, state: CycleState, limited: Limited, now: flo
 def _write(
     config: Config, register_map: RegisterMap, state: CycleState, limited: Limited, now: float
 ) -> tuple[CycleState, Setpoint | None]:
-    """The command block of this tick, and the state that knows of it."""
+    """Make the command block of this tick; None: this state writes nothing."""
     if state.supervisor.state not in command.WRITING:
         return replace(state, command=command.reset(state.command, now)), None
     after = command.next_command(register_map, state.command, limited, now)

@@ -1,10 +1,10 @@
-"""The last word on every setpoint. Knows no regulator and no state: whoever asks gets the same.
+"""The limits that every setpoint passes. They know no regulator and no state.
 
-A setpoint is finite, inside the bench's range, no faster than its slopes allow, and rises neither
-more than `deviation` over the measured speed nor on stale data. The PLC goes on along the slope
-that came with a setpoint when no further one comes; where that ends has to hold as well. Downward
-is the safe direction: measurements never keep a setpoint from falling. What is not a number counts
-as standstill.
+A setpoint is finite, lies inside the range of the bench, and changes no faster than the slopes. It
+rises neither on stale data nor to more than `deviation` over the measured speed. The PLC continues
+along the slope of the last command for `HOLD`; the end of that slope obeys the same limits.
+Downward is the safe direction, so that no measurement keeps a setpoint from falling. A demand that
+is not a number counts as standstill.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from register_maps.timing import HOLD
 
 
 class Limit(Flag):
-    """What kept the setpoint from what was wanted."""
+    """Limits that kept the setpoint from the demand."""
 
     NONE = 0
     NOT_FINITE = auto()
@@ -27,7 +27,10 @@ class Limit(Flag):
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """speed_max [rad/s], rate_up, rate_down [rad/s^2], deviation [rad/s], stale [s]"""
+    """Limits of a setpoint.
+
+    speed_max, deviation [rad/s]; rate_up, rate_down [rad/s^2]; stale : age of a sample [s]
+    """
 
     speed_max: float
     rate_up: float
@@ -38,7 +41,7 @@ class Limits:
 
 @dataclass(frozen=True, kw_only=True)
 class Limited:
-    """Setpoint [rad/s], its slope until the next one [rad/s^2], and what has limited it."""
+    """Setpoint [rad/s], its slope until the next setpoint [rad/s^2], and the limits that acted."""
 
     speed: float
     rate: float
@@ -55,9 +58,10 @@ def limit(
     dt: float,
     limits: Limits,
 ) -> Limited:
-    """What is allowed of a wanted motor speed and its slope.
+    """Setpoint that is allowed for a wanted motor speed [rad/s] and its slope [rad/s^2].
 
-    last : setpoint before [rad/s], dt ago [s]; measured : motor [rad/s]; age : of that sample [s]
+    last, dt : the setpoint before [rad/s], and the time since then [s]
+    measured, age : measured motor speed [rad/s], and the age of that sample [s]
     """
     stale = not age <= limits.stale
     speed, by = _replace_not_finite(wanted)
@@ -78,7 +82,7 @@ def _replace_not_finite(wanted: float) -> tuple[float, Limit]:
 
 
 def _ceiling(last: float, measured: float, limits: Limits) -> float:
-    """Highest setpoint that the measured speed allows; a motor not measured may not speed up."""
+    """Highest setpoint that the measured speed allows. An unknown speed allows no rise."""
     return measured + limits.deviation if isfinite(measured) else last
 
 
@@ -87,7 +91,7 @@ def _limit_ceiling(speed: float, ceiling: float, name: Limit, by: Limit) -> tupl
 
 
 def _interval(dt: float, limits: Limits) -> float:
-    """Time that counts for the slope [s]: a gap earns no jump, a time that is no time nothing."""
+    """Time that counts for the slope [s]. A gap allows no jump, and a negative time or NaN is 0."""
     return min(max(0.0, dt), limits.stale)
 
 
@@ -108,5 +112,5 @@ def _note(speed: float, allowed: float, name: Limit, by: Limit) -> tuple[float, 
 
 
 def _steepest(speed: float, ceiling: float, limits: Limits) -> float:
-    """Steepest rise with which the PLC, left alone, still ends under all ceilings [rad/s^2]."""
+    """Steepest rise whose end after `HOLD` stays under all ceilings [rad/s^2]."""
     return min(limits.rate_up, (min(ceiling, limits.speed_max) - speed) / HOLD)

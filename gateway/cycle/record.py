@@ -1,9 +1,9 @@
-"""One tick as bytes of fixed length: what came in, what went out, when (pure).
+"""One tick as bytes of fixed length: input, output, times (pure).
 
-A record holds the raw words, so that a replay starts from exactly what the PLC said, and beside
-them the decoded values, so that a reader needs no register map. A value that was not there is a
-NaN; a record ends with the CRC-32 of what stands before it, so that a torn one is recognised.
-Little-endian, no padding.
+A record holds the raw words, so that a replay starts from exactly what the PLC sent. It also holds
+the decoded values, so that a reader needs no register map. A missing value is NaN. A record ends
+with the CRC-32 of the bytes before it, so that a torn record is recognised. Byte order is
+little-endian, without padding.
 """
 
 import math
@@ -34,14 +34,14 @@ HEAD: Final = (
     ("state", "B", "u1"),
     ("flags", "B", "u1"),
 )
-"""Name, letter of struct, numpy format. Times in seconds, demand in rad/s."""
+"""Name, letter of struct, NumPy format. Times in seconds, demand in rad/s."""
 SHADOW: Final = 1
 STOP_REQUESTED: Final = 2
 READ: Final = 4
 WRITTEN: Final = 8
 COMPUTED: Final = 16
 NOTHING: Final = 0
-"""Code of a fault or reason that is not there."""
+"""Code of no fault and of no reason."""
 
 MEASURED: Final = tuple(field.name for field in fields(Measurement))
 COMMANDED: Final = tuple(field.name for field in fields(Setpoint))
@@ -51,11 +51,14 @@ COMMANDED: Final = tuple(field.name for field in fields(Setpoint))
 class Tick:
     """What one tick of the loop did.
 
-    now : monotonic time of the reading [s]; period : since the tick before [s]
-    lateness : wake-up after the deadline [s]; latency : from wake-up to end of write [s]
-    age : of the newest sample [s]; demand : of the regulator [rad/s]
-    missed : deadlines so far; overruns : in a row, up to this tick
-    words_written : what the limits passed; `written` says whether the PLC confirmed it
+    now, period : monotonic time of the reading, and time since the tick before [s]
+    lateness : from deadline to wake-up [s]
+    latency : from wake-up to the end of the write [s]
+    age : of the newest sample [s]
+    demand : of the regulator [rad/s]
+    missed, overruns : deadlines missed so far, and in a row up to this tick
+    dropped : records lost so far
+    words_written, written : the encoded setpoint, and whether the PLC confirmed it
     """
 
     tick: int
@@ -81,7 +84,7 @@ class Tick:
 
     @property
     def flags(self) -> int:
-        """The yes-or-no facts in one byte."""
+        """Flags of the tick in one byte."""
         return (
             SHADOW * self.shadow
             | STOP_REQUESTED * self.stop_requested
@@ -93,31 +96,31 @@ class Tick:
 
 @dataclass(frozen=True, kw_only=True)
 class Layout:
-    """Where each value of a record lies, for blocks of these sizes."""
+    """Place of each value in a record, for blocks of these sizes."""
 
     read_count: int
     write_count: int
 
     @classmethod
     def of(cls, register_map: RegisterMap) -> "Layout":
-        """The layout for a register map."""
+        """Layout for the blocks of a register map."""
         return cls(
             read_count=register_map.measurement.count, write_count=register_map.command.count
         )
 
     @property
     def body(self) -> struct.Struct:
-        """All but the checksum."""
+        """Structure of a record without its checksum."""
         return _body(self.read_count, self.write_count)
 
     @property
     def size(self) -> int:
-        """Bytes of a record."""
+        """Size of a record [bytes]."""
         return self.body.size + 4
 
     @property
     def formats(self) -> list[tuple[str, str, tuple[int, ...]]]:
-        """The same as a numpy structured dtype: name, format, shape."""
+        """Fields of a record as a NumPy structured type has them: name, format, shape."""
         return [
             *((name, code, ()) for name, _, code in HEAD),
             ("words_read", "<u2", (self.read_count,)),
@@ -128,7 +131,7 @@ class Layout:
         ]
 
     def pack(self, tick: Tick) -> bytes:
-        """The record of one tick."""
+        """Return the record of one tick."""
         body = self.body.pack(
             tick.tick,
             tick.now,
@@ -160,17 +163,17 @@ def _body(read_count: int, write_count: int) -> struct.Struct:
 
 
 def number(value: float | None) -> float:
-    """A value as a record holds it: NaN where there is none."""
+    """Value in a record; NaN for None."""
     return math.nan if value is None else float(value)
 
 
 def values(record: Measurement | Setpoint | None, names: Sequence[str]) -> list[float]:
-    """The named fields as a record holds them."""
+    """Named fields of a block in a record; NaN where there is no block."""
     if record is None:
         return [math.nan] * len(names)
     return [number(getattr(record, name)) for name in names]
 
 
 def is_intact(record: bytes) -> bool:
-    """Whether a record is whole: its checksum fits."""
+    """Whether the checksum of a record fits."""
     return zlib.crc32(record[:-4]) == int.from_bytes(record[-4:], "little")

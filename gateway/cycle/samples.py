@@ -1,12 +1,13 @@
-"""Which readings are new samples, how old the newest is, and what lies between two of them.
+"""The samples of the PLC: which reading is new, how old it is, and the window between two samples.
 
-A PLC that is polled as fast as it scans now and then shows the same sample twice: that is neither
-news nor a fault. It is stale when heartbeat or sequence number have not moved for too long. A poll
-that was lost is bridged: the torque integral and the speeds of the next sample span the gap.
+A PLC that is polled as fast as it scans sometimes shows one sample twice. Such a repetition is
+neither new nor a fault. A sample is stale when heartbeat or sequence number have not moved for too
+long. A lost poll is bridged, because the torque integral and the speeds of the next sample span the
+gap.
 
-Nothing is regulated on a window that cannot be: over which the PLC's clock has not advanced, or not
-as ours has, or whose mean torque no sensor could have shown. One such window is left out; when none
-that can be used has come for too long, there is no fresh sample.
+The regulator never sees an impossible window. A window is impossible when the PLC's clock has not
+advanced over it, or has advanced unlike our clock, or when no sensor could show its mean torque.
+One such window is left out. When no usable window has come for too long, there is no fresh sample.
 """
 
 from dataclasses import dataclass, replace
@@ -21,26 +22,30 @@ from register_maps.signals import Measurement
 from register_maps.timing import SCAN
 
 LINK_IS_DOWN = frozenset({Reason.NOT_CONNECTED, Reason.CONNECTION_LOST})
-"""Faults that no waiting for the next poll cures."""
+"""Faults that waiting for the next poll does not cure."""
 OUT_OF_STEP, JITTER = 0.5, 0.05
-"""How far two clocks may differ over a window: as a share of it, and [s] besides."""
+"""Allowed difference of two clocks over a window: a share of the window, and an addition [s]."""
 MEMORY = 0.5
-"""[s] over which a clock that is always too fast or too slow is noticed."""
+"""[s] Time over which a clock that is always too fast or too slow is noticed."""
 APART, SWING = 20.0, 200.0
-"""[N m] that the mean of a window may differ from the PLC's mean of its last scan: when the window
-is that scan, and by how much more when the rest of it is all of the window."""
+"""[N m] Allowed difference of a window's mean torque from the PLC's mean over its last scan. The
+first number holds for a window of one scan; the second is added for a window of many scans."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Samples:
-    """newest : the last good reading; before : the sample before it that was another one
+    """The last two samples of the PLC, and the window between them. Times are those of our clock.
 
-    heartbeat_moved, sequence_moved : when they last did [s]
-    fault : the first since the last good reading; down : the link is known to be gone
-    is_new : this tick has brought a new sample; before_came : when the one before it came [s]
-    window : what lies between the two, None: nothing new, or nothing that can be used
-    used : when the last window came that can be [s]; window_fault : why a later one cannot
-    ahead : by how much the PLC's clock has got ahead of ours in the last MEMORY [s]
+    newest, before : the last good reading, and the other sample before it
+    heartbeat_moved, sequence_moved : times of their last change [s]
+    fault : the first fault since the last good reading
+    down : the link is known to be gone
+    is_new : this tick has brought a new sample
+    before_came : time at which the sample before came [s]
+    window : the window between the two samples, None: no new sample, or an impossible window
+    used : time of the last usable window [s]
+    window_fault : why a later window is impossible
+    ahead : lead of the PLC's clock over ours within the last MEMORY [s]
     """
 
     newest: Measurement | None = None
@@ -57,14 +62,14 @@ class Samples:
     ahead: float = 0.0
 
     def age(self, now: float) -> float:
-        """Age of the newest sample [s]."""
+        """Age of the newest sample at this time [s]."""
         return now - min(self.heartbeat_moved, self.sequence_moved)
 
 
 def take(
     samples: Samples, measurement: Measurement | None, fault: Reason | None, now: float
 ) -> Samples:
-    """Samples after one reading; whether its window can be used is for `windowed` to say."""
+    """Return the samples after one reading, without its window; `windowed` adds that."""
     samples = replace(samples, is_new=False, window=None)
     if measurement is None:
         first = samples.fault or fault or Reason.STALE
@@ -88,7 +93,7 @@ def take(
 
 
 def fault(samples: Samples, now: float, stale: float) -> Reason | None:
-    """Why there is no fresh sample; None: there is one."""
+    """Reason for which there is no fresh sample; None: there is one."""
     if samples.down or samples.newest is None:
         return samples.fault or Reason.STALE
     if samples.age(now) <= stale:
@@ -100,7 +105,7 @@ def fault(samples: Samples, now: float, stale: float) -> Reason | None:
 
 
 def windowed(config: Config, register_map: RegisterMap, samples: Samples) -> Samples:
-    """Samples with the window that a new one ends, or with why it cannot be used."""
+    """Return the samples with the window that a new sample ends, or with its fault."""
     now, before = samples.newest, samples.before
     if not samples.is_new or now is None or before is None:
         return samples
@@ -126,7 +131,7 @@ def windowed(config: Config, register_map: RegisterMap, samples: Samples) -> Sam
 
 
 def _in_step(duration: float, own: float) -> bool:
-    """Whether a window took about as long by the PLC's clock as by ours."""
+    """Whether a window took about as long by the PLC's clock as by ours [s]."""
     allowed = OUT_OF_STEP * max(duration, own) + JITTER
     return duration > 0.0 and abs(duration - own) <= allowed
 
@@ -134,7 +139,7 @@ def _in_step(duration: float, own: float) -> bool:
 def _is_possible(
     register_map: RegisterMap, torque: float, of_scan: float | None, duration: float
 ) -> bool:
-    """Whether a sensor may have shown this mean torque [N m]; `of_scan`: the PLC's own mean."""
+    """Whether a sensor may have shown this mean torque [N m]; `of_scan` is the PLC's own mean."""
     register = register_map.register("shaft_torque")
     if register is not None:
         lowest, highest = sorted(register.si_unit.to_si(end) for end in register.range)
@@ -151,13 +156,13 @@ NEEDS = {
     "averaged": "shaft_torque_mean",
     "instantaneous": "shaft_torque",
 }
-"""The signal that each choice of `regulator.torque` reads."""
+"""Signal that each choice of `regulator.torque` reads."""
 
 
 def _torque(
     kind: str, register_map: RegisterMap, now: Measurement, before: Measurement, duration: float
 ) -> float:
-    """Torque of the window [N m]; where its signal is missing in a sample, that at its end."""
+    """Torque of the window [N m]; the torque at its end where a sample lacks the needed signal."""
     if kind == "averaged" and now.shaft_torque_mean is not None:
         return now.shaft_torque_mean
     last, first = now.shaft_torque_integral, before.shaft_torque_integral
@@ -167,7 +172,7 @@ def _torque(
 
 
 def _shell_temperature(measurement: Measurement) -> float | None:
-    """Mean of the thermocouples that work [K]."""
+    """Mean of the thermocouples that work [K]; None: none works."""
     both = (measurement.shell_temperature_1, measurement.shell_temperature_2)
     working = [one for one in both if one is not None]
     return sum(working) / len(working) if working else None

@@ -1,9 +1,8 @@
-"""What the gateway is doing, and what it does next: states, one table, one reason for every exit.
+"""The supervisor: the states of the gateway, one table of transitions, a reason for every exit.
 
-`advance` is told the facts of this tick (`Facts`), names the one event that they amount to, and
-looks the next state up in TRANSITIONS; an event that the table does not know there changes nothing.
-Whoever wants to know why a run ended reads `reason`: it is set where a state is left against the
-wish of the operator, and kept until the bench is armed again.
+`advance` takes the facts of this tick, finds the one event that follows from them, and looks the
+next state up in TRANSITIONS. `reason` says why a run ended: it is set when a state is left against
+the wish of the operator, and kept until the bench is armed again.
 """
 
 from collections.abc import Callable
@@ -16,7 +15,7 @@ __all__ = ["TRANSITIONS", "Event", "Facts", "Reason", "State", "Supervisor", "ad
 
 
 class State(IntEnum):
-    """What the gateway is doing."""
+    """State of the gateway."""
 
     OFF = 0
     CONNECT = 1
@@ -28,7 +27,7 @@ class State(IntEnum):
 
 
 class Event(Enum):
-    """What can happen."""
+    """Event that may change the state."""
 
     START = "the loop runs"
     STOP = "a stop is requested"
@@ -64,13 +63,16 @@ TRANSITIONS: dict[State, dict[Event, State]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Facts:
-    """What is known at one tick.
+    """Facts of one tick.
 
-    link : None: a fresh sample is at hand; otherwise why there is none
-    write : None: what is written gets through; otherwise why it does not
-    check : None: all checks hold; otherwise the first that does not
-    remote, confirmed : status bits of the PLC: remote; enabled and road load
+    now : time of the tick [s]
+    link : why there is no fresh sample; None: there is one
+    write : why no command arrives; None: commands arrive
+    check : reason of the first check that does not hold; None: all checks hold
+    remote : the operator has switched the PLC to remote
+    confirmed : the PLC is enabled and in the mode of the run
     at_rest : the setpoint has come down to zero
+    stop_requested, shadow : a stop is requested; nothing may be written
     """
 
     now: float
@@ -88,8 +90,10 @@ class Facts:
 class Supervisor:
     """State of the supervisor.
 
-    released : remote has been seen off since this state was entered, so that on is a wish of now
-    started : when RUN was entered [s]; confirmed : the PLC has confirmed enable and road load
+    state, reason : state of the gateway, and why it is there
+    released : remote has been off since this state was entered, so that a remote that is on is new
+    started : time at which this state was entered [s]
+    confirmed : the PLC has confirmed the run
     """
 
     state: State = State.OFF
@@ -100,13 +104,13 @@ class Supervisor:
 
 
 CONFIRM_WITHIN = 1.0
-"""[s] that the PLC has to confirm enable and road load."""
+"""[s] Time within which the PLC has to confirm the run."""
 
 Decision = tuple[Event | None, Reason | None]
 
 
 def advance(before: Supervisor, facts: Facts) -> Supervisor:
-    """State after this tick."""
+    """Return the supervisor after the facts of one tick."""
     event, reason = DECISIONS[before.state](before, facts)
     state = TRANSITIONS[before.state][event] if event else before.state
     entered = state is not before.state
@@ -190,4 +194,4 @@ DECISIONS: dict[State, Callable[[Supervisor, Facts], Decision]] = {
     State.RAMPDOWN: _rampdown,
     State.SAFE: _safe,
 }
-"""In each state: the event that the facts amount to, and the reason to show."""
+"""For each state: the event that follows from the facts, and the reason to show."""

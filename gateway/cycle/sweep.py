@@ -1,8 +1,8 @@
-"""Steady speeds one after the other, in the place of a regulator (pure).
+"""A sweep of steady speeds in the place of a regulator (pure).
 
-It has the form of a regulator (gateway.regulators), so that supervisor, limits, command block and
-recording are those of any run. It knows no truck and looks at no torque; the PLC is in mode SPEED,
-in which nobody drives. After the last speed it asks for standstill, and goes on asking for it.
+The sweep has the form of a regulator (gateway.regulators), so that supervisor, limits, command
+block and recording work as in any run. It knows no truck and needs no torque. The PLC is in mode
+SPEED, in which nobody drives a truck. After the last speed the sweep asks for standstill.
 """
 
 from dataclasses import dataclass, replace
@@ -25,8 +25,11 @@ class Params(Sweep):
 
 @dataclass(frozen=True, kw_only=True)
 class State:
-    """number : of the speed that is gone to or held; held : for so long [s]
-    motor_speed : that was last asked for [rad/s]
+    """Where the sweep is.
+
+    number : index of the present speed
+    held : time for which this speed has been held [s]
+    motor_speed : last demand [rad/s]
     """
 
     number: int
@@ -35,12 +38,12 @@ class State:
 
 
 def seed(params: Params, motor_speed: float, drum_speed: float) -> State:  # noqa: ARG001 - all regulators have these arguments
-    """The sweep before its first speed."""
+    """State before the first speed."""
     return State(number=0, held=0.0, motor_speed=max(motor_speed, 0.0))
 
 
 def update(params: Params, state: State, window: Window) -> tuple[State, Demand]:
-    """Where the sweep is one sample later."""
+    """State and demand one sample later."""
     over = state.number >= len(params.speeds)
     target = 0.0 if over else params.speeds[state.number]
     step = params.rate * window.duration
@@ -57,5 +60,5 @@ def update(params: Params, state: State, window: Window) -> tuple[State, Demand]
 
 
 def follow(params: Params, state: State, demand: float, setpoint: float) -> State:  # noqa: ARG001 - all regulators have these arguments
-    """The sweep goes on from what the limits passed."""
+    """State that continues from the setpoint that the limits passed."""
     return replace(state, motor_speed=setpoint)
