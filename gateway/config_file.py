@@ -1,4 +1,4 @@
-"""Configuration files: read TOML, and name file and line of whatever is wrong in it."""
+"""Read configuration files. An error names file and line."""
 
 import re
 import tomllib
@@ -14,7 +14,10 @@ from gateway.friction import friction_table
 
 
 def load(path: str | Path) -> Config:
-    """The configuration in a file; a friction file is looked for beside it."""
+    """Configuration in a TOML file; a relative friction file is searched beside it.
+
+    Raises ConfigError with file and line.
+    """
     file = Path(path)
     text = _text(file)
 
@@ -31,7 +34,10 @@ def given(config: Config | str | Path) -> Config:
 
 
 def with_values(config: Config, values: Mapping[str, object]) -> Config:
-    """`Config.with_values` where `regulator.friction` may also be the path of a friction file."""
+    """Configuration with some values changed, `{"truck.load_kg": 1600}`; a text is read as TOML.
+
+    `regulator.friction` may also be the path of a friction file. Raises ConfigError.
+    """
     try:
         document = merge(config.document, values)
     except (ValueError, RecursionError) as error:
@@ -41,7 +47,7 @@ def with_values(config: Config, values: Mapping[str, object]) -> Config:
 
 
 def load_friction(path: str | Path) -> dict[str, Any]:
-    """The friction's table out of a friction map or a parameter set of the bench."""
+    """Table of the friction in the file of a friction map or of a parameter set."""
     return friction_table(_toml(Path(path), _text(Path(path))), path)
 
 
@@ -78,7 +84,7 @@ def _toml(path: Path, text: str) -> dict[str, Any]:
 
 
 def _why(error: ValueError | RecursionError) -> str:
-    """What the TOML reader met, in our words where its own speak to programmers."""
+    """Message of the TOML reader; plain words where the reader names Python instead of TOML."""
     match error:
         case tomllib.TOMLDecodeError():
             return str(error)
@@ -88,7 +94,7 @@ def _why(error: ValueError | RecursionError) -> str:
 
 
 def _place(path: Path, text: str, section: str, key: str) -> str:
-    """`file:line: [section] key`; without the line where the key is not written in the file."""
+    """`file:line: [section] key`, without the line where the file does not have the key."""
     inside = ""
     for number, line in enumerate(text.splitlines(), 1):
         heading = re.match(r"\s*\[\s*([\w.-]+)\s*\]", line)

@@ -1,17 +1,17 @@
-"""What can go wrong, by who did it: the operator (ConfigError), the peer (PlcError), we (BugError).
+"""The errors of the gateway, by origin: the operator's input, the PLC, this software.
 
-The command line shows any error that carries `exit_code` as one line and exits with that code.
+The command line shows an error that has an `exit_code` as one line, and exits with that code.
 """
 
 
 class GatewayError(Exception):
-    """The thing asked for failed."""
+    """What was asked for failed; exit code 1."""
 
     exit_code = 1
 
 
 class ConfigError(GatewayError):
-    """Bad input: what is wrong, where, the value found, and what would be right."""
+    """Bad input: what is wrong, its place, the value found and the value expected; exit code 2."""
 
     exit_code = 2
 
@@ -32,8 +32,8 @@ class ConfigError(GatewayError):
 
 
 class PlcError(GatewayError):
-    """The peer did wrong: no answer, a refusal, or an answer that does not fit the question."""
+    """Fault of the PLC or the link: no reply, a refusal, or a reply to something else."""
 
 
 class BugError(GatewayError):
-    """We did wrong: a state that our own code should have made impossible."""
+    """Mistake in this software: a state that should have been impossible."""

@@ -1,11 +1,11 @@
-"""Friction of the gear, as the regulator knows it: law, values, and their reading from a document.
+"""Friction of the gear as the regulator knows it: law, values, and their reading from a document.
 
-Values not given are those of the thesis (Table 3.1), identified with the gear's shell at 32 degC.
-The temperature coefficient is not in the thesis: friction falls with the oil's viscosity.
+Default values are those of the thesis (Table 3.1), identified with the gear's shell at 32 degC. The
+temperature coefficient is not in the thesis: friction falls with the viscosity of the oil.
 
-A friction file is a friction map (keys of RANGES; a measured one also tells its origin in a table
-`measured`, which changes nothing), or a parameter set of the whole bench (a table a parameter, as
-identification writes it); then its three tables of PARAMETERS are taken. Names tell which it is.
+A friction file is either a friction map or a parameter set of the whole bench. A friction map has
+the keys of RANGES; a measured map also has a table `measured` with its origin, which has no effect.
+A parameter set has one table a parameter, and the tables of PARAMETERS are used.
 """
 
 import math
@@ -19,10 +19,11 @@ from register_maps.units import ZERO_CELSIUS
 
 @dataclass(frozen=True, kw_only=True)
 class Friction:
-    """coulomb [N m], viscous [N m (s/rad)^exponent], exponent [1], at the gear output.
+    """Parameters of the friction law at the gear output.
 
+    coulomb [N m], viscous [N m (s/rad)^exponent], exponent [1]
     temperature_coefficient : relative fall of the friction per kelvin of the shell [1/K]
-    reference_temperature_celsius : shell at which coulomb and viscous hold [degC]
+    reference_temperature_celsius : shell temperature at which coulomb and viscous hold [degC]
     """
 
     coulomb: float = 35.989
@@ -33,7 +34,7 @@ class Friction:
 
     @property
     def document(self) -> dict[str, float]:
-        """The same as a table of TOML."""
+        """Table of the friction as a configuration file has it."""
         return asdict(self)
 
 
@@ -51,7 +52,7 @@ PARAMETERS = {
     "gear_viscous_friction": ("viscous", "N m (s/rad)^delta_g"),
     "gear_friction_exponent": ("exponent", "1"),
 }
-"""Table of a parameter set -> key of the friction, and the unit that the table has to name."""
+"""Table of a parameter set -> key of the friction, and the unit that the table must name."""
 
 
 def friction_torque(omega: float, friction: Friction, temperature: float | None = None) -> float:
@@ -59,8 +60,8 @@ def friction_torque(omega: float, friction: Friction, temperature: float | None 
 
     T_f = (f_gc + f_g |omega|^delta_g) sgn(omega) exp(-a (T - T_0))         (thesis, eq 3.27; a = 0)
 
-    omega : speed of the gear output [rad/s]; at rest the sign is 0
-    temperature : of the shell [K], None: not known, the law holds as at its reference temperature
+    omega : speed of the gear output [rad/s]; the friction at rest is 0
+    temperature : of the shell [K]; None: unknown, the reference temperature is assumed
     """
     if omega == 0.0:
         return 0.0
@@ -73,14 +74,14 @@ def friction_torque(omega: float, friction: Friction, temperature: float | None 
 
 
 def read_friction(table: object, place: str) -> Friction:
-    """The friction in a table; `place` names it in the error."""
+    """Friction in a table. Raises ConfigError, in which `place` names the table."""
     if not isinstance(table, Mapping):
         raise ConfigError("no friction table", place=place, value=table, expected=", ".join(RANGES))
     return Friction(**{key: _read_value(key, value, place) for key, value in table.items()})
 
 
 def friction_table(document: Mapping[str, Any], file: object) -> dict[str, Any]:
-    """The friction's keys in a friction file: a friction map or a parameter set of the bench."""
+    """Table of the friction in a friction map or a parameter set. Raises ConfigError."""
     in_set = [name for name in PARAMETERS if name in document]
     in_map = [key for key in RANGES if key in document]
     if in_set and in_map:
@@ -103,7 +104,7 @@ def friction_table(document: Mapping[str, Any], file: object) -> dict[str, Any]:
 
 
 def _parameter(document: Mapping[str, Any], name: str, file: object) -> float:
-    """Value of one table of a parameter set."""
+    """Value of one parameter in a parameter set."""
     key, unit = PARAMETERS[name]
     table = document.get(name)
     if not isinstance(table, Mapping) or "value" not in table:

@@ -1,15 +1,18 @@
-"""Why a run ended or does not begin: a number and a text each. A number keeps its meaning."""
+"""The reasons for which a run ends or cannot begin: a number and a text each.
+
+Recordings hold the numbers, so that a number never changes its meaning.
+"""
 
 from enum import IntEnum
 
 
 class Reason(IntEnum):
-    """Reason code; `text` is for the operator."""
+    """Reason with its code; `text` is for the operator."""
 
     text: str
 
     def __new__(cls, code: int, text: str) -> "Reason":
-        """A member that is its code and carries its text."""
+        """Make a member whose value is the code."""
         member = int.__new__(cls, code)
         member._value_ = code
         member.text = text
@@ -22,8 +25,8 @@ class Reason(IntEnum):
     CONNECTION_LOST = 11, "connection to the PLC lost"
     TIMEOUT = 12, "PLC did not answer in time"
     WRONG_TRANSACTION = 13, "reply to another request"
-    WRONG_FUNCTION = 14, "reply with another function code"
-    WRONG_COUNT = 15, "reply with another number of registers"
+    WRONG_FUNCTION = 14, "reply with a wrong function code"
+    WRONG_COUNT = 15, "reply with a wrong number of registers"
     TORN_IMAGE = 16, "sequence numbers at both ends of the block differ"
     HEARTBEAT_FROZEN = 17, "heartbeat of the PLC stands still"
     SEQUENCE_FROZEN = 18, "samples of the PLC do not advance"
@@ -32,7 +35,7 @@ class Reason(IntEnum):
     TEST_WORD = 21, "test word differs: word order or register map is wrong"
     NOT_AVAILABLE = 22, "a needed value is not available"
     STALE = 23, "no fresh sample in time"
-    PLC_CLOCK = 24, "clock of the PLC stands still or goes otherwise than ours"
+    PLC_CLOCK = 24, "clock of the PLC stands still or differs from ours"
     TORQUE_IMPLAUSIBLE = 25, "mean torque between two samples is impossible"
     PLC_NOT_READY = 30, "PLC is not ready"
     PLC_FAULT = 31, "PLC reports a fault"
@@ -41,8 +44,8 @@ class Reason(IntEnum):
     OVERSPEED = 34, "overspeed"
     PLC_ALARM = 35, "PLC reports an alarm"
     SETPOINT_REJECTED = 36, "PLC rejects the command"
-    MAP_VERSION = 37, "PLC rejects the command block: version of the register map"
-    NOT_ECHOED = 38, "PLC does not take over the commands"
+    MAP_VERSION = 37, "PLC rejects the version of the register map"
+    NOT_ECHOED = 38, "PLC does not accept the commands"
     PLC_LEFT = 39, "PLC left enable or road load"
     IMPLAUSIBLE = 40, "motor and drum speed do not belong together"
     OTHER_MASTER = 41, "another master writes commands to the PLC"

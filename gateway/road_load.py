@@ -1,9 +1,9 @@
-"""What the road asks of the truck: rolling resistance, grade, air. Forces at the wheel, in newtons.
+"""Road load of the truck: rolling resistance, air drag, grade. Forces at the wheel in newtons.
 
-Two forms are offered. The thesis's (eq 4.10-4.12): rolling resistance with a part that grows with
-the drum's speed. The dynamometer's: F0 + F1 v + F2 v^2, as road coast-downs give it. In both the
-weight's share along the grade pulls downhill whichever way the truck goes; the thesis prints it
-under the sign of the speed (eq 4.11), which would let a truck on a slope push itself uphill.
+There are two forms. The thesis (eq 4.10-4.12) has a rolling resistance with a part that grows with
+the drum's speed. Dynamometers use F0 + F1 v + F2 v^2, which road coast-downs determine. In both
+forms the weight pulls downhill in either direction of travel. The thesis prints that term under the
+sign of the speed (eq 4.11), with which a truck on a slope would push itself uphill.
 """
 
 from dataclasses import dataclass
@@ -16,9 +16,11 @@ GRAVITY = 9.81
 
 @dataclass(frozen=True, kw_only=True)
 class RoadLoad:
-    """F = (f0 + f1 |v| + f2 v^2) sgn(v) + slope, v the speed of the truck [m/s].
+    """Coefficients of the road load.
 
-    f0 [N], f1 [N s/m], f2 [N s^2/m^2]; slope : share of the weight along the grade [N]
+    F = (f0 + f1 |v| + f2 v^2) sgn(v) + slope, with the speed v of the truck [m/s]
+
+    f0 [N], f1 [N s/m], f2 [N s^2/m^2]; slope : weight along the grade [N]
     """
 
     f0: float
@@ -27,14 +29,14 @@ class RoadLoad:
     slope: float
 
     def rolling(self, speed: float) -> float:
-        """Resistance against the motion [N]; 0 at rest."""
+        """Resistance against the motion [N] at a speed [m/s]; 0 at rest."""
         if speed == 0.0:
             return 0.0
         v = abs(speed)
         return copysign(self.f0 + (self.f1 + self.f2 * v) * v, speed)
 
     def force(self, speed: float) -> float:
-        """Road load [N] at that speed [m/s]: positive slows a truck that goes forward."""
+        """Road load [N] at a speed [m/s]; a positive load slows a truck that goes forward."""
         return self.rolling(speed) + self.slope
 
     @property
@@ -46,8 +48,9 @@ class RoadLoad:
 def road_load(truck: TruckConfig, bench: BenchConfig) -> RoadLoad:
     """Road load of the configured truck.
 
-    C_rr m g cos(gamma) + C_rr,v m g theta_d'                               (thesis, eq 4.11)
-    becomes F0 and F1 with v = r_d theta_d'; given F0 .. F2 stand as they are.
+    F = C_rr m g cos(gamma) + C_rr,v m g theta_d'                           (thesis, eq 4.11)
+
+    With v = r_d theta_d' the two terms are F0 and F1. Configured F0 .. F2 are used unchanged.
     """
     gamma, weight = atan(truck.grade), truck.total_mass * GRAVITY
     slope = weight * sin(gamma)

@@ -1,8 +1,8 @@
-"""The gateway's configuration, and the document that it is written as.
+"""The configuration of the gateway, and the document that it comes from.
 
-A `Config` keeps its `document`, the whole of what was configured in the units of the file with all
-defaults written out, so that a recording can carry it and `from_document` makes the same again.
-The sections stand in `sections.py`; `gateway/config_file.py` reads files. This module touches none.
+A `Config` keeps its `document`: all values in the units of the file, with every default. A
+recording carries the document, and `from_document` makes an equal configuration from it.
+`sections.py` has the sections, and `gateway/config_file.py` reads files.
 """
 
 import hashlib
@@ -45,10 +45,10 @@ def _defaults() -> Document:
 
 @dataclass(frozen=True, kw_only=True)
 class Config:
-    """Everything that is configured. Changed with `with_values`, so that `document` stays true.
+    """Configuration of the gateway in SI. Change it by `with_values`, which keeps `document` true.
 
-    sweep : steady speeds that are held instead of a road load; None: none
-    document : sections, keys and values as in a file, defaults written out; JSON can hold it
+    sweep : steady speeds to hold instead of a road load; None: road load
+    document : sections, keys and values as in a file, with every default; can be written as JSON
     """
 
     plc: PlcConfig = field(default_factory=PlcConfig)
@@ -87,7 +87,7 @@ def _set_place(section: str, key: str) -> str:
 
 
 def from_document(document: Mapping[str, Any], *, place: Place = _set_place) -> Config:
-    """The configuration in a document; `place` names where a key stands, for the error."""
+    """Configuration in a document. Raises ConfigError; `place` names section and key there."""
     written = _defaults()
     sections: dict[str, Any] = {}
     for name, entries in document.items():
@@ -124,7 +124,7 @@ def _section(name: str, section: type, entries: Mapping[str, Any], place: Place)
 
 
 def _form_of_road_load(document: Mapping[str, Any], place: Place) -> None:
-    """Road load is told once: either by crr or by f0 .. f2."""
+    """Refuse f1 or f2 without f0: the road load is given either by crr or by f0 .. f2."""
     truck = document.get("truck", {})
     given = [key for key in ("f0_N", "f1_N_per_m_s", "f2_N_per_m2_s2") if key in truck]
     if given and "f0_N" not in truck:
@@ -137,6 +137,6 @@ def _form_of_road_load(document: Mapping[str, Any], place: Place) -> None:
 
 
 def config_hash(config: Config) -> str:
-    """SHA-256 over the document: the same for the same configuration however it was written."""
+    """SHA-256 over the document; equal configurations have equal hashes."""
     text = json.dumps(config.document, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()

@@ -1,4 +1,4 @@
-"""One key of a configuration file: declared once beside the field it fills, and checked by that."""
+"""Keys of a configuration file: each is declared beside its field, which also checks the value."""
 
 import math
 import re
@@ -8,12 +8,12 @@ from typing import Any, Final
 from gateway.errors import ConfigError
 
 CONTROL: Final = re.compile(r"[\x00-\x1f\x7f]")
-"""What no value on one line holds."""
+"""Characters that no text on one line has."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Key:
-    """One key of the file. Value in SI = value in the file * `scale`; the range is the file's."""
+    """One key of the file. Value in SI = value in the file * scale; the range is in file units."""
 
     name: str
     default: Any
@@ -32,23 +32,23 @@ def declare(
     upper: float = math.inf,
     choices: tuple[str, ...] = (),
 ) -> Any:
-    """A field of a section with its key."""
+    """Declare the field of a section with its key."""
     found = Key(name=name, default=default, scale=scale, lower=lower, upper=upper, choices=choices)
     return field(default=si(found, default), metadata={"key": found})
 
 
 def si(key: Key, value: Any) -> Any:
-    """Value of the file in SI; whole numbers and texts have no unit."""
+    """Value in SI of a value in the file; whole numbers and texts have no unit."""
     return value * key.scale if isinstance(value, float) else value
 
 
 def keys(section: type) -> dict[str, Key]:
-    """The keys of a section by the name of their field."""
+    """Keys of a section by the name of their field."""
     return {one.name: one.metadata["key"] for one in fields(section) if "key" in one.metadata}
 
 
 def read_value(key: Key, kind: Any, value: Any, where: str) -> Any:
-    """Value in SI; raises ConfigError that names `where`, value and what would be right."""
+    """Value in SI of a value in the file. Raises ConfigError with place and allowed values."""
     wanted = next((one for one in (str, bool, int) if kind is one), float)
     numeric = wanted is float and isinstance(value, int) and not isinstance(value, bool)
     if type(value) is not wanted and not numeric:
@@ -67,7 +67,7 @@ def read_value(key: Key, kind: Any, value: Any, where: str) -> Any:
 
 
 def check_text(value: str, where: str) -> None:
-    """Refuse a text that names nothing: an empty one, or one that no line can hold."""
+    """Refuse an empty text and a text with control characters."""
     if not value.strip() or CONTROL.search(value):
         what = "control character" if value.strip() else "empty"
         raise ConfigError(what, place=where, value=value, expected="a text on one line")

@@ -1,6 +1,6 @@
-"""The sections of the gateway's configuration: frozen records in SI, with the keys of the TOML.
+"""The sections of the configuration: frozen records in SI with the keys of the TOML file.
 
-Each field declares its key once: name as in the file, factor to SI, range or choice, default.
+Each field declares its key: name in the file, default, factor to SI, range or choices.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ PERCENT = 1e-2
 
 @dataclass(frozen=True, kw_only=True)
 class PlcConfig:
-    """Where the PLC is, and how long it may take [s]."""
+    """Address of the PLC, its register map, and the time-out of one request [s]."""
 
     host: str = declare("host", "127.0.0.1")
     port: int = declare("port", 5020, lower=1, upper=65535)
@@ -26,8 +26,13 @@ class PlcConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class LoopConfig:
-    """The clock. `stale`: age at which a sample is of no more use; `overruns`: deadlines in a row
-    that may be missed."""
+    """The loop.
+
+    period : from tick to tick [s]
+    stale : age at which a sample is too old [s]
+    overruns : deadlines in a row that may be missed
+    realtime : ask the operating system for real time
+    """
 
     period: float = declare("period_ms", 10.0, scale=MILLI, lower=1.0, upper=200.0)
     stale: float = declare("stale_ms", 100.0, scale=MILLI, lower=5.0, upper=1000.0)
@@ -37,9 +42,12 @@ class LoopConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class BenchConfig:
-    """The bench as the regulator knows it (thesis, Table 3.1), and the filters in its PLC.
+    """The bench as the regulator knows it (thesis, Table 3.1).
 
-    torque_filter, speed_filter : time constants of first-order filters before the PLC's values [s]
+    drum_inertia, gear_inertia [kg m^2]; drum_radius [m]; gear_ratio [1]
+    dead_time : of the drive's reference [s]
+    torque_filter, speed_filter : time constants of first-order filters in front of the PLC [s]
+    flux_constant, flux_constant_1, flux_constant_2 : K_m, K_1, K_2 of the motor
     """
 
     drum_inertia: float = declare("drum_inertia_kg_m2", 312.69, lower=1.0, upper=1e5)
@@ -56,11 +64,13 @@ class BenchConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class TruckConfig:
-    """The truck that the bench imitates.
+    """The truck that the bench emulates.
 
+    mass, load [kg]; wheel_radius [m]
     crr, crr_v : rolling resistance [1], and its part with the drum's speed [s] (thesis, eq 4.11)
-    f0, f1, f2 : road load instead of crr, crr_v [N], [N s/m], [N s^2/m^2]; None: crr holds
-    grade : rise over run [1]; top_speed, acceleration, braking : what the run will ask for
+    f0, f1, f2 : road load [N], [N s/m], [N s^2/m^2] instead of crr and crr_v; None: crr holds
+    grade : rise over run [1]
+    top_speed, acceleration, braking : of the planned run [m/s], [m/s^2]; only the review reads them
     """
 
     mass: float = declare("mass_kg", 3640.0, lower=50.0, upper=1e5)
@@ -78,20 +88,23 @@ class TruckConfig:
 
     @property
     def total_mass(self) -> float:
-        """Mass with its load [kg]."""
+        """Mass of truck and load [kg]."""
         return self.mass + self.load
 
 
 @dataclass(frozen=True, kw_only=True)
 class RegulatorConfig:
-    """Which regulator, and what it knows.
+    """The regulator and its settings.
 
-    lead : [s] of the emulated acceleration added; trim : gain on virtual minus drum speed [1];
-        at 0.8 the shaft torque rings after a reversal, with 64 ms dead time and 10 ms scan
-    under_compensation : share of the friction left out; _slow : the same at standstill, from where
-        it falls to the other at 0.5 rad/s of the drum
-    torque_offset : what the sensor shows at no torque [N m]
-    breakaway : torque over the road load at which a standing truck starts to roll [N m at the drum]
+    torque : torque that the regulator uses: integral, mean of the last scan, or momentary value
+    lead : time by which the demand leads by the emulated acceleration [s]
+    trim : gain on virtual minus drum speed [1]; with 64 ms dead time and 10 ms scan, the shaft
+        torque rings after a reversal from 0.8 on
+    under_compensation : share of the friction that is not compensated
+    under_compensation_slow : share at standstill; it falls to the other share at 0.5 rad/s of the
+        drum
+    torque_offset : torque that the sensor shows without load [N m]
+    breakaway : torque over the road load at which a standing truck starts [N m at the drum]
     """
 
     name: str = declare("name", "compensated")
@@ -113,11 +126,13 @@ class RegulatorConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class LimitsConfig:
-    """What no setpoint may exceed. Speeds are the motor's.
+    """Limits of the setpoint, and limits that the PLC gets. Speeds are those of the motor.
 
-    rate_up, rate_down : slopes; deviation : setpoint from measured speed
-    overspeed : measured speed at which the run ends; current : that the PLC may use
-    watchdog : after which the PLC ramps down by itself
+    speed_max, deviation : of the setpoint, and of setpoint minus measured speed [rad/s]
+    rate_up, rate_down : slopes of the setpoint [rad/s^2]
+    overspeed : measured speed at which the run ends [rad/s]
+    current : armature current that the PLC may use [A]
+    watchdog : time without a command after which the PLC ramps down by itself [s]
     """
 
     speed_max: float = declare("speed_max_rpm", 4830.0, scale=RPM, lower=1.0, upper=4830.0)
@@ -131,7 +146,7 @@ class LimitsConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class RecordingConfig:
-    """Where recordings go."""
+    """Folder of the recordings."""
 
     dir: str = declare("dir", "recordings")
 

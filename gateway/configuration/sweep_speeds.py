@@ -1,7 +1,7 @@
 """The steady speeds of a sweep, and their reading from a document (pure).
 
-A configuration with a `sweep` holds these speeds one after the other instead of a road load. It is
-put there by whoever wants the losses, so that the recording tells what was asked.
+A configuration with a `sweep` makes the gateway hold these speeds in turn instead of a road load.
+The measurement of losses puts it there, so that the recording shows which speeds were asked for.
 """
 
 from collections.abc import Mapping
@@ -15,15 +15,18 @@ from register_maps.units import RPM
 RANGES: Final = {"hold_s": (3.0, 3600.0), "rate_rpm_s": (10.0, 3000.0)}
 SLOWEST_RPM, FASTEST_RPM = 60.0, 4830.0
 DEFAULT: Final = (200.0, 400.0, 800.0, 1400.0, 2100.0, 2900.0, 3700.0, 4500.0)
-"""[rpm] Dense where the friction bends; the drum's rim then moves at 0.8 .. 17.5 km/h."""
+"""[rpm] Dense where the friction curve bends; the drum's rim moves at 0.8 .. 17.5 km/h."""
 HOLD_S: Final = 8.0
 RATE_RPM_S: Final = 300.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep:
-    """speeds : of the motor, in their order [rad/s]; hold : each for so long [s]
-    rate : slope from one to the next [rad/s^2]
+    """A sweep of steady motor speeds.
+
+    speeds : in their order [rad/s]
+    hold : time for which each speed is held [s]
+    rate : slope from one speed to the next [rad/s^2]
     """
 
     speeds: tuple[float, ...]
@@ -32,14 +35,14 @@ class Sweep:
 
     @property
     def duration(self) -> float:
-        """From standstill to standstill [s]."""
+        """Duration of the sweep from standstill to standstill [s]."""
         stops = (0.0, *self.speeds, 0.0)
         ways = sum(abs(to - since) for since, to in pairwise(stops))
         return ways / self.rate + self.hold * len(self.speeds)
 
 
 def read_sweep(table: object, place: str) -> Sweep:
-    """The sweep in a table with speeds_rpm, hold_s, rate_rpm_s; `place` names it in the error."""
+    """Sweep in a table with speeds_rpm, hold_s, rate_rpm_s. Raises ConfigError."""
     if not isinstance(table, Mapping) or set(table) != {"speeds_rpm", *RANGES}:
         wanted = ", ".join(("speeds_rpm", *RANGES))
         raise ConfigError("no sweep", place=place, value=table, expected=f"a table with {wanted}")

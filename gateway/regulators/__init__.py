@@ -1,7 +1,7 @@
-"""Regulators: from what happened since the last sample to the motor speed that is wanted.
+"""Regulators: from the window since the last sample to the demanded motor speed.
 
-A regulator is one module here, found by its name. It gives `Params` (frozen, with a classmethod
-`of(config)`), `State` (frozen) and three functions:
+A regulator is one module of this folder, found by its file name. It has `Params` (frozen, with a
+classmethod `of(config)`), `State` (frozen) and three functions:
 
     seed(params, motor_speed, drum_speed) -> State      its demand is the measured motor speed
     update(params, state, window) -> (State, Demand)    one new sample
@@ -43,7 +43,7 @@ class Regulator(Protocol):
 
 
 def names() -> tuple[str, ...]:
-    """The regulators there are."""
+    """Names of all regulators, sorted."""
     return tuple(sorted(found.name for found in iter_modules(__path__) if found.name != "window"))
 
 
@@ -54,7 +54,10 @@ def unknown(name: str, place: str) -> ConfigError:
 
 @lru_cache
 def load(name: str) -> Regulator:
-    """The regulator of that name; the folder is looked through once, not at every tick."""
+    """Import the regulator of this name; a repeated call does not read the folder again.
+
+    Raises ConfigError where there is none.
+    """
     if name not in names():
         raise unknown(name, "regulator.name")
     return cast("Regulator", import_module(f"{__name__}.{name}"))

@@ -1,16 +1,18 @@
-"""A virtual truck, driven by the torque that the real one puts on the drum, which the drum follows.
+"""The compensated regulator: the drum follows a virtual truck, which the real truck's torque
+drives.
 
-Beyond the thesis's regulator:
-- Friction from the motor's speed, which is the gear's also inside the backlash; a little less than
-  the whole of it, because what is compensated too much runs away (slowly, above 1 rad/s).
-- Torque as it acted over exactly the window of the speed difference, so that the inertia term
-  cancels what the bench's own acceleration puts into it.
-- Lead: the virtual truck's acceleration over the delay of drive and link is added, so that the
-  drum does not lag. Trim: so is a share of what the drum, held up by the backlash, is behind.
-- Standstill: sensor and friction cannot be told apart while the gear sticks. The virtual truck
-  stands until the impulse above the road load and a margin has earned it START_SPEED, which it then
-  has; so noise and a creeping offset do not start it and a real start loses nothing. Inside the
-  backlash the sensor sees no truck; the torque there is that which accelerates the drum.
+It differs from the regulator of the thesis in four points.
+- Friction: it follows from the motor speed, which is the gear's speed inside the backlash, too. A
+  small share is left out, because an overcompensated friction runs away (slowly, above 1 rad/s).
+- Torque: it is the torque over exactly the window of the speed difference. The inertia term then
+  cancels the torque of the bench's own acceleration.
+- Lead and trim: the demand leads by the virtual truck's acceleration over the delay of drive and
+  link, so that the drum does not lag. A share of the drum's speed error is added, which the
+  backlash causes at a reversal.
+- Standstill: while the gear sticks, the sensor shows friction and truck together. The virtual truck
+  stands until the impulse above road load and margin is worth START_SPEED, and then has this speed.
+  So noise and a slow offset do not start it, and a real start loses nothing. Inside the backlash
+  the sensor sees no truck, and the torque there is the torque that accelerates the drum.
 """
 
 from dataclasses import dataclass, replace
@@ -21,21 +23,25 @@ from gateway.regulators.window import Demand, Window
 from gateway.road_load import RoadLoad, road_load
 
 SLOW = 0.5
-"""[rad/s] of the drum, up to which the friction may be compensated less. In cruise 1 % of the
+"""[rad/s] Drum speed up to which less of the friction may be compensated. In cruise, 1 % of the
 friction is 3 % of the truck's force."""
 START_SPEED = 0.01
-"""[rad/s] of the drum, with which a standing truck is taken to have started."""
+"""[rad/s] Drum speed with which a standing truck starts."""
 STICK_SPEED = 0.005
-"""[rad/s] of the gear output, below which its friction takes any value up to f_gc."""
+"""[rad/s] Speed of the gear output below which its friction has any value up to f_gc."""
 TRIM_MOST = 0.8
-"""[rad/s] of the drum: more than the backlash costs at a torque reversal is another fault."""
+"""[rad/s] Largest trim, at the drum: the error that the backlash causes at a torque reversal."""
 LEAD_MOST = 0.5
-"""rho above which the lead is cut back, as it feeds back rho times the drum's acceleration."""
+"""rho above which the lead is reduced, because it feeds back rho times the acceleration."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Params:
-    """As the thesis has them; drum_inertia : of gear and drum [kg m^2]; the rest as configured."""
+    """Parameters of the regulator in SI.
+
+    inertia : m r_d^2 of the truck; drum_inertia : of gear and drum [kg m^2]
+    friction, road : laws of eq 4.8 and 4.12; the other fields stand in the configuration
+    """
 
     inertia: float
     drum_inertia: float
@@ -74,29 +80,29 @@ class Params:
 
 @dataclass(frozen=True, kw_only=True)
 class State:
-    """virtual_speed : of the truck [rad/s of the drum]; moving : it has started"""
+    """Speed of the virtual truck [rad/s of the drum], and whether it has started."""
 
     virtual_speed: float
     moving: bool
 
 
 def seed(params: Params, motor_speed: float, drum_speed: float) -> State:
-    """Virtual truck with which the demand is the measured motor speed."""
+    """State whose demand is the measured motor speed."""
     gear_speed = motor_speed / params.gear_ratio
     behind = (gear_speed - drum_speed) / (1.0 + params.trim)
-    virtual = gear_speed - _bounded(params.trim * behind, TRIM_MOST)
+    virtual = gear_speed - _clip(params.trim * behind, TRIM_MOST)
     return State(virtual_speed=max(virtual, 0.0), moving=gear_speed > START_SPEED)
 
 
 def update(params: Params, state: State, window: Window) -> tuple[State, Demand]:
-    """Virtual truck and demand after one new sample."""
+    """State and demand after one new sample."""
     torque = truck_torque(params, window)
-    moving, speed = _moved(params, state, torque, window.duration)
+    moving, speed = _move(params, state, torque, window.duration)
     after = State(virtual_speed=speed, moving=moving)
     if not moving:
         return after, Demand(speed=0.0)
     acceleration = (speed - state.virtual_speed) / window.duration if state.moving else 0.0
-    trim = _bounded(params.trim * (speed - window.drum_speed), TRIM_MOST)
+    trim = _clip(params.trim * (speed - window.drum_speed), TRIM_MOST)
     wanted = params.gear_ratio * (speed + params.lead * acceleration + trim)
     demanded = min(max(wanted, 0.0), params.speed_max)
     rate = params.gear_ratio * acceleration if demanded == wanted else 0.0
@@ -104,13 +110,13 @@ def update(params: Params, state: State, window: Window) -> tuple[State, Demand]
 
 
 def follow(params: Params, state: State, demand: float, setpoint: float) -> State:
-    """Virtual truck with which the demand would have been what the limits passed."""
+    """State whose demand would have been the setpoint that the limits passed."""
     change = (setpoint - demand) / params.gear_ratio / (1.0 + params.trim)
     return replace(state, virtual_speed=max(state.virtual_speed + change, 0.0))
 
 
 def truck_torque(params: Params, window: Window) -> float:
-    """Torque of the truck on the drum, mean over the window [N m].
+    """Mean torque of the truck on the drum over the window [N m].
 
     T_w' = (J_g + J_d) theta_d'' + T_f(theta_m' / xi) + xi T_meas           (thesis, eq 4.9)
     """
@@ -122,28 +128,28 @@ def truck_torque(params: Params, window: Window) -> float:
 def _friction(params: Params, window: Window, measured: float) -> float:
     gear_speed = window.motor_speed / params.gear_ratio
     if abs(gear_speed) < STICK_SPEED:
-        return _bounded(-measured, params.friction.coulomb)
+        return _clip(-measured, params.friction.coulomb)
     least, most = params.under_compensation, params.under_compensation_slow
     slow = max(0.0, 1.0 - abs(gear_speed) / SLOW)
     share = 1.0 - least - max(0.0, most - least) * slow
     return share * friction_torque(gear_speed, params.friction, window.shell_temperature)
 
 
-def _moved(params: Params, state: State, torque: float, duration: float) -> tuple[bool, float]:
-    """Whether the virtual truck moves, and its speed."""
+def _move(params: Params, state: State, torque: float, duration: float) -> tuple[bool, float]:
+    """Whether the virtual truck moves after this torque [N m], and its speed [rad/s]."""
     r_d, before = params.drum_radius, state.virtual_speed
     if state.moving:
         road = r_d * params.road.force(r_d * max(before, 1e-9))
-        speed = min(before + (torque - road) / params.inertia * duration, _top(params))
+        speed = min(before + (torque - road) / params.inertia * duration, _top_speed(params))
         return speed > 0.0, max(speed, 0.0)
     threshold = r_d * params.road.breakaway + params.breakaway
     earned = max(before + (torque - threshold) / params.inertia * duration, 0.0)
     return earned > START_SPEED, earned
 
 
-def _top(params: Params) -> float:
+def _top_speed(params: Params) -> float:
     return params.speed_max / params.gear_ratio
 
 
-def _bounded(value: float, most: float) -> float:
+def _clip(value: float, most: float) -> float:
     return min(max(value, -most), most)

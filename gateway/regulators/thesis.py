@@ -1,17 +1,17 @@
-"""The thesis's regulator (chapter 4): the drum is to turn as the truck's speed would change.
+"""The regulator of the thesis (chapter 4): the drum turns as the speed of the truck would change.
 
-The truck's torque is what the sensor shows, plus friction, plus what turns the drum faster (eq
-4.9); less the road load (eq 4.12) it accelerates the truck, whose speed is the reference (eq 4.4).
-The inertia term of eq 4.9 is the derivative of a measured speed, integrated at once by eq 4.4; so
-it is not differentiated here:
+The torque of the truck is the torque of the sensor plus friction plus the torque that accelerates
+the drum (eq 4.9). It accelerates the truck against the road load (eq 4.12), and the speed of the
+truck is the reference (eq 4.4). Eq 4.9 differentiates a measured speed, which eq 4.4 integrates
+again. Both steps cancel, so that nothing is differentiated here:
 
     theta_ref' = rho theta_d' + 1 / (m r_d^2) integral (T_f + xi T_meas - T_RL) dt
     rho = (J_g + J_d) / (m r_d^2),    setpoint of the motor = xi theta_ref'
 
-Friction takes the drum's speed for the gear's (eq 4.8), which is wrong in the backlash. At rest
-sgn(0) = 0: friction and rolling resistance vanish. The bench has no reverse: where the reference
-would leave its range, the integral is set to what keeps it there. The setpoint is a staircase, as
-in the thesis: no slope is sent that the PLC could follow between two writes.
+Friction uses the drum's speed for the gear's speed (eq 4.8), which is wrong in the backlash. At
+rest sgn(0) = 0, so that friction and rolling resistance vanish. The bench has no reverse: where the
+reference would leave its range, the integral is set so that the reference stays at the end of the
+range. The setpoint is a staircase as in the thesis, without a slope between two writes.
 """
 
 from dataclasses import dataclass, replace
@@ -24,7 +24,11 @@ from gateway.road_load import RoadLoad, road_load
 
 @dataclass(frozen=True, kw_only=True)
 class Params:
-    """m r_d^2 [kg m^2], (J_g + J_d) over it [1], r_d [m], xi [1], and the laws of eq 4.8, 4.12."""
+    """Parameters of the regulator in SI.
+
+    inertia : m r_d^2; rho : (J_g + J_d) / (m r_d^2); drum_radius : r_d; gear_ratio : xi
+    friction, road : laws of eq 4.8 and 4.12
+    """
 
     inertia: float
     rho: float
@@ -52,25 +56,25 @@ class Params:
 
 @dataclass(frozen=True, kw_only=True)
 class State:
-    """integral : the second term of the reference [rad/s of the drum]"""
+    """The integral in the reference [rad/s of the drum]."""
 
     integral: float
 
 
 def seed(params: Params, motor_speed: float, drum_speed: float) -> State:
-    """Integral with which the demand is the measured motor speed."""
+    """State whose demand is the measured motor speed."""
     return State(integral=motor_speed / params.gear_ratio - params.rho * drum_speed)
 
 
 def update(params: Params, state: State, window: Window) -> tuple[State, Demand]:
-    """Reference after one new sample."""
+    """State and demand after one new sample."""
     xi, rho, theta_d = params.gear_ratio, params.rho, window.drum_speed
     r_d, dt = params.drum_radius, window.duration
     t_f = friction_torque(theta_d, params.friction)
     t_rl = r_d * params.road.rolling(r_d * theta_d) + r_d * params.road.slope * (theta_d != 0.0)
     growth = (t_f + xi * window.shaft_torque - t_rl) / params.inertia
     if theta_d == 0.0 and window.drum_speed_change == 0.0:
-        growth = 0.0  # standing: the sensor shows how the shaft is wound, not what the truck wants
+        growth = 0.0  # at standstill the sensor shows the twist of the shaft, not the truck
     integral = state.integral + growth * dt
     wanted = xi * (rho * theta_d + integral)
     speed = min(max(wanted, 0.0), params.speed_max)
@@ -79,5 +83,5 @@ def update(params: Params, state: State, window: Window) -> tuple[State, Demand]
 
 
 def follow(params: Params, state: State, demand: float, setpoint: float) -> State:
-    """Integral with which the demand would have been what the limits passed."""
+    """State whose demand would have been the setpoint that the limits passed."""
     return replace(state, integral=state.integral + (setpoint - demand) / params.gear_ratio)

@@ -1,17 +1,17 @@
-"""What a regulator is told and what it answers."""
+"""Input and output of a regulator."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, kw_only=True)
 class Window:
-    """What happened since the last sample that the regulator saw.
+    """The time between two samples that the regulator sees.
 
     duration : by the PLC's clock [s]
-    shaft_torque : of the window or its end, by `regulator.torque` [N m, the sensor's sign]
-    motor_speed, drum_speed : at its end [rad/s]
+    shaft_torque : over the window or at its end, see `regulator.torque` [N m, sign of the sensor]
+    motor_speed, drum_speed : at the end of the window [rad/s]
     drum_speed_change : over exactly this window [rad/s]
-    shell_temperature : of the gear [K], None: not known
+    shell_temperature : of the gear [K], None: unknown
     """
 
     duration: float
@@ -24,7 +24,7 @@ class Window:
 
 @dataclass(frozen=True, kw_only=True)
 class Demand:
-    """Motor speed that is wanted [rad/s], and its slope until the next sample [rad/s^2]."""
+    """Demanded motor speed [rad/s], and its slope until the next sample [rad/s^2]."""
 
     speed: float
     rate: float = 0.0
