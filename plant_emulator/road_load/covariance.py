@@ -2,9 +2,9 @@
 
     cov = H^-1 (L J'J + P'P) H^-1,   H = J'J + P'P
 
-J, P: derivatives of the whitened residual and of the prior. L: long-run variance of the whitened
-residual with Bartlett's weights (Newey and West, Econometrica 55 (1987) 703). L is 1 for a white
-residual. It is larger for correlated samples, which carry less information.
+J: derivatives of the whitened residual. P'P: precision of the prior. L: long-run variance of the
+whitened residual with Bartlett's weights (Newey and West, Econometrica 55 (1987) 703). L is 1 for a
+white residual. It is larger for correlated samples, which carry less information.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ LAGS = 1.5
 
 def covariance_of(fit: RoadFit) -> Array:
     """Covariance of the free parameters, shape (free, free)."""
-    rows = len(fit.residual) - len(fit.prior.rows)
-    scale = np.sqrt(np.sum(fit.jacobian**2, axis=0))
-    of_data, of_prior = fit.jacobian[:rows] / scale, fit.jacobian[rows:] / scale
-    information, precision = of_data.T @ of_data, of_prior.T @ of_prior
+    information = fit.jacobian.T @ fit.jacobian
+    precision = np.diag(fit.prior.deviation[fit.free] ** -2.0)
+    scale = np.sqrt(np.diag(information + precision))
+    information, precision = (m / np.outer(scale, scale) for m in (information, precision))
     inverse = np.linalg.inv(information + precision)
     middle = residual_variance(fit) * information + precision
     found: Array = inverse @ middle @ inverse / np.outer(scale, scale)
@@ -34,9 +34,8 @@ def covariance_of(fit: RoadFit) -> Array:
 
 
 def residual_variance(fit: RoadFit) -> float:
-    """Long-run variance of the whitened residual, without the rows of the prior [1]."""
-    rows = len(fit.residual) - len(fit.prior.rows)
-    return long_run_variance(fit.residual[:rows], round(LAGS / fit.run.spacing))
+    """Long-run variance of the whitened residual [1]."""
+    return long_run_variance(fit.residual, round(LAGS / fit.run.spacing))
 
 
 def long_run_variance(white: Array, lags: int) -> float:

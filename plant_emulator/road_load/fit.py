@@ -1,9 +1,9 @@
 """Estimates a truck's road load, gear efficiency and load cell from its two road logs (pure).
 
-A bounded nonlinear least-squares fit minimises the whitened residual and the residual of the prior.
-It begins from several starts and keeps the best optimum: a simulated truck that stops where the
-real truck crept on can make a local minimum. A last fit uses the likeliest random walk of the noise
-(see `random_walk_filter`). The load cell's noise makes the least walk, an uneven road makes more.
+`estimation.least_squares` minimises the whitened residual with the prior. It begins from several
+starts and keeps the best optimum: a simulated truck that stops where the real truck crept on can
+make a local minimum. A last fit uses the likeliest random walk of the noise (see
+`random_walk_filter`). The load cell's noise makes the least walk, an uneven road makes more.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from plant_emulator.estimation.least_squares import estimate
+from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.road_load.prior import (
     NAMES,
     Indices,
@@ -26,17 +28,17 @@ from plant_emulator.road_load.prior import (
 from plant_emulator.road_load.random_walk_filter import Whitener, whitener
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from plant_emulator.road_load.run import RoadRun
     from plant_emulator.road_load.signal import Mask
     from plant_emulator.road_load.truck_model import RoadParameters
     from plant_emulator.signals.log import Array
 
 STEPS = np.array([1e-5, 5e-5, 1e-3, 1e-3, 0.02, 1e-3, 2e-5, 1e-3])
-"""Scale of each parameter in the search, and step of its central differences, in order of NAMES."""
+"""Scale of each parameter in the search, in order of NAMES."""
 LOWER = np.array([0.0, -0.01, 0.3, 0.5, -30.0, -20.0, -0.01, -10.0])
 UPPER = np.array([0.2, 0.01, 1.0, 2.0, 30.0, 20.0, 0.01, 10.0])
-EVALUATIONS = 60
-"""Largest number of simulations per start, without those of the derivatives."""
 WALKS = np.geomspace(1.0, 100.0, 13)
 """Candidates for the random walk, over the walk that the load cell's noise makes [1]."""
 
@@ -46,9 +48,9 @@ class RoadFit:
     """An optimum of the fit.
 
     free : indices of the fitted parameters
-    residual : whitened residual of the data, then that of the prior, shape (rows,)
-    jacobian : derivatives of the residual per unit of each parameter, shape (rows, free)
-    cost : sum of squares; settled : whether the solver converged
+    residual : whitened residual, shape (samples,)
+    jacobian : derivatives of the residual per unit of each parameter, shape (samples, free)
+    cost : sum of squares of the residual and of the prior; settled : whether the solver converged
     walk : random walk of the noise, over the walk that the load cell's noise makes [1]
     reached : number of starts that reached this optimum, number of all starts
     """
@@ -123,62 +125,43 @@ def noises(run: RoadRun, values: RoadParameters) -> tuple[float, float]:
 def fit_from(
     run: RoadRun, start: RoadParameters, free: Indices, prior: Prior, filters: Whitener
 ) -> RoadFit:
-    """Fit the free parameters from one start by bounded least squares."""
-    from scipy.optimize import least_squares
-    from threadpoolctl import threadpool_limits
+    """Fit the free parameters from one start."""
+    base = vector(start)
 
-    base, scale = vector(start), STEPS[free]
-
-    def values_at(x: Array) -> Array:
+    def values_of(found: Mapping[str, float]) -> RoadParameters:
         values = base.copy()
-        values[free] = x * scale
-        return values
+        values[free] = [found[NAMES[index]] for index in free]
+        return parameters(values)
 
-    def rows(x: Array) -> Array:
-        values = values_at(x)
-        data = filters.whiten(run.residual(parameters(values))[:, None])[:, 0]
-        return np.concatenate([data, prior.residual(values)])
+    def residual(found: Mapping[str, float]) -> Array:
+        return filters.whiten(run.residual(values_of(found))[:, None]).T
 
-    def derivatives(x: Array) -> Array:
-        of_data = filters.whiten(jacobian(run, values_at(x), free)) * scale
-        of_prior = np.zeros((len(prior.rows), len(free)))
-        for row, index in enumerate(prior.rows):
-            of_prior[row] = np.where(free == index, -scale / prior.deviation[index], 0.0)
-        return np.concatenate([of_data, of_prior])
-
-    bounds = (LOWER[free] / scale, UPPER[free] / scale)
-    x0 = np.clip(base[free] / scale, bounds[0], bounds[1])
-    # A decomposition of eight columns takes twice as much processor time with a second thread.
-    with threadpool_limits(1):
-        found = least_squares(
-            rows, x0, derivatives, bounds, xtol=1e-7, ftol=1e-7, gtol=1e-7, max_nfev=EVALUATIONS
-        )
+    found = estimate(unknowns(base, free, prior), [residual])
     return RoadFit(
         run=run,
-        values=parameters(values_at(found.x)),
+        values=values_of(found.parameters()),
         free=free,
         prior=prior,
         whitener=filters,
-        residual=found.fun,
-        jacobian=np.asarray(found.jac, dtype=np.float64) / scale,
-        cost=float(2.0 * found.cost),
-        settled=bool(found.status > 0),
+        residual=found.residuals[0][0],
+        jacobian=found.jacobians[0][0] / STEPS[free],
+        cost=found.cost + found.penalty,
+        settled=found.converged,
     )
 
 
-def jacobian(run: RoadRun, values: Array, free: Indices) -> Array:
-    """Derivatives of the residual per unit of each free parameter, shape (m, free).
-
-    They are central differences over STEPS.
-    """
-
-    def moved(index: int, by: float) -> Array:
-        changed = values.copy()
-        changed[index] += by
-        return run.residual(parameters(changed))
-
-    def slope(index: int) -> Array:
-        step = STEPS[index]
-        return np.asarray((moved(index, step) - moved(index, -step)) / (2.0 * step))
-
-    return np.stack([slope(int(index)) for index in free], axis=1)
+def unknowns(start: Array, free: Indices, prior: Prior) -> list[Unknown]:
+    """The free parameters with their starts, bounds and priors."""
+    return [
+        Unknown(
+            name=NAMES[index],
+            start=float(start[index]),
+            lower=float(LOWER[index]),
+            upper=float(UPPER[index]),
+            logarithmic=False,
+            scale=float(STEPS[index]),
+            prior=float(prior.mean[index]),
+            std=float(deviation) if np.isfinite(deviation := prior.deviation[index]) else None,
+        )
+        for index in free
+    ]

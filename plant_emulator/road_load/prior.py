@@ -45,16 +45,6 @@ class Prior:
     mean: Array
     deviation: Array
 
-    @property
-    def rows(self) -> Indices:
-        """Indices of the parameters that have a prior."""
-        return np.flatnonzero(np.isfinite(self.deviation)).astype(np.int64)
-
-    def residual(self, values: Array) -> Array:
-        """Distance from the means [standard deviations], one row per index of `rows`."""
-        found: Array = ((self.mean - values) / self.deviation)[self.rows]
-        return found
-
 
 def vector(values: RoadParameters) -> Array:
     """Values as an array in order of NAMES."""
