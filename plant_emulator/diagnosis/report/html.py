@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from plant_emulator.diagnosis.report import html_maps, html_traces
 from plant_emulator.diagnosis.report import html_tables as tables
-from plant_emulator.diagnosis.report import html_traces
-from plant_emulator.diagnosis.report.html_parts import code, scrolled
+from plant_emulator.diagnosis.report.html_parts import PLUS_MINUS, code, scrolled
 from plant_emulator.diagnosis.report.html_pictures import line, waterfall
 from plant_emulator.diagnosis.report.html_remainder import remainder_by_band
 from plant_emulator.diagnosis.report.html_style import STYLE
-from plant_emulator.diagnosis.report.html_tables import PLUS_MINUS
 from plant_emulator.diagnosis.report.markup import Markup, join, tag
 from plant_emulator.diagnosis.wording import (
     KINDS,
@@ -139,8 +138,8 @@ def _shrinkage(gap: HeldOutGap, details: Details) -> Markup:
 def _location(location: Location, units: Mapping[str, str]) -> Markup:
     parts = []
     if location.cells:
-        parts.append(tables.residual_map(location, units))
-        parts += tables.residual_maps(location.maps, units)
+        parts.append(html_maps.residual_map(location, units))
+        parts += html_maps.residual_maps(location.maps, units)
     if location.shares:
         parts.append(tables.subsystems(location))
     return _section("Where the gap lies", *(parts or [tag("p", "No residual exceeds the noise.")]))

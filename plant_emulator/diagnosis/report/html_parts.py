@@ -9,6 +9,9 @@ from plant_emulator.diagnosis.report.markup import Markup, tag
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+PLUS_MINUS = "\N{PLUS-MINUS SIGN}"
+TIMES = "\N{MULTIPLICATION SIGN}"
+
 
 def table(
     caption: str, heads: Iterable[str], rows: Iterable[Markup], look: str = "plain"

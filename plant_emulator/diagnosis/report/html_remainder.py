@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.prediction.remainder import describe_band
-from plant_emulator.diagnosis.report.html_parts import bar, cell, right, row_head, table
-from plant_emulator.diagnosis.report.html_tables import TIMES
+from plant_emulator.diagnosis.report.html_parts import TIMES, bar, cell, right, row_head, table
 from plant_emulator.diagnosis.report.markup import Markup, join, tag
 from plant_emulator.diagnosis.wording import number
 from plant_emulator.signals.frequency_bands import BANDS

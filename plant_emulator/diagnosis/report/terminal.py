@@ -89,7 +89,7 @@ def _paragraph(text: str, width: int, most: int, label: str = "") -> list[str]:
 def _listed(
     items: Sequence[str], width: int, most: int, label: str, names: Sequence[str] = ()
 ) -> list[str]:
-    """As many items as fit into `most` lines, and the number of the others.
+    """List as many items as fit into `most` lines, and the number of the others.
 
     names : shorter forms of the items, for the case that not even the first item fits
     """

@@ -120,6 +120,8 @@ def diagnose(
     Raises InputError for a log, a set or an option that cannot be used, and EmulatorError where
     a worker is lost.
     """
+    if not logs:
+        raise DiagnosisError("no log is given; at least one is needed")
     axis = model == "axis"
     given = None if axis else _set(parameters, effects)
     if given is None:

@@ -88,6 +88,11 @@ def test_log_of_another_machine_is_refused(log: Log) -> None:
         diagnose([axis_truth.log()])
 
 
+def test_no_log_is_refused() -> None:
+    with pytest.raises(DiagnosisError, match="at least one is needed"):
+        diagnose([])
+
+
 def test_axis_has_no_parameter_set() -> None:
     found = Diagnosis(findings=cast("Any", None), given=None, fitted=())
     with pytest.raises(DiagnosisError, match="no parameter set"):
