@@ -1,21 +1,71 @@
-"""What the README tells to type has to work."""
+"""What the README files tell to type has to work, and what they link to has to be there."""
 
 import re
+import shlex
 import tomllib
 from pathlib import Path
 
+import click
+import pytest
+
+import gateway.cli
+import plant_emulator.cli
 from gateway.configuration.config import from_document
 
-README = (Path(__file__).parents[1] / "README.md").read_text("utf-8")
+ROOT = Path(__file__).parents[1]
+PAGES = sorted(
+    page.relative_to(ROOT).as_posix()
+    for folder in ("", "gateway", "plant_emulator", "register_maps", "tests")
+    for page in (ROOT / folder).glob("**/*.md" if folder else "*.md")
+    if page.name != "CHANGELOG.md"
+)
+PROGRAMS = {"gateway": gateway.cli.main, "plant-emulator": plant_emulator.cli.main}
+TYPED = re.compile(r"\.venv/bin/(gateway|plant-emulator) (.*)")
 
 
-def test_configuration_in_the_readme_is_valid() -> None:
-    [text] = re.findall(r"```toml\n(.*?)```", README, flags=re.DOTALL)
-    config = from_document(tomllib.loads(text))
-    assert config.truck.total_mass == 3640.0
+def text(page: str) -> str:
+    return (ROOT / page).read_text("utf-8")
 
 
-def test_every_link_in_the_readme_leads_to_a_file() -> None:
-    links = re.findall(r"\]\(([^)#:]+)\)", README)
-    assert links
-    assert all((Path(__file__).parents[1] / link).is_file() for link in links)
+def typed(page: str) -> list[tuple[str, str]]:
+    """Program and arguments of every command line on a page."""
+    return TYPED.findall(re.sub(r"\\\n\s*", " ", text(page)).replace("`", "\n"))
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_link_leads_to_a_file_or_folder(page: str) -> None:
+    links = re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", text(page))
+    missing = [link for link in links if not ((ROOT / page).parent / link).exists()]
+    assert not missing
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if typed(page)])
+def test_every_command_line_has_a_known_command_and_known_options(page: str) -> None:
+    for program, line in typed(page):
+        command: click.Command = PROGRAMS[program]
+        context = click.Context(command, info_name=program)
+        arguments = shlex.split(line, comments=True)
+        while isinstance(command, click.Group) and arguments and arguments[0][0] != "-":
+            name = arguments.pop(0)
+            found = command.get_command(context, name)
+            assert found is not None, f"{program} knows no {name}: {line}"
+            command, context = found, click.Context(found, info_name=name, parent=context)
+        command.make_parser(context).parse_args(arguments)
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if "```toml" in text(page)])
+def test_every_configuration_is_valid(page: str) -> None:
+    for block in re.findall(r"```toml\n(.*?)```", text(page), flags=re.DOTALL):
+        document = tomllib.loads(block)
+        if "truck" in document:
+            assert from_document(document).truck.total_mass == 3640.0
+
+
+def test_the_first_page_is_short() -> None:
+    assert len(text("README.md").splitlines()) <= 150
+
+
+def test_the_python_of_the_first_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    for block in re.findall(r"```python\n(.*?)```", text("README.md"), flags=re.DOTALL):
+        exec(compile(block, "README.md", "exec"), {})
+    assert "shaft_torque" in capsys.readouterr().out
