@@ -21,12 +21,15 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.effects import Effect
+    from plant_emulator.estimation.unknowns import Estimate, Residual
     from plant_emulator.recordings.recording import Recording
     from plant_emulator.signals.log import Array
 
     Effects = Mapping[str, Mapping[str, float]]
 
 GAP = Unknown(name=GAP_POSITION, start=0.0, lower=-1.0, upper=1.0, logarithmic=False)
+# Gap positions that a scan tries.
+GAP_POSITIONS = 41
 
 
 def states_of(own: Effects, known: Mapping[str, Effect] | None = None) -> tuple[Unknown, ...]:
@@ -74,18 +77,51 @@ def with_own(
 def fit_states(
     recording: Recording, values: Mapping[str, float], states: Sequence[Unknown]
 ) -> dict[str, float]:
-    """States that fit a run best, all parameters as given: scans, then least squares.
+    """Fit the states of a run to its log, all parameters as given: scans, then least squares.
 
-    values : all parameters [SI]
+    values : all parameters [SI]; states : the gap position among them
     """
     values = {**values, **recording.own}
-    search = Search([recording], values, ())
-    search.scan_gaps(41)
 
     def residual(found: Mapping[str, float]) -> Array:
         return recording.residual(*split_gap_position({**values, **found}))
 
-    starts = {u.name: u.start for u in states} | {GAP_POSITION: search.gaps[0]}
-    starts = scanned(residual, starts, [u for u in states if u.name != GAP_POSITION])
-    unknowns = [replace(u, start=starts[u.name], run=0) for u in states]
-    return estimate(unknowns, [residual]).states(0)
+    others = [u for u in states if u.name != GAP_POSITION]
+    starts = scan_states(recording, values, [others], residual)
+    return fit_from(starts, states, residual).states(0)
+
+
+def scan_states(
+    recording: Recording,
+    values: Mapping[str, float],
+    groups: Sequence[Sequence[Unknown]],
+    residual: Residual,
+) -> dict[str, float]:
+    """Find states of a run in the best basin by scans, all parameters as given.
+
+    The gap position is scanned first, with all other states at their starts. Then each group of
+    states is scanned: all states together would be too many.
+
+    values : all parameters [SI]; groups : the states but the gap position
+    residual : of the run, as a function of its states
+    """
+    starts = {u.name: u.start for group in groups for u in group}
+    search = Search([recording], {**values, **starts}, ())
+    search.scan_gaps(GAP_POSITIONS)
+    found = {GAP_POSITION: search.gaps[0], **starts}
+    for group in groups:
+        found = scanned(residual, found, group)
+    return found
+
+
+def fit_from(
+    starts: Mapping[str, float], states: Sequence[Unknown], residual: Residual
+) -> Estimate:
+    """Fit the states of a run by least squares from these starts; the run is number 0.
+
+    residual : of the run, as a function of its states
+    """
+    unknowns = [
+        replace(u, run=0, start=float(np.clip(starts[u.name], u.lower, u.upper))) for u in states
+    ]
+    return estimate(unknowns, [residual])

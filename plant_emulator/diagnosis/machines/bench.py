@@ -20,8 +20,7 @@ from plant_emulator.diagnosis.machines.bench_programs import (
 from plant_emulator.effects import from_file
 from plant_emulator.estimation.equation_error import start_values
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
-from plant_emulator.estimation.initial_states import states_of, with_own
-from plant_emulator.estimation.robust_scan import scanned
+from plant_emulator.estimation.initial_states import scan_states, states_of, with_own
 from plant_emulator.estimation.start_search import Search
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.model.parameters import UNITS
@@ -50,8 +49,6 @@ if TYPE_CHECKING:
 WITH_TRUCK = 1e-4
 # How what an effect needs begins that the voltage shows.
 LOG_VOLTAGE = f"log {NAMES[VOLTAGE]}"
-# Positions in the gap that a predicted run is tried from.
-GAPS = 41
 
 
 def candidate(effect: Effect, *, voltage: bool = False) -> Candidate:
@@ -220,17 +217,14 @@ class BenchModel:
     ) -> dict[str, float]:
         """See `Model`."""
         given = [u for u in self.states if u.name != GAP_POSITION]
-        own = {u.name: u.start for name in effects for u in self.candidates[name].states}
-        own |= {u.name: u.start for u in given}
-        everything = {**self._fixed(run, effects), **own, **values}
-        search = Search([self._recordings[run]], everything, ())
-        search.scan_gaps(GAPS)
-        found = {GAP_POSITION: search.gaps[0], **own}
+        groups = [given, *(self.candidates[name].states for name in effects)]
         residual = self.residual(run, effects)
-        # Each effect's alone: all of several together are too many.
-        for states in (given, *(self.candidates[name].states for name in effects)):
-            found = scanned(lambda trial: residual({**values, **trial}), found, states)
-        return found
+        return scan_states(
+            self._recordings[run],
+            {**self._fixed(run, effects), **values},
+            groups,
+            lambda states: residual({**values, **states}),
+        )
 
     def locate(self, where: FitResult, runs: Sequence[int]) -> Location | None:
         """See `Model`."""

@@ -17,7 +17,7 @@ import numpy as np
 from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
 from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
 from plant_emulator.diagnosis.prediction import block_bootstrap
-from plant_emulator.estimation.least_squares import estimate
+from plant_emulator.estimation.initial_states import fit_from
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -116,8 +116,7 @@ def _predict_run(
     if known is not None or not own:
         return predicted(known or {}), True
     start = model.initial_states(run, effects, found.values)
-    states = [replace(u, run=0, start=float(np.clip(start[u.name], u.lower, u.upper))) for u in own]
-    estimated = estimate(states, [predicted])
+    estimated = fit_from(start, own, predicted)
     return estimated.residuals[0], estimated.converged
 
 
