@@ -88,7 +88,7 @@ def command(
     if json_file:
         _options.write_json(found.to_json(), json_file)
     if json_file != "-":
-        click.echo(str(found.answer))
+        click.echo(str(found))
     if not found.converged:
         kept = f"; {save} is not written" if save else ""
         raise EmulatorError(

@@ -61,6 +61,9 @@ class Estimate:
         half = NORMAL_95 * self.standard_error
         return self.value - half, self.value + half
 
+    def __str__(self) -> str:
+        return f"{self.value:.6g} +- {self.standard_error:.2g}"
+
 
 @dataclass(frozen=True, kw_only=True)
 class RoadAnswer:

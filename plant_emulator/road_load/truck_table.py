@@ -19,9 +19,8 @@ def table(answer: RoadAnswer, truck: Truck, origin: Sequence[str]) -> str:
     estimates that the gateway does not need.
     """
     lines = [*origin, "Standard errors at the end of a line; mass and radius as given.", ""]
-    for name in ("crr", "crr_v", "efficiency", "torque_gain", "torque_offset_Nm"):
-        estimate = answer.estimates[name]
-        lines.append(f"{name} = {estimate.value:.6g} +- {estimate.standard_error:.2g}")
+    names = ("crr", "crr_v", "efficiency", "torque_gain", "torque_offset_Nm")
+    lines += [f"{name} = {answer.estimates[name]}" for name in names]
     lines += [f"Not separable: {text}" for text in answer.not_separable]
     f0, f1 = answer.estimates["f0_newton"], answer.estimates["f1_newton_per_m_s"]
     keys = [

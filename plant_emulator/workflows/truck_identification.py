@@ -23,7 +23,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class TruckIdentification:
-    """An identified truck: the answer, the fit behind it, and the origin of both."""
+    """An identified truck; `print` shows the table of the command `identify-truck`.
+
+    origin : lines about date, version and logs, for the saved table
+    """
 
     answer: RoadAnswer
     fit: RoadFit
@@ -58,8 +61,13 @@ class TruckIdentification:
 
         plot(self.fit, path)
 
-    def __repr__(self) -> str:
+    def __str__(self) -> str:
         return str(self.answer)
+
+    def __repr__(self) -> str:
+        shown = [f"{name} {self.estimates[name]}" for name in ("crr", "efficiency")]
+        state = "" if self.converged else "; not converged"
+        return f"<TruckIdentification: {', '.join(shown)}{state}>"
 
 
 def identify_truck(

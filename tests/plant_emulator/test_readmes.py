@@ -32,6 +32,13 @@ def test_every_link_leads_to_a_file(readme: Path) -> None:
 
 
 @every_readme
+def test_every_named_file_of_the_package_exists(readme: Path) -> None:
+    places = (readme.parent, ROOT / "plant_emulator", ROOT)
+    names = re.findall(r"`([\w/]+(?:/|\.py))`", readme.read_text("utf-8"))
+    assert [name for name in names if not any((place / name).exists() for place in places)] == []
+
+
+@every_readme
 def test_every_command_and_option_exists(readme: Path) -> None:
     context = click.Context(main)
     for name, *arguments in calls(readme.read_text("utf-8")):

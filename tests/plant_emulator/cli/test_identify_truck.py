@@ -107,7 +107,8 @@ def test_library_function_gives_the_answer_of_the_command(done: tuple[Result, Pa
     found = identify_truck(DATA / TORQUE, DATA / VELOCITY, mass=3640.0)
     assert found.converged
     assert found.to_json() == json.loads((folder / "truck.json").read_text())
-    assert repr(found) == result.stdout.rstrip("\n")
+    assert str(found) == result.stdout.rstrip("\n")
+    assert repr(found).startswith("<TruckIdentification: crr 0.0115")
     assert (
         found.truck_table().splitlines()[-7:]
         == ((folder / "truck.toml").read_text().splitlines()[-7:])
