@@ -81,7 +81,7 @@ def test_without_effect_only_its_own_verdict_is_right(
 @pytest.mark.parametrize(
     ("verdict", "alarm"), [("effect", True), ("unknown", True), ("parameter", False)]
 )
-def test_claimed_cause_or_gap_on_drift_is_a_false_alarm(verdict: Kind, alarm: bool) -> None:
+def test_claimed_cause_of_parameter_deviations_is_a_false_alarm(verdict: Kind, alarm: bool) -> None:
     named = ["stribeck"] if verdict == "effect" else []
     assert is_false_alarm(unsealed(answer(verdict, *named), kind="drift")) is alarm
 
@@ -146,7 +146,7 @@ def test_place_is_that_of_one_of_the_hidden() -> None:
     assert not is_located(unsealed(answer("unknown", place="gear"), RIPPLE, kind="outside"))
 
 
-def test_failed_diagnosis_is_wrong_and_told(all_effects: dict[str, Effect]) -> None:
+def test_failed_diagnosis_is_wrong_and_counted(all_effects: dict[str, Effect]) -> None:
     found = score(unsealed(None, OFFSET), all_effects)
     assert (found.right, found.verdict, found.evidence) == (False, "failed", None)
 

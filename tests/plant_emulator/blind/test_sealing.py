@@ -24,7 +24,7 @@ def test_changed_answer_is_refused() -> None:
         unseal(text.replace("0.5", "0.7"), commitment, "here")
 
 
-def test_commitment_does_not_tell_the_answer() -> None:
+def test_commitment_does_not_reveal_the_answer() -> None:
     """Another nonce gives another hash of the same truth."""
     assert seal(CASE, "one")[1] != seal(CASE, "two")[1]
 

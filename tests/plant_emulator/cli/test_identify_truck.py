@@ -276,5 +276,5 @@ def test_impossible_truck_is_refused(option: str, value: str) -> None:
     assert option in refusal(call(DATA / TORQUE, DATA / VELOCITY, option, value))
 
 
-def test_missing_file_is_told() -> None:
+def test_missing_file_is_refused() -> None:
     assert "nowhere.csv" in refusal(call("nowhere.csv", DATA / VELOCITY))

@@ -35,8 +35,8 @@ def test_a_second_step_has_a_remaining_time_of_its_own() -> None:
     assert task.fields["before"] == "0:06 so far"
 
 
-def test_every_step_of_a_pool_is_told_from_its_begin() -> None:
-    told: list[tuple[str, float]] = []
+def test_every_step_of_a_pool_is_reported_from_its_begin() -> None:
+    reported: list[tuple[str, float]] = []
 
     def refit(_model: object, item: int) -> int:
         return 2 * item
@@ -48,9 +48,9 @@ def test_every_step_of_a_pool_is_told_from_its_begin() -> None:
         def digest(self) -> str:
             return "nothing"
 
-    pool = ReportingPool(InProcess(), lambda step, done: told.append((step, done)))
+    pool = ReportingPool(InProcess(), lambda step, done: reported.append((step, done)))
     assert list(pool.map(refit, Nothing(), [1, 2])) == [2, 4]  # type: ignore[arg-type]
-    assert told == [
+    assert reported == [
         ("fits to their end", 0.0),
         ("fits to their end", 0.5),
         ("fits to their end", 1),

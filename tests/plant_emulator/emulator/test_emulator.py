@@ -292,7 +292,7 @@ OPTIONAL = {
 }  # fmt: skip
 
 
-def test_status_tells_stages_of_the_bench_that_did_not_settle(spiking):
+def test_status_counts_steps_of_the_bench_that_did_not_converge(spiking):
     emulator, bench = spiking
     channel = ControlChannel(emulator, None, lambda: None)
     assert json.loads(channel.answer('{"do": "status"}'))["ok"]["unsettled"] == 0

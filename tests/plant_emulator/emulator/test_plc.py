@@ -452,7 +452,7 @@ def test_truck_without_a_driver_is_parked_once_the_drum_stands():
     assert made.plc.bench.wheel[-1] == (0.0, 300.0)
 
 
-def test_driver_is_told_the_speed_of_the_tread():
+def test_driver_gets_the_speed_of_the_tread():
     diary = Diary()
     made = desk(truck=Truck(lambda: diary, drum_radius=0.645))
     made.scan(2)

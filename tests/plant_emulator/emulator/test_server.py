@@ -180,7 +180,7 @@ def test_taken_port_is_named_in_our_words_only(served, capfd):
 
 
 @pytest.mark.parametrize("host", ["nowhere.invalid", "a..b", "192.0.2.1"])
-def test_host_that_is_none_of_this_machine_is_told_from_a_busy_port(served, host):
+def test_host_of_another_machine_is_distinguished_from_a_busy_port(served, host):
     with pytest.raises(PortError, match=f"{host}.*a --host that is an address") as refused:
         served.do(PlcServer(INT16, host, 0).start())
     assert "--port" not in str(refused.value)

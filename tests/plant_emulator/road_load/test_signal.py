@@ -85,7 +85,7 @@ def test_low_pass_leaves_a_signal_that_has_nothing_above_it() -> None:
     assert low_pass(NOISY, 0.002, 250.0) is NOISY
 
 
-def test_rest_is_where_speed_is_zero_for_a_while() -> None:
+def test_standstill_is_where_speed_is_zero_for_a_while() -> None:
     """A speed that only crosses zero is no standstill."""
     speed = np.interp(TIME, [0.0, 2.0, 4.0, 6.0, 8.0, 10.0], [1.0, 0.0, 0.0, 1.0, -1.0, -1.0])
     found = TIME[find_rests(speed + 0.01 * DRAW.standard_normal(5000), 0.002)]
