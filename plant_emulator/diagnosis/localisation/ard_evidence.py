@@ -1,14 +1,15 @@
-"""Evidence of a linear model with unknown coefficients, in groups of unknown size.
+"""The evidence of a linear model whose coefficients lie in groups of unknown size.
 
     y = F theta + sum_g B_g beta_g + white noise,   theta ~ N(0, 1),   beta_g ~ N(0, a_g^2)
 
-The logarithm of the probability of y, theta and beta integrated out, is
+The evidence is the marginal likelihood: the probability of y with theta and beta integrated out.
+Its logarithm is
 
     - y'y/2 + v'v/2 - log det L,    L L' = 1 + S G S,  v = L^-1 S g,  G = X'X, g = X'y, X = [F B]
 
-with S the diagonal of the standard deviations. The sizes a_g are chosen to make it largest, a_g = 0
-leaving the group out (automatic relevance determination: MacKay, Neural Computation 4 (1992) 415).
-A group that explains only noise thus costs, and is not taken.
+S is the diagonal of the standard deviations. The sizes a_g are chosen to make the evidence largest;
+a_g = 0 leaves the group out (automatic relevance determination: D. MacKay, Neural Computation 4
+(1992) 415). A group that explains only noise makes the evidence smaller, and is not taken.
 """
 
 from __future__ import annotations
@@ -23,23 +24,30 @@ if TYPE_CHECKING:
 
     from plant_emulator.signals.log import Array
 
-SIZES = np.geomspace(1e-2, 30.0, 9)
-SWEEPS = 3
-# A gain of log probability that is worth another group, or another sweep.
+# Sizes a_g that are tried.
+GROUP_SIZES = np.geomspace(1e-2, 30.0, 9)
+# The sizes of all groups are chosen again at most so many times.
+MOST_SWEEPS = 3
+# Another group, or another sweep, is worth this gain of log probability.
 WORTHWHILE_GAIN = 0.5
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """The best log probability; mean : of theta and beta; left : of y, without them."""
+class MarginalLikelihood:
+    """The largest marginal likelihood of a model.
+
+    log : its logarithm
+    mean : posterior mean of theta and beta, shape (k,)
+    residual : y without what they explain, shape (n,)
+    """
 
     log: float
     mean: Array
-    left: Array
+    residual: Array
 
 
-def log_evidence(gram: Array, product: Array, deviations: Array) -> float:
-    """v'v/2 - log det L of the module's text."""
+def log_marginal_likelihood(gram: Array, product: Array, deviations: Array) -> float:
+    """v'v/2 - log det L of the module's text; deviations : diagonal of S."""
     lower = np.linalg.cholesky(_system(gram, deviations))
     v = np.linalg.solve(lower, deviations * product)
     return float(0.5 * v @ v - np.log(np.diag(lower)).sum())
@@ -50,19 +58,19 @@ def _system(gram: Array, deviations: Array) -> Array:
 
 
 class Products:
-    """Products of groups of columns, kept: a group is one array and does not change."""
+    """Products of groups of columns, each computed once; no array of a group ever changes."""
 
     def __init__(self) -> None:
         self._known: dict[tuple[int, int], tuple[Array, Array, Array]] = {}
         self._rows: dict[int, tuple[int, int]] = {}
 
     def of(self, a: Array, b: Array) -> Array:
-        """A' B, computed once for a pair of arrays, over the rows where both are not zero."""
+        """Product A' B of two arrays, over the rows where both are not zero."""
         key = (id(a), id(b))
         if key not in self._known:
             transposed = self._known.get((id(b), id(a)))
             found = self._product(a, b) if transposed is None else transposed[2].T
-            self._known[key] = (a, b, found)  # the arrays too: their identity stays theirs
+            self._known[key] = (a, b, found)  # a kept array keeps its identity
         return self._known[key][2]
 
     def _product(self, a: Array, b: Array) -> Array:
@@ -71,17 +79,17 @@ class Products:
         return np.asarray(a[rows].T @ b[rows])
 
     def _within(self, a: Array) -> tuple[int, int]:
-        """The rows of an array that are not zero lie from the first of these to before the last."""
+        """First row of an array that is not zero, and the row behind the last one."""
         if id(a) not in self._rows:
             filled = np.flatnonzero(np.any(a != 0.0, axis=1))
             self._rows[id(a)] = (int(filled[0]), int(filled[-1]) + 1) if len(filled) else (0, 0)
         return self._rows[id(a)]
 
 
-class Linear:
-    """Data y with its nuisance columns F (scaled to unit priors), in parts.
+class LinearModel:
+    """Data y with the nuisance columns F, which are scaled to unit priors, in parts.
 
-    products : of parts and groups, shared with other data that have them too
+    products : of columns, shared with other data that have the same ones
     """
 
     def __init__(
@@ -93,33 +101,33 @@ class Linear:
         self._products = products or Products()
 
     def left(self, rows: slice) -> float:
-        """Sum of squares of these rows that the nuisance leaves, their own prior paid."""
+        """Sum of squares that the nuisance columns leave of these rows, with their penalty."""
         y, x = self.y[rows], np.concatenate([part[rows] for part in self.nuisance], axis=1)
         product = x.T @ y
         system = np.eye(x.shape[1]) + x.T @ x
         return float(y @ y - product @ np.linalg.solve(system, product))
 
-    def evidence(self, groups: Sequence[Array]) -> Evidence:
-        """The evidence with groups of columns, each as large as the data want it."""
+    def marginal_likelihood(self, groups: Sequence[Array]) -> MarginalLikelihood:
+        """The largest evidence with these groups of columns, each as large as the data want it."""
         parts, of = [*self.nuisance, *groups], self._products.of
         gram = np.block([[of(a, b) for b in parts] for a in parts])
         product = np.concatenate([of(a, self._y)[:, 0] for a in parts])
         known = sum(part.shape[1] for part in self.nuisance)
         counts = [known, *(group.shape[1] for group in groups)]
-        search = _Sizes(gram, product, counts)
+        search = _SizeSearch(gram, product, counts)
         search.run()
         deviations = np.repeat(search.sizes, counts)
         system = _system(gram, deviations)
         mean = deviations * np.linalg.solve(system, deviations * product)
-        left = self.y.copy()
+        residual = self.y.copy()
         ends = np.cumsum([part.shape[1] for part in parts])[:-1]
         for part, own in zip(parts, np.split(mean, ends), strict=True):
-            left -= part @ own
-        return Evidence(search.best - 0.5 * self.square, mean, left)
+            residual -= part @ own
+        return MarginalLikelihood(search.best - 0.5 * self.square, mean, residual)
 
 
-class _Sizes:
-    """The search for the sizes: the group that gains most first, then all again in turn."""
+class _SizeSearch:
+    """The search for the sizes: first the group of the largest gain, then all again in turn."""
 
     def __init__(self, gram: Array, product: Array, counts: Sequence[int]) -> None:
         self.gram, self.product, self.counts = gram, product, counts
@@ -128,28 +136,30 @@ class _Sizes:
         self.sizes[0] = 1.0
         nuisance = self.group_of == 0
         alone = np.ones(int(nuisance.sum()))
-        self.best = log_evidence(gram[np.ix_(nuisance, nuisance)], product[nuisance], alone)
+        self.best = log_marginal_likelihood(
+            gram[np.ix_(nuisance, nuisance)], product[nuisance], alone
+        )
 
     def run(self) -> None:
-        """Find the sizes."""
+        """Search the sizes of the largest evidence."""
         absent = list(range(1, len(self.counts)))
         while absent:
-            gain, group, size = max(self._trial(group, SIZES) for group in absent)
+            gain, group, size = max(self._trial(group, GROUP_SIZES) for group in absent)
             if gain <= self.best + WORTHWHILE_GAIN:
                 break
             self.best, self.sizes[group] = gain, size
             absent.remove(group)
-        for _ in range(SWEEPS):
+        for _ in range(MOST_SWEEPS):
             before = self.best
             for k in range(1, len(self.counts)):
-                value, group, size = self._trial(k, np.append(0.0, SIZES))
+                value, group, size = self._trial(k, np.append(0.0, GROUP_SIZES))
                 if value > self.best:
                     self.best, self.sizes[group] = value, size
             if self.best - before < WORTHWHILE_GAIN:
                 break
 
     def _trial(self, group: int, sizes: Array) -> tuple[float, int, float]:
-        """The best of these sizes of a group, the others as they are: value, group, size.
+        """The best of these sizes of a group, with the others as they are: value, group, size.
 
         With the others integrated out, the group's own products give all sizes at once.
         """
@@ -171,12 +181,12 @@ class _Sizes:
         return float(others + values[k]), group, float(sizes[k])
 
 
-def variance_gain(left: Array, weight: Array) -> float:
-    """Gain of log probability if what is left has the variance 1 + (s weight)^2, at the best s.
+def variance_gain(residual: Array, weight: Array) -> float:
+    """Largest gain of log probability if a residual has the variance 1 + (s weight)^2.
 
-    For what varies from sample to sample, which no smooth law follows.
+    It covers what varies from sample to sample, which no smooth law follows.
     """
     weight = weight / max(float(np.max(np.abs(weight))), 1e-12)
-    trials = [1.0 + (size * weight) ** 2 for size in SIZES]
-    gains = [0.5 * np.sum(left**2 * (1.0 - 1.0 / v) - np.log(v)) for v in trials]
-    return max(0.0, float(max(gains)) - float(np.log(len(SIZES))))
+    trials = [1.0 + (size * weight) ** 2 for size in GROUP_SIZES]
+    gains = [0.5 * np.sum(residual**2 * (1.0 - 1.0 / v) - np.log(v)) for v in trials]
+    return max(0.0, float(max(gains)) - float(np.log(len(GROUP_SIZES))))

@@ -1,6 +1,10 @@
-"""All that measured signals tell of the blocks, as one linear model with a group of laws a block.
+"""The block regression: all that the measured signals say of the blocks, as one linear model.
 
-Rows: the whitened relations of every run, then the drum's speed of every run over its noise.
+The rows are the whitened parity relations of all runs, then the drum speeds of all runs over their
+noise. The nuisance columns are the deviations of the parameters, the noise of the smoothed motor
+speed in the drum speed, and the errors of a logged voltage. Each block adds columns of its unknown
+laws. The evidence of the model (`ard_evidence`) says how much more probable the columns of a block
+make all measurements.
 """
 
 from __future__ import annotations
@@ -13,29 +17,28 @@ import numpy as np
 
 from plant_emulator.diagnosis.localisation import block_basis, drum_basis, parameter_sensitivities
 from plant_emulator.diagnosis.localisation.ard_evidence import (
-    Evidence,
-    Linear,
+    LinearModel,
     Products,
     variance_gain,
 )
 from plant_emulator.diagnosis.localisation.drum_subsystem import (
-    TORQUE,
-    DrumSide,
-    expected,
-    is_torque,
+    TORQUE_STD,
+    DrumSubsystem,
+    is_torque_size,
+    prior_means,
 )
-from plant_emulator.diagnosis.localisation.parity_covariance import relations
+from plant_emulator.diagnosis.localisation.parity_covariance import whitened_relations
 from plant_emulator.diagnosis.localisation.parity_relations import (
     ARMATURE,
     DRIVE,
     GEAR,
-    Relations,
+    WhitenedRelations,
     base_speed,
-    measured,
-    middle,
-    values,
+    interval_means,
+    measured_signals,
+    relation_residuals,
 )
-from plant_emulator.diagnosis.localisation.stacked_rows import Table
+from plant_emulator.diagnosis.localisation.stacked_rows import StackedRows
 from plant_emulator.errors import UnsettledError
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import voltage_errors
@@ -47,166 +50,184 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.localisation.ard_evidence import MarginalLikelihood
     from plant_emulator.estimation.unknowns import Estimate
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
     from plant_emulator.signals.log import Array
 
-# Blocks that only the drum's speed can show.
-BESIDE = ("drum", "speed_sensor", "backlash_shaft")
-# Variance that the draws of the smoothing's noise do not span, over what they do, next to impacts.
-UNSPANNED = 3.0
-# Deviations of a sum of squares that are no chance.
+# Blocks that only the drum speed can show.
+DRUM_SIDE_BLOCKS = ("drum", "speed_sensor", "backlash_shaft")
+# Next to impacts, the variance that the draws of the smoothed speed's noise do not span, over the
+# variance that they span.
+UNSPANNED_VARIANCE = 3.0
+# A sum of squares is no chance from so many of its standard deviations on.
 SURPRISING_DEVIATIONS = 3.0
 
 
-class Site:
-    """The blocks of a bench with the measured signals at their borders."""
+class BlockRegression:
+    """The blocks of a bench, with the measured signals at their borders.
+
+    fitted : parameter values of the fit without effects [SI]
+    values : parameter values at which the relations are taken [SI]
+    stds : prior standard deviations of the free parameters by name
+    drum : subsystem of gap, shaft and drum; drum_fit : its fit without an unknown torque
+    """
 
     def __init__(
         self, recordings: Sequence[Recording], parameters: ParameterSet, null: FitResult
     ) -> None:
-        self.recordings, self.parameters, self.null = recordings, parameters, null
+        self.recordings, self.null = recordings, null
         self.fitted = {**parameters.values(), **null.values}
         self.base_speed = base_speed(self.fitted)
-        self.stds = parameter_sensitivities.priors(parameters, list(null.values))
-        p = parameter_sensitivities.assumed(parameters, null.values, self.stds)
-        self.signals = [measured(r, p) for r in recordings]
+        self.stds = parameter_sensitivities.prior_deviations(parameters, list(null.values))
+        p = parameter_sensitivities.believed_values(parameters, null.values, self.stds)
+        self.signals = [measured_signals(r, p) for r in recordings]
         if "dead_time" in self.stds:
-            p["dead_time"] = parameter_sensitivities.dead_time(
+            p["dead_time"] = parameter_sensitivities.estimate_dead_time(
                 self.signals, p, parameters["dead_time"]
             )
-        self.prior = parameter_sensitivities.prior(parameters, p, self.stds)
         self.values = p
+        self.prior_offsets = parameter_sensitivities.prior_offsets(parameters, p, self.stds)
         top = max(float(np.max(np.abs(m.speed))) for m in self.signals)
-        unknown = [drum_basis.torque(m, p["gear_ratio"], top) for m in self.signals]
-        self.side = DrumSide(recordings, self.signals, parameters, p, unknown)
+        torques = [drum_basis.torque(m, p["gear_ratio"], top) for m in self.signals]
+        self.drum = DrumSubsystem(recordings, self.signals, parameters, p, torques)
+        self.drum_fit = self.drum.fit_null(null.values, [s[GAP_POSITION] for s in null.states])
         self.products = Products()
-        self.plain = self.side.null(null.values, [s[GAP_POSITION] for s in null.states])
         self.relations = [self._relations(k) for k in range(len(recordings))]
         self.blocks = tuple(
             name
-            for name in (*block_basis.BLOCKS, *BESIDE)
+            for name in (*block_basis.BLOCKS, *DRUM_SIDE_BLOCKS)
             if name != "wheel_contact" or any(m.truck for m in self.signals)
         )
 
-    def _relations(self, run: int) -> Relations:
-        return relations(self.signals[run], self.values, self._simulated(run))
+    def _relations(self, run: int) -> WhitenedRelations:
+        return whitened_relations(self.signals[run], self.values, self._simulated(run))
 
     def _simulated(self, run: int) -> tuple[Array, NDArray[np.bool_]] | None:
-        """What the fit without effects leaves of the relations, their error between samples.
+        """Residuals of the relations in the simulated run, and whether its drive is limited.
 
-        And where its drive is limited.
+        The residuals are the relations' own error between samples.
+        None: the run cannot be simulated at the fit
         """
         recording, gap = self.recordings[run], self.null.states[run][GAP_POSITION]
         try:
             log = simulate(recording.inputs, self.fitted, gap_position=gap)
         except UnsettledError:
             return None
-        m = measured(replace(recording, log=log), self.fitted)
-        left, limited = values(replace(m, speed=m.motor_speed), self.fitted)
-        left[DRIVE, limited] = 0.0
-        return left, limited
+        m = measured_signals(replace(recording, log=log), self.fitted)
+        residuals, limited = relation_residuals(replace(m, speed=m.motor_speed), self.fitted)
+        residuals[DRIVE, limited] = 0.0
+        return residuals, limited
+
+    def _drum_values(self, run: int) -> dict[str, float]:
+        """Values and states of the drum subsystem in a run, at its fit."""
+        return {**self.drum_fit.parameters(), **self.drum_fit.states(run)}
 
     @cached_property
-    def inside(self) -> list[block_basis.Inside]:
-        """Quantities inside the blocks of every run."""
-        found = self.plain.parameters()
+    def quantities(self) -> list[block_basis.BlockQuantities]:
+        """Quantities inside the blocks, one record a run."""
         return [
-            block_basis.inside(
-                m,
-                self.side.simulated(k, {**found, **self.plain.states(k)}),
-                self.values,
+            block_basis.block_quantities(
+                m, self.drum.simulate(k, self._drum_values(k)), self.values
             )
             for k, m in enumerate(self.signals)
         ]
 
     @cached_property
-    def spread(self) -> list[Array]:
-        """Noise of the smoothed motor speed in the drum's speed, see `DrumSide.spread`."""
-        found = self.plain.parameters()
-        return [
-            self.side.spread(k, {**found, **self.plain.states(k)}) for k in range(len(self.signals))
-        ]
+    def speed_noise(self) -> list[Array]:
+        """Noise of the smoothed motor speed in the drum speed; see `DrumSubsystem.speed_noise`."""
+        return [self.drum.speed_noise(k, self._drum_values(k)) for k in range(len(self.signals))]
 
     @cached_property
     def weights(self) -> list[Array]:
-        """Of the drum's speed; few draws span little of the noise of a flight through the gap."""
+        """Weights of the drum speed samples, shape (n,) each.
+
+        Few draws span little of the noise of a flight through the gap, so that samples near a large
+        noise count less.
+        """
         from scipy.ndimage import maximum_filter1d
 
         return [
-            1.0 / np.sqrt(1.0 + UNSPANNED * maximum_filter1d((s**2).sum(-1), 11))
-            for s in self.spread
+            1.0 / np.sqrt(1.0 + UNSPANNED_VARIANCE * maximum_filter1d((s**2).sum(-1), 11))
+            for s in self.speed_noise
         ]
 
     @cached_property
-    def table(self) -> Table:
-        """Where columns stand in the rows of all runs."""
-        return Table(self.relations, self.weights)
+    def rows(self) -> StackedRows:
+        """The stacked rows of all runs."""
+        return StackedRows(self.relations, self.weights)
 
     @cached_property
-    def drifting(self) -> list[Array]:
-        """Columns of the parameters that drift in the relations of every run."""
+    def deviations(self) -> list[Array]:
+        """Columns of the parameters' deviations in the relations, one array a run."""
         return [
-            parameter_sensitivities.columns(m, q, self.values, self.stds)
-            for m, q in zip(self.signals, self.inside, strict=True)
+            parameter_sensitivities.deviation_columns(m, q, self.values, self.stds)
+            for m, q in zip(self.signals, self.quantities, strict=True)
         ]
 
     @cached_property
     def nuisance(self) -> tuple[Array, ...]:
-        """Columns of drift in the relations, of the smoothing's noise in the drum's speed, and of
-        what the sensor of a logged voltage may be off by.
-        """
+        """The nuisance columns that no linearisation of the drum subsystem changes."""
         none = [None] * len(self.signals)
-        found = self.table.shared(self.drifting, none), self.table.own_speed(self.spread)
+        found = self.rows.shared(self.deviations, none), self.rows.own_speed(self.speed_noise)
         if all(m.voltage is None for m in self.signals):
             return found
-        p, known = self.values, [float(m.voltage is not None) for m in self.signals]
-        told = [p["armature_resistance"] * q.current + q.flux * q.speed for q in self.inside]
-        sensor = [
-            block_basis.acting({ARMATURE: there}, voltage_errors(voltage))
-            for there, voltage in zip(known, told, strict=True)
-        ]
-        return (*found, self.table.own_relations(sensor))
+        return (*found, self._voltage_sensor())
 
-    def linear(self, fitted: Estimate) -> Linear:
-        """Data and drift, the drum's speed linearise at a fit of the drum's side."""
+    def _voltage_sensor(self) -> Array:
+        """Columns of the errors of the sensor of a logged voltage."""
+        resistance = self.values["armature_resistance"]
+        logged = [float(m.voltage is not None) for m in self.signals]
+        voltages = [resistance * q.current + q.flux * q.speed for q in self.quantities]
+        return self.rows.own_relations(
+            [
+                block_basis.acting_in({ARMATURE: there}, voltage_errors(voltage))
+                for there, voltage in zip(logged, voltages, strict=True)
+            ]
+        )
+
+    def linear_model(self, fitted: Estimate) -> LinearModel:
+        """The linear model with the drum subsystem linearised at one of its fits."""
         runs = range(len(self.signals))
-        away = fitted.z - expected(fitted)
+        away = fitted.z - prior_means(fitted)
         speed = [fitted.residuals[k][0] - fitted.jacobians[k][0] @ away for k in runs]
         relation = [
-            (r.value - (d @ self.prior)[: len(r.value)])[..., None]
-            for r, d in zip(self.relations, self.drifting, strict=True)
+            (r.value - (d @ self.prior_offsets)[: len(r.value)])[..., None]
+            for r, d in zip(self.relations, self.deviations, strict=True)
         ]
-        y = self.table.shared(relation, [s[:, None] for s in speed])
+        y = self.rows.shared(relation, [s[:, None] for s in speed])
         scale = np.array([min(u.scaled_std, 1.0) for u in fitted.unknowns])
-        bent = [(fitted.jacobians[k][0] * scale)[:, ~is_torque(fitted)] for k in runs]
-        own = self.table.shared([None] * len(self.signals), bent)
-        return Linear(y[:, 0], [*self.nuisance, own], self.products)
+        slopes = [(fitted.jacobians[k][0] * scale)[:, ~is_torque_size(fitted)] for k in runs]
+        own = self.rows.shared([None] * len(self.signals), slopes)
+        return LinearModel(y[:, 0], [*self.nuisance, own], self.products)
 
     @cached_property
-    def data(self) -> Linear:
-        """Linearised without an unknown torque on the drum."""
-        return self.linear(self.plain)
+    def model(self) -> LinearModel:
+        """The linear model without an unknown torque on the drum."""
+        return self.linear_model(self.drum_fit)
 
     @cached_property
     def groups(self) -> dict[str, list[Array]]:
-        """Columns of the laws of every block."""
-        top = block_basis.largest(self.inside)
-        own = {name: self._block(law, top) for name, law in block_basis.BLOCKS.items()}
+        """Columns of the unknown laws of every block but the drum, a group a law."""
+        top = block_basis.largest(self.quantities)
+        own = {name: self._block(laws, top) for name, laws in block_basis.BLOCKS.items()}
         return own | {"speed_sensor": self._speed_sensor(), "backlash_shaft": self._backlash()}
 
     def _block(
         self,
-        block: Callable[[block_basis.Inside, Mapping[str, float]], list[block_basis.Law]],
+        block: Callable[
+            [block_basis.BlockQuantities, Mapping[str, float]], list[block_basis.UnknownLaw]
+        ],
         top: Mapping[str, float],
     ) -> list[Array]:
+        """Columns of the laws of a block; a law that acts in no relation of the runs has none."""
         none = [None] * len(self.signals)
-        runs = [block(q, top) for q in self.inside]
+        runs = [block(q, top) for q in self.quantities]
         return [
-            self.table.own_relations([law.rows for law in group])
+            self.rows.own_relations([law.rows for law in group])
             if group[0].own
-            else self.table.shared([law.rows for law in group], none)
+            else self.rows.shared([law.rows for law in group], none)
             for group in zip(*runs, strict=True)
             if any(
                 law.rows[: len(r.value)].any() for law, r in zip(group, self.relations, strict=True)
@@ -214,68 +235,75 @@ class Site:
         ]
 
     def _speed_sensor(self) -> list[Array]:
-        """Errors of the measuring wheel."""
+        """Columns of the errors of the drum's speed sensor."""
         none = [None] * len(self.signals)
-        laws_of = [drum_basis.speed_sensor(m, self.values["gear_ratio"]) for m in self.signals]
-        *shared, own = zip(*laws_of, strict=True)
-        return [*(self.table.shared(none, group) for group in shared), self.table.own_speed(own)]
+        laws = [drum_basis.speed_sensor(m, self.values["gear_ratio"]) for m in self.signals]
+        *shared, own = zip(*laws, strict=True)
+        return [*(self.rows.shared(none, group) for group in shared), self.rows.own_speed(own)]
 
     def _backlash(self) -> list[Array]:
-        """Gap and damping that differ from one contact to the next."""
-        laws_of = [
-            drum_basis.backlash(m, self.plain.jacobians[k][0]) for k, m in enumerate(self.signals)
+        """Columns of a gap and a damping that change in time."""
+        laws = [
+            drum_basis.backlash(m, self.drum_fit.jacobians[k][0])
+            for k, m in enumerate(self.signals)
         ]
-        return [self.table.own_speed(group) for group in zip(*laws_of, strict=True)]
+        return [self.rows.own_speed(group) for group in zip(*laws, strict=True)]
 
-    def _drum(self, fitted: Estimate) -> list[Array]:
-        """An unknown torque on the drum, in the gear's relation and in the drum's speed."""
-        speed = [-fitted.jacobians[k][0][:, is_torque(fitted)] for k in range(len(self.signals))]
-        return [self.table.shared(self._on_gear(), speed) * TORQUE]
+    def _drum_torque(self, fitted: Estimate) -> list[Array]:
+        """Columns of an unknown torque on the drum, in the gear's relation and the drum speed."""
+        torque = is_torque_size(fitted)
+        speed = [-fitted.jacobians[k][0][:, torque] for k in range(len(self.signals))]
+        return [self.rows.shared(self._torque_on_gear(), speed) * TORQUE_STD]
 
     @cached_property
-    def with_torque(self) -> list[tuple[Linear, list[Array]]]:
-        """Data and laws of the drum, linearise at no torque, and at the best if that is far."""
-        start = {**self.plain.parameters(), **self.side.torques(0.0)}
-        gaps = [self.plain.states(k)[GAP_POSITION] for k in range(len(self.signals))]
-        near = self.side.at(start, gaps)
-        fits = [near]
+    def with_torque(self) -> list[tuple[LinearModel, list[Array]]]:
+        """Linear models and columns of an unknown torque on the drum.
+
+        The drum subsystem is linearised without the torque and, where it leaves more than chance
+        does, also at its best fit with the torque.
+        """
+        start = {**self.drum_fit.parameters(), **self.drum.torque_sizes(0.0)}
+        gaps = [self.drum_fit.states(k)[GAP_POSITION] for k in range(len(self.signals))]
+        fits = [self.drum.linearise(start, gaps)]
         count = sum(len(m.time) for m in self.signals)
-        if self.data.left(slice(-count, None)) > count + SURPRISING_DEVIATIONS * np.sqrt(
-            2.0 * count
-        ):
-            fits.append(self.side.far(self.plain.parameters(), gaps, self._told_torque()))
-        return [(self.linear(f), self._drum(f)) for f in fits]
+        chance = count + SURPRISING_DEVIATIONS * np.sqrt(2.0 * count)
+        if self.model.left(slice(-count, None)) > chance:
+            sizes = self._torque_sizes_by_gear()
+            fits.append(self.drum.fit_torque(self.drum_fit.parameters(), gaps, sizes))
+        return [(self.linear_model(f), self._drum_torque(f)) for f in fits]
 
-    def _on_gear(self) -> list[Array]:
-        """The unknown torque on the drum in the gear's relation."""
+    def _torque_on_gear(self) -> list[Array]:
+        """Columns of the unknown torque on the drum in the gear's relation."""
         xi = self.values["gear_ratio"]
-        return [block_basis.acting({GEAR: 1.0 / xi}, middle(law)) for law in self.side.laws]
+        return [
+            block_basis.acting_in({GEAR: 1.0 / xi}, interval_means(law)) for law in self.drum.laws
+        ]
 
-    def _told_torque(self) -> Array:
-        """Sizes of the torque on the drum that the gear's relation tells of, all else silent."""
-        group = TORQUE * self.table.shared(self._on_gear(), [None] * len(self.signals))
-        return np.asarray(TORQUE * self.data.evidence([group]).mean[-group.shape[1] :])
+    def _torque_sizes_by_gear(self) -> Array:
+        """Sizes of the torque on the drum that the gear's relation alone says [10 N m]."""
+        none = [None] * len(self.signals)
+        group = TORQUE_STD * self.rows.shared(self._torque_on_gear(), none)
+        mean = self.model.marginal_likelihood([group]).mean
+        return np.asarray(TORQUE_STD * mean[-group.shape[1] :])
 
-    def evidence(self, blocks: Sequence[str]) -> Evidence:
+    def marginal_likelihood(self, blocks: Sequence[str]) -> MarginalLikelihood:
         """The evidence with unknown laws in these blocks."""
         groups = [g for name in blocks if name != "drum" for g in self.groups[name]]
         if "drum" not in blocks:
-            return self.data.evidence(groups)
-        found = [data.evidence([*groups, *drum]) for data, drum in self.with_torque]
+            return self.model.marginal_likelihood(groups)
+        found = [model.marginal_likelihood([*groups, *drum]) for model, drum in self.with_torque]
         return max(found, key=lambda e: e.log)
 
-    def log_evidence(self, blocks: Sequence[str]) -> float:
+    def log_marginal_likelihood(self, blocks: Sequence[str]) -> float:
         """Log probability of all measurements with unknown laws in these blocks.
 
-        The drive's dead time may also vary from scan to scan.
+        With the drive among them, its dead time may also vary from scan to scan.
         """
-        found = self.evidence(blocks)
+        found = self.marginal_likelihood(blocks)
         if "drive" not in blocks:
             return found.log
         ends = np.cumsum([r.value.size for r in self.relations])
-        own = [
-            part[DRIVE :: len(r.value)]
-            for part, r in zip(np.split(found.left, ends)[:-1], self.relations, strict=True)
-        ]
-        slope = np.concatenate([q.demand_rate for q in self.inside])
+        parts = np.split(found.residual, ends)[:-1]
+        own = [part[DRIVE :: len(r.value)] for part, r in zip(parts, self.relations, strict=True)]
+        slope = np.concatenate([q.demand_rate for q in self.quantities])
         return found.log + variance_gain(np.concatenate(own), slope)

@@ -1,6 +1,6 @@
-"""The drum behind its backlash shaft, driven by a gear whose speed is known (pure).
+"""The drum behind its backlash shaft, driven by a gear whose speed is known.
 
-Thesis, eq. 3.29-3.31 and 3.34, alone: ten to thirty times faster than the whole bench.
+Thesis, eq. 3.29 to 3.31 and 3.34, without the rest of the bench: ten to thirty times faster.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 
 @cache
-def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The loop, compiled at its first call."""
+def compile_once(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a loop, once in this process."""
     compiler.use_cache([__file__, str(compiler.__file__)], ["driven drum"])
     return compiler.compile_function(function, on_disk=True)
 

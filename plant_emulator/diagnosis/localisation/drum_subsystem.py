@@ -1,8 +1,8 @@
-"""Gap, shaft and drum alone, driven by the measured motor speed: what the drum's speed should be.
+"""The drum subsystem: gap, shaft and drum, simulated with the measured motor speed as input.
 
-Whatever ails drive, motor, gear friction or torque sensor leaves this simulation untouched; the
-drum's speed then tells of gap, shaft, drum and its own sensor only. What the noise of the smoothed
-motor speed does to it, the drum's flight through the gap above all, is sampled.
+A fault of drive, motor, gear friction or torque sensor leaves this simulation untouched. The drum
+speed then tells of gap, shaft, drum and its own sensor only. The noise of the smoothed motor speed
+disturbs the simulation, above all the drum's flight through the gap; the disturbance is sampled.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.localisation.drum_simulation import compiled, drum_speed
+from plant_emulator.diagnosis.localisation.drum_simulation import compile_once, drum_speed
 from plant_emulator.diagnosis.localisation.parity_relations import NOISES, smoothed_speed
 from plant_emulator.estimation.initial_states import GAP
 from plant_emulator.estimation.least_squares import estimate, linearise_at
@@ -25,48 +25,53 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from plant_emulator.diagnosis.localisation.parity_relations import Measured
+    from plant_emulator.diagnosis.localisation.parity_relations import MeasuredSignals
     from plant_emulator.estimation.unknowns import Estimate, Residual
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
     from plant_emulator.signals.log import Array
 
-# What of the bench shapes the drum's speed; the drum's inertia only together with the damping.
+# Free parameters. The drum's inertia shapes the drum speed only together with the damping.
 FREE = ("backlash_half_gap", "drum_shaft_damping")
-GAPS = 17
+# Positions in the gap that a scan tries, and draws of the speed's noise.
+GAP_POSITIONS = 17
 DRAWS = 10
-# Mean square in the noise above which the set's own values are tried as a start too.
+# Mean square above which a fit may lie in a local minimum, so that other starts are tried.
 SUSPECT_MEAN_SQUARE = 1.5
+# Relative fall of the cost that ends a fit.
 COST_TOLERANCE = 1e-4
-# Prior standard deviation of an unknown torque on the drum [10 N m].
-TORQUE = 5.0
-# Constant torques that a fit starts from [10 N m]; laws of the angle, which are the last ones.
+# Prior standard deviation of the sizes of an unknown torque on the drum [10 N m].
+TORQUE_STD = 5.0
+# Constant torques that a fit starts from [10 N m].
 TORQUE_STARTS = (0.0, 1.0, 3.0, 8.0, 20.0)
-BY_ANGLE = 2
+# The last laws of the unknown torque are laws of the angle.
+LAWS_OF_ANGLE = 2
 
 
 @dataclass(frozen=True)
-class DrumSide:
-    """Recordings with their smoothed motor speeds; values : of all parameters [SI].
+class DrumSubsystem:
+    """The drum subsystem in all runs.
 
-    laws : of an unknown torque on the drum, shape (n, k) [N m] a run; none: k = 0
+    values : of all parameters [SI]
+    laws : basis of an unknown torque on the drum [N m], shape (n, k), one array a run
     """
 
     recordings: Sequence[Recording]
-    signals: Sequence[Measured]
+    signals: Sequence[MeasuredSignals]
     parameters: ParameterSet
     values: Mapping[str, float]
     laws: Sequence[Array]
 
-    def simulated(self, run: int, found: Mapping[str, float], speed: Array | None = None) -> Array:
-        """The drum's speed [rad/s] with the motor speed as measured, shape (n,).
+    def simulate(self, run: int, found: Mapping[str, float], speed: Array | None = None) -> Array:
+        """Simulate the drum speed [rad/s] of a run, shape (n,).
 
-        found : gap, damping, the gap's position at the start, sizes of the unknown torque, torque_k
+        found : gap, damping, position in the gap at the start, and sizes torque_k of the torque
+        speed : motor speed [rad/s]; None: the smoothed measurement
         """
         p, inputs = self.values, self.recordings[run].inputs
         sizes = [found.get(f"torque_{k}", 0.0) for k in range(self.laws[run].shape[1])]
         wheel = p["drum_radius"] / p["wheel_radius"] * inputs.wheel_torque
-        driven = compiled(drum_speed)(
+        driven = compile_once(drum_speed)(
             inputs.time,
             (self.signals[run].speed if speed is None else speed) / p["gear_ratio"],
             wheel + self.laws[run] @ np.array(sizes),
@@ -80,18 +85,18 @@ class DrumSide:
         return np.asarray(driven)
 
     def residual(self, run: int, found: Mapping[str, float], speed: Array | None = None) -> Array:
-        """The drum's speed, measured minus simulated over its noise, shape (n,)."""
+        """Drum speed, measured minus simulated over its noise [1], shape (n,)."""
         m = self.signals[run]
-        left = m.drum_speed - self.simulated(run, found, speed)
+        left = m.drum_speed - self.simulate(run, found, speed)
         return np.asarray(left / m.noise[NOISES.index("drum_speed")])
 
     def loss(self, run: int, found: Mapping[str, float]) -> float:
-        """Cauchy's loss of a run."""
+        """Cauchy's loss of a run [1]."""
         return cauchy_loss(self.residual(run, found))
 
     def scan(self, found: Mapping[str, float]) -> list[float]:
-        """Start in the gap of every run, the best of a few."""
-        positions = np.linspace(-1.0, 1.0, GAPS)
+        """Find the best of some positions in the gap at the start, for every run."""
+        positions = np.linspace(-1.0, 1.0, GAP_POSITIONS)
         losses = [
             [self.loss(k, {**found, GAP_POSITION: float(g)}) for g in positions]
             for k in range(len(self.recordings))
@@ -99,7 +104,7 @@ class DrumSide:
         return [float(positions[int(np.argmin(own))]) for own in losses]
 
     def unknowns(self, start: Mapping[str, float], gaps: Sequence[float]) -> list[Unknown]:
-        """Gap, damping, sizes of the unknown torque that `start` has, starts of the runs."""
+        """List gap, damping, the sizes of the torque in `start`, and the positions in the gap."""
         wide = [
             Unknown(
                 name=name,
@@ -112,18 +117,18 @@ class DrumSide:
             for name in FREE
         ]
         torque = [
-            Unknown(name=name, start=size, lower=-1e3, upper=1e3, logarithmic=False, std=TORQUE)
+            Unknown(name=name, start=size, lower=-1e3, upper=1e3, logarithmic=False, std=TORQUE_STD)
             for name, size in start.items()
             if name.startswith("torque_")
         ]
         return [*wide, *torque, *(replace(GAP, start=g, run=k) for k, g in enumerate(gaps))]
 
     def fit(self, start: Mapping[str, float], gaps: Sequence[float]) -> Estimate:
-        """Least squares from these values."""
+        """Fit by least squares from these values and positions in the gap."""
         return estimate(self.unknowns(start, gaps), self._functions(), settled=COST_TOLERANCE)
 
-    def at(self, start: Mapping[str, float], gaps: Sequence[float]) -> Estimate:
-        """The same, not fitted: residuals and Jacobians there."""
+    def linearise(self, start: Mapping[str, float], gaps: Sequence[float]) -> Estimate:
+        """Compute residuals and Jacobians at these values, without fitting."""
         return linearise_at(self.unknowns(start, gaps), self._functions())
 
     def _functions(self) -> list[Residual]:
@@ -132,10 +137,10 @@ class DrumSide:
     def _function(self, run: int) -> Residual:
         return lambda found: self.residual(run, found)[None]
 
-    def null(self, start: Mapping[str, float], gaps: Sequence[float]) -> Estimate:
-        """The fit without any unknown torque, from a joint fit's end, else from scans of the gap.
+    def fit_null(self, start: Mapping[str, float], gaps: Sequence[float]) -> Estimate:
+        """Fit without an unknown torque, from a joint fit or else from scans of the gap.
 
-        start, gaps : where the joint fit has come to; the set's own values where it lacks them
+        start, gaps : values and positions of the joint fit; the set gives those that it lacks
         """
         own = {name: self.parameters.value(name) for name in FREE}
         near = {name: start.get(name, own[name]) for name in FREE}
@@ -146,18 +151,20 @@ class DrumSide:
             fits.append(self.fit(values, self.scan(values)))
         return min(fits, key=lambda f: f.cost + f.penalty)
 
-    def torques(self, size: float) -> dict[str, float]:
-        """Sizes of an unknown torque that is the same at all speeds and angles [10 N m]."""
+    def torque_sizes(self, size: float) -> dict[str, float]:
+        """Sizes of an unknown torque that is constant in speed and angle, by name [10 N m]."""
         count = self.laws[0].shape[1]
-        return {f"torque_{k}": size if k < count - BY_ANGLE else 0.0 for k in range(count)}
+        return {f"torque_{k}": size if k < count - LAWS_OF_ANGLE else 0.0 for k in range(count)}
 
-    def far(self, start: Mapping[str, float], gaps: Sequence[float], told: Array) -> Estimate:
-        """The fit with an unknown torque that may be far from none, from the best of some sizes.
+    def fit_torque(
+        self, start: Mapping[str, float], gaps: Sequence[float], sizes: Array
+    ) -> Estimate:
+        """Fit with an unknown torque that may be large, from the best of some sizes.
 
-        told : sizes that something else tells of
+        sizes : further sizes to start from [10 N m]
         """
-        trials = [{**start, **self.torques(size)} for size in TORQUE_STARTS]
-        trials.append({**start, **{f"torque_{k}": float(size) for k, size in enumerate(told)}})
+        trials = [{**start, **self.torque_sizes(size)} for size in TORQUE_STARTS]
+        trials.append({**start, **{f"torque_{k}": float(size) for k, size in enumerate(sizes)}})
         losses = [
             sum(self.loss(k, {**trial, GAP_POSITION: gap}) for k, gap in enumerate(gaps))
             for trial in trials
@@ -165,10 +172,10 @@ class DrumSide:
         best = trials[int(np.argmin(losses))]
         return self.fit(best, self.scan(best))
 
-    def spread(self, run: int, found: Mapping[str, float], seed: int = 0) -> Array:
-        """What noise of the smoothed motor speed does to the residual, shape (n, DRAWS).
+    def speed_noise(self, run: int, found: Mapping[str, float], seed: int = 0) -> Array:
+        """Sample the noise of the smoothed motor speed in the residual [1], shape (n, DRAWS).
 
-        Columns for a covariance: their sum of squares is the variance.
+        The sum of squares of a row is the variance of its sample.
         """
         random, m = np.random.default_rng((seed, run)), self.signals[run]
         base = self.residual(run, found)
@@ -187,12 +194,12 @@ class DrumSide:
         return np.asarray(np.stack(columns, axis=-1) / np.sqrt(DRAWS))
 
 
-def is_torque(fitted: Estimate) -> NDArray[np.bool_]:
-    """Which unknowns of a fit are sizes of an unknown torque."""
+def is_torque_size(fitted: Estimate) -> NDArray[np.bool_]:
+    """Whether each unknown of a fit is a size of the unknown torque."""
     return np.array([u.name.startswith("torque_") for u in fitted.unknowns])
 
 
-def expected(fitted: Estimate) -> Array:
-    """Where the unknowns of a fit lie by their priors; those without one stay where they are."""
+def prior_means(fitted: Estimate) -> Array:
+    """Prior means of the unknowns of a fit, on its scale; an unknown without a prior stays."""
     pairs = zip(fitted.unknowns, fitted.z, strict=True)
     return np.array([float(z) if u.std is None else u.scaled(u.prior) for u, z in pairs])

@@ -1,7 +1,7 @@
-"""Which phase of operation each sample of a run belongs to.
+"""The phase of operation of each sample of a run.
 
-Standstill, breakaway, acceleration, cruise and deceleration share the samples of a run among them;
-field weakening is the mask of those above base speed, across the others.
+Standstill, breakaway, acceleration, cruise and deceleration divide the samples of a run. Field
+weakening is a mask across these phases, of the samples above base speed.
 """
 
 from __future__ import annotations
@@ -19,23 +19,24 @@ if TYPE_CHECKING:
 
 PHASES = ("standstill", "breakaway", "acceleration", "cruise", "deceleration", "field_weakening")
 STANDSTILL, BREAKAWAY, ACCELERATION, CRUISE, DECELERATION = range(5)
-# Window of the slope [s]; a tachometer's noise of 0.15 rad/s leaves 0.15 rad/s^2 of it at 100 Hz.
-WINDOW = 0.5
-# A slope of the motor speed that is a ramp [rad/s^2], and a speed that is a motion [rad/s]: after a
-# stop the speed integrator unwinds, and the motor creeps at up to 0.3 rad/s.
+# Window of the slope [s]. A tachometer's noise of 0.15 rad/s leaves 0.15 rad/s^2 of it at 100 Hz.
+SLOPE_WINDOW = 0.5
+# The motor speed ramps from this slope on [rad/s^2].
 RAMP = 3.0
+# The motor moves from this speed on [rad/s]. After a stop the speed integrator unwinds, and the
+# motor creeps at up to 0.3 rad/s.
 MOVING = 1.0
-# How long leaving standstill takes: the gap is crossed within it [s].
+# The gear crosses the backlash within this time after standstill [s].
 BREAKAWAY_TIME = 0.5
 
 
 def phases(time: Array, reference: Array, motor_speed: Array) -> NDArray[np.int_]:
-    """Phase of every sample as its place in PHASES, shape (n,).
+    """Phase of each sample as its index in PHASES, shape (n,).
 
-    reference, motor_speed : [rad/s]
+    time : [s]; reference, motor_speed : [rad/s]; shape (n,) each
     """
-    speed = smooth(time, motor_speed, WINDOW / 5)
-    slope = np.sign(speed) * smooth(time, motor_speed, WINDOW, 1)
+    speed = smooth(time, motor_speed, SLOPE_WINDOW / 5)
+    slope = np.sign(speed) * smooth(time, motor_speed, SLOPE_WINDOW, 1)
     found = np.full(len(time), CRUISE)
     found[slope > RAMP] = ACCELERATION
     found[slope < -RAMP] = DECELERATION
@@ -50,5 +51,5 @@ def phases(time: Array, reference: Array, motor_speed: Array) -> NDArray[np.int_
 
 
 def field_weakened(motor_speed: Array, base_speed: float) -> NDArray[np.bool_]:
-    """Which samples lie above base speed [rad/s], shape (n,)."""
+    """Whether the field is weakened at each sample, shape (n,); speeds [rad/s]."""
     return np.asarray(np.abs(motor_speed) > base_speed)

@@ -1,8 +1,9 @@
-"""What drifting parameters do to the relations of the blocks, so that drift is not called a fault.
+"""The sensitivities of the parity relations to the nuisance parameters.
 
-What is left of the relations when a free parameter is larger than assumed, by its derivative and
-in standard deviations of its prior (thesis, eq. 3.7, 3.16, 3.27, 3.34). The derivatives are taken
-at simulated and smoothed signals: a column with a relation's own noise in it would explain that.
+A parameter that deviates from its assumed value leaves something of the relations: the derivative
+by the parameter (thesis, eq. 3.7, 3.16, 3.27, 3.34) times the deviation. Columns of these
+sensitivities keep a parameter's deviation from being called a fault. The derivatives are taken at
+simulated and smoothed signals; a column with a relation's own noise in it would explain that noise.
 """
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ from plant_emulator.diagnosis.localisation.parity_relations import (
     GEAR,
     MOTOR,
     ROWS,
-    Measured,
+    MeasuredSignals,
     delayed_reference,
     flux,
-    middle,
+    interval_means,
     reconstructed_reference,
 )
 from plant_emulator.estimation.robust_scan import cauchy_loss
@@ -28,20 +29,25 @@ from plant_emulator.estimation.robust_scan import cauchy_loss
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.localisation.block_basis import Inside
+    from plant_emulator.diagnosis.localisation.block_basis import BlockQuantities
     from plant_emulator.model.parameters import Parameter, ParameterSet
     from plant_emulator.signals.log import Array
 
-# Prior standard deviations that a fit without effects is believed within.
-WIDE = 2.0
-# Dead times that are tried, over that of the set, and their prior standard deviation.
+# A fit without effects is believed within so many prior standard deviations.
+BELIEVED_DEVIATIONS = 2.0
+# Dead times that are tried [that of the set].
 DEAD_TIMES = np.linspace(0.7, 1.3, 61)
 
 Slope = dict[int, "Array"]
 
 
-def slopes(m: Measured, q: Inside, p: Mapping[str, float]) -> dict[str, Slope]:
-    """Derivatives of the relations by parameter, shape (n - 1,) each [relation over parameter]."""
+def sensitivities(
+    m: MeasuredSignals, q: BlockQuantities, p: Mapping[str, float]
+) -> dict[str, Slope]:
+    """Derivatives of the relations by parameter and relation, shape (n - 1,) each.
+
+    q : quantities inside the blocks; p : parameter values [SI]
+    """
     xi, speed = p["gear_ratio"], np.abs(q.speed) / p["gear_ratio"]
     k = flux(q.speed, p)
     weak = np.where(k < p["flux_constant"], 1.0, 0.0)
@@ -61,16 +67,20 @@ def slopes(m: Measured, q: Inside, p: Mapping[str, float]) -> dict[str, Slope]:
         "gear_viscous_friction": {GEAR: -power / xi},
         "gear_friction_exponent": {GEAR: -growth / xi},
         "drum_inertia": {GEAR: -drum / xi},
-        "dead_time": {DRIVE: -middle(np.gradient(delayed_reference(m, p["dead_time"]), m.time))},
+        "dead_time": {
+            DRIVE: -interval_means(np.gradient(delayed_reference(m, p["dead_time"]), m.time))
+        },
     }
 
 
-def columns(m: Measured, q: Inside, p: Mapping[str, float], stds: Mapping[str, float]) -> Array:
-    """One column a free parameter of the relations, in its standard deviation, (ROWS, n - 1, k).
+def deviation_columns(
+    m: MeasuredSignals, q: BlockQuantities, p: Mapping[str, float], stds: Mapping[str, float]
+) -> Array:
+    """Columns of the relations by the free parameters, shape (ROWS, n - 1, k).
 
-    stds : prior standard deviations of the free parameters by name
+    stds : prior standard deviations of the free parameters by name; a column is the change by one
     """
-    known = slopes(m, q, p)
+    known = sensitivities(m, q, p)
     found = np.zeros((ROWS, len(m.intervals), len(stds)))
     for column, (name, std) in enumerate(stds.items()):
         for row, slope in known[name].items():
@@ -78,8 +88,11 @@ def columns(m: Measured, q: Inside, p: Mapping[str, float], stds: Mapping[str, f
     return found
 
 
-def priors(parameters: ParameterSet, free: Sequence[str]) -> dict[str, float]:
-    """Standard deviations of those free parameters that the relations hold; no prior: a half."""
+def prior_deviations(parameters: ParameterSet, free: Sequence[str]) -> dict[str, float]:
+    """Prior standard deviations of the free parameters that the relations contain, by name.
+
+    A parameter without a prior gets half of its value.
+    """
     wanted = (
         "armature_resistance",
         "flux_constant",
@@ -99,29 +112,40 @@ def priors(parameters: ParameterSet, free: Sequence[str]) -> dict[str, float]:
     }
 
 
-def assumed(
+def believed_values(
     parameters: ParameterSet, fitted: Mapping[str, float], stds: Mapping[str, float]
 ) -> dict[str, float]:
-    """Values to take the relations at: fitted ones, as far as their priors find them likely."""
+    """Values at which the relations are taken: the fitted ones, as far as their priors allow.
+
+    stds : see `prior_deviations`
+    """
     nominal = parameters.values()
     likely = {
-        name: float(np.clip(fitted[name], nominal[name] - WIDE * std, nominal[name] + WIDE * std))
+        name: float(
+            np.clip(
+                fitted[name],
+                nominal[name] - BELIEVED_DEVIATIONS * std,
+                nominal[name] + BELIEVED_DEVIATIONS * std,
+            )
+        )
         for name, std in stds.items()
     }
     return {**nominal, **likely}
 
 
-def prior(
+def prior_offsets(
     parameters: ParameterSet, values: Mapping[str, float], stds: Mapping[str, float]
 ) -> Array:
-    """How far the priors' means lie from these values, in standard deviations."""
+    """Distance of the priors' means from these values [prior standard deviations]."""
     return np.array([(parameters.value(n) - values[n]) / std for n, std in stds.items()])
 
 
-def dead_time(runs: Sequence[Measured], p: Mapping[str, float], known: Parameter) -> float:
-    """Dead time [s] that the drive's relation tells of; outliers count by their logarithm.
+def estimate_dead_time(
+    runs: Sequence[MeasuredSignals], p: Mapping[str, float], known: Parameter
+) -> float:
+    """Estimate the dead time from the drive's relation, by Cauchy's loss [s].
 
-    known : what is known of it beforehand
+    known : the dead time of the parameter set, with its prior
     """
     nominal, std = known.value, known.std or 0.5 * known.value
     references = [
@@ -132,8 +156,8 @@ def dead_time(runs: Sequence[Measured], p: Mapping[str, float], known: Parameter
         trial = factor * nominal
         away = 0.5 * ((trial - nominal) / std) ** 2
         return away + sum(
-            cauchy_loss((t - delayed_reference(m, trial)) / m.noise[0])
-            for t, m in zip(references, runs, strict=True)
+            cauchy_loss((reference - delayed_reference(m, trial)) / m.noise[0])
+            for reference, m in zip(references, runs, strict=True)
         )
 
     return float(min(DEAD_TIMES, key=loss) * nominal)

@@ -1,4 +1,10 @@
-"""The covariance of the relations over a run, from the noise of the sensors."""
+"""The covariance of the parity relations over a run, from the noise of the sensors.
+
+The relations are linear in the noise of omega_m, omega_d, i, T and u at two samples. Their
+covariance over the run is therefore banded, and its Cholesky factor whitens them. A jump within an
+interval adds what the mean of its ends leaves open. At standstill friction takes any value up to
+its level.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +17,13 @@ from plant_emulator.diagnosis.localisation.parity_relations import (
     DRIVE,
     GEAR,
     MOTOR,
-    STILL,
-    VOID,
-    Measured,
-    Relations,
+    STILL_SPEED,
+    VOID_VARIANCE,
+    MeasuredSignals,
+    WhitenedRelations,
     flux,
-    jump,
-    values,
+    jump_variance,
+    relation_residuals,
 )
 
 if TYPE_CHECKING:
@@ -27,65 +33,73 @@ if TYPE_CHECKING:
 
     from plant_emulator.signals.log import Array
 
-# Standard deviation of the torque of the truck's brake, which reacts at standstill [N m].
-BRAKE = 300.0
-# A simulated drive reaches and leaves a limit that much before or after the real one [s].
-SAME_LIMIT = 0.1
+# Standard deviation of the torque of the truck's brake at standstill [N m].
+BRAKE_TORQUE = 300.0
+# A simulated drive reaches and leaves a limit so long before or after the real one [s].
+LIMIT_TIME = 0.1
 
 
-def relations(
-    m: Measured,
+def whitened_relations(
+    m: MeasuredSignals,
     p: Mapping[str, float],
     simulated: tuple[Array, NDArray[np.bool_]] | None = None,
-) -> Relations:
-    """The relations of a run.
+) -> WhitenedRelations:
+    """Compute the relations of a run and the factor of their covariance; p : parameter values [SI].
 
-    simulated : what a simulated run with the same samples leaves of them, taken off and not
-        believed better than by half, and where its drive is limited. A limit that both runs reach
-        begins and ends with the earlier and the later one
+    simulated : residuals of the relations in a simulated run with the same samples, and whether its
+        drive is limited. The residuals are the relations' own error between samples: they are taken
+        off, with a standard deviation of half their value. A limit that both runs reach lasts from
+        the earlier start to the later end.
     """
-    value, limited = values(m, p)
+    value, limited = relation_residuals(m, p)
     if simulated is None:
         variance = extra_variance(m, p, limited)
     else:
         left, also = simulated
-        limited = limited | (also & near(limited, m))
+        limited = limited | (also & near_limit(limited, m))
         value = value - left
         variance = extra_variance(m, p, limited) + (0.5 * left) ** 2
     if m.missing_current:
-        variance[[MOTOR, *range(DRIVE, m.rows)]] += VOID
-    return Relations(value, factor(m, p, variance))
+        variance[[MOTOR, *range(DRIVE, m.rows)]] += VOID_VARIANCE
+    return WhitenedRelations(value, covariance_factor(m, p, variance))
 
 
-def near(limited: NDArray[np.bool_], m: Measured) -> NDArray[np.bool_]:
-    """Which intervals lie no further than SAME_LIMIT from one in which the drive is limited."""
+def near_limit(limited: NDArray[np.bool_], m: MeasuredSignals) -> NDArray[np.bool_]:
+    """Whether each interval lies within LIMIT_TIME of one in which the drive is limited."""
     from scipy.ndimage import maximum_filter1d
 
-    reach = int(np.ceil(SAME_LIMIT / float(np.median(m.intervals))))
+    reach = int(np.ceil(LIMIT_TIME / float(np.median(m.intervals))))
     return np.asarray(maximum_filter1d(limited, 2 * reach + 1, mode="constant"))
 
 
-def extra_variance(m: Measured, p: Mapping[str, float], limited: NDArray[np.bool_]) -> Array:
-    """Variance of each relation beside the sensors' noise, shape (m.rows, n - 1)."""
+def extra_variance(m: MeasuredSignals, p: Mapping[str, float], limited: NDArray[np.bool_]) -> Array:
+    """Variance of each relation beyond the sensors' noise, shape (m.rows, n - 1)."""
     k = flux(m.speed, p)[1:]
     variance = np.zeros((m.rows, len(m.intervals)))
-    variance[MOTOR] = jump(m.torque, m.noise[3]) + k**2 * jump(m.current, m.noise[2])
+    variance[MOTOR] = jump_variance(m.torque, m.noise[3]) + k**2 * jump_variance(
+        m.current, m.noise[2]
+    )
     level = 3.0 * p["gear_coulomb_friction"] / p["gear_ratio"]
-    still = np.minimum(np.abs(m.speed[1:]), np.abs(m.speed[:-1])) < STILL
+    still = np.minimum(np.abs(m.speed[1:]), np.abs(m.speed[:-1])) < STILL_SPEED
     still |= np.sign(m.speed[1:]) != np.sign(m.speed[:-1])
-    variance[GEAR] = jump(m.torque, m.noise[3])
-    variance[GEAR] += np.where(still, level**2 + m.truck * BRAKE**2, 0.0)
-    variance[DRIVE] = np.where(limited, VOID, 0.0)
+    variance[GEAR] = jump_variance(m.torque, m.noise[3])
+    variance[GEAR] += np.where(still, level**2 + m.truck * BRAKE_TORQUE**2, 0.0)
+    variance[DRIVE] = np.where(limited, VOID_VARIANCE, 0.0)
     if m.voltage is not None:
         # Where the current jumps, the voltage that makes it do so falls between the samples.
         surge = 12.0 * (p["armature_inductance"] / m.intervals) ** 2
-        variance[ARMATURE] = jump(m.voltage, m.noise[4])
-        variance[ARMATURE] += (p["armature_resistance"] ** 2 + surge) * jump(m.current, m.noise[2])
+        variance[ARMATURE] = jump_variance(m.voltage, m.noise[4])
+        variance[ARMATURE] += (p["armature_resistance"] ** 2 + surge) * jump_variance(
+            m.current, m.noise[2]
+        )
     return variance
 
 
-def sensitivities(m: Measured, p: Mapping[str, float]) -> tuple[Array, Array]:
-    """Relations by noise of unit variance at begin and end, shape (m.rows, 5, n - 1) each."""
+def noise_sensitivities(m: MeasuredSignals, p: Mapping[str, float]) -> tuple[Array, Array]:
+    """Derivatives of the relations by each sensor's unit noise at begin and end of an interval.
+
+    Both have the shape (m.rows, 5, n - 1).
+    """
     xi, step, n = p["gear_ratio"], m.intervals, len(m.intervals)
     k, zero, half = flux(m.speed, p), np.zeros(n), np.full(n, 0.5)
 
@@ -103,11 +117,14 @@ def sensitivities(m: Measured, p: Mapping[str, float]) -> tuple[Array, Array]:
     return at(-1.0, k[:-1]), at(1.0, k[1:])
 
 
-def factor(m: Measured, p: Mapping[str, float], variance: Array) -> Array:
-    """Lower banded Cholesky factor of the covariance, relations of an interval side by side."""
+def covariance_factor(m: MeasuredSignals, p: Mapping[str, float], variance: Array) -> Array:
+    """Lower banded Cholesky factor of the covariance, the relations of an interval side by side.
+
+    variance : beyond the sensors' noise, shape (m.rows, n - 1)
+    """
     from scipy.linalg import cholesky_banded
 
-    begin, end = sensitivities(m, p)
+    begin, end = noise_sensitivities(m, p)
     n, rows = len(m.intervals), m.rows
     banded = np.zeros((2 * rows, rows * n))
     for r in range(rows):

@@ -1,22 +1,20 @@
-"""What measured signals alone must satisfy, block by block, and the noise of it from the sensors'.
+"""The parity relations: what the measured signals of a run must satisfy, block by block.
 
-Over every interval between two samples, with means of what acts in it (thesis, eq. 3.10, 3.20,
-3.34 with the drum's torque eliminated, and 3.1-3.8 solved for the reference):
+A parity relation (analytical redundancy; E. Chow, A. Willsky, IEEE Trans. Automatic Control 29
+(1984) 603) holds between measured signals alone. Here it holds over each interval between two
+samples, with the means of what acts in the interval (thesis, eq. 3.10, 3.20, 3.34 with the drum's
+torque eliminated, and 3.1 to 3.8 solved for the reference):
 
     motor     J_m omega_m' - k Phi(omega_m) i - T = 0
     gear      T + (J_g omega_m'/xi + J_d omega_d' + T_f(omega_m/xi) - T_d) / xi = 0
     drive     omega_m + e - omega_ref(t - b) = 0,   e : speed error that the current tells of
     armature  u - R_a i - L_a i' - k Phi(omega_m) omega_m = 0,   where the voltage is logged
 
-No relation needs a simulation, or to know whether gear and drum touch: momentum is kept in the gap
-too. The drive's works backwards through both controllers: u, logged or from the armature's, gives
-i_ref = i + u/K_c - (its part that the integrator holds), i_ref gives e the same way. At a limit it
-tells nothing.
+No relation needs a simulation, nor whether gear and drum touch: momentum is kept in the gap too.
 
-Noise is propagated: the relations are linear in the noise of omega_m, omega_d, i, T and u at two
-samples, so their covariance over the run is banded and its Cholesky factor whitens them. A jump
-within an interval adds what the mean of its ends leaves open, jump^2/12. At standstill friction
-takes any value up to its level.
+The drive's relation solves both controllers backwards. The voltage u is logged, or follows from the
+armature's relation. It gives i_ref = i + u/K_c - (the part that the integrator holds), and i_ref
+gives e in the same way. At a limit the drive's relation says nothing.
 """
 
 from __future__ import annotations
@@ -37,54 +35,64 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 MOTOR, GEAR, DRIVE, ARMATURE = range(4)
-# Of a run with its voltage; without it the armature's, the last one, is not there.
+# Relations of a run with its voltage; a run without it lacks the last one, the armature's.
 ROWS = 4
 NOISES = ("motor_speed", "drum_speed", "armature_current", "shaft_torque", VOLTAGE)
-# A difference of two samples that is no noise: three deviations of it.
-JUMP = 3.0 * np.sqrt(2.0)
-# Four deviations of the smoothed motor speed [rad/s]: below, its sign and the friction are open.
-STILL = 0.6
-# Share of a limit from which on the drive counts as limited.
+# A difference of two samples is a jump from so many deviations of the noise on.
+JUMP_NOISES = 3.0 * np.sqrt(2.0)
+# Below this speed the sign of the motion and the friction are open [rad/s]: four deviations of the
+# smoothed motor speed.
+STILL_SPEED = 0.6
+# The drive counts as limited from this share of a limit on.
 AT_LIMIT = 0.97
 # Variance that makes a relation count for nothing.
-VOID = 1e6
+VOID_VARIANCE = 1e6
 
 
-def middle(channel: Array) -> Array:
-    """Means over the intervals, shape (n - 1, ...)."""
+def interval_means(channel: Array) -> Array:
+    """Means of a channel over the intervals, shape (n - 1, ...)."""
     return np.asarray(0.5 * (channel[1:] + channel[:-1]))
 
 
 def flux(speed: Array, p: Mapping[str, float]) -> Array:
-    """Flux k Phi [N m/A] (thesis, eq. 3.16-3.18)."""
+    """Flux k Phi at a motor speed [N m/A] (thesis, eq. 3.16 to 3.18)."""
     weakened = p["flux_constant_1"] / (p["flux_constant_2"] + np.abs(speed))
     return np.asarray(np.minimum(p["flux_constant"], weakened))
 
 
 def base_speed(p: Mapping[str, float]) -> float:
-    """Speed above which the field is weakened [rad/s] (thesis, eq. 3.18)."""
+    """Motor speed above which the field is weakened [rad/s] (thesis, eq. 3.18)."""
     return p["flux_constant_1"] / p["flux_constant"] - p["flux_constant_2"]
 
 
 def friction(speed: Array, p: Mapping[str, float]) -> Array:
-    """Friction of the gear [N m] at its output's speed [rad/s] (thesis, eq. 3.27)."""
+    """Friction torque of the gear [N m] at the speed of its output [rad/s] (thesis, eq. 3.27)."""
     rest = p["gear_viscous_friction"] * np.abs(speed) ** p["gear_friction_exponent"]
     return np.asarray((p["gear_coulomb_friction"] + rest) * np.sign(speed))
 
 
-def jump(channel: Array, deviation: float) -> Array:
-    """Variance of the mean of two samples as a mean over the interval, where it jumps."""
+def jump_variance(channel: Array, deviation: float) -> Array:
+    """Variance of the mean of two samples as a mean over their interval, where the channel jumps.
+
+    jump^2 / 12,   as if the jump came at any time of the interval
+
+    deviation : of the channel's noise
+    """
     step = np.diff(channel)
-    return np.where(np.abs(step) > JUMP * deviation, step**2 / 12.0, 0.0)
+    return np.where(np.abs(step) > JUMP_NOISES * deviation, step**2 / 12.0, 0.0)
 
 
 @dataclass(frozen=True)
-class Measured:
-    """The signals of a run [SI], shape (n,) each; noise : standard deviations in NOISES' order.
+class MeasuredSignals:
+    """The measured signals of a run [SI], shape (n,) each.
 
-    speed : the motor's, smoothed; drum_torque : of the truck over each interval, shape (n - 1,)
+    staircase : whether the reference stands between its samples; else it is linear
     voltage : of the armature; None: not logged
-    missing_current : relations with the current then tell nothing
+    noise : standard deviations in the order of NOISES
+    speed : motor speed, smoothed
+    drum_torque : of the truck over each interval, shape (n - 1,)
+    truck : whether a truck stood on the drum
+    missing_current : whether the current is not logged; its relations then say nothing
     """
 
     time: Array
@@ -108,12 +116,12 @@ class Measured:
 
     @property
     def rows(self) -> int:
-        """How many relations the run has."""
+        """Number of relations of the run."""
         return ROWS if self.voltage is not None else ARMATURE
 
 
-def measured(recording: Recording, p: Mapping[str, float]) -> Measured:
-    """The signals of a recording."""
+def measured_signals(recording: Recording, p: Mapping[str, float]) -> MeasuredSignals:
+    """Take the measured signals of a recording; p : parameter values [SI]."""
     log = recording.log
     missing = "armature_current" not in log
     current = np.zeros_like(log.time) if missing else log["armature_current"]
@@ -122,7 +130,7 @@ def measured(recording: Recording, p: Mapping[str, float]) -> Measured:
     truck = "wheel_torque" in log
     wheel = log["wheel_torque"] if truck else np.zeros_like(log.time)
     signals = (log["motor_speed"], current, log["shaft_torque"])
-    return Measured(
+    return MeasuredSignals(
         time=log.time,
         reference=log["speed_reference"],
         staircase=not np.any(recording.inputs.slope),
@@ -149,21 +157,24 @@ def smoothed_speed(
     *,
     use_current: bool = True,
 ) -> Array:
-    """Motor speed [rad/s], smoothed by what the torques tell of its acceleration.
+    """Motor speed [rad/s], smoothed by the acceleration that the torques give, shape (n,).
 
-    The tachometer and omega_m' = (k Phi i + T)/J_m, each with its variance: a tridiagonal least
-    squares problem (a fixed-interval smoother). Where the two disagree for longer than noise would,
-    the torques are believed the less.
+    omega_m' = (k Phi i + T) / J_m
+
+    A fixed-interval smoother: the tachometer and the acceleration, each with its variance, make a
+    tridiagonal least squares problem. Where the two disagree for longer than noise would, the
+    torques get a larger variance.
+    noise : standard deviations in the order of NOISES
     """
     from scipy.linalg import solveh_banded
     from scipy.ndimage import uniform_filter1d
 
     k, inertia, step, width = flux(speed, p)[1:], p["motor_inertia"], np.diff(time), 21
-    means = middle(flux(speed, p) * current) + middle(torque)
+    means = interval_means(flux(speed, p) * current) + interval_means(torque)
     variance = 0.5 * noise[3] ** 2 + 0.5 * (k * noise[2]) ** 2
-    variance += jump(torque, noise[3]) + k**2 * jump(current, noise[2])
+    variance += jump_variance(torque, noise[3]) + k**2 * jump_variance(current, noise[2])
     if not use_current:
-        variance += VOID
+        variance += VOID_VARIANCE
     wrong = uniform_filter1d(inertia * np.diff(speed) / step - means, width)
     plain = noise[3] ** 2 + (k * noise[2]) ** 2
     usual = plain / width + 2.0 * (inertia * noise[0] / (width * step)) ** 2
@@ -178,13 +189,13 @@ def smoothed_speed(
     return np.asarray(solveh_banded(banded, right))
 
 
-def turned(time: Array, speed: Array) -> Array:
-    """Angle that something has turned since the start [rad], at the samples."""
+def turned_angle(time: Array, speed: Array) -> Array:
+    """Angle turned since the start [rad] at the samples; speed : [rad/s]."""
     return np.asarray(np.cumsum(np.diff(time, prepend=time[0]) * speed))
 
 
-def delayed_reference(m: Measured, dead_time: float) -> Array:
-    """Reference after the dead time [rad/s], at the samples."""
+def delayed_reference(m: MeasuredSignals, dead_time: float) -> Array:
+    """Speed reference after the dead time [rad/s] at the samples; dead_time : [s]."""
     if not m.staircase:
         return np.interp(m.time - dead_time, m.time, m.reference)
     held = np.searchsorted(m.time, m.time - dead_time, side="right") - 1
@@ -192,11 +203,13 @@ def delayed_reference(m: Measured, dead_time: float) -> Array:
 
 
 def reconstructed_reference(
-    m: Measured, p: Mapping[str, float], nominal: Array
+    m: MeasuredSignals, p: Mapping[str, float], nominal: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Reference that the drive must have had [rad/s], and where it was limited and tells nothing.
+    """Speed reference that the drive must have had [rad/s], and whether it was limited.
 
-    nominal : the delayed reference, for the integrators while the drive is limited
+    Both controllers are solved backwards, sample by sample. A limited drive says nothing of its
+    reference.
+    nominal : the delayed reference, for the integrators while the drive is limited [rad/s]
     """
     voltage = m.voltage
     if voltage is None:
@@ -223,14 +236,21 @@ def reconstructed_reference(
 
 
 @dataclass(frozen=True)
-class Relations:
-    """The relations of a run, shape (3 or 4, n - 1) [N m, N m, rad/s, V], and what whitens them."""
+class WhitenedRelations:
+    """The relations of a run with the factor that whitens them.
+
+    value : shape (3 or 4, n - 1) [N m, N m, rad/s, V]
+    factor : lower banded Cholesky factor of their covariance
+    """
 
     value: Array
     factor: Array
 
-    def white(self, rows: Array) -> Array:
-        """Rows of shape (r, n - 1, k), whitened, shape (r (n - 1), k); rows beyond are left out."""
+    def whiten(self, rows: Array) -> Array:
+        """Whiten columns of shape (ROWS, n - 1, k); the result has the shape (r (n - 1), k).
+
+        Rows of relations that the run lacks are left out.
+        """
         from scipy.linalg import solve_banded
 
         count = len(self.value)
@@ -239,24 +259,28 @@ class Relations:
         return np.asarray(solve_banded((below, 0), self.factor, stacked))
 
 
-def values(m: Measured, p: Mapping[str, float]) -> tuple[Array, NDArray[np.bool_]]:
-    """What is left of the relations, shape (m.rows, n - 1), and where the drive is limited."""
+def relation_residuals(
+    m: MeasuredSignals, p: Mapping[str, float]
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Residuals of the relations, shape (m.rows, n - 1), and whether the drive is limited."""
     xi, step = p["gear_ratio"], m.intervals
     acceleration = np.diff(m.motor_speed) / step
-    motor = p["motor_inertia"] * acceleration - middle(flux(m.speed, p) * m.current)
+    motor = p["motor_inertia"] * acceleration - interval_means(flux(m.speed, p) * m.current)
     driven = (
         p["gear_inertia"] * acceleration / xi + p["drum_inertia"] * np.diff(m.drum_speed) / step
     )
-    driven += middle(friction(m.speed / xi, p)) - m.drum_torque
+    driven += interval_means(friction(m.speed / xi, p)) - m.drum_torque
     nominal = delayed_reference(m, p["dead_time"])
     reconstructed, limited = reconstructed_reference(m, p, nominal)
     rows = [
-        motor - middle(m.torque),
-        middle(m.torque) + driven / xi,
-        middle(reconstructed - nominal),
+        motor - interval_means(m.torque),
+        interval_means(m.torque) + driven / xi,
+        interval_means(reconstructed - nominal),
     ]
     if m.voltage is not None:
         induced = p["armature_inductance"] * np.diff(m.current) / step
         emf = flux(m.speed, p) * m.motor_speed
-        rows.append(middle(m.voltage - p["armature_resistance"] * m.current - emf) - induced)
+        rows.append(
+            interval_means(m.voltage - p["armature_resistance"] * m.current - emf) - induced
+        )
     return np.stack(rows), limited[1:] | limited[:-1]

@@ -1,4 +1,7 @@
-"""How large the gap of each channel is where: by phase, speed, load, direction, frequency, time."""
+"""The residual map: how large the gap of each channel is, and where.
+
+The axes are operating phase, speed, load, direction, frequency and time since the start.
+"""
 
 from __future__ import annotations
 
@@ -19,23 +22,23 @@ if TYPE_CHECKING:
     from plant_emulator.recordings.recording import Recording
     from plant_emulator.signals.log import Array
 
-# Bands of frequency [Hz], as far as the sampling goes.
+# Edges of the bins: frequency [Hz], as far as the sampling goes.
 BANDS = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
-SPEEDS = (0.0, 25.0, 50.0, 100.0, 200.0, 300.0, 400.0)  # rad/s at the motor
-TIMES = (0.0, 5.0, 10.0, 20.0, 40.0, 80.0)  # since the start [s]
-# Load is told apart from none by this torque at the sensor [N m], four deviations of its noise.
+SPEEDS = (0.0, 25.0, 50.0, 100.0, 200.0, 300.0, 400.0)  # [rad/s at the motor]
+TIMES = (0.0, 5.0, 10.0, 20.0, 40.0, 80.0)  # [s since the start]
+# There is a load from this torque at the sensor on [N m]: four deviations of its noise.
 LOADED = 1.0
-# Motion, for the direction [rad/s at the motor].
+# The motor moves in a direction from this speed on [rad/s].
 MOVING = 1.0
 
 
 def residual_map(
     recordings: Sequence[Recording], residuals: Sequence[Array], base_speed: float
 ) -> tuple[Cell, ...]:
-    """All cells of all axes.
+    """All cells of all axes, the runs pooled.
 
-    residuals : of every run, over the noise, shape (channels, samples)
-    base_speed : above which the field is weakened [rad/s]
+    residuals : of every run, over the noise [1], shape (channels, samples)
+    base_speed : motor speed above which the field is weakened [rad/s]
     """
     masks = [bins(r, base_speed) for r in recordings]
     keys = dict.fromkeys(key for mask in masks for key in mask)
@@ -46,26 +49,26 @@ def residual_map(
 
 
 def bins(recording: Recording, base_speed: float) -> dict[tuple[str, str], NDArray[np.bool_]]:
-    """Samples of a run by axis and bin."""
+    """Masks of the samples of a run, by axis and bin; base_speed : [rad/s]."""
     log = recording.log
     time, speed = log.time, smooth(log.time, log["motor_speed"], 0.1)
     torque = smooth(time, log["shaft_torque"], 0.1)
     phase = phases(time, log["speed_reference"], log["motor_speed"])
     found = {("phase", name): phase == k for k, name in enumerate(PHASES[:-1])}
     found["phase", PHASES[-1]] = field_weakened(speed, base_speed)
-    found |= {("speed", n): m for n, m in _parts(np.abs(speed), SPEEDS, "rad/s")}
+    found |= {("speed", n): m for n, m in _ranges(np.abs(speed), SPEEDS, "rad/s")}
     found["load", "driving"] = torque * speed < -LOADED * np.abs(speed)
     found["load", "braking"] = torque * speed > LOADED * np.abs(speed)
     found["load", "none"] = np.abs(torque) <= LOADED
     found["direction", "forward"] = speed > MOVING
     found["direction", "backward"] = speed < -MOVING
-    return found | {("time", n): m for n, m in _parts(time - time[0], TIMES, "s")}
+    return found | {("time", n): m for n, m in _ranges(time - time[0], TIMES, "s")}
 
 
-def _parts(
+def _ranges(
     value: Array, edges: Sequence[float], unit: str
 ) -> Iterator[tuple[str, NDArray[np.bool_]]]:
-    """Bins of a quantity between edges, the last one open."""
+    """Name and mask of each bin of a quantity between the edges; the last bin is open."""
     for low, high in zip(edges, (*edges[1:], np.inf), strict=True):
         name = f"{low:g} to {high:g} {unit}" if high < np.inf else f"from {low:g} {unit}"
         yield name, (value >= low) & (value < high)
@@ -77,7 +80,10 @@ def _cells(
     masks: Sequence[Mapping[tuple[str, str], NDArray[np.bool_]]],
     key: tuple[str, str],
 ) -> Iterator[Cell]:
-    """One bin's cells, all runs pooled; a channel's noise is that of the runs' samples in it."""
+    """Cells of one bin, all runs pooled.
+
+    The noise of a channel is that of the samples in the bin, each with its own run's noise.
+    """
     for channel in dict.fromkeys(c for r in recordings for c in r.channels):
         squares = variance = samples = 0.0
         for r, residual, mask in zip(recordings, residuals, masks, strict=True):
@@ -104,7 +110,7 @@ def _cell(channel: str, key: tuple[str, str], square: float, noise: float, sampl
 
 
 def _frequency_cells(recordings: Sequence[Recording], residuals: Sequence[Array]) -> Iterator[Cell]:
-    """Bands of frequency; gap and noise are what lies within the band (Parseval)."""
+    """Cells of the frequency bands: gap and noise within each band (Parseval's theorem)."""
     for channel in dict.fromkeys(c for r in recordings for c in r.channels):
         for low, high in pairwise(BANDS):
             squares = variance = samples = degrees = 0.0
@@ -123,7 +129,7 @@ def _frequency_cells(recordings: Sequence[Recording], residuals: Sequence[Array]
 
 
 def _band(time: Array, residual: Array, low: float, high: float) -> tuple[float, float]:
-    """Degrees of freedom in a band, and the sum of squares there."""
+    """Degrees of freedom of a residual in a band [Hz], and its sum of squares there."""
     n = len(residual)
     frequency = np.fft.rfftfreq(n, float(np.median(np.diff(time))))
     weight = np.where((frequency == 0.0) | ((n % 2 == 0) & (frequency == frequency[-1])), 1.0, 2.0)

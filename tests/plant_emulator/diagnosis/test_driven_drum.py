@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from plant_emulator.diagnosis.localisation.drum_simulation import compiled, drum_speed
+from plant_emulator.diagnosis.localisation.drum_simulation import compile_once, drum_speed
 
 # Thesis, Table 3.1: half gap, damping, drum's inertia; stiffness by eq. 3.32 and 3.33.
 ALPHA, K, C, J = 0.15073, 1349265.04, 120320.0, 312.69
@@ -15,7 +15,7 @@ def driven(
     gear: np.ndarray, torque: float = 0.0, *, parked: float = 0.0, position: float = 0.0
 ) -> np.ndarray:
     constant = np.ones_like(TIME)
-    return compiled(drum_speed)(
+    return compile_once(drum_speed)(
         TIME, gear, torque * constant, parked * constant, position, ALPHA, K, C, J
     )
 

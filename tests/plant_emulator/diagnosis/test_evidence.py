@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from plant_emulator.diagnosis.localisation.ard_evidence import Linear, log_evidence, variance_gain
+from plant_emulator.diagnosis.localisation.ard_evidence import (
+    LinearModel,
+    log_marginal_likelihood,
+    variance_gain,
+)
 
 RANDOM = np.random.default_rng(3)
 NUISANCE, LAW = RANDOM.standard_normal((40, 2)), RANDOM.standard_normal((40, 3))
@@ -18,19 +22,21 @@ def test_it_is_the_marginal_density_up_to_the_noise_s_own_constant(size: float) 
     expected = multivariate_normal(np.zeros(40), covariance).logpdf(y)
     columns = np.concatenate([NUISANCE, LAW], axis=1)
     deviations = np.array([1.0, 1.0, size, size, size])
-    found = log_evidence(columns.T @ columns, columns.T @ y, deviations)
+    found = log_marginal_likelihood(columns.T @ columns, columns.T @ y, deviations)
     constant = -20.0 * np.log(2.0 * np.pi) - 0.5 * y @ y
     assert found + constant == pytest.approx(expected, abs=1e-9)
 
 
 def test_noise_takes_no_group() -> None:
-    data = Linear(NOISE, [NUISANCE])
-    assert data.evidence([LAW]).log - data.evidence([]).log < 2.0
+    data = LinearModel(NOISE, [NUISANCE])
+    assert data.marginal_likelihood([LAW]).log - data.marginal_likelihood([]).log < 2.0
 
 
 def test_of_two_groups_the_one_in_the_data_is_found_with_its_coefficients() -> None:
     other = RANDOM.standard_normal((40, 3))
-    found = Linear(NOISE + LAW @ [6.0, -7.0, 8.0], [NUISANCE]).evidence([other, LAW])
+    found = LinearModel(NOISE + LAW @ [6.0, -7.0, 8.0], [NUISANCE]).marginal_likelihood(
+        [other, LAW]
+    )
     assert found.mean[5:] == pytest.approx([6.0, -7.0, 8.0], abs=0.6)
     assert np.abs(found.mean[2:5]).max() < 0.6
 

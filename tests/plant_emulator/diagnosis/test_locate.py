@@ -8,7 +8,7 @@ import pytest
 from plant_emulator import parameter_sets
 from plant_emulator.diagnosis.answer import Location
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
-from plant_emulator.diagnosis.localisation.locate import WORTHWHILE_BLOCK_GAIN, among, locate
+from plant_emulator.diagnosis.localisation.locate import WORTHWHILE_BLOCK_GAIN, gain_shares, locate
 from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
@@ -38,7 +38,7 @@ def with_effect(inputs: Log, effects: Mapping[str, Mapping[str, float]]) -> Log:
 
 
 def test_equal_gains_are_equal_shares_and_a_small_one_is_little() -> None:
-    shares = among({"motor": 1000.0, "torque_sensor": 1000.0, "drum": 10.0})
+    shares = gain_shares({"motor": 1000.0, "torque_sensor": 1000.0, "drum": 10.0})
     assert shares["motor"] == shares["torque_sensor"] == pytest.approx(0.5, abs=1e-6)
     assert sum(shares.values()) == pytest.approx(1.0)
 

@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.localisation.parity_covariance import relations
+from plant_emulator.diagnosis.localisation.parity_covariance import whitened_relations
 from plant_emulator.diagnosis.localisation.parity_relations import (
     DRIVE,
     GEAR,
     MOTOR,
-    measured,
+    measured_signals,
+    relation_residuals,
     smoothed_speed,
-    values,
 )
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import Recording, recording
@@ -27,8 +27,8 @@ def run(bench_log: Callable[[str], Log]) -> Recording:
 
 
 def whitened(run: Recording, nominal: ParameterSet) -> np.ndarray:
-    found = relations(measured(run, nominal.values()), nominal.values())
-    return found.white(found.value[..., None]).reshape(-1, 3)
+    found = whitened_relations(measured_signals(run, nominal.values()), nominal.values())
+    return found.whiten(found.value[..., None]).reshape(-1, 3)
 
 
 def smooth_rms(whitened: np.ndarray, length: int = 20) -> np.ndarray:
@@ -64,7 +64,10 @@ def test_a_signal_that_is_off_moves_the_relations_that_it_is_in_and_no_other(
     off = replace(run, log=replace(run.log, signals=signals))
     p = nominal.values()
     cruise = (run.log.time[1:] > 9.0) & (run.log.time[1:] < 13.0)
-    before, after = (relations(measured(r, p), p).value[:, cruise].mean(axis=1) for r in (run, off))
+    before, after = (
+        whitened_relations(measured_signals(r, p), p).value[:, cruise].mean(axis=1)
+        for r in (run, off)
+    )
     for row, expected in moved.items():
         assert after[row] - before[row] == pytest.approx(expected, abs=0.02)
 
@@ -100,12 +103,12 @@ def test_a_limit_of_the_simulated_drive_counts_only_next_to_one_of_the_real_driv
     p = nominal.values()
     # At its limit of 72 A (thesis, eq. 3.5) for a while.
     current = np.where(np.arange(len(run.log.time)) // 10 == 100, 72.0, 20.0)
-    signals = replace(measured(run, p), current=current)
-    limited = values(signals, p)[1]
+    signals = replace(measured_signals(run, p), current=current)
+    limited = relation_residuals(signals, p)[1]
     last = int(np.flatnonzero(limited)[-1])
     also = np.zeros_like(limited)
     soon, late = last + 3, last + 60
     also[[soon, late]] = True
-    found = relations(signals, p, (np.zeros((3, len(limited))), also))
-    drive = np.abs(found.white(np.ones((3, len(limited), 1))).reshape(-1, 3)[:, DRIVE])
+    found = whitened_relations(signals, p, (np.zeros((3, len(limited))), also))
+    drive = np.abs(found.whiten(np.ones((3, len(limited), 1))).reshape(-1, 3)[:, DRIVE])
     assert drive[soon] < 0.01 * drive[late]

@@ -9,17 +9,17 @@ import pytest
 from plant_emulator.diagnosis.design.detectability import detection_limits, effect_detectability
 from plant_emulator.diagnosis.fitting.evidence import LJUNG_BOX_LIMIT
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
-from plant_emulator.diagnosis.localisation.block_basis import inside
+from plant_emulator.diagnosis.localisation.block_basis import block_quantities
 from plant_emulator.diagnosis.localisation.locate import WORTHWHILE_BLOCK_GAIN, locate
-from plant_emulator.diagnosis.localisation.parameter_sensitivities import slopes
-from plant_emulator.diagnosis.localisation.parity_covariance import relations
+from plant_emulator.diagnosis.localisation.parameter_sensitivities import sensitivities
+from plant_emulator.diagnosis.localisation.parity_covariance import whitened_relations
 from plant_emulator.diagnosis.localisation.parity_relations import (
     ARMATURE,
     DRIVE,
     GEAR,
     MOTOR,
-    measured,
-    values,
+    measured_signals,
+    relation_residuals,
 )
 from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.model.parameters import ParameterSet
@@ -171,12 +171,14 @@ def test_derivatives_of_the_relations_are_those_of_finite_differences(
     """What is left with a parameter taken too small, over how much: its column in `slopes`."""
     log = simulate(inputs_of(bench_log("bench_nominal/program1")), nominal.values())
     true = nominal.values()
-    m = measured(recording(log), true)
-    q = inside(m, m.drum_speed, true)
-    for name, by_row in slopes(m, q, true).items():
+    m = measured_signals(recording(log), true)
+    q = block_quantities(m, m.drum_speed, true)
+    for name, by_row in sensitivities(m, q, true).items():
         step = 1e-3 * true[name]
-        low = values(replace(m, speed=m.motor_speed), {**true, name: true[name] - step})[0]
-        here = values(replace(m, speed=m.motor_speed), true)[0]
+        low = relation_residuals(
+            replace(m, speed=m.motor_speed), {**true, name: true[name] - step}
+        )[0]
+        here = relation_residuals(replace(m, speed=m.motor_speed), true)[0]
         for row, slope in by_row.items():
             difference = (low[row] - here[row]) / step
             scale = np.dot(difference, slope) / np.dot(slope, slope)
@@ -187,9 +189,9 @@ def test_armature_s_relation_leaves_only_white_noise(
     bench_log: Reader, nominal: ParameterSet
 ) -> None:
     p = nominal.values()
-    m = measured(recording(driven(bench_log("bench_nominal/program1"), nominal)), p)
-    found = relations(m, p)
-    left = found.white(found.value[..., None]).reshape(-1, 4)
+    m = measured_signals(recording(driven(bench_log("bench_nominal/program1"), nominal)), p)
+    found = whitened_relations(m, p)
+    left = found.whiten(found.value[..., None]).reshape(-1, 4)
     assert np.sqrt(np.mean(left**2, axis=0)) == pytest.approx(1.0, abs=0.06)
 
 
@@ -200,7 +202,7 @@ def test_voltage_that_is_off_moves_the_armature_s_relation_alone(
     log = driven(bench_log("bench_nominal/program1"), nominal)
     cruise = (log.time[1:] > 9.0) & (log.time[1:] < 13.0)
     means = [
-        relations(measured(recording(one), p), p).value[:, cruise].mean(axis=1)
+        whitened_relations(measured_signals(recording(one), p), p).value[:, cruise].mean(axis=1)
         for one in (log, with_voltage(log, log[VOLTAGE] + 2.0))
     ]
     moved = means[1] - means[0]
@@ -211,7 +213,7 @@ def test_voltage_that_is_off_moves_the_armature_s_relation_alone(
 def test_log_without_voltage_has_three_relations(bench_log: Reader, nominal: ParameterSet) -> None:
     p = nominal.values()
     run = recording(bench_log("bench_practice/practice_004/program1"))
-    assert relations(measured(run, p), p).value.shape == (3, len(run.log.time) - 1)
+    assert whitened_relations(measured_signals(run, p), p).value.shape == (3, len(run.log.time) - 1)
 
 
 @pytest.mark.slow
