@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.blind.orthogonal_norm import noise_levels
-from plant_emulator.estimation.initial_states import fit_states, states_of, with_own
+from plant_emulator.estimation.initial_states import fit_states, states_of, with_logged_values
 from plant_emulator.model.stage import split_gap_position
 from plant_emulator.recordings.recording import Recording
 from plant_emulator.signals.log import COMPARED
@@ -52,7 +52,7 @@ def _residual(log: Log, saved: ParameterSet) -> Array:
     """Truth minus model over the noise, shape (channels, samples)."""
     use = np.ones((len(COMPARED), len(log.time)), bool)
     bare = Recording(log, inputs_of(log), COMPARED, noise_levels(COMPARED), use)
-    recording = with_own(bare, saved.effects)
+    recording = with_logged_values(bare, saved.effects)
     values = values_of(saved)
     states = fit_states(recording, values, states_of(saved.effects))
-    return recording.residual(*split_gap_position({**values, **recording.own, **states}))
+    return recording.residual(*split_gap_position({**values, **recording.logged_values, **states}))

@@ -1,6 +1,7 @@
-"""What belongs to one run only: where in the gap it starts, and what its effects start from.
+"""Initial states of a run: its position in the backlash gap, and the initial states of effects.
 
-A run that is predicted keeps all parameters; only these states are fitted to it.
+They belong to one run only. A run that is predicted keeps all parameters; only its initial states
+are fitted to it.
 """
 
 from __future__ import annotations
@@ -11,10 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.estimation.least_squares import estimate
-from plant_emulator.estimation.robust_scan import scanned
+from plant_emulator.estimation.residuals import residual_function
+from plant_emulator.estimation.robust_scan import scan_unknowns
 from plant_emulator.estimation.start_search import Search
 from plant_emulator.estimation.unknowns import Unknown
-from plant_emulator.model.stage import GAP_POSITION, split_gap_position
+from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.solver.kernel import kernel
 
 if TYPE_CHECKING:
@@ -23,7 +25,6 @@ if TYPE_CHECKING:
     from plant_emulator.effects import Effect
     from plant_emulator.estimation.unknowns import Estimate, Residual
     from plant_emulator.recordings.recording import Recording
-    from plant_emulator.signals.log import Array
 
     Effects = Mapping[str, Mapping[str, float]]
 
@@ -33,9 +34,9 @@ GAP_POSITIONS = 41
 
 
 def states_of(own: Effects, known: Mapping[str, Effect] | None = None) -> tuple[Unknown, ...]:
-    """The states of a run, the position in the gap first.
+    """Unknowns of the initial states of a run; the position in the gap is the first.
 
-    own : values of the effects that the bench has, by effect and parameter
+    own : values of the effects that the bench has, by effect and parameter [SI]
     known : the effects by name; None: those of the kernel
     """
     known = known if known is not None else kernel().effects
@@ -60,10 +61,13 @@ def states_of(own: Effects, known: Mapping[str, Effect] | None = None) -> tuple[
     )
 
 
-def with_own(
+def with_logged_values(
     recording: Recording, own: Effects, known: Mapping[str, Effect] | None = None
 ) -> Recording:
-    """The recording with those parameters of effects that its own log tells."""
+    """The recording with those values of effects that its log measures, such as a temperature.
+
+    own, known : as for `states_of`
+    """
     known = known if known is not None else kernel().effects
     measured = {
         f"{effect}_{key}": float(np.mean(recording.log[signal]))
@@ -71,7 +75,7 @@ def with_own(
         for key in values
         if (signal := known[effect].parameters[key].measured) and signal in recording.log
     }
-    return replace(recording, own=measured)
+    return replace(recording, logged_values=measured)
 
 
 def fit_states(
@@ -81,11 +85,8 @@ def fit_states(
 
     values : all parameters [SI]; states : the gap position among them
     """
-    values = {**values, **recording.own}
-
-    def residual(found: Mapping[str, float]) -> Array:
-        return recording.residual(*split_gap_position({**values, **found}))
-
+    values = {**values, **recording.logged_values}
+    residual = residual_function(recording, values)
     others = [u for u in states if u.name != GAP_POSITION]
     starts = scan_states(recording, values, [others], residual)
     return fit_from(starts, states, residual).states(0)
@@ -110,7 +111,7 @@ def scan_states(
     search.scan_gaps(GAP_POSITIONS)
     found = {GAP_POSITION: search.gaps[0], **starts}
     for group in groups:
-        found = scanned(residual, found, group)
+        found = scan_unknowns(residual, found, group)
     return found
 
 

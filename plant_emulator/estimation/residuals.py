@@ -1,4 +1,4 @@
-"""The residual of every run as a function of the unknowns of a fit (pure)."""
+"""Residuals of runs as functions of the unknowns of a fit (pure)."""
 
 from __future__ import annotations
 
@@ -17,23 +17,39 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 
+def residual_function(
+    recording: Recording, values: Mapping[str, float], tolerance: float = TOLERANCE
+) -> Residual:
+    """Residual of a run as a function of the unknowns, shape (channels, samples).
+
+    values : of everything that is not unknown [SI]
+    """
+
+    def residual(found: Mapping[str, float]) -> Array:
+        return recording.residual(*split_gap_position({**values, **found}), tolerance)
+
+    return residual
+
+
+def whitened_function(residual: Residual, noise: NoiseDirections | None) -> Residual:
+    """The residual function, whitened for the noise of a measured input; None: as it is."""
+    if noise is None:
+        return residual
+    return lambda found: noise.whitened(residual(found))
+
+
 def residual_functions(
     recordings: Sequence[Recording],
     values: Mapping[str, float],
     free: Sequence[str],
     tolerance: float = TOLERANCE,
 ) -> list[Residual]:
-    """For every run the residual as a function of the unknowns; the rest stays at `values`."""
+    """Residual function of every run.
+
+    values : of all parameters [SI]; those in `free` are among the unknowns
+    """
     fixed = {n: v for n, v in values.items() if n not in free}
-
-    def of(recording: Recording) -> Residual:
-        def residual(found: Mapping[str, float]) -> Array:
-            trial = {**fixed, **recording.own, **found}
-            return recording.residual(*split_gap_position(trial), tolerance)
-
-        return residual
-
-    return [of(recording) for recording in recordings]
+    return [residual_function(r, {**fixed, **r.logged_values}, tolerance) for r in recordings]
 
 
 def whitened_functions(
@@ -42,19 +58,17 @@ def whitened_functions(
     free: Sequence[str],
     near: Estimate,
 ) -> list[Residual] | None:
-    """The same with the noise of what is fed as it is near a fit; None: it changes no run's."""
-    directions = []
+    """Residual function of every run, whitened for the noise of its measured input.
+
+    near : the fit at which the effect of that noise is taken; other arguments as those of
+        `residual_functions`
+    None: the noise counts in no run.
+    """
+    noise = []
     for k, recording in enumerate(recordings):
-        there = {**values, **recording.own, **near.parameters(), **near.states(k)}
-        directions.append(noise_directions(recording, *split_gap_position(there)))
-    if not any(directions):
+        there = {**values, **recording.logged_values, **near.parameters(), **near.states(k)}
+        noise.append(noise_directions(recording, *split_gap_position(there)))
+    if not any(noise):
         return None
     plain = residual_functions(recordings, values, free)
-    return [
-        simple if found is None else _whitened(found, simple)
-        for found, simple in zip(directions, plain, strict=True)
-    ]
-
-
-def _whitened(found: NoiseDirections, residual: Residual) -> Residual:
-    return lambda trial: found.whitened(residual(trial))
+    return [whitened_function(r, directions) for r, directions in zip(plain, noise, strict=True)]

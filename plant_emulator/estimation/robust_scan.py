@@ -50,7 +50,7 @@ def turns(angles: Array) -> Array:
     return np.stack([np.ones_like(angles), np.cos(angles), np.sin(angles)], axis=1)
 
 
-def scanned(
+def scan_unknowns(
     residual: Residual, found: Mapping[str, float], states: Sequence[Unknown]
 ) -> dict[str, float]:
     """States of a run where what has many valleys and angles starts in the best, all else as found.

@@ -189,6 +189,6 @@ def _planned_residual(
 
     def residual(found: Mapping[str, float]) -> Array:
         trial = {**values, **found}
-        return planned.settled(trial, trial.pop(GAP_POSITION), FINAL_TOLERANCE)
+        return planned.strict_residual(trial, trial.pop(GAP_POSITION), FINAL_TOLERANCE)
 
     return residual

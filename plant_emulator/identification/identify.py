@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 from plant_emulator.estimation import least_squares
 from plant_emulator.estimation.equation_error import start_values
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
-from plant_emulator.estimation.initial_states import GAP, states_of, with_own
+from plant_emulator.estimation.initial_states import GAP, states_of, with_logged_values
 from plant_emulator.estimation.residuals import residual_functions, whitened_functions
 from plant_emulator.estimation.start_search import FINE_SCANS, Search
 from plant_emulator.model.stage import GAP_POSITION
@@ -107,7 +107,7 @@ def identify(
     """
     free = free_parameters(parameters, free, voltage=any(VOLTAGE in r.channels for r in recordings))
     states = states_of(effects or {})
-    recordings = [with_own(r, effects or {}) for r in recordings]
+    recordings = [with_logged_values(r, effects or {}) for r in recordings]
     values = values_of(parameters, effects)
     search = Search(recordings, values, free, progress)
     logs = [r.log for r in recordings]
@@ -117,14 +117,14 @@ def identify(
     for retry in range(RETRIES):
         if chi_squared(best) <= NOISE_REACHED:
             break
-        again = _next_valley(recordings, values, free, best, retry)
-        other = fit_from(recordings, parameters, free, again, states, progress)
-        search.simulations += again.simulations
+        retried = _next_search(recordings, values, free, best, retry)
+        other = fit_from(recordings, parameters, free, retried, states, progress)
+        search.simulations += retried.simulations
         best = min(best, other, key=lambda e: e.cost + e.penalty)
     wanted = unknowns(parameters, free, search.values, search.gaps, states)
-    best = _with_fed_noise(recordings, search.values, free, wanted, best, progress)
+    best = _fit_with_input_noise(recordings, search.values, free, wanted, best, progress)
     best = replace(best, simulations=best.simulations + search.simulations)
-    return answer(best, parameters, free, len(recordings))
+    return identification_of(best, parameters, free, len(recordings))
 
 
 def fit_from(
@@ -140,14 +140,14 @@ def fit_from(
     truck = any(recording.inputs.truck for recording in recordings)
     tolerance = TOLERANCE if truck else FINAL_TOLERANCE
     fine = residual_functions(recordings, search.values, free, tolerance)
-    tell = _telling(recordings, progress)
+    report = _report_cost(recordings, progress)
     wanted = unknowns(parameters, free, search.values, search.gaps, states)
-    first = least_squares.estimate(wanted, coarse, progress=tell)
-    last = least_squares.estimate(_outdone(first), fine, progress=tell)
+    first = least_squares.estimate(wanted, coarse, progress=report)
+    last = least_squares.estimate(_without_outdone_priors(first), fine, progress=report)
     return replace(last, simulations=first.simulations + last.simulations)
 
 
-def _outdone(first: Estimate) -> list[Unknown]:
+def _without_outdone_priors(first: Estimate) -> list[Unknown]:
     """The unknowns from where a fit has come to, without the priors that its data outdo."""
     return [
         replace(u, start=u.value(float(z)), std=None if error < u.scaled_std else u.std)
@@ -155,7 +155,7 @@ def _outdone(first: Estimate) -> list[Unknown]:
     ]
 
 
-def _with_fed_noise(
+def _fit_with_input_noise(
     recordings: Sequence[Recording],
     values: Mapping[str, float],
     free: Sequence[str],
@@ -170,15 +170,15 @@ def _with_fed_noise(
     residuals = whitened_functions(recordings, values, free, best)
     if residuals is None:
         return best
-    tell = _telling(recordings, progress)
+    report = _report_cost(recordings, progress)
     near = [replace(u, start=u.value(float(z))) for u, z in zip(wanted, best.z, strict=True)]
-    first = least_squares.estimate(near, residuals, progress=tell)
-    last = least_squares.estimate(_outdone(first), residuals, progress=tell)
+    first = least_squares.estimate(near, residuals, progress=report)
+    last = least_squares.estimate(_without_outdone_priors(first), residuals, progress=report)
     simulations = best.simulations + first.simulations + last.simulations
     return replace(last, simulations=simulations)
 
 
-def _telling(
+def _report_cost(
     recordings: Sequence[Recording], progress: Progress | None
 ) -> Callable[[float], None] | None:
     """What tells how far a fit has come; chi^2 falls to 1: half way is where it has fallen to 2."""
@@ -188,7 +188,7 @@ def _telling(
     return lambda cost: progress("least squares", min(1.0, counted / max(cost, 1.0)))
 
 
-def _next_valley(
+def _next_search(
     recordings: Sequence[Recording],
     values: Mapping[str, float],
     free: Sequence[str],
@@ -213,7 +213,7 @@ def chi_squared(found: Estimate) -> float:
     return found.cost / max(1, found.samples - len(found.unknowns))
 
 
-def answer(
+def identification_of(
     found: Estimate, parameters: ParameterSet, free: Sequence[str], runs: int
 ) -> Identification:
     """The estimate in the parameters' own terms."""

@@ -81,13 +81,13 @@ def noise_directions(
     if not recording.inputs.truck:
         return None
     try:
-        base = recording.settled(values, gap_position, TOLERANCE)
+        base = recording.strict_residual(values, gap_position, TOLERANCE)
     except UnsettledError:
         return None
     length = max(1, round(WINDOW / recording.inputs.interval))
     stretch, memory = (length * round(span / WINDOW) for span in (STRETCH, MEMORY))
     answers = [
-        _answer(recording.fed(torque), values, gap_position, base)
+        _answer(recording.with_wheel_torque(torque), values, gap_position, base)
         for torque in _disturbed(recording, length, stretch + memory)
     ]
     if not answers:
@@ -111,7 +111,7 @@ def _answer(
     of these windows.
     """
     try:
-        return recording.settled(values, gap_position, TOLERANCE) - base
+        return recording.strict_residual(values, gap_position, TOLERANCE) - base
     except UnsettledError:
         return np.zeros_like(base)
 

@@ -37,7 +37,7 @@ class Recording:
     channels: tuple[str, ...]
     noise: Array
     use: NDArray[np.bool_]
-    own: Mapping[str, float] = field(default_factory=dict)
+    logged_values: Mapping[str, float] = field(default_factory=dict)
 
     def residual(
         self, values: Mapping[str, float], gap_position: float, tolerance: float = TOLERANCE
@@ -50,11 +50,11 @@ class Recording:
         measured one would pass for a part of itself.
         """
         try:
-            return self.settled(values, gap_position, tolerance)
+            return self.strict_residual(values, gap_position, tolerance)
         except UnsettledError:
             return np.where(self.use, IMPOSSIBLE, 0.0)
 
-    def settled(
+    def strict_residual(
         self, values: Mapping[str, float], gap_position: float, tolerance: float = TOLERANCE
     ) -> Array:
         """The same; UnsettledError where the model cannot be simulated at these values."""
@@ -64,7 +64,7 @@ class Recording:
         if VOLTAGE in self.channels:
             row = self.channels.index(VOLTAGE)
             errors = voltage_errors(found[VOLTAGE]) / self.noise[row]
-            white[row] = forgiven(white[row], errors * self.use[row][:, None])
+            white[row] = whiten_sensor_errors(white[row], errors * self.use[row][:, None])
         return white
 
     def without_voltage(self) -> Recording:
@@ -78,7 +78,7 @@ class Recording:
             use=self.use[kept],
         )
 
-    def fed(self, wheel_torque: Array) -> Recording:
+    def with_wheel_torque(self, wheel_torque: Array) -> Recording:
         """The same log simulated with another wheel torque [N m], shape (n,)."""
         return replace(self, inputs=replace(self.inputs, wheel_torque=wheel_torque))
 
@@ -90,7 +90,7 @@ def voltage_errors(voltage: Array) -> Array:
     return np.stack([np.full(len(voltage), OFFSET), GAIN_ERROR * voltage], axis=-1)
 
 
-def forgiven(residual: Array, errors: Array) -> Array:
+def whiten_sensor_errors(residual: Array, errors: Array) -> Array:
     """A residual, shape (n,), whitened for errors of its sensor, shape (n, k), beside white noise.
 
     (1 + X X')^(-1/2) r, by the eigenvalues of X'X.

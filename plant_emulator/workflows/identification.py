@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from time import process_time
 from typing import TYPE_CHECKING, Any
 
-from plant_emulator.estimation.initial_states import fit_states, states_of, with_own
+from plant_emulator.estimation.initial_states import fit_states, states_of, with_logged_values
 from plant_emulator.identification import report
 from plant_emulator.identification.experiment_design import experiments
 from plant_emulator.identification.identify import identify as identify_bench
@@ -131,7 +131,7 @@ def identify(
     """
     bench, own = parameter_set(parameters), effect_values(effects)
     recordings, notes = load_recordings([*logs, *hold_out], bench, reference)
-    recordings = [with_own(r, own) for r in recordings]
+    recordings = [with_logged_values(r, own) for r in recordings]
     estimation, prediction = recordings[: len(logs)], recordings[len(logs) :]
     simulate(estimation[0].inputs, values_of(bench, own))  # compiling is not part of the fit's time
     begin = process_time()
@@ -153,5 +153,5 @@ def _compare(
     recording: Recording, values: Mapping[str, float], states: Mapping[str, float]
 ) -> Comparison:
     """A log beside its simulation; states : initial states of the run, by name."""
-    own, gap = split_gap_position({**values, **recording.own, **states})
+    own, gap = split_gap_position({**values, **recording.logged_values, **states})
     return compare(recording.log, simulate(recording.inputs, own, gap_position=gap))

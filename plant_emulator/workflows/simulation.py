@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from plant_emulator import effects as library
 from plant_emulator import logs
-from plant_emulator.estimation.initial_states import fit_states, states_of, with_own
+from plant_emulator.estimation.initial_states import fit_states, states_of, with_logged_values
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.model.stage import split_gap_position
 from plant_emulator.parameter_sets import DEFAULT, with_effects
@@ -109,9 +109,9 @@ def simulate_log(
     own = {name: table for name, table in parameters.effects.items() if name not in effects}
     library = kernel().effects if own else {}
     if start == "fit" and any(p.per_run for e in own for p in library[e].parameters.values()):
-        measured = with_own(recording(without_voltage(log), reference), own)
+        measured = with_logged_values(recording(without_voltage(log), reference), own)
         states = fit_states(measured, values, states_of(own))
-        values, gap = split_gap_position({**values, **measured.own, **states})
+        values, gap = split_gap_position({**values, **measured.logged_values, **states})
         return kernel_level.simulate(measured.inputs, values, gap_position=gap)
     run = inputs_of(log, reference)
     gap = fit_start(log, run, values) if start == "fit" else 0.0

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from plant_emulator.diagnosis.fitting.steps import refit, start
 from plant_emulator.diagnosis.fitting.task import Task
+from plant_emulator.estimation.residuals import whitened_function
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.estimation.unknowns import Residual
     from plant_emulator.recordings.input_noise import NoiseDirections
-    from plant_emulator.signals.log import Array
 
 
 def whiten_inputs(runner: TaskRunner) -> tuple[TaskRunner, FitResult | None]:
@@ -69,14 +69,7 @@ class _InputNoiseModel:
 
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
         """See `Model`."""
-        plain, found = self._model.residual(run, effects), self._noise.get(run)
-        if found is None:
-            return plain
-
-        def residual(values: Mapping[str, float]) -> Array:
-            return found.whitened(plain(values))
-
-        return residual
+        return whitened_function(self._model.residual(run, effects), self._noise.get(run))
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.estimation.robust_scan import cauchy_loss, scanned
+from plant_emulator.estimation.robust_scan import cauchy_loss, scan_unknowns
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -63,7 +63,7 @@ def _together(
 ) -> dict[str, float]:
     """States of a run with these tried all together, or as they are where that is better."""
     residual = model.residual(run, effects)
-    anew = scanned(lambda v: residual({**values, **v}), state, unknowns)
+    anew = scan_unknowns(lambda v: residual({**values, **v}), state, unknowns)
     return min(dict(state), anew, key=lambda s: loss_of(model, effects, [run], values, [s]))
 
 

@@ -20,7 +20,12 @@ from plant_emulator.diagnosis.machines.bench_programs import (
 from plant_emulator.effects import from_file
 from plant_emulator.estimation.equation_error import start_values
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
-from plant_emulator.estimation.initial_states import scan_states, states_of, with_own
+from plant_emulator.estimation.initial_states import (
+    scan_states,
+    states_of,
+    with_logged_values,
+)
+from plant_emulator.estimation.residuals import residual_function
 from plant_emulator.estimation.start_search import Search
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.model.parameters import UNITS
@@ -42,7 +47,6 @@ if TYPE_CHECKING:
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.input_noise import NoiseDirections
     from plant_emulator.recordings.recording import Recording
-    from plant_emulator.signals.log import Array
 
 # Tolerance of a run with a truck, whose every sample is a corner: twice as fast as the usual one,
 # and it moves the residual by less than a hundredth of the noise (rms).
@@ -151,7 +155,7 @@ class BenchModel:
         known = {**kernel().effects, **effects}
         plausible = {name: effect.plausible() for name, effect in effects.items()}
         everything = {**plausible, **parameters.effects}
-        self._recordings = [with_own(r, everything, known) for r in recordings]
+        self._recordings = [with_logged_values(r, everything, known) for r in recordings]
         self._given = {f"{e}_{key}" for e, own in parameters.effects.items() for key in own}
         self.states = states_of(parameters.effects, known)
         self.candidates = {
@@ -176,19 +180,15 @@ class BenchModel:
     def _fixed(self, run: int, effects: Sequence[str]) -> dict[str, float]:
         """Values that no fit changes: of the set, of the effects, and what the log tells."""
         there = {k: v for name in effects for k, v in self.candidates[name].fixed.items()}
-        told = self._recordings[run].own
+        told = self._recordings[run].logged_values
         own = {k: v for k, v in told.items() if k in there or k in self._given}
         return {**self._values, **there, **own}
 
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
         """See `Model`."""
-        recording, fixed = self._recordings[run], self._fixed(run, effects)
+        recording = self._recordings[run]
         tolerance = WITH_TRUCK if recording.inputs.truck else TOLERANCE
-
-        def residual(found: Mapping[str, float]) -> Array:
-            return recording.residual(*split_gap_position({**fixed, **found}), tolerance)
-
-        return residual
+        return residual_function(recording, self._fixed(run, effects), tolerance)
 
     def input_noise(
         self, run: int, where: FitResult, state: Mapping[str, float]

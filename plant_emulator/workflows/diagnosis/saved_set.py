@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.estimation.initial_states import with_own
+from plant_emulator.estimation.initial_states import with_logged_values
 from plant_emulator.solver.kernel import kernel
 from plant_emulator.workflows.provenance import program_version, today
 
@@ -56,7 +56,7 @@ def _of_runs(
 ) -> dict[str, float]:
     """Means over the runs of what every run has of its own of an effect, fitted or measured."""
     own = {effect.name: effect.plausible()}
-    told = [*states, *(with_own(r, own).own for r in recordings)]
+    told = [*states, *(with_logged_values(r, own).logged_values for r in recordings)]
     values = {
         key: [run[name] for run in told if (name := f"{effect.name}_{key}") in run]
         for key in effect.parameters

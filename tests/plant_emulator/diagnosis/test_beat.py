@@ -13,7 +13,7 @@ from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace, gain_
 from plant_emulator.diagnosis.fitting.signature import signature
 from plant_emulator.diagnosis.machine import Candidate
 from plant_emulator.diagnosis.prediction.gap import Fold, refit_fold
-from plant_emulator.estimation.robust_scan import scanned
+from plant_emulator.estimation.robust_scan import scan_unknowns
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.test_contest import TIME, Line, explained, linear, noisy
@@ -138,7 +138,7 @@ def test_looks_make_the_cost_the_probability_of_the_data() -> None:
 
 def test_held_out_run_starts_in_the_valley_of_its_own_beat() -> None:
     y = noisy(wave(0.5, 3.37, 2.0))
-    found = scanned(
+    found = scan_unknowns(
         lambda v: (y - wave(0.5, v["beat_rate"], v["beat_phase"]))[None, :],
         {"beat_rate": 0.0, "beat_phase": 0.0},
         BEAT.states,

@@ -9,7 +9,12 @@ import pytest
 from plant_emulator.estimation.free_parameters import free_parameters
 from plant_emulator.estimation.start_search import Search
 from plant_emulator.identification.experiment_design import experiments, promised_errors
-from plant_emulator.identification.identify import Identification, answer, fit_from, identify
+from plant_emulator.identification.identify import (
+    Identification,
+    fit_from,
+    identification_of,
+    identify,
+)
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import Recording, recording
 from plant_emulator.signals.log import Log, without_voltage
@@ -57,7 +62,7 @@ class Bench:
         free = free_parameters(self.nominal)
         search = Search(both, self.true, free)
         search.gaps = [self.found.gap_positions[0], gap]
-        return answer(fit_from(both, self.nominal, free, search), self.nominal, free, 2)
+        return identification_of(fit_from(both, self.nominal, free, search), self.nominal, free, 2)
 
 
 @pytest.fixture(scope="module")

@@ -145,7 +145,7 @@ def test_what_the_sensor_may_be_off_by_weighs_no_more_than_its_prior(
     run = recording(driven(bench_log("bench_nominal/program1"), nominal))
     off = replace(run, log=with_voltage(run.log, run.log[VOLTAGE] + 3.0 * OFFSET))
     values = nominal.values()
-    before, after = (np.sum(r.settled(values, 0.3)[-1] ** 2) for r in (run, off))
+    before, after = (np.sum(r.strict_residual(values, 0.3)[-1] ** 2) for r in (run, off))
     assert abs(after - before) < 9.0 + 18.0
     assert before == pytest.approx(len(run.log.time), rel=0.1)
 

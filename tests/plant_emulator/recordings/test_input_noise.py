@@ -60,11 +60,11 @@ def test_directions_hold_what_drawn_noise_of_the_wheel_torque_does(
     spikes = np.abs(found.directions.toarray().reshape(shape)).max(axis=2).argmax(axis=1)
     assert sorted(np.round(true_log.time[spikes], 1).tolist()) == [2.4, 22.6]
     random, torque = np.random.default_rng(2), true_log["wheel_torque"]
-    base = measured.fed(torque).residual(nominal.values(), GAP)
+    base = measured.with_wheel_torque(torque).residual(nominal.values(), GAP)
     deviation = SENSORS["wheel_torque"][0]
     raw, quiet = [], []
     for _ in range(20):
-        fed = measured.fed(torque + deviation * random.standard_normal(len(torque)))
+        fed = measured.with_wheel_torque(torque + deviation * random.standard_normal(len(torque)))
         change = fed.residual(nominal.values(), GAP) - base
         raw.append(found.along(change))
         quiet.append(found.along(found.whitened(change)))
@@ -103,7 +103,7 @@ def test_window_whose_simulation_does_not_settle_tells_nothing(
 ) -> None:
     plain, settled, calls = (
         noise_directions(measured, nominal.values(), GAP),
-        Recording.settled,
+        Recording.strict_residual,
         count(),
     )
 
@@ -112,7 +112,7 @@ def test_window_whose_simulation_does_not_settle_tells_nothing(
             raise UnsettledError("does not settle")
         return settled(self, *values)
 
-    monkeypatch.setattr(Recording, "settled", unsettled)
+    monkeypatch.setattr(Recording, "strict_residual", unsettled)
     found = noise_directions(measured, nominal.values(), GAP)
     assert plain is not None
     assert found is not None
@@ -123,13 +123,13 @@ def test_long_log_needs_no_more_simulations_than_a_short_one(
     true_log: Log, nominal: ParameterSet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """60 windows of 0.25 s in 15 s, and the run itself; 30 s alone hold 120 windows."""
-    settled, calls = Recording.settled, count()
+    settled, calls = Recording.strict_residual, count()
 
     def counting(self: Recording, *values: Any) -> Any:
         next(calls)
         return settled(self, *values)
 
-    monkeypatch.setattr(Recording, "settled", counting)
+    monkeypatch.setattr(Recording, "strict_residual", counting)
     assert noise_directions(recording(add_noise(true_log, 1)), nominal.values(), GAP) is not None
     assert next(calls) == 61
 
@@ -140,5 +140,5 @@ def test_run_that_cannot_be_simulated_has_no_directions(
     def unsettled(self: Recording, *values: Any) -> Any:
         raise UnsettledError("does not settle")
 
-    monkeypatch.setattr(Recording, "settled", unsettled)
+    monkeypatch.setattr(Recording, "strict_residual", unsettled)
     assert noise_directions(measured, nominal.values(), GAP) is None
