@@ -160,7 +160,7 @@ def _effects(answer: Answer) -> Markup:
     ]
     parts = [tables.ranking(answer.ranking)]
     if classes:
-        parts += [tag("h3", "Effects that cannot be distinguished"), tag("ul", *classes)]
+        parts += [tag("h3", "Are the effects distinguishable?"), tag("ul", *classes)]
     return _section("Which effects were tested", *parts)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.report.html_parts import (
     PLUS_MINUS,
+    UNBROKEN,
     bar,
     cell,
     code,
@@ -65,7 +66,8 @@ def gap_by_channel(gap: HeldOutGap, traces: Sequence[Trace]) -> Markup:
     heads = [*(f"{name} [%]" for name in steps), *rms_of, "noise"]
     return table(
         "Held-out gap of every channel over all samples of all runs, in percent of the channel's "
-        "measured range (NRMSD), and rms of the residual in the channel's unit.",
+        "measured range (NRMSD). Rms of the residual before and after the effects, and noise, in "
+        "the channel's unit.",
         ["channel", *map(right, heads)],
         rows,
     )
@@ -118,7 +120,7 @@ def ranking(entries: Sequence[RankedEffect]) -> Markup:
             "accepted",
             right("evidence"),
             right("held-out gain"),
-            f"parameter: value {PLUS_MINUS} standard error (95 % interval)",
+            f"parameter: value {PLUS_MINUS} standard error (95{UNBROKEN}% interval)",
         ],
         [_ranked(entry, most) for entry in entries],
     )
@@ -170,7 +172,7 @@ def parameters(deviations: Sequence[ParameterDeviation]) -> Markup:
         "set",
         f"estimated {PLUS_MINUS} standard error",
         "change",
-        "distance in standard errors",
+        "deviation in standard errors",
     ]
     return table(
         "Parameters that lie more than 3 standard errors from the parameter set.",
