@@ -1,8 +1,8 @@
-"""Connecting without waiting: one attempt at a time, spaced by a bounded back-off.
+"""TCP connection without waiting: one attempt at a time, with a bounded back-off.
 
-`poll` is called once a tick and returns at once. A host name is resolved when the connector is
-made, because a name server may take seconds. Delays: 0.1 s after the first failure, doubling to 2
-s; `succeeded` starts over.
+`poll` is called once a tick and returns at once. The constructor resolves a host name, because a
+name server may take seconds. The delay is 0.1 s after the first failure and doubles up to 2 s;
+`succeeded` resets it.
 """
 
 import contextlib
@@ -19,14 +19,17 @@ from gateway.errors import ConfigError
 FIRST_DELAY: Final = 0.1
 LAST_DELAY: Final = 2.0
 ATTEMPT_TIMEOUT: Final = 1.0
-"""[s] For one attempt; it passes between ticks, never inside one."""
+"""[s] Time-out of one attempt; it runs between ticks, never inside a tick."""
 USER_TIMEOUT_MS: Final = 300
-"""Bytes that stay unacknowledged for this long end the connection: a pulled cable is noticed."""
+"""[ms] Bytes unacknowledged for longer end the connection, so that a pulled cable is noticed."""
 KEEPALIVE: Final = ((socket.TCP_KEEPIDLE, 1), (socket.TCP_KEEPINTVL, 1), (socket.TCP_KEEPCNT, 3))
 
 
 class Connector:
-    """Opens TCP connections to one peer, never blocking."""
+    """Opens TCP connections to one peer and never blocks.
+
+    problem : why the last attempt failed; empty: it did not
+    """
 
     def __init__(self, host: str, port: int, clock: Callable[[], float] = time.monotonic) -> None:
         self._family, self._address = resolve(host, port)
@@ -38,22 +41,22 @@ class Connector:
         self.problem = ""
 
     def poll(self) -> socket.socket | None:
-        """A connected socket, or None; `problem` says why the last attempt failed."""
+        """Start or continue an attempt; return the connected socket, or None."""
         if self._pending is None and self._clock() >= self._next_attempt:
             self._start()
         return self._finish() if self._pending is not None else None
 
     def failed(self, delay: float | None = None) -> None:
-        """Note that one ended; the next attempt waits for `delay` or the back-off [s]."""
+        """Note that a connection ended. The next attempt waits for `delay` or the back-off [s]."""
         self._next_attempt = self._clock() + (self._delay if delay is None else delay)
         self._delay = min(2.0 * self._delay, LAST_DELAY)
 
     def succeeded(self) -> None:
-        """Note a good reply: the back-off starts over."""
+        """Note a good reply, which resets the back-off."""
         self._delay = FIRST_DELAY
 
     def close(self) -> None:
-        """Give up a pending attempt."""
+        """Abandon a pending attempt."""
         if self._pending is not None:
             self._pending.close()
             self._pending = None
@@ -87,10 +90,10 @@ class Connector:
 
 
 def resolve(host: str, port: int) -> tuple[socket.AddressFamily, tuple[str, int]]:
-    """Address family and numeric address of a peer."""
+    """Address family and numeric address of a peer. Raises ConfigError for an unknown host."""
     try:
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-    except (OSError, ValueError) as error:  # a ValueError for what cannot be a name at all
+    except (OSError, ValueError) as error:  # a ValueError for a text that cannot be a name
         raise ConfigError(
             getattr(error, "strerror", None) or "cannot be a name",
             place="[plc] host",
@@ -101,7 +104,7 @@ def resolve(host: str, port: int) -> tuple[socket.AddressFamily, tuple[str, int]
 
 
 def set_options(connection: socket.socket) -> None:
-    """Send at once, and notice a dead peer by ourselves."""
+    """Make a connection send at once, and notice a dead peer."""
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     for option, value in KEEPALIVE:

@@ -1,4 +1,4 @@
-"""A device as the operator meets it: connect, read all registers of a map, twice, and hang up."""
+"""A live device for the operator's commands: connect, read and write registers, disconnect."""
 
 import math
 import time
@@ -17,12 +17,12 @@ from register_maps.units import UNITS
 
 POLL: Final = 0.002
 VERIFY_PAUSE: Final = 0.15
-"""[s] Between the readings of `verify`: many scans of a PLC."""
+"""[s] Time between the two readings of `verify`: many scans of a PLC."""
 
 
 @contextmanager
 def open_link(host: str, port: int, unit: int, timeout: float) -> Iterator[TcpLink]:
-    """A link that is connected, for a command that may wait."""
+    """Connected link, for a command that may wait. Raises LinkError after `timeout` [s]."""
     link = TcpLink(host, port, unit, timeout)
     deadline = time.monotonic() + timeout
     try:
@@ -45,7 +45,7 @@ def _connects(link: TcpLink, deadline: float) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class Device:
-    """Where a device is."""
+    """Address of a device; timeout : of a request [s]."""
 
     host: str
     port: int
@@ -54,17 +54,17 @@ class Device:
 
     @contextmanager
     def link(self) -> Iterator[TcpLink]:
-        """A connection to it."""
+        """Connected link to the device."""
         with open_link(self.host, self.port, self.unit, self.timeout) as link:
             yield link
 
     def mbpoll(self, register: Register, words: Words | None = None) -> str:
-        """The equivalent call."""
+        """Call of mbpoll that reads the register, or writes these words to it."""
         return mbpoll(register, self.host, self.port, self.unit, writing=words)
 
 
 def two_readings(device: Device, register_map: RegisterMap) -> list[Reading]:
-    """Two readings, many scans apart."""
+    """Two readings of all registers, many scans apart."""
     with device.link() as link:
         first = read_all(link, register_map)
         time.sleep(VERIFY_PAUSE)
@@ -72,7 +72,7 @@ def two_readings(device: Device, register_map: RegisterMap) -> list[Reading]:
 
 
 def read_all(link: TcpLink, register_map: RegisterMap) -> Reading:
-    """Words of each register, by blocks as the loop reads them, single where a block is refused."""
+    """Words of each register. Blocks are read whole, and register by register where that fails."""
     reading: dict[str, Words | str] = {}
     for block in (register_map.measurement, register_map.command):
         inside = [register for register in register_map.registers if block.holds(register)]
@@ -108,7 +108,7 @@ def _alone(link: TcpLink, register: Register) -> Words | str:
 
 
 def write_value(link: TcpLink, register: Register, words: Words) -> Words:
-    """Write one register, by function code 6 or 16; the words that it reads back."""
+    """Write one register by function code 6 or 16; return the words that it then reads."""
     if len(words) == 1:
         link.write_one(register.address, words[0])
     else:
@@ -117,7 +117,7 @@ def write_value(link: TcpLink, register: Register, words: Words) -> Words:
 
 
 def writable(register_map: RegisterMap, name: str) -> Register:
-    """The register of that name, if the map lets one write it."""
+    """Register of this name. Raises ConfigError where the map has no such writable register."""
     allowed = {
         found.name: found
         for found in register_map.registers
@@ -134,7 +134,7 @@ def writable(register_map: RegisterMap, name: str) -> Register:
 
 
 def encode_scaled(register: Register, scaled_value: float) -> Words:
-    """Words of a value in the register's unit, if the map's range has it."""
+    """Words of a value in the register's unit. Raises ConfigError for a value out of range."""
     value = UNITS[register.unit].to_si(scaled_value)
     if SIGNALS[register.signal].type is not float and not value.is_integer():
         raise ConfigError(
@@ -149,7 +149,7 @@ def encode_scaled(register: Register, scaled_value: float) -> Words:
 
 
 def is_exact(register: Register, words: Words, scaled_value: float) -> bool:
-    """Whether the words are this value, not only the nearest one that the register can hold."""
+    """Whether the words hold exactly this value, and not only the nearest possible one."""
     value = decode_value(register, words)
     return value is not None and math.isclose(
         scaled(register, value), scaled_value, rel_tol=1e-9, abs_tol=1e-9

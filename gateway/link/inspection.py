@@ -1,9 +1,9 @@
-"""The operator's view of a register map: what stands where, and whether a device agrees (pure).
+"""The operator's view of a register map, and its comparison with a device (pure).
 
-A finding that fails is one that no standing bench explains: a register that cannot be read or is
-out of range, a test constant or a value that only makes sense in another word order, a counter of
-the PLC's program that does not move, a zero where a running PLC has none. A zero that a standing
-bench may show is named too, but does not fail.
+A finding fails if no standing bench explains it: a register that cannot be read or is out of range,
+a constant or a value that fits another word order only, a counter of the PLC's program that stands
+still, a zero where a running PLC has none. A zero that a standing bench may show is a finding that
+does not fail.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,7 +22,7 @@ MBPOLL_TABLES: Final = {"holding": "4", "input": "3"}
 
 Words = tuple[int, ...]
 Reading = Mapping[str, Words | str]
-"""Words of each register by its name, or why it gave none."""
+"""Words of each register by its name, or why it could not be read."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +70,7 @@ class Verification:
 
 
 def value_text(register: Register, words: Words) -> str:
-    """Value in the register's unit, or why there is none."""
+    """Value in the register's unit as a text, or why there is none."""
     try:
         value = decode_value(register, words)
     except CodecError as error:
@@ -85,14 +85,14 @@ def value_text(register: Register, words: Words) -> str:
 
 
 def value_in_other_order(register: Register, words: Words) -> str:
-    """Value with the two words exchanged; empty for one word."""
+    """Value as a text with the two words exchanged; empty for a register of one word."""
     if register.raw.words == 1:
         return ""
     return value_text(replace(register, word_order=swap_words(register.word_order)), words)
 
 
 def swap_words(order: WordOrder) -> WordOrder:
-    """The order with the two words exchanged."""
+    """Word order with the two words exchanged."""
     orders: dict[WordOrder, WordOrder] = {
         "ABCD": "CDAB",
         "CDAB": "ABCD",
@@ -103,7 +103,7 @@ def swap_words(order: WordOrder) -> WordOrder:
 
 
 def constant_words(register: Register, order: WordOrder) -> Words:
-    """Words that a test constant has in an order."""
+    """Words of a constant in this word order."""
     placed = replace(register, word_order=order)
     return raw_words(placed, conversion(placed, bounded=True).low)
 
@@ -111,7 +111,7 @@ def constant_words(register: Register, order: WordOrder) -> Words:
 def mbpoll(
     register: Register, host: str, port: int, unit: int, *, writing: Words | None = None
 ) -> str:
-    """The call of mbpoll that reads the register, or writes these words to it."""
+    """Call of mbpoll that reads the register, or writes these words to it."""
     plain = (
         register.raw.words == 1 or writing is not None or register.word_order in ("BADC", "DCBA")
     )
@@ -159,7 +159,7 @@ def _finding(register: Register, words: Sequence[Words]) -> str:
 
 
 def _refusal(register: Register, words: Words) -> str:
-    """Why the words may not be this register's value, and whether another order would do."""
+    """Why the words are no value of this register, and which word order would fit; empty: none."""
     try:
         decode_value(register, words)
     except CodecError as error:
@@ -192,7 +192,7 @@ def _still(register: Register, words: Sequence[Words]) -> str:
 
 
 def _zero(register: Register, words: Sequence[Words]) -> str:
-    """A zero that a standing bench may show as well."""
+    """Finding of a zero that a standing bench may show; empty: no zero."""
     numeric = register.type not in ("bits", "enum")
     if register.access == "read" and numeric and not any(map(any, words)):
         return "constant zero (as on a standing bench)"
@@ -200,7 +200,7 @@ def _zero(register: Register, words: Sequence[Words]) -> str:
 
 
 def _value(register: Register, words: Words) -> float | None:
-    """Value in the register's unit, for a machine to read."""
+    """Value in the register's unit; None where the words hold no value."""
     try:
         value = decode_value(register, words)
     except CodecError:

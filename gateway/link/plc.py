@@ -1,12 +1,14 @@
-"""The link to the PLC: the only place that knows pymodbus, and strict where pymodbus is not.
+"""The Modbus link to the PLC: the only module that knows pymodbus, and stricter than pymodbus.
 
-pymodbus accepts a reply with another function code or another number of registers, connects
-(blocking) inside a request, and measures its time-out by the wall clock. Here a reply counts only
-when gateway.link.reply has nothing against its bytes, connecting never blocks, and time-outs run on
-the monotonic clock. A connection is given up after the second failure in a row, and at once when
-its bytes are out of step. A late reply to a request that was given up is recognised by its
-transaction id and dropped. An exception that no retry cures (1, 2, 3: the map or the unit is
-wrong) before the first good reply makes the next attempt wait 2 s.
+pymodbus accepts a reply with a wrong function code or a wrong number of registers. It connects
+inside a request, which blocks, and measures its time-out by the wall clock. Here a reply counts
+only if `check_reply` of gateway.link.reply accepts its bytes. Connecting never blocks, and
+time-outs run on the monotonic clock.
+
+A connection is closed after the second failure in a row, and at once when its bytes are out of
+sync. A late reply to an abandoned request is recognised by its transaction id and dropped. The
+exceptions 1, 2 and 3 say that map or unit are wrong, which no retry cures: before the first good
+reply, the next attempt waits 2 s.
 """
 
 import logging
@@ -34,11 +36,11 @@ PERMANENT: Final = frozenset({1, 2, 3})
 
 logging.getLogger("pymodbus").setLevel(
     logging.CRITICAL + 1
-)  # every failure is reported by us, once
+)  # the gateway reports every failure itself, once
 
 
 class LinkError(PlcError):
-    """The link gave no good reply, with the reason."""
+    """The link gave no good reply; `reason` is why."""
 
     def __init__(self, reason: Reason, text: str) -> None:
         super().__init__(text)
@@ -46,13 +48,13 @@ class LinkError(PlcError):
 
 
 class PlcLink(Protocol):
-    """What the loop needs of a PLC. Each method but `close` raises LinkError."""
+    """Link to a PLC as the loop needs it. Each method but `close` raises LinkError."""
 
     def connect(self) -> None:
-        """Have a connection: start or continue an attempt, never wait for it."""
+        """Start or continue a connection attempt without waiting; nothing while connected."""
 
     def read(self, address: int, count: int, function: int = READ_HOLDING) -> tuple[int, ...]:
-        """The words of one block, by one request."""
+        """Words of one block, read by one request."""
 
     def write(self, address: int, words: Sequence[int]) -> None:
         """Write one block by one request."""
@@ -62,7 +64,7 @@ class PlcLink(Protocol):
 
 
 class TcpLink:
-    """One Modbus TCP connection to one unit, one request outstanding."""
+    """One Modbus TCP connection to one unit, with one request at a time."""
 
     def __init__(
         self,
@@ -83,7 +85,7 @@ class TcpLink:
         self._last = Rejection(reason=Reason.NOT_CONNECTED, text="not connected yet")
 
     def connect(self) -> None:
-        """Have a connection: start or continue an attempt, never wait for it."""
+        """Start or continue a connection attempt without waiting; nothing while connected."""
         if self._client is not None:
             return
         connection = self._connector.poll()
@@ -98,7 +100,7 @@ class TcpLink:
         self._failures = 0
 
     def read(self, address: int, count: int, function: int = READ_HOLDING) -> tuple[int, ...]:
-        """The words of one block, by one request."""
+        """Words of one block, read by one request."""
         client = self._connected()
         ask = (
             client.read_input_registers if function == READ_INPUT else client.read_holding_registers
@@ -128,7 +130,7 @@ class TcpLink:
             )
 
     def write_one(self, address: int, word: int) -> None:
-        """Write one register (function code 6)."""
+        """Write one register by function code 6."""
         client = self._connected()
         reply = self._ask(
             lambda: client.write_register(address, word, device_id=self._unit), WRITE_ONE, 5
@@ -137,7 +139,7 @@ class TcpLink:
             raise self._fail(_wrong_count(f"echo {reply.registers} at {reply.address}"))
 
     def close(self) -> None:
-        """End the connection, and any attempt."""
+        """End the connection and any attempt."""
         self._connector.close()
         if self._client is not None:
             self._client.close()  # type: ignore[no-untyped-call]  # pymodbus declares none here
@@ -149,7 +151,7 @@ class TcpLink:
         return self._client
 
     def _ask(self, call: Callable[[], ModbusPDU], function: int, length: int) -> ModbusPDU:
-        """The reply to one request, with nothing against it; `length` of its PDU in bytes."""
+        """Reply to one request, checked; `length` is that of its PDU [bytes]."""
         client = self._connected()
         client.begin()
         reply, refusal = _attempt(call)
@@ -159,7 +161,7 @@ class TcpLink:
             function=function,
             length=length,
         )
-        self._abandoned.discard(request.transaction)  # ids come round again after 65000 requests
+        self._abandoned.discard(request.transaction)  # ids repeat after 65000 requests
         rejection = refusal or check_reply(client.received, request, self._abandoned)
         if rejection is not None:
             if rejection.reason is Reason.TIMEOUT:
@@ -172,7 +174,7 @@ class TcpLink:
         return reply
 
     def _fail(self, rejection: Rejection) -> LinkError:
-        """Draw the consequences for the connection; the error to raise."""
+        """Close the connection where this failure requires it; return the error to raise."""
         self._last = rejection
         if rejection.exception is None:
             self._failures += 1
@@ -191,7 +193,7 @@ class TcpLink:
 
 
 class _Client(ModbusTcpClient):
-    """pymodbus on a connection of ours: never connects by itself, keeps what it received."""
+    """Client of pymodbus on a given connection: never connects itself, keeps the received bytes."""
 
     def __init__(self, connection: socket.socket, timeout: float) -> None:
         super().__init__("", timeout=timeout, retries=0)
@@ -200,7 +202,7 @@ class _Client(ModbusTcpClient):
         self._deadline = 0.0
 
     def begin(self) -> None:
-        """Start the time-out of one request."""
+        """Begin a request: forget received bytes, start the time-out."""
         self.received = b""
         self._deadline = time.monotonic() + self.comm_params.timeout_connect
 
@@ -222,7 +224,7 @@ class _Client(ModbusTcpClient):
 
 
 def _attempt(call: Callable[[], ModbusPDU]) -> tuple[ModbusPDU | None, Rejection | None]:
-    """The reply as pymodbus sees it, and the objection when the connection itself failed."""
+    """Reply as pymodbus decodes it, and the rejection where the connection itself failed."""
     try:
         return call(), None
     except (ConnectionException, OSError) as error:

@@ -1,10 +1,10 @@
 """Check that the bytes that came back are the reply to the request (pure).
 
-A Modbus TCP frame is the MBAP header (transaction id, protocol id 0, length, unit id; Modbus
-Messaging on TCP/IP Implementation Guide V1.0b, 3.1.3) and a PDU: function code and data, or
-function code + 0x80 and an exception code (Application Protocol V1.1b3, 7). One request is
-outstanding at a time, so exactly one frame may answer it; in front of it may stand late replies to
-requests that were given up, nothing may follow it.
+A Modbus TCP frame is an MBAP header and a PDU. The header has transaction id, protocol id 0, length
+and unit id (Modbus Messaging on TCP/IP Implementation Guide V1.0b, 3.1.3). The PDU has function
+code and data, or function code + 0x80 and an exception code (Application Protocol V1.1b3, 7). One
+request is outstanding at a time, so that exactly one frame may answer it. Late replies to abandoned
+requests may stand before that frame, and nothing may follow it.
 """
 
 import struct
@@ -20,17 +20,17 @@ EXCEPTION_BIT: Final = 0x80
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """One request, as far as its reply depends on it."""
+    """Properties of a request that its reply must match."""
 
     transaction: int
     unit: int
     function: int
     length: int
-    """Bytes of the PDU of a normal reply."""
+    """[bytes] PDU of a normal reply."""
 
 
 class Frame(NamedTuple):
-    """One frame of a reply."""
+    """One frame of the received bytes."""
 
     transaction: int
     protocol: int
@@ -40,17 +40,17 @@ class Frame(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Rejection:
-    """Why bytes are not the reply."""
+    """Why received bytes are not the reply; exception : code of a Modbus exception."""
 
     reason: Reason
     text: str
     exception: int | None = None
     out_of_sync: bool = False
-    """What is left of these bytes would come as the head of the next reply."""
+    """The rest of these bytes would be taken for the begin of the next reply."""
 
 
 def split(received: bytes) -> tuple[list[Frame], bytes]:
-    """Whole frames, and what is left over."""
+    """Whole frames in the received bytes, and the bytes after them."""
     frames = []
     while len(received) >= HEADER.size:
         transaction, protocol, length, unit = HEADER.unpack_from(received)
@@ -65,7 +65,7 @@ def split(received: bytes) -> tuple[list[Frame], bytes]:
 def check_reply(
     received: bytes, request: Request, abandoned: Set[int] = frozenset()
 ) -> Rejection | None:
-    """What is wrong with these bytes as the reply, or None.
+    """Why these bytes are not the reply to the request; None: they are.
 
     abandoned : transaction ids of earlier requests whose replies may still come
     """

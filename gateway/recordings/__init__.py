@@ -1,1 +1,1 @@
-"""The recordings: recorder process, screen, file format, header, export, runs of files."""
+"""Files of runs: recorder process and its screen, recordings, header, export, logs."""

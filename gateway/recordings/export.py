@@ -1,8 +1,7 @@
-"""A recording as a log: the log's columns, and the gateway's own beside them.
+"""Export of a recording as a log: the columns of a log, and the gateway's own columns.
 
-One row for each new sample of the PLC, timed by the PLC's clock: ticks without a reading, and
-readings of a sample that was read before, have no row, because a log's time increases and its
-values are finite.
+A log has one row for each new sample of the PLC, timed by the PLC's clock. Ticks without a reading
+and repeated samples have no row, because the time of a log increases and its values are finite.
 """
 
 import csv
@@ -52,7 +51,7 @@ SUFFIXES: Final = {
 
 
 def columns(recording: Recording, register_map: RegisterMap) -> Columns:
-    """Every column that the recording can fill."""
+    """Every column that the recording can fill, by its name with unit."""
     rows = recording.records[new_samples(recording)]
     found: Columns = {}
     for column in LOG_COLUMNS.values():
@@ -71,7 +70,7 @@ def columns(recording: Recording, register_map: RegisterMap) -> Columns:
 
 
 def start_date(recording: Recording) -> datetime:
-    """When the time of the columns was zero: the date of the first sample that was read."""
+    """Date at which the time of the columns is zero: that of the first sample."""
     date = datetime.fromisoformat(recording.header["date"])
     rows = recording.records[new_samples(recording)]
     waited = float(rows["now"][0] - recording.header["started"]) if len(rows) else 0.0
@@ -79,7 +78,7 @@ def start_date(recording: Recording) -> datetime:
 
 
 def new_samples(recording: Recording) -> NDArray[np.intp]:
-    """Ticks that read a sample which no tick before had read."""
+    """Indices of the ticks that read a new sample."""
     read = np.flatnonzero(recording.records["flags"] & READ)
     samples = recording.records["measured_plc_time"][read]
     known = np.isfinite(samples)
@@ -89,13 +88,13 @@ def new_samples(recording: Recording) -> NDArray[np.intp]:
 
 
 def unwrap_time(time: Array, modulus: float | None) -> Array:
-    """Time since the first sample, the PLC's clock unwrapped [s]."""
+    """Time since the first sample [s] from a clock that wraps at `modulus` (None: never)."""
     steps = np.diff(time, prepend=time[:1])
     return np.cumsum(steps if modulus is None else np.mod(steps, modulus))
 
 
 def _other_signals(rows: Any, taken: Set[str | None]) -> Columns:
-    """Measured signals that have no column in a log, in SI."""
+    """Measured signals that are no column of a log, in SI."""
     return {
         f"{signal.name}{SUFFIXES[signal.unit]}": rows[f"measured_{signal.name}"]
         for signal in SIGNALS.values()
@@ -108,7 +107,7 @@ def _missing(values: Any) -> bool:
 
 
 def write_csv(path: Path, found: Columns) -> None:
-    """Write the columns so that reading them gives the same numbers."""
+    """Write the columns as CSV so that reading gives the same numbers again."""
     opened: Callable[..., Any] = gzip.open if path.name.endswith(".gz") else open
     with opened(path, "wt", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -121,11 +120,11 @@ def write_csv(path: Path, found: Columns) -> None:
 def _text(value: object) -> str:
     if isinstance(value, bool):
         return str(int(value))
-    return "" if value != value else str(value)  # noqa: PLR0124 - NaN: there is none
+    return "" if value != value else str(value)  # noqa: PLR0124 - true for NaN, which is written as nothing
 
 
 def with_units(found: Columns) -> list[Column]:
-    """The columns as files hold them that keep the unit as metadata: by signal, with unit."""
+    """Columns with signal and unit apart, for files that keep the unit as metadata."""
     return [
         Column(name=signal, unit=unit, values=values)
         for (signal, unit), values in zip(map(split_unit, found), found.values(), strict=True)
@@ -133,7 +132,7 @@ def with_units(found: Columns) -> list[Column]:
 
 
 def split_unit(column: str) -> tuple[str, str]:
-    """Signal and unit of a column's name."""
+    """Signal and unit in the name of a column."""
     if column in LOG_COLUMNS:
         return LOG_COLUMNS[column].signal, LOG_COLUMNS[column].unit
     # The longest, because _rad_s ends in _s; no suffix fits every name.
@@ -143,9 +142,9 @@ def split_unit(column: str) -> tuple[str, str]:
 
 
 def write(path: Path, found: Columns, start: datetime) -> None:
-    """Write the columns in the form that the file's name asks for.
+    """Write the columns in the format of the file's ending. Raises ConfigError for another ending.
 
-    start : when their time was zero
+    start : date at which the time of the columns is zero
     """
     try:
         if path.name.endswith((".csv", ".csv.gz")):
@@ -156,7 +155,7 @@ def write(path: Path, found: Columns, start: datetime) -> None:
             path.write_bytes(mdf4_log.encode(with_units(found), start))
         else:
             raise ConfigError(
-                "unknown form",
+                "unknown format",
                 place="--to",
                 value=str(path),
                 expected="one of .csv, .csv.gz, .parquet, .mf4",

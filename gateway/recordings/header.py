@@ -1,4 +1,4 @@
-"""The header of a recording: all that it was made under, so that it can be replayed anywhere."""
+"""The header of a recording: everything that a replay needs besides the records."""
 
 import platform
 import tomllib
@@ -19,7 +19,7 @@ from register_maps.register_map import RegisterMap
 def header(
     config: Config, register_map: RegisterMap, *, started: float, shadow: bool, real_time: str
 ) -> dict[str, Any]:
-    """What a recording says of itself; `started` is the monotonic time of its first tick."""
+    """Header of a new recording; started : monotonic time of its first tick [s]."""
     return {
         "title": f"gateway: {config.plc.host}:{config.plc.port}, map {register_map.name}",
         "date": datetime.now(UTC).isoformat(timespec="milliseconds"),
@@ -44,7 +44,7 @@ def header(
 
 
 def map_text(name: str) -> str:
-    """Text of a map file, shipped or given by path."""
+    """Text of a register map, given by its shipped name or its path."""
     shipped = Path(register_maps.__file__).with_name(f"{name}.toml")
     return (shipped if name in register_maps.names() else Path(name)).read_text("utf-8")
 

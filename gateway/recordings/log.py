@@ -1,4 +1,4 @@
-"""Logs as the gateway replays them: the readers of `register_maps` on a file."""
+"""Logs as the gateway replays them, read by the readers of `register_maps`."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,19 +13,19 @@ from register_maps.signals import LOG_COLUMNS
 
 
 class LogError(ConfigError):
-    """A log that may not be used: file, line, column, and what was expected."""
+    """A log that cannot be used: file, line, column, and what was expected."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Log:
-    """A log in SI: `columns` by signal name, each as long as `time` [s]."""
+    """A log in SI; columns : by signal name, each as long as `time` [s]."""
 
     path: Path
     time: Array
     columns: dict[str, Array]
 
     def missing(self) -> list[str]:
-        """Optional columns that are not there."""
+        """Names of the optional columns that the log lacks."""
         return [
             column.column
             for column in LOG_COLUMNS.values()
@@ -34,7 +34,7 @@ class Log:
 
 
 def read(path: Path) -> Log:
-    """The log in a CSV (plain or compressed), Parquet or MDF4 file, known by its content."""
+    """Log in a CSV, Parquet or MDF4 file; its content tells the format. Raises LogError."""
     try:
         data = path.read_bytes()
         binary = (form for form in (parquet_log, mdf4_log) if form.recognises(data))

@@ -1,10 +1,10 @@
-"""The recorder's own process: takes records from a pipe, appends them to the recording, shows them.
+"""The recorder: a process that takes records from a pipe, appends them to the file and shows them.
 
-The loop writes each record into the pipe without waiting (a record is smaller than PIPE_BUF, so it
-goes in whole or not at all, and what does not go in is counted). When the loop ends, however it
-ends, the pipe is at its end: the recorder writes what is still in it and closes the file. So a
-gateway that is killed loses no tick. Ctrl-C reaches both processes; the recorder ignores it,
-because the ramp-down has to be recorded too.
+The loop writes each record into the pipe without waiting. A record is smaller than PIPE_BUF, so
+that it enters whole or not at all; a record that does not enter is counted. When the loop ends in
+any way, the pipe ends, and the recorder writes the records that are still in it. So a killed
+gateway loses no tick. Ctrl-C reaches both processes; the recorder ignores it, because it has to
+record the ramp-down.
 """
 
 import fcntl
@@ -27,16 +27,16 @@ from gateway.recordings.recording import RecordingError, encode_header
 from gateway.recordings.screen import View
 
 BATCH: Final = 0.05
-"""[s] Records are written this often."""
+"""[s] Period of writing to the file."""
 SYNC: Final = 1.0
-"""[s] And are on the disk this often."""
+"""[s] Period of synchronising the file with the disk."""
 PIPE_SIZE: Final = 1 << 20
-"""Some 10 s of records at 100 Hz: as long may the disk be busy before a record is dropped."""
+"""[bytes] About 10 s of records at 100 Hz: the disk may be busy so long before one is dropped."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Job:
-    """What the recorder's process is told: where to write, in which form, and whether to show."""
+    """Task of the recorder's process: file, header, layout, and whether to show the run."""
 
     path: Path
     header: dict[str, Any]
@@ -45,7 +45,10 @@ class Job:
 
 
 class Recorder:
-    """The loop's end of the pipe. `failed`: the other process has ended before its time."""
+    """The loop's end of the pipe.
+
+    dropped : count of lost records; failed : the recorder's process has ended early
+    """
 
     def __init__(self, job: Job) -> None:
         _create(job)
@@ -55,7 +58,7 @@ class Recorder:
             fcntl.fcntl(self._sender.fileno(), fcntl.F_SETPIPE_SZ, PIPE_SIZE)
         os.set_blocking(self._sender.fileno(), False)
         self._process = context.Process(target=record, args=(receiver, job), name="recorder")
-        with _signals_held():
+        with _block_signals():
             self._process.start()
         receiver.close()
         self.path = job.path
@@ -63,7 +66,7 @@ class Recorder:
         self.failed = False
 
     def push(self, record: bytes) -> None:
-        """Hand over one record; never waits."""
+        """Hand over one record without waiting."""
         try:
             os.write(self._sender.fileno(), record)
         except BlockingIOError:
@@ -72,12 +75,15 @@ class Recorder:
             self.failed = True
 
     def close(self) -> None:
-        """End the recording; returns when it is on the disk."""
+        """End the recording, and return when it is on the disk.
+
+        Raises GatewayError where the recorder ended early.
+        """
         self._sender.close()
         self._process.join()
         code = self._process.exitcode
         if code:
-            # 1 is an error of ours, a negative one a signal; the others are what a write met.
+            # 1 is a mistake in this software, a negative code a signal, any other a failed write.
             why = os.strerror(code) if code > 1 else f"exit code {code}"
             raise GatewayError(
                 f"{self.path}: the recorder ended early: {why}; expected room on the disk"
@@ -85,8 +91,8 @@ class Recorder:
 
 
 @contextmanager
-def _signals_held() -> Iterator[None]:
-    """The new process inherits the mask: a Ctrl-C while it still starts does not end it."""
+def _block_signals() -> Iterator[None]:
+    """Block signals while a process starts, so that a Ctrl-C does not end it at once."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:
         yield
@@ -95,7 +101,7 @@ def _signals_held() -> Iterator[None]:
 
 
 def record(receiver: Connection, job: Job) -> None:
-    """The recorder's process: append what comes until the loop's end is closed."""
+    """Run the recorder's process: append every record until the loop closes its end."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     view = View(job.header, job.layout) if job.view else nullcontext(_show_nothing)
@@ -103,7 +109,7 @@ def record(receiver: Connection, job: Job) -> None:
         try:
             _append(receiver, job, show)
         except OSError as error:
-            # The loop learns it by its broken pipe, ramps down, and tells the number as words.
+            # The broken pipe makes the loop ramp down; `close` turns the number into words.
             sys.exit(error.errno)
 
 
@@ -120,14 +126,14 @@ def _append(receiver: Connection, job: Job, show: Callable[[bytes], None]) -> No
 
 
 def _write(file: FileIO, batch: bytes) -> None:
-    """All of it: a disk that fills up takes a part first, and says so only the next time."""
+    """Write the whole batch; a disk that fills up takes a part first, without an error."""
     left = memoryview(batch)
     while left:
         left = left[file.write(left) :]
 
 
 def _batches(source: int, size: int) -> Iterator[bytes]:
-    """Whole records as they come, a few at a time."""
+    """Whole records from the pipe, a few at a time."""
     waiting = b""
     while chunk := os.read(source, PIPE_SIZE):
         waiting += chunk
@@ -138,18 +144,18 @@ def _batches(source: int, size: int) -> Iterator[bytes]:
 
 
 def _create(job: Job) -> None:
-    """Make the file before anything runs: a bad directory is an error at the start."""
+    """Create the file before anything runs. Raises RecordingError for a bad folder."""
     try:
         job.path.parent.mkdir(parents=True, exist_ok=True)
         with job.path.open("xb") as file:
             file.write(encode_header(job.header))
     except OSError as error:
         raise RecordingError(
-            error.strerror or "cannot be made",
+            error.strerror or "cannot be created",
             file=job.path,
             expected="[recording] dir that can be written",
         ) from error
 
 
 def _show_nothing(batch: bytes) -> None:
-    """Where nobody looks."""
+    """Show no record."""

@@ -1,10 +1,12 @@
-"""Recordings: a header that says under what they were made, and one record a tick. Read and append.
+"""Recordings: a header, and one record a tick.
 
 File = magic, length of the header (4 bytes, little-endian), header (JSON), records
-(gateway.cycle.record). The header carries the texts of configuration and register map with their
-hashes, so that a recording can be replayed without the files it was made with. Only appended to:
-what a crash leaves is a file whose last record may be cut, and such a record is left out with a
-note. Any other record whose checksum differs is damage, and what holds damage is not used.
+(gateway.cycle.record). The header has configuration and register map with their hashes, so that a
+recording can be replayed without their files.
+
+A recording is only appended to. A crash leaves a file whose last record may be cut; that record is
+left out with a note. Any other record with a wrong checksum is damage, and a damaged recording is
+refused.
 """
 
 import json
@@ -25,11 +27,11 @@ CHUNK: Final = 1000
 
 
 class RecordingError(ConfigError):
-    """A file that is no recording, or cannot become one."""
+    """A file that is no recording, or that cannot be written as one."""
 
 
 class DamageError(RecordingError):
-    """A recording of which a record is not what the gateway wrote."""
+    """A recording with a damaged record; exit code 1."""
 
     exit_code = 1
 
@@ -38,8 +40,8 @@ class DamageError(RecordingError):
 class Recording:
     """A recording in memory.
 
-    records : numpy structured array, fields as gateway.cycle.record.Layout.formats
-    note : what had to be left out at the end, or empty
+    records : structured NumPy array, fields as gateway.cycle.record.Layout.formats
+    note : bytes that were left out at the end; empty: none
     """
 
     path: Path
@@ -63,23 +65,23 @@ class Recording:
         return str(self.header["states"][str(code)])
 
     def reason(self, code: int) -> str:
-        """Name of a reason or fault; empty: there is none."""
+        """Name of a reason or fault; empty: none."""
         return str(self.header["reasons"][str(code)][0]) if code != NOTHING else ""
 
     def stop_reason(self) -> str:
-        """Name of the reason why the gateway left RUN first; empty: it did not."""
+        """Name of the reason for which the gateway first left RUN; empty: it did not."""
         after = self.records[self.records["state"] == State.RAMPDOWN]
         return self.reason(int(after["reason"][0])) if len(after) else ""
 
 
 def encode_header(header: dict[str, Any]) -> bytes:
-    """First bytes of a recording."""
+    """First bytes of a recording: magic, length, header."""
     text = json.dumps({"schema": SCHEMA, **header}).encode()
     return MAGIC + len(text).to_bytes(4, "little") + text
 
 
 def read(path: Path) -> Recording:
-    """The recording in a file."""
+    """Recording in a file. Raises RecordingError, and DamageError for a damaged record."""
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -89,7 +91,7 @@ def read(path: Path) -> Recording:
     header, start = _header(path, content)
     layout = Layout(read_count=header["read_count"], write_count=header["write_count"])
     body = content[start:]
-    whole = _finished(body, layout.size)
+    whole = _count_finished(body, layout.size)
     left = len(body) - whole * layout.size
     records = np.frombuffer(body, dtype=np.dtype(layout.formats), count=whole)
     _check(path, body, records)
@@ -97,10 +99,10 @@ def read(path: Path) -> Recording:
     return Recording(path=path, header=header, layout=layout, records=records, note=note)
 
 
-def _finished(body: bytes, size: int) -> int:
-    """Number of records before the one that a crash left unfinished.
+def _count_finished(body: bytes, size: int) -> int:
+    """Count of the records before one that a crash left unfinished.
 
-    After it may stand zeros: a file system gives a file its length before its content.
+    Zeros may follow it, because a file system extends a file before it writes the content.
     """
     last = -(-len(body.rstrip(b"\0")) // size)
     torn = last > 0 and not is_intact(body[(last - 1) * size : last * size])
@@ -108,7 +110,7 @@ def _finished(body: bytes, size: int) -> int:
 
 
 def _check(path: Path, body: bytes, records: "np.ndarray[Any, np.dtype[np.void]]") -> None:
-    """Refuse records that are not what was written; the record before tells a bad one's tick."""
+    """Refuse damaged records. The record before a damaged one tells its tick."""
     size = records.itemsize
     places = range(0, len(records) * size, size)
     bad = [k for k, at in enumerate(places) if not is_intact(body[at : at + size])]
@@ -123,7 +125,7 @@ def _check(path: Path, body: bytes, records: "np.ndarray[Any, np.dtype[np.void]]
 
 
 def is_recording(path: Path) -> bool:
-    """Whether a file begins as a recording does."""
+    """Whether the file begins like a recording."""
     with path.open("rb") as file:
         return file.read(len(MAGIC)) == MAGIC
 
@@ -133,7 +135,7 @@ def _header(path: Path, content: bytes) -> tuple[dict[str, Any], int]:
     length = int.from_bytes(content[len(MAGIC) : start], "little")
     if not content.startswith(MAGIC) or len(content) < start + length:
         raise RecordingError(
-            "is no recording",
+            "not a recording",
             file=path,
             value=content[: len(MAGIC)],
             expected=f"a file that begins with {MAGIC!r} and a whole header",
@@ -144,7 +146,7 @@ def _header(path: Path, content: bytes) -> tuple[dict[str, Any], int]:
         raise RecordingError(str(error), file=path, place="header", expected="JSON") from error
     if header.get("schema") != SCHEMA:
         raise RecordingError(
-            "unknown form",
+            "unknown format",
             file=path,
             place="schema",
             value=header.get("schema"),

@@ -1,7 +1,7 @@
-"""What the operator sees while the gateway runs, drawn by the recorder's process.
+"""The operator's view of a running gateway, drawn by the recorder's process.
 
-One line for each change of state or reason, and on a terminal a table under it that is drawn anew
-a few times a second. Units here are the operator's: rpm, km/h, Nm, ms.
+Each change of state or reason gives a line. On a terminal, a table below is drawn anew a few times
+a second. Units here are the operator's: rpm, Nm, ms.
 """
 
 import math
@@ -19,7 +19,7 @@ from register_maps.units import RPM
 
 
 class View:
-    """Shows batches of records."""
+    """Shows batches of records, as a context manager."""
 
     def __init__(self, header: dict[str, Any], layout: Layout) -> None:
         self._header = header
@@ -29,7 +29,7 @@ class View:
         self._live = Live(console=self._console, auto_refresh=False, transient=True)
 
     def __call__(self, batch: bytes) -> None:
-        """Show whole records."""
+        """Show a batch of whole records."""
         records = np.frombuffer(batch, dtype=self._type)
         for record in records:
             self._line(record)
@@ -52,7 +52,7 @@ class View:
 
 
 def state_line(header: dict[str, Any], record: np.void) -> str:
-    """Time since the start, state, reason with its text, and this tick's fault."""
+    """Line with time since the start, state, reason with its text, and fault of this tick."""
     state = header["states"][str(record["state"])]
     parts = [f"{record['now'] - header['started']:9.3f} s  {state:9s}"]
     if record["reason"] != NOTHING:
@@ -63,12 +63,12 @@ def state_line(header: dict[str, Any], record: np.void) -> str:
 
 
 def reason_text(header: dict[str, Any], reason: int) -> str:
-    """Code and text of a reason; a dash where there is none."""
+    """Name and text of a reason; a dash for none."""
     return ": ".join(header["reasons"][str(reason)]) if reason != NOTHING else "-"
 
 
 def status_table(header: dict[str, Any], record: np.void) -> Table:
-    """The newest tick in the operator's units."""
+    """Table of one tick in the operator's units."""
     table = Table(title=header["title"], show_header=False, min_width=48)
     table.add_column(style="bold")
     table.add_column(justify="right")

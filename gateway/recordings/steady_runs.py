@@ -1,4 +1,4 @@
-"""Runs in files, as the analysis of losses takes them: CSV logs and the gateway's recordings."""
+"""Runs without a truck in files: logs and recordings, for the measurement of losses."""
 
 import hashlib
 from dataclasses import dataclass
@@ -20,15 +20,16 @@ from register_maps.register_map import RegisterMap
 from register_maps.signals import Status
 
 TRUCK: Final = 1.0
-"""[N m] of the truck's wheel, over which there is a truck that drives or brakes."""
+"""[N m] Torque at the truck's wheel above which a truck drives or brakes."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SteadyRun:
     """A run in a file.
 
-    date : of the recording, or of the log's last change; sha256 : of the file
-    config : that the run was recorded under, None: a log does not tell
+    date : of the recording, or of the last change of a log
+    sha256 : of the file
+    config : configuration of a recording, None: a log has none
     """
 
     path: Path
@@ -39,7 +40,10 @@ class SteadyRun:
 
 
 def read(path: Path) -> SteadyRun:
-    """The run in a log or a recording; refused where a truck drives the drum."""
+    """Run in a log or a recording.
+
+    Raises ConfigError for a file that cannot be used, LossesError where a truck is on the drum.
+    """
     try:
         is_recording = recording.is_recording(path)
         changed = datetime.fromtimestamp(path.stat().st_mtime, UTC)
@@ -69,7 +73,7 @@ def _of_log(found: log.Log) -> Trace:
             file=found.path,
             place="column wheel_torque_Nm",
             value=float(wheel[np.argmax(np.abs(wheel))]),
-            expected="a run without a truck: what it pushes is no loss of the bench",
+            expected="a run without a truck, whose torque is no loss of the bench",
         )
     return Trace(
         name=found.path.name,
@@ -87,7 +91,7 @@ def _of_recording(found: recording.Recording, register_map: RegisterMap) -> Trac
         raise LossesError(f"{found.path}: holds no samples of the PLC; expected a run")
     if np.any(rows["measured_status"].astype(int) & Status.ROAD_LOAD):
         raise LossesError(
-            f"{found.path}: was made in road load: a truck is on the drum, and what it pushes is "
+            f"{found.path}: was made in road load with a truck on the drum, whose torque is "
             "no loss of the bench; expected a sweep of steady speeds (gateway losses -c CONFIG)"
         )
     time = unwrap_time(rows["measured_plc_time"], register_map.modulus("plc_time"))
@@ -102,7 +106,7 @@ def _of_recording(found: recording.Recording, register_map: RegisterMap) -> Trac
 
 
 def _mean_torque(rows: Any, time: Array, modulus: float | None) -> Array:
-    """Mean of the torque up to each sample [N m]: out of its integral, where the PLC has one."""
+    """Mean torque up to each sample [N m], from the integral where the PLC has one."""
     sampled: Array = rows["measured_shaft_torque"]
     integral = rows["measured_shaft_torque_integral"]
     if not np.isfinite(integral).all():
@@ -115,7 +119,7 @@ def _mean_torque(rows: Any, time: Array, modulus: float | None) -> Array:
 
 
 def _shell(rows: Any) -> Array | None:
-    """Mean of the thermocouples that work [K]; None: there is none all the time."""
+    """Mean of the thermocouples that work all the time [K]; None: none does."""
     both = [rows[f"measured_shell_temperature_{number}"] for number in (1, 2)]
     working = [one for one in both if np.isfinite(one).all()]
     mean: Array | None = np.mean(working, axis=0) if working else None

@@ -1,8 +1,8 @@
-"""The gateway as a whole: link, loop and recorder put together, and signals that ask it to stop.
+"""The whole gateway: link, loop, recorder, and the signals that stop it.
 
-The loop runs in the calling process, which is asked for real time; the recorder has a process of
-its own. The first SIGINT or SIGTERM asks for a ramp-down; the second ends at once, and the PLC's
-watchdog ramps down.
+The loop runs in the calling process, for which real time is requested. The recorder has a process
+of its own. The first SIGINT or SIGTERM asks for a ramp-down. A second one ends the process at once,
+and the PLC's watchdog ramps down.
 """
 
 import signal
@@ -30,14 +30,14 @@ from register_maps.register_map import RegisterMap
 
 BY_OPERATOR: Final = frozenset({Reason.STOP_REQUESTED, Reason.REMOTE_OFF})
 AT_FAULT: Final = frozenset({State.CONNECT, State.ARMED, State.RAMPDOWN, State.SAFE})
-"""States whose reason is the peer's; ARMED has one when what is written does not get through."""
+"""States whose reason is a fault of the PLC; in ARMED it is a command that does not arrive."""
 APART: Final = 1.0
-"""[s] A second signal sooner than this is the first once more: some send to process and group."""
+"""[s] A second signal sooner than this repeats the first: some send to process and to group."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunResult:
-    """How a run went. Times in seconds; `reason`: why it ended, None: because it was asked to."""
+    """How a run went. Times in seconds; reason : why it ended, None: the operator ended it."""
 
     recording: Path
     reason: Reason | None
@@ -50,7 +50,7 @@ class RunResult:
 
 
 class _Stop:
-    """Whether to stop: by a signal, or because the time is over."""
+    """Whether to stop: after a signal, or after a time."""
 
     def __init__(self, until: float | None) -> None:
         self._until = until
@@ -58,7 +58,7 @@ class _Stop:
         self.asked = False
 
     def signalled(self, number: int, _frame: object) -> None:
-        """First: ask; second: end at once."""
+        """Handle a signal: the first asks for a stop, the second ends at once."""
         now = time.monotonic()
         if self.asked and now - self._first > APART:
             raise GatewayError(f"stopped at once by a second {signal.Signals(number).name}")
@@ -69,7 +69,7 @@ class _Stop:
         return self.asked or (self._until is not None and time.monotonic() >= self._until)
 
 
-def _never(output: Output) -> bool:  # noqa: ARG001 - a run that only its operator ends
+def _never(output: Output) -> bool:  # noqa: ARG001 - only the operator ends this run
     return False
 
 
@@ -86,16 +86,19 @@ def run(
     view: bool = True,
     over: Callable[[Output], bool] = _never,
 ) -> RunResult:
-    """Run the gateway until it is asked to stop, for so long [s], or until a tick says `over`."""
+    """Run the gateway until a signal, for a duration [s], or until `over` holds after a tick.
+
+    shadow : write nothing; view : show the run on standard output
+    """
     link = TcpLink(config.plc.host, config.plc.port, config.plc.unit, config.plc.timeout)
     granted = real_time() if config.loop.realtime else nullcontext("not asked for")
     with granted as real:
         started = time.monotonic()
         stop = _Stop(None if duration is None else started + duration)
-        told = header(config, register_map, started=started, shadow=shadow, real_time=real)
+        head = header(config, register_map, started=started, shadow=shadow, real_time=real)
         with _signals(stop):
             recorder = Recorder(
-                Job(path=_new_file(config), header=told, layout=Layout.of(register_map), view=view)
+                Job(path=_new_file(config), header=head, layout=Layout.of(register_map), view=view)
             )
             try:
                 loop = Loop(
@@ -109,11 +112,11 @@ def run(
                 loop.run(lambda: stop() or _is_over(loop, over))
             finally:
                 recorder.close()
-    return _ended(loop, recorder, real)
+    return _result(loop, recorder, real)
 
 
 def _new_file(config: Config) -> Path:
-    """Named after the moment, so that files sort by time."""
+    """Path of a new recording, named after the present time."""
     return Path(config.recording.dir) / f"{datetime.now(UTC):%Y%m%dT%H%M%S.%fZ}{SUFFIX}"
 
 
@@ -130,13 +133,13 @@ def _signals(stop: _Stop) -> Iterator[None]:
 
 
 def fault_of(before: Output | None) -> Reason | None:
-    """Whose fault the end was, by the last output before a stop; None: the operator's wish."""
+    """Fault that ended a run, from the last output before the stop; None: the operator ended it."""
     if before is None or before.state not in AT_FAULT or before.reason in BY_OPERATOR:
         return None
     return before.reason
 
 
-def _ended(loop: Loop, recorder: Recorder, real: str) -> RunResult:
+def _result(loop: Loop, recorder: Recorder, real: str) -> RunResult:
     return RunResult(
         recording=recorder.path,
         reason=fault_of(loop.before_stop),

@@ -1,10 +1,12 @@
-"""The clock: every period read, decode, step, encode, write, and push a record.
+"""The loop: in every period read, decode, step, encode, write, and push a record.
 
-Deadlines are absolute, so errors do not add up. A tick that overruns skips the deadlines it missed,
-keeps phase and counts them; everything downstream uses measured times. Here alone an error becomes
-an action: the peer's (LinkError, CodecError) becomes the fault of this tick's observation and the
-supervisor decides; ours, any other exception, ends all writing at once, so that the PLC's watchdog
-ramps down, and ends the run as BugError.
+Deadlines are absolute, so that errors do not add up. A tick that overruns skips the deadlines that
+it missed, keeps the phase and counts them. All later code uses measured times.
+
+Only this module turns an error into an action. An error of the PLC (LinkError, CodecError) becomes
+the fault of this tick's observation, on which the supervisor decides. Any other exception is a
+mistake in this software: it ends all writing, so that the PLC's watchdog ramps down, and ends the
+run as BugError.
 """
 
 import time
@@ -35,41 +37,41 @@ REFUSED: Final[dict[Refusal, Reason]] = {
 
 
 class Clock(Protocol):
-    """Monotonic time, and waiting for it."""
+    """Monotonic clock that can wait."""
 
     def now(self) -> float:
         """Time [s]."""
 
     def sleep_until(self, deadline: float) -> None:
-        """Return when it is that late [s]."""
+        """Return at this time [s]."""
 
 
 class MonotonicClock:
-    """The machine's clock."""
+    """Monotonic clock of this computer."""
 
     def now(self) -> float:
         """Time [s]."""
         return time.monotonic()
 
     def sleep_until(self, deadline: float) -> None:
-        """Return when it is that late [s]; time.sleep itself waits on an absolute time."""
+        """Return at this time [s]; time.sleep itself waits for an absolute time."""
         if (remaining := deadline - time.monotonic()) > 0.0:
             time.sleep(remaining)
 
 
 class Sink(Protocol):
-    """Where records go; never waits. `dropped`: records lost, `failed`: it takes no more."""
+    """Receiver of records that never waits. dropped : records lost; failed : it takes no more."""
 
     dropped: int
     failed: bool
 
     def push(self, record: bytes) -> None:
-        """Take one record."""
+        """Take one record without waiting."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """What the PLC gave in a tick: words and what they say, or why not."""
+    """Reading of a tick: words and their measurement, or the fault."""
 
     words: tuple[int, ...] | None = None
     measurement: Measurement | None = None
@@ -78,7 +80,7 @@ class Reading:
 
 @dataclass(frozen=True, kw_only=True)
 class Writing:
-    """What was to be written in a tick, whether the PLC confirmed it, or why not."""
+    """Write of a tick: words, whether the PLC confirmed them, or the fault."""
 
     words: tuple[int, ...] | None = None
     confirmed: bool = False
@@ -88,7 +90,9 @@ class Writing:
 class Loop:
     """One run of the gateway against one PLC.
 
-    before_stop : the last output before a stop was requested, None: it was requested at once
+    before_stop : the last output before a stop was requested, None: there was none
+    latency, lateness : histograms of all ticks
+    cycles, missed : count of ticks and of missed deadlines
     """
 
     before_stop: Output | None = None
@@ -114,7 +118,10 @@ class Loop:
         self.cycles = self.missed = self._overruns = 0
 
     def run(self, stop_requested: Callable[[], bool]) -> None:
-        """Tick until a requested stop is complete; the connection is closed in any case."""
+        """Tick until a requested stop is complete, and close the connection.
+
+        Raises BugError for a mistake in this software.
+        """
         deadline, stopping = self._clock.now(), False
         try:
             while True:
@@ -134,7 +141,7 @@ class Loop:
             self._link.close()
 
     def tick(self, deadline: float, *, stop_requested: bool) -> Output:
-        """One cycle: read, step, write, record."""
+        """Run one tick: read, step, write, record."""
         woken = self._clock.now()
         reading = self._read()
         observation = Observation(
@@ -157,7 +164,7 @@ class Loop:
         return output
 
     def _next(self, deadline: float) -> float:
-        """The next deadline that is not past; those between are missed."""
+        """Next deadline in the future [s]; the deadlines before it count as missed."""
         period = self._config.loop.period
         late = max(0, int((self._clock.now() - deadline) / period))
         self.missed += late
@@ -165,7 +172,7 @@ class Loop:
         return deadline + (late + 1) * period
 
     def _read(self) -> Reading:
-        """The measurement; a torn image is read once more: the next scan has a whole one."""
+        """Read the measurement; read a torn image again, because the next scan is whole."""
         try:
             self._link.connect()
             reading = self._read_once()
@@ -185,7 +192,7 @@ class Loop:
             return Reading(words=words, fault=REFUSED[error.kind])
 
     def _write(self, output: Output) -> Writing:
-        """Send what the limits passed, unless nothing is to be written."""
+        """Write the command block, unless there is none or the run is in shadow mode."""
         if output.setpoint is None or self._shadow:
             return Writing()
         try:

@@ -1,8 +1,8 @@
-"""Ask the system for real time, and say whether it was granted.
+"""Request real time from the operating system, and report what it granted.
 
-SCHED_FIFO decides the wake-up (p99 0.1 ms instead of some ms on a loaded machine), mlockall keeps
-pages in memory, and the garbage collector is stopped because its full run takes longer than a
-tick. None of it is needed to work.
+SCHED_FIFO improves the wake-up (p99 0.1 ms instead of some ms on a loaded machine). mlockall keeps
+pages in memory. The garbage collector is stopped, because its full run takes longer than a tick.
+The gateway also works without all three.
 """
 
 import ctypes
@@ -18,7 +18,7 @@ LOCK_CURRENT_AND_FUTURE: Final = 3
 
 @contextmanager
 def real_time() -> Iterator[str]:
-    """Real time for this process while inside; what was granted, in words."""
+    """Give this process real time inside the block; the value says what was granted."""
     policy, priority = os.sched_getscheduler(0), os.sched_getparam(0)
     granted = [f"SCHED_FIFO {_fifo()}", f"memory lock {_lock()}"]
     gc.collect()

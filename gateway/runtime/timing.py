@@ -1,15 +1,15 @@
-"""How late and how long: a histogram of durations of fixed size (pure)."""
+"""Histogram of durations with a fixed number of bins (pure)."""
 
 import math
 from typing import Final
 
 WIDTH: Final = 1e-5
 BINS: Final = 20_000
-"""10 us steps up to 0.2 s; what is longer counts in the last, and `max` is exact."""
+"""Bins of 10 us up to 0.2 s; the last bin counts every longer duration, and `max` is exact."""
 
 
 class Histogram:
-    """Counts of durations [s]."""
+    """Histogram of durations [s]; total : count of durations; max : the longest."""
 
     def __init__(self) -> None:
         self._counts = [0] * BINS
@@ -23,11 +23,11 @@ class Histogram:
         self.max = max(self.max, duration)
 
     def summary(self) -> dict[str, float]:
-        """Median, 99 % and the longest [s]."""
+        """Median, 99 % quantile and longest duration [s]."""
         return {"p50": self.quantile(0.5), "p99": self.quantile(0.99), "max": self.max}
 
     def quantile(self, share: float) -> float:
-        """Duration that this share of all does not exceed, upper edge of its step [s]."""
+        """Duration that this share does not exceed, as the upper edge of its bin [s]."""
         wanted, seen = max(1, math.ceil(share * self.total)), 0
         for index, count in enumerate(self._counts):
             seen += count

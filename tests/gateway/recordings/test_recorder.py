@@ -162,7 +162,7 @@ def test_a_damaged_record_before_the_last_is_a_failure_that_names_its_tick(
 def test_a_file_without_a_whole_header_is_refused(tmp_path: Path, length: int) -> None:
     path = tmp_path / "a.rlrec"
     path.write_bytes(write(path, 1)[:length])
-    with pytest.raises(RecordingError, match="is no recording") as caught:
+    with pytest.raises(RecordingError, match="not a recording") as caught:
         read(path)
     assert caught.value.exit_code == 2
 
@@ -171,7 +171,7 @@ def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("time_s,motor_speed_rad_s\n0,1\n")
     assert not is_recording(path)
-    with pytest.raises(RecordingError, match="is no recording"):
+    with pytest.raises(RecordingError, match="not a recording"):
         read(path)
 
 
