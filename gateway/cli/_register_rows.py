@@ -1,4 +1,4 @@
-"""The tables of `gateway registers`: what a row of each holds, and how one is printed."""
+"""The tables of `gateway registers`: their rows, and how a table is printed."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -20,7 +20,7 @@ PAPER: Final = ("name", "signal", "address", "form", "type", "order", "raw to", 
 
 
 def paper_row(register: Register) -> tuple[str, ...]:
-    """A register as the map has it."""
+    """Row of a register in the map."""
     low, high = register.range
     constant = "" if register.constant is None else f" = {register.constant:.10g} {_both(register)}"
     return (
@@ -38,7 +38,7 @@ def paper_row(register: Register) -> tuple[str, ...]:
 
 
 def _both(register: Register) -> str:
-    """Words of a constant in its own order and with the words exchanged."""
+    """Words of a constant in its word order and with the words exchanged; empty for one word."""
     if register.raw.words == 1:
         return ""
     orders = (register.word_order, swap_words(register.word_order))
@@ -58,7 +58,7 @@ LIVE: Final = (
 
 
 def live_row(register: Register, found: Words | str, age: float, device: Device) -> tuple[str, ...]:
-    """A register as the device shows it. age : of what was found [s]"""
+    """Row of a register on a device; age : of the reading [s]."""
     words = () if isinstance(found, str) else found
     return (
         register.name,
@@ -85,18 +85,18 @@ FOUND: Final = (
 
 
 def comparison_row(row: Row, device: Device) -> tuple[str, ...]:
-    """A register as the device shows it, and what speaks against it."""
+    """Row of a register on a device, with the finding of the comparison."""
     line = live_row(row.register, row.words or row.finding, 0.0, device)
     return (*line[:6], ("" if row.holds else "! ") + row.finding, line[7])
 
 
 def in_hex(words: Sequence[int]) -> str:
-    """The words as four hexadecimal digits each."""
+    """Words as four hexadecimal digits each."""
     return " ".join(f"{word:04X}" for word in words)
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print columns as wide as their widest entry; never wrapped, so that a line can be copied."""
+    """Print a table without wrapping, so that a line can be copied."""
     if not rows:
         return
     widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]

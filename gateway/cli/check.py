@@ -1,4 +1,4 @@
-"""Configuration, register map, loop stability and aliasing, before any start."""
+"""Check configuration, register map, loop stability and aliasing before any start."""
 
 from pathlib import Path
 
@@ -22,7 +22,9 @@ Examples:
 @click.command(cls=Command, epilog=EXAMPLE)
 @click.option("-c", "--config", type=click.Path(path_type=Path), required=True, help="TOML file")
 @click.option("--live", is_flag=True, help="also compare the register map with the device")
-@click.option("--set", "values", multiple=True, metavar="KEY=VALUE", help="instead of the file's")
+@click.option(
+    "--set", "values", multiple=True, metavar="KEY=VALUE", help="change a value of the file"
+)
 @click.option(
     "--json", "target", type=OutputFile(dash=True), help="machine-readable answer, - = stdout"
 )

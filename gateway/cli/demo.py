@@ -44,7 +44,7 @@ Examples:
     type=click.Choice(["integrated", "averaged", "instantaneous"]),
     default="integrated",
     show_default=True,
-    help="How the regulator sees the shaft torque.",
+    help="Shaft torque that the regulator uses.",
 )
 @click.option(
     "--period",
@@ -52,7 +52,7 @@ Examples:
     default=10.0,
     show_default=True,
     metavar="MS",
-    help="Of the gateway's loop.",
+    help="Period of the gateway's loop.",
 )
 @click.option("--map", "map_name", default="bench_int16", show_default=True, metavar="NAME")
 @click.option(
@@ -60,12 +60,12 @@ Examples:
     default="thesis_table_3_1",
     show_default=True,
     metavar="SET",
-    help="The emulated bench; the regulator goes on believing in Table 3.1.",
+    help="Parameters of the emulated bench; the regulator keeps those of Table 3.1.",
 )
 @click.option(
     "--friction",
     metavar="FILE",
-    help="Friction that the regulator compensates: a friction map, or a parameter set.",
+    help="Friction that the regulator compensates: a friction map or a parameter set.",
 )
 @click.option(
     "--duration",
@@ -73,16 +73,16 @@ Examples:
     default=30.0,
     show_default=True,
     metavar="S",
-    help="Of the truck's cycle.",
+    help="Duration of the truck's cycle.",
 )
-@click.option("--fast", is_flag=True, help="Do not wait for the clock; latency is not measured.")
+@click.option("--fast", is_flag=True, help="Do not wait for a clock; latency is not measured.")
 @click.option(
     "--out",
     type=click.Path(path_type=Path, file_okay=False),
     default=Path("demo_output"),
     show_default=True,
     metavar="DIR",
-    help="Where log, picture and summary go.",
+    help="Folder for log, picture and summary.",
 )
 @click.option(
     "--json", "json_file", type=OutputFile(dash=True), help="Summary; - is standard output."
@@ -104,9 +104,9 @@ def command(
 ) -> None:
     """Run the emulated bench, a forklift on its drum, and the gateway between them.
 
-    Three processes: the bench with its PLC behind Modbus TCP on 127.0.0.1, the gateway, and this
-    one as the operator. Leaves log, recording, configuration, demo.png and summary.json in DIR.
-    Exit code 1: anything but the operator ended a run.
+    There are three processes: the bench with its PLC behind Modbus TCP on 127.0.0.1, the gateway,
+    and this one as the operator. The demo writes log, recording, configuration, demo.png and
+    summary.json to DIR. Exit code 1: something other than the operator ended a run.
     """
     from rich.console import Console
 

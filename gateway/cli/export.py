@@ -1,4 +1,4 @@
-"""Turn a recording into a CSV, Parquet or MDF4 log."""
+"""Write a recording as a CSV, Parquet or MDF4 log."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ Example:
     help="FILE.csv, .csv.gz, .parquet or .mf4",
 )
 def command(file: Path, target: Path) -> None:
-    """Write the samples of a RECORDING as a log that every command here reads."""
+    """Write the samples of a RECORDING as a log that all commands read."""
     found = recording.read(file)
     columns = export.columns(found, map_of(found.header))
     export.write(target, columns, export.start_date(found))

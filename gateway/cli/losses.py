@@ -44,9 +44,11 @@ class Speeds(click.ParamType[list[float]]):
     "--hold",
     type=Number(0.0, min_open=True),
     metavar="S",
-    help="each of them for so long; default: 8",
+    help="time for which each speed is held; default: 8",
 )
-@click.option("--set", "values", multiple=True, metavar="KEY=VALUE", help="instead of the file's")
+@click.option(
+    "--set", "values", multiple=True, metavar="KEY=VALUE", help="change a value of the file"
+)
 @click.option("--save", type=OutputFile(path_type=Path), help="write the friction map (TOML)")
 @click.option("--csv", "table", type=OutputFile(path_type=Path), help="write the steady stretches")
 @click.option("--plot", type=PICTURE, help="draw friction over speed (PNG)")

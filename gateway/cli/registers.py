@@ -1,4 +1,4 @@
-"""Look at a register map on paper and on a live device: list, read, watch, verify, write."""
+"""List a register map, and read, watch, verify or write the registers of a live device."""
 
 import time
 from collections.abc import Callable
@@ -44,7 +44,7 @@ Examples:
 
 @click.group(epilog=EXAMPLE)
 def command() -> None:
-    """Look at a register MAP (a shipped name or a TOML file), on paper and on a live device."""
+    """List a register MAP (shipped name or TOML file), and use it on a live device."""
 
 
 def _on_a_device(wrapped: Callable[..., Any]) -> Callable[..., Any]:
@@ -54,7 +54,7 @@ def _on_a_device(wrapped: Callable[..., Any]) -> Callable[..., Any]:
             type=Number(0.0, LONGEST, min_open=True),
             default=1.0,
             show_default=True,
-            help="for each request [s]",
+            help="time-out of each request [s]",
         ),
         click.option(
             "--unit", type=click.IntRange(0, 255), default=1, show_default=True, help="unit id"
@@ -76,7 +76,7 @@ def _on_a_device(wrapped: Callable[..., Any]) -> Callable[..., Any]:
 @command.command("list")
 @click.argument("name", metavar="MAP")
 def list_registers(name: str) -> None:
-    """Print the map: addresses in both forms, types, orders, units, ranges."""
+    """Print addresses in both notations, types, word orders, units and ranges."""
     rows = [paper_row(register) for register in register_maps.load(name).registers]
     table(PAPER, rows)
 
@@ -84,7 +84,7 @@ def list_registers(name: str) -> None:
 @command.command()
 @_on_a_device
 def read(name: str, **where: Any) -> None:
-    """Read every register once; exit code 1 when not one answered."""
+    """Read every register once; exit code 1: no register answered."""
     register_map, device = register_maps.load(name), Device(**where)
     with device.link() as link:
         reading = read_all(link, register_map)
@@ -96,7 +96,7 @@ def read(name: str, **where: Any) -> None:
     table(LIVE, rows)
     if all(isinstance(found, str) for found in reading.values()):
         raise PlcError(
-            f"{device.host}:{device.port}, unit {device.unit}: not one register of {name} answered"
+            f"{device.host}:{device.port}, unit {device.unit}: no register of {name} answered"
         )
 
 
@@ -106,12 +106,12 @@ def read(name: str, **where: Any) -> None:
     type=Number(0.0, LONGEST),
     default=0.5,
     show_default=True,
-    help="between two readings [s]",
+    help="time between two readings [s]",
 )
 @click.option("--count", type=click.IntRange(1), help="end after so many readings")
 @_on_a_device
 def watch(name: str, interval: float, count: int | None, **where: Any) -> None:
-    """Print each register when it changes, with the time that it had been unchanged."""
+    """Print each register that changes, and how long it was unchanged."""
     register_map, device = register_maps.load(name), Device(**where)
     seen: dict[str, tuple[Words | str, float]] = {}
     with device.link() as link:
@@ -141,7 +141,7 @@ def _changes(
 @click.option("--json", "json_file", type=OutputFile(dash=True), help="register-map/1; - = stdout")
 @_on_a_device
 def verify_device(name: str, json_file: str | None, **where: Any) -> int:
-    """Compare the map with the device; exit code 1 when it does not hold."""
+    """Compare the map with the device; exit code 1: it does not hold."""
     register_map, device = register_maps.load(name), Device(**where)
     found = verify(register_map, two_readings(device, register_map))
     if json_file is not None:
@@ -158,7 +158,7 @@ def verify_device(name: str, json_file: str | None, **where: Any) -> int:
 @click.argument("value", type=float)
 @click.option("--yes", is_flag=True, help="do not ask")
 def write(name: str, register_name: str, value: float, *, yes: bool, **where: Any) -> None:
-    """Write VALUE (in the map's unit) to a REGISTER that the map lets one write."""
+    """Write VALUE, in the unit of the map, to a writable REGISTER."""
     register_map, device = register_maps.load(name), Device(**where)
     register = writable(register_map, register_name)
     words = encode_scaled(register, value)
@@ -174,5 +174,5 @@ def write(name: str, register_name: str, value: float, *, yes: bool, **where: An
 
 
 def _meaning(register_map: RegisterMap) -> list[Register]:
-    """Registers that mean something."""
+    """Registers of the map that are not reserved."""
     return [found for found in register_map.registers if found.signal != RESERVED]

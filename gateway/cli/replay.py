@@ -1,4 +1,4 @@
-"""Put a recording or a log through the regulator again, bit for bit or with other parameters."""
+"""Replay a recording or a log through the regulator, bit for bit or with other parameters."""
 
 from pathlib import Path
 
@@ -21,7 +21,13 @@ PICTURE = OutputFile(endings=PICTURES, path_type=Path)
 @click.command(cls=Command, epilog=EXAMPLE)
 @click.argument("file", metavar="LOG|RECORDING", type=click.Path(path_type=Path))
 @click.option("-c", "--config", type=click.Path(path_type=Path), help="TOML file")
-@click.option("--set", "values", multiple=True, metavar="KEY=VALUE", help="another parameter")
+@click.option(
+    "--set",
+    "values",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="change a value of the configuration",
+)
 @click.option("--out", type=OutputFile(path_type=Path), help="write both setpoints to a CSV file")
 @click.option("--plot", type=PICTURE, help="draw both setpoints (PNG)")
 @click.option("--json", "json_file", type=OutputFile(dash=True), help="run/1; - = stdout")

@@ -1,4 +1,4 @@
-"""The daemon: make the bench feel like the road, over Modbus TCP."""
+"""Run the daemon, which makes the bench feel like the road over Modbus TCP."""
 
 import shlex
 from pathlib import Path
@@ -27,21 +27,23 @@ Examples:
 @click.command(cls=Command, epilog=EXAMPLE)
 @click.option("-c", "--config", type=click.Path(path_type=Path), required=True, help="TOML file")
 @click.option("--shadow", is_flag=True, help="read and compute, write nothing")
-@click.option("--duration", type=Number(min=0.0), help="stop by itself after so long [s]")
-@click.option("--set", "values", multiple=True, metavar="KEY=VALUE", help="instead of the file's")
+@click.option("--duration", type=Number(min=0.0), help="stop after this time [s]")
+@click.option(
+    "--set", "values", multiple=True, metavar="KEY=VALUE", help="change a value of the file"
+)
 def command(config: Path, *, shadow: bool, duration: float | None, values: tuple[str, ...]) -> int:
-    """Run until Ctrl-C or SIGTERM: ramp down, hang up, keep the recording.
+    """Run until Ctrl-C or SIGTERM, then ramp down and close the recording.
 
-    Exit code 0: ended by the operator; 1: a fault of the PLC or of ours ended the last run, or the
-    PLC was not there; 2: bad configuration, also one that `gateway check` refuses. With --shadow
-    such a one is only warned of, as nothing is written.
+    Exit code 0: the operator ended the run; 1: a fault of PLC or gateway ended it, or the PLC was
+    not there; 2: bad configuration, also one that `gateway check` refuses. With --shadow a refused
+    configuration only gives a warning, because nothing is written.
     """
     settings = with_values(load(config), assignments(values))
     register_map = register_maps.load(settings.plc.map)
     refused = refusals(settings, register_map)
-    told = shlex.join(["gateway", "check", "-c", str(config), *_repeated("--set", values)])
+    check = shlex.join(["gateway", "check", "-c", str(config), *_repeated("--set", values)])
     for line in refused:
-        click.echo(f"{'warning' if shadow else 'error'}: {config}: {line}; see {told}", err=True)
+        click.echo(f"{'warning' if shadow else 'error'}: {config}: {line}; see {check}", err=True)
     if refused and not shadow:
         return 2
     ended = daemon.run(settings, register_map, shadow=shadow, duration=duration)
@@ -64,7 +66,7 @@ def _repeated(option: str, values: tuple[str, ...]) -> list[str]:
 
 
 def report(ended: daemon.RunResult) -> str:
-    """What is worth knowing afterwards."""
+    """Lines for the operator after a run."""
     times = "  ".join(f"{name} {value * 1e3:.2f} ms" for name, value in ended.latency.items())
     why = "by the operator" if ended.reason is None else f"{ended.reason.name}: {ended.reason.text}"
     return (

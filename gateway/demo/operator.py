@@ -1,8 +1,8 @@
-"""Plays the operator at the emulated PLC: waits for ARMED, sets remote, clears it after the cycle.
+"""The operator of the demo: waits for ARMED, sets remote at the PLC, clears it after the cycle.
 
-In real time the gateway is the daemon (`gateway run`, a process of its own), and all that is known
-of it is what it appends to its recording. Fast, the same loop runs here over the same kind of
-socket, against an emulator that scans on request, so that no clock is waited for.
+In real time the gateway is the daemon (`gateway run`) in a process of its own, and the operator
+only reads its recording. In a fast demo the same loop runs in this process over the same kind of
+socket. The emulator then scans on request, so that nothing waits for a clock.
 """
 
 import math
@@ -32,17 +32,17 @@ from register_maps.timing import SCAN
 
 LOOK_EVERY: Final = 0.1
 CHANGE_WITHIN: Final = 30.0
-"""[s] For each state that is waited for, beside the cycle itself."""
+"""[s] Longest wait for each state, besides the cycle itself."""
 
 
 class Emulator(Protocol):
-    """The switches of the emulated bench."""
+    """Switches of the emulated bench."""
 
     def set_remote(self, *, on: bool) -> None:
         """Turn the operator's switch."""
 
     def step(self, scans: int) -> None:
-        """Scan so many times."""
+        """Run so many scans."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,14 +58,14 @@ class Session:
 
 @dataclass(frozen=True, kw_only=True)
 class GatewayRun:
-    """What a gateway left behind: its recording and its exit code."""
+    """Result of one gateway: its recording and its exit code."""
 
     recording: Path
     exit_code: int
 
 
 def operate_in_real_time(session: Session) -> GatewayRun:
-    """The daemon through one cycle."""
+    """Run the daemon through one cycle in real time. Raises GatewayError."""
     folder, words = session.file.parent, session.file.with_suffix(".txt")
     before = set(folder.glob(f"*{SUFFIX}"))
     with (
@@ -109,7 +109,7 @@ def wait_for(
     daemon: "subprocess.Popen[bytes]",
     within: float = CHANGE_WITHIN,
 ) -> None:
-    """Look until it holds; raises GatewayError when that takes too long or the daemon ends."""
+    """Wait until a condition holds. Raises GatewayError after `within` [s] or a daemon's end."""
     deadline = time.monotonic() + within
     while not holds():
         if daemon.poll() is not None:
@@ -120,7 +120,10 @@ def wait_for(
 
 
 class _Follower:
-    """Reads what the daemon appends to its recording, and shows the newest tick."""
+    """Reads the growing recording of the daemon, and shows its newest tick.
+
+    time : of the cycle [s]; -1 before it
+    """
 
     def __init__(self, path: Path, session: Session) -> None:
         self._path, self._session = path, session
@@ -128,7 +131,7 @@ class _Follower:
         self.time = -1.0
 
     def state(self) -> State | None:
-        """State of the newest tick; None: there is none yet."""
+        """State of the newest tick; None: no tick yet."""
         records = recording.read(self._path).records
         if not len(records):
             return None
@@ -141,7 +144,7 @@ class _Follower:
 
 
 def moment(tick: np.void, cycle_time: float, config: Config) -> Moment:
-    """A record as the screen shows it."""
+    """Moment of a tick for the screen; cycle_time [s]."""
     drum_speed = float(tick["measured_drum_speed"])
     return Moment(
         time=cycle_time,
@@ -157,7 +160,7 @@ def moment(tick: np.void, cycle_time: float, config: Config) -> Moment:
 
 
 class _ScanClock:
-    """Time of an emulator that scans on request: sleeping is scanning."""
+    """Clock of an emulator that scans on request: to sleep is to scan."""
 
     def __init__(self, emulator: Emulator) -> None:
         self._emulator, self._scans = emulator, 0
@@ -167,7 +170,7 @@ class _ScanClock:
         return self._scans * SCAN
 
     def sleep_until(self, deadline: float) -> None:
-        """Let the emulator scan until it is that late [s]."""
+        """Let the emulator scan until this time [s]."""
         scans = round(deadline / SCAN) - self._scans
         if scans > 0:
             self._emulator.step(scans)
@@ -175,7 +178,10 @@ class _ScanClock:
 
 
 class _FileSink:
-    """Takes the records of a loop that nothing hurries; shows some of them."""
+    """Writes the records of a fast loop to a file, and shows some of them.
+
+    state, now, began : state and time of the newest tick, and the time at which RUN began [s]
+    """
 
     dropped, failed = 0, False
 
@@ -199,16 +205,16 @@ class _FileSink:
 
     @property
     def time(self) -> float:
-        """Time since RUN began [s]; -1 before."""
+        """Time since RUN began [s]; -1 before it."""
         return max(-1.0, self.now - self.began)
 
     def close(self) -> None:
-        """Everything is in the file."""
+        """Close the file."""
         self._file.close()
 
 
 def operate_fast(session: Session) -> GatewayRun:
-    """The same loop through one cycle as fast as the machine allows."""
+    """Run the loop through one cycle as fast as this computer allows. Raises GatewayError."""
     config = session.config
     register_map = register_maps.load(config.plc.map)
     clock, layout = _ScanClock(session.emulator), Layout.of(register_map)

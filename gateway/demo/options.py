@@ -1,4 +1,4 @@
-"""What a demo shows, and the gateway's configuration that follows from it."""
+"""Options of a demo, and the configuration of the gateway that follows from them."""
 
 import json
 from dataclasses import dataclass
@@ -11,7 +11,11 @@ LOADS: Final = (0.0, 1600.0)
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """What is shown: loads [kg], period [s], duration of the cycle [s]; names as on the line."""
+    """Options of a demo.
+
+    loads : of the trucks [kg], one run each; period : of the loop [s]; duration : of the cycle [s]
+    the others : as the options of the command
+    """
 
     loads: tuple[float, ...] = LOADS
     driver: str = "none"
@@ -28,9 +32,9 @@ class Options:
     def config_text(
         self, *, load_mass: float, rolling: tuple[float, float], address: tuple[str, int]
     ) -> str:
-        """The gateway's configuration of one run, as an operator would write it.
+        """Configuration of the gateway for one run as TOML.
 
-        load_mass : [kg]; rolling : Crr [1] and Crr_v [s/rad] of the truck; address : of the PLC
+        load_mass : [kg]; rolling : C_rr [1] and C_rr,v [s] of the truck; address : of the PLC
         """
         friction = ""
         if self.friction is not None:

@@ -1,4 +1,4 @@
-"""The picture of a demo: does the drum feel like the road? One column a truck.
+"""The picture of a demo with one column a truck: does the drum feel like the road?
 
 matplotlib is imported only when a picture is drawn.
 """
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 KMH = 3.6
-# Okabe and Ito's colours: told apart with every kind of colour vision.
+# Colours of Okabe and Ito, distinct for every kind of colour vision.
 ROAD, BENCH, ASKED, WARM = "#999999", "#0072B2", "#E69F00", "#D55E00"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Curves:
-    """What is drawn of one run; time from the start of the cycle [s], SI, shape (n,) each."""
+    """Curves of one run in SI, shape (n,) each; time : since the start of the cycle [s]."""
 
     title: str
     note: str

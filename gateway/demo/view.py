@@ -1,4 +1,4 @@
-"""What the operator sees of a demo: newest tick as a live table, or a plain line now and then."""
+"""The screen of a demo: the newest tick as a live table, or a line from time to time."""
 
 import math
 from collections.abc import Iterator
@@ -13,12 +13,12 @@ from rich.table import Table
 from register_maps.units import RPM
 
 LINE_EVERY: Final = 5.0
-"""[s] of the cycle between two lines where no table can be drawn."""
+"""[s] Time of the cycle between two lines, where no table can be drawn."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Moment:
-    """The newest tick, SI; nan: not known. time: of the cycle [s]; latency of the tick [s]."""
+    """One tick in SI, NaN: unknown; time : of the cycle [s]; latency : of the tick [s]."""
 
     time: float
     state: str
@@ -32,7 +32,7 @@ class Moment:
 
 
 class Screen:
-    """Shows moments: as a table on a terminal, else as lines."""
+    """Shows moments as a table on a terminal, otherwise as lines."""
 
     def __init__(self, console: Console, title: str, duration: float) -> None:
         self._console, self._title, self._duration = console, title, duration
@@ -41,7 +41,7 @@ class Screen:
 
     @contextmanager
     def showing(self) -> Iterator[None]:
-        """Draw while inside."""
+        """Draw the table inside the block."""
         if not self._console.is_terminal:
             yield
             return

@@ -1,1 +1,1 @@
-"""The analysis of parasitic losses: steady sections, fit of the friction law."""
+"""Parasitic losses of the bench: steady stretches of a run, fit of the friction law, result."""

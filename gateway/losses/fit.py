@@ -1,11 +1,11 @@
-"""The friction law through the steady stretches of a run, with what they leave open (pure).
+"""Fit of the friction law to the steady stretches of a run, with standard errors (pure).
 
     T_f = f_gc + f_g omega^delta_g                                          (thesis, eq 3.27)
 
-Two of the three parameters are linear: for any exponent they follow from weighted least squares, so
-only the exponent is searched, over the whole of its range and then by golden section. Standard
-errors come from the curvature at the optimum, and from the distances of the stretches to the law
-where these are larger than the scatter of the torque explains.
+Two of the three parameters are linear: for any exponent they follow from weighted least squares. So
+only the exponent is searched, on a grid over its whole range and then by golden section. Standard
+errors follow from the curvature at the optimum. They grow with the residuals where these are larger
+than the scatter of the torque explains.
 """
 
 from collections.abc import Iterable, Sequence
@@ -19,26 +19,26 @@ from gateway.friction import RANGES, Friction
 from gateway.losses.sections import LossesError, Section
 
 FEWEST: Final = 4
-"""Speeds: one more than the law has parameters, so that their distance to it can be told."""
+"""Least count of speeds: one more than the law has parameters, so that residuals remain."""
 APART: Final = 1.05
-"""Two speeds count as two from this ratio on."""
+"""Ratio from which two speeds count as two."""
 SPREAD: Final = 2.5
-"""Fastest over slowest; closer together, exponent and constant part cannot be told apart."""
+"""Least ratio of fastest and slowest speed, which separates exponent and constant part."""
 EXPONENT_ERROR: Final = 0.15
-"""Standard error of the exponent, over which it counts as not determined."""
+"""Standard error above which the exponent counts as not determined."""
 RESOLUTION: Final = 0.01
-"""Of the friction at the gear output [N m]: scatter below it is no knowledge."""
+"""[N m] Resolution of the friction at the gear output; a smaller scatter gives no more weight."""
 GOLDEN: Final = (np.sqrt(5.0) - 1.0) / 2.0
 GRID: Final = np.linspace(*RANGES["exponent"], 196)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fit:
-    """The law found.
+    """The fitted friction law.
 
-    covariance : of coulomb, viscous, exponent [their units]; zero where one is held
+    covariance : of coulomb, viscous, exponent [their units], shape (3, 3); zero for a held one
+    residuals : friction of each section minus friction of the law [N m], shape (n,)
     held_at_zero : the constant part would have been negative and is held at 0
-    residuals : friction of each section minus the law's [N m], shape (n,)
     slowest, fastest : of the sections, at the gear output [rad/s]
     """
 
@@ -51,24 +51,24 @@ class Fit:
 
     @property
     def standard_errors(self) -> tuple[float, float, float]:
-        """Of coulomb [N m], viscous [N m (s/rad)^exponent] and exponent [1]."""
+        """Standard errors of coulomb [N m], viscous [N m (s/rad)^exponent] and exponent [1]."""
         coulomb, viscous, exponent = np.sqrt(np.diag(self.covariance))
         return float(coulomb), float(viscous), float(exponent)
 
     def torque(self, omega: Array) -> Array:
-        """Friction at speeds of the gear output [N m]."""
+        """Friction [N m] at speeds of the gear output [rad/s], shape (n,) each."""
         law = self.friction
         return law.coulomb + law.viscous * omega**law.exponent
 
     def torque_error(self, omega: Array) -> Array:
-        """Standard error of that [N m]."""
+        """Standard error of the friction [N m] at speeds of the gear output [rad/s]."""
         slopes = _slopes(omega, self.friction.viscous, self.friction.exponent)
         error: Array = np.sqrt(np.einsum("ki,ij,kj->k", slopes, self.covariance, slopes))
         return error
 
 
 def fit(sections: Sequence[Section]) -> Fit:
-    """The friction law; raises LossesError where these sections do not determine it."""
+    """Fit the friction law. Raises LossesError where these sections do not determine it."""
     omega = np.array([one.gear_speed for one in sections])
     torque = np.array([one.friction for one in sections])
     weight = 1.0 / (np.array([one.standard_error for one in sections]) ** 2 + RESOLUTION**2)
@@ -96,7 +96,7 @@ def fit(sections: Sequence[Section]) -> Fit:
 
 
 def count_speeds(speeds: Iterable[float]) -> int:
-    """How many speeds there are, those within APART of each other taken as one."""
+    """Count of different speeds; speeds within a ratio of APART count as one."""
     counted, last = 0, 0.0
     for one in sorted(speeds):
         if one > APART * last:
@@ -123,7 +123,7 @@ def _refuse_edge(exponent: float, viscous: float, omega: Array) -> None:
     if viscous <= 0.0:
         raise LossesError(
             f"the friction does not rise with the speed over {_range(omega)}; expected "
-            "coulomb + viscous w^exponent: is a truck on the drum?"
+            "coulomb + viscous w^exponent without a truck on the drum"
         )
     if not low * 1.01 < exponent < high * 0.99:
         raise LossesError(
@@ -137,7 +137,7 @@ def _range(omega: Array) -> str:
 
 
 def _linear(exponent: float, omega: Array, torque: Array, weight: Array) -> tuple[float, float]:
-    """Constant and rising part that go with an exponent; the constant one not below zero."""
+    """Constant part (not negative) and rising part for an exponent, by least squares."""
     power = omega**exponent
     scale = np.sqrt(weight)
     columns = np.column_stack((scale, scale * power))
@@ -148,7 +148,7 @@ def _linear(exponent: float, omega: Array, torque: Array, weight: Array) -> tupl
 
 
 def _search(omega: Array, torque: Array, weight: Array) -> float:
-    """Exponent of the least weighted squares."""
+    """Exponent with the least sum of weighted squares."""
 
     def cost(exponent: float) -> float:
         coulomb, viscous = _linear(exponent, omega, torque, weight)
@@ -163,7 +163,7 @@ def _search(omega: Array, torque: Array, weight: Array) -> float:
 
 
 def _slopes(omega: Array, viscous: float, exponent: float) -> Array:
-    """Derivatives of the torque by coulomb, viscous and exponent, shape (n, 3)."""
+    """Derivatives of the friction by coulomb, viscous and exponent, shape (n, 3)."""
     power = omega**exponent
     return np.column_stack((np.ones_like(omega), power, viscous * power * np.log(omega)))
 
@@ -171,7 +171,7 @@ def _slopes(omega: Array, viscous: float, exponent: float) -> Array:
 def _covariance(
     omega: Array, weight: Array, residuals: Array, values: tuple[float, float, float]
 ) -> Array:
-    """Of coulomb, viscous, exponent; a constant part that is held at zero has none."""
+    """Covariance of coulomb, viscous, exponent, shape (3, 3); zero for a held constant part."""
     coulomb, viscous, exponent = values
     free = slice(1 if coulomb == 0.0 else 0, 3)
     slopes = _slopes(omega, viscous, exponent)[:, free]

@@ -14,11 +14,14 @@ from register_maps.units import RPM
 
 ENDED: Final = (State.RAMPDOWN, State.SAFE)
 BEGUN: Final = 0.5
-"""Of the first speed: what was asked for before is where the bench happened to stand."""
+"""Share of the first speed that shows that the sweep has begun; before, the bench only stood."""
 
 
 def sweep_config(config: Config, speeds: Sequence[float] | None, hold: float | None) -> Config:
-    """The same with a sweep; speeds in rpm, hold in s, None: as usual."""
+    """Configuration with a sweep. Raises ConfigError for speeds that do not suit the fit.
+
+    speeds : [rpm], None: the default speeds up to the limit; hold : [s], None: the default
+    """
     highest = config.limits.speed_max / RPM
     usual = [one for one in sweep_speeds.DEFAULT if one <= highest * (1.0 + 1e-9)]
     asked = usual if speeds is None else list(speeds)
@@ -33,7 +36,7 @@ def sweep_config(config: Config, speeds: Sequence[float] | None, hold: float | N
 
 
 def _refuse(speeds: Sequence[float], highest: float) -> None:
-    """Refuse what the law cannot be fitted to, before anything turns."""
+    """Refuse speeds that cannot determine the law, before anything turns."""
     ordered = sorted(speeds)
     if count_speeds(speeds) < FEWEST or ordered[-1] < SPREAD * ordered[0]:
         raise ConfigError(
@@ -52,14 +55,17 @@ def _refuse(speeds: Sequence[float], highest: float) -> None:
 
 
 class Progress:
-    """Told of every tick's output, whether the run is over. `done`: the sweep was completed."""
+    """Progress of a sweep; called with the output of every tick.
+
+    done : the sweep was completed
+    """
 
     def __init__(self, sweep: Sweep) -> None:
         self._first = BEGUN * sweep.speeds[0]
         self._begun = self.done = False
 
     def __call__(self, output: Output) -> bool:
-        """Whether the sweep has come to standstill again, or the run has ended otherwise."""
+        """Whether the run is over: the sweep is at standstill again, or the run has ended early."""
         if output.state in ENDED:
             return True
         if output.state is State.RUN and output.demand is not None:

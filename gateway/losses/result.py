@@ -59,7 +59,8 @@ class Row:
 class Losses:
     """The friction of a bench, and the runs that show it.
 
-    bench : for which the friction was computed
+    sections, left_out : steady stretches that are used, and those that are not
+    bench : of the last run
     """
 
     fit: Fit
@@ -70,7 +71,7 @@ class Losses:
 
     @property
     def shell(self) -> tuple[float, float] | None:
-        """Coldest and warmest shell of the stretches [degC]; None: not known."""
+        """Lowest and highest shell temperature of the stretches [degC]; None: unknown."""
         known = [one.shell_temperature for one in self.sections]
         if any(one is None for one in known):
             return None
@@ -79,7 +80,7 @@ class Losses:
 
     @property
     def friction(self) -> Friction:
-        """The law, at the shell temperature at which it was measured."""
+        """Friction law with the shell temperature of the measurement as its reference."""
         law, shell = self.fit.friction, self.shell
         if shell is None:
             return law
@@ -88,12 +89,12 @@ class Losses:
 
     @property
     def worst_percent(self) -> float:
-        """Largest standard error of the friction between slowest and fastest speed [%]."""
+        """Largest relative standard error of the friction between slowest and fastest speed [%]."""
         omega = np.linspace(self.fit.slowest, self.fit.fastest, 50)
         return float(100.0 * np.max(self.fit.torque_error(omega) / self.fit.torque(omega)))
 
     def rows(self) -> list[Row]:
-        """The stretches, slowest first."""
+        """Steady stretches in the operator's units, slowest first."""
         pairs = zip(self.sections, self.fit.residuals, strict=True)
         rows = [_row(one, float(residual), self.bench) for one, residual in pairs]
         return sorted(rows, key=lambda row: row.gear_speed_rad_s)

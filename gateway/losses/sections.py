@@ -1,16 +1,18 @@
-"""Steady stretches of a run, and the torque that the bench itself takes there (pure).
+"""Steady stretches of a run, and the friction of the bench in each of them (pure).
 
-At steady speed without a truck the motor gives what friction takes, so the sensor between motor and
-gear shows the parasitic loss of the bench (what 40 CFR 1066.255 has dynamometers verify):
+At steady speed without a truck, the motor gives exactly the torque of the friction. The sensor
+between motor and gear then shows the parasitic loss of the bench, which 40 CFR 1066.255 makes
+dynamometers verify:
 
     T_f = -xi mean(T_meas) - (J_g + J_d) mean(theta_d'')            (thesis, eq 4.9 with T_w' = 0)
 
-The second term is small, and exact also while the drum floats in the backlash, where its speed does
-not change. A stretch counts as steady while half a second before and half a second after any of its
-moments differ by less than STEADY allows. What cannot be used is left out, with the reason.
+The second term is small. It is also exact while the drum floats in the backlash, where the drum's
+speed does not change. A stretch is steady where the mean speeds of the half second before and after
+each of its moments differ by less than STEADY allows. An unusable stretch is left out with a
+reason.
 
-What this cannot tell: a constant error of the torque sensor is in the friction found, as the bench
-turns forward only (0..4830 rpm); a regulator that reads the same sensor is right all the same.
+A constant error of the torque sensor ends up in the friction, because the bench only turns forward
+(0..4830 rpm). A regulator that reads the same sensor is right nevertheless.
 """
 
 from collections.abc import Iterator
@@ -25,24 +27,25 @@ from gateway.errors import GatewayError
 from register_maps.units import RPM
 
 HALF: Final = 0.5
-"""[s] Before and after a moment, over which its slope is taken."""
+"""[s] Time before and after a moment over which its slope is taken."""
 LONGEST: Final = 2.4 * HALF
-"""[s] For the samples of both halves together: with a gap between them they say nothing."""
+"""[s] Longest span of the samples of both halves; a longer span has a hole."""
 STEADY: Final = 0.5
-"""[rad/s^2] of the motor: the drum's inertia then takes 2.5 N m, under 1 % of the friction."""
+"""[rad/s^2] Slope of the motor speed; the drum's inertia takes 2.5 N m, under 1 % of the
+friction."""
 MOVING: Final = 5.0
-"""[rad/s] of the motor; slower is standstill."""
+"""[rad/s] Motor speed below which the bench stands."""
 SHORTEST, WORTH_NAMING = 1.0, 0.2
-"""[s] Of a stretch that is used; of one that is told of when it is not."""
+"""[s] Least duration of a stretch that is used, and of a stretch that is named as left out."""
 COARSEST: Final = 0.5 * HALF
-"""[s] Between two samples."""
+"""[s] Longest time between two samples."""
 APART: Final = 0.1
-"""Of drum and gear, relative: more is a wrong ratio, scale or a channel that stands."""
+"""Relative difference of drum and gear that shows a wrong ratio, scale or a frozen channel."""
 DRIFT: Final = 0.02
-"""Change of speed over a stretch, relative to its mean."""
+"""Largest relative change of the speed over a stretch."""
 BATCHES: Final = 5
 UNSTEADY: Final = 0.15
-"""Between the batches of a stretch, relative to the mean torque: more is not one load."""
+"""Largest difference of the batches of a stretch relative to the mean torque: one load."""
 
 
 class LossesError(GatewayError):
@@ -52,12 +55,12 @@ class LossesError(GatewayError):
 
 
 class SignError(LossesError):
-    """The commissioning check: the torque has the wrong sign where the motor must drive."""
+    """The torque has the wrong sign where the motor must drive; a commissioning check."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Trace:
-    """A run in SI, by name: shape (n,) each. `shaft_torque`: mean up to each sample, if known."""
+    """Signals of a run in SI, shape (n,) each; shaft_torque : mean up to each sample, if known."""
 
     name: str
     time: Array
@@ -69,10 +72,10 @@ class Trace:
 
 @dataclass(frozen=True, kw_only=True)
 class Section:
-    """A steady stretch of a run: from, to [s], means in SI; `friction` at the gear output [N m].
+    """A steady stretch of a run: times [s], and means in SI.
 
-    standard_error : of the friction, by the scatter of the torque [N m]
-    shell_temperature : [K], None: not known
+    friction, standard_error : at the gear output [N m]; the error follows from the torque's scatter
+    shell_temperature : [K], None: unknown
     """
 
     run: str
@@ -87,13 +90,13 @@ class Section:
 
     @property
     def duration(self) -> float:
-        """Its length [s]."""
+        """Duration of the stretch [s]."""
         return self.end - self.start
 
 
 @dataclass(frozen=True, kw_only=True)
 class LeftOut:
-    """A stretch of a run that is not used: from, to [s], motor speed [rad/s], and why."""
+    """A stretch of a run that is not used: times [s], motor speed [rad/s], and the reason."""
 
     run: str
     start: float
@@ -104,17 +107,19 @@ class LeftOut:
 
 @dataclass(frozen=True, kw_only=True)
 class Steady:
-    """What a run holds."""
+    """Stretches of a run: those that are used, and those that are left out."""
 
     sections: tuple[Section, ...]
     left_out: tuple[LeftOut, ...]
 
 
 def steady(trace: Trace, bench: BenchConfig, torque_offset: float = 0.0) -> Steady:
-    """The steady stretches of a run, with the friction in each; torque_offset of the sensor [N m].
+    """Steady stretches of a run with the friction in each.
 
-    Raises LossesError where the torque has the sign of a truck that pushes, or of a sensor whose
-    sign is wrong.
+    torque_offset : torque that the sensor shows without load [N m]
+
+    Raises SignError where the torque is that of a truck that drives, or of a sensor with the wrong
+    sign. Raises LossesError where the samples are too far apart.
     """
     every = float(np.median(np.diff(trace.time)))
     if every > COARSEST:
@@ -130,11 +135,11 @@ def steady(trace: Trace, bench: BenchConfig, torque_offset: float = 0.0) -> Stea
         else:
             sections.append(_section(trace, part, bench, torque_offset))
     _refuse_sign(sections)
-    return Steady(sections=_pooled(sections), left_out=tuple(left_out))
+    return Steady(sections=_pool_noise(sections), left_out=tuple(left_out))
 
 
 def _stretches(trace: Trace) -> Iterator[slice]:
-    """Where the motor turns at a speed that does not change, samples."""
+    """Samples in which the motor turns at a constant speed, stretch by stretch."""
     still = np.abs(_slope(trace.time, trace.motor_speed)) < STEADY
     turning = still & (np.abs(trace.motor_speed) > MOVING)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], turning.astype(np.int8), [0]))))
@@ -144,8 +149,10 @@ def _stretches(trace: Trace) -> Iterator[slice]:
 
 
 def _slope(time: Array, values: Array) -> Array:
-    """Mean of the HALF second after less that of the one before, by their distance; inf where
-    there are none. A gap in the log makes the slope around it unknown."""
+    """Slope at each sample, from the means of the HALF second after and before it; inf: unknown.
+
+    The slope is unknown at both ends and around a hole in the log.
+    """
     count = max(1, round(HALF / float(np.median(np.diff(time)))))
     slope = np.full_like(values, np.inf)
     if len(values) <= 2 * count:
@@ -166,7 +173,7 @@ def _moving_mean(values: Array, count: int) -> Array:
 
 
 def _rejection(trace: Trace, part: slice, gear_ratio: float) -> str:
-    """Why a stretch cannot be used; empty: it can."""
+    """Reason for which a stretch cannot be used; empty: it can."""
     time, speed, torque = trace.time[part], trace.motor_speed[part], trace.shaft_torque[part]
     if speed.mean() < 0.0:
         return "turns backwards; the bench is rated for 0..4830 rpm, forward only"
@@ -196,7 +203,7 @@ def _left_out(trace: Trace, part: slice, why: str) -> LeftOut:
 
 
 def _section(trace: Trace, part: slice, bench: BenchConfig, torque_offset: float) -> Section:
-    """Friction in one steady stretch, with the standard error of its own batches."""
+    """Friction in one steady stretch, with the standard error of its batches."""
     xi, inertia = bench.gear_ratio, bench.gear_inertia + bench.drum_inertia
     time, torque = trace.time[part], trace.shaft_torque[part] - torque_offset
     acceleration = float(np.polyfit(time - time[0], trace.drum_speed[part], 1)[0])
@@ -222,15 +229,15 @@ def _refuse_sign(sections: list[Section]) -> None:
         return
     worst = max(wrong, key=lambda one: one.shaft_torque)
     raise SignError(
-        f"the sign of the shaft torque is wrong, or a truck pushes the drum: at steady forward "
+        f"the sign of the shaft torque is wrong, or a truck drives the drum: at steady forward "
         f"speed the sensor shows {worst.shaft_torque:+.2f} N m ({worst.start:.1f} .. "
         f"{worst.end:.1f} s, {worst.motor_speed / RPM:.0f} rpm; {len(wrong)} of "
         f"{len(sections)} steady stretches); expected below zero, as the motor drives"
     )
 
 
-def _pooled(sections: list[Section]) -> tuple[Section, ...]:
-    """The same with one noise for all: a stretch has too few batches to know its own."""
+def _pool_noise(sections: list[Section]) -> tuple[Section, ...]:
+    """Sections with one common noise, because a stretch has too few batches for its own."""
     if not sections:
         return ()
     power = np.mean([one.standard_error**2 * one.duration for one in sections])

@@ -1,1 +1,1 @@
-"""The replay of logs and recordings through the regulator, and its evaluation."""
+"""Replay of logs and recordings through the tick, and the key figures of a run."""

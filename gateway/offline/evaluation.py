@@ -1,12 +1,12 @@
-"""Key figures of a run: how closely the drum feels like the road.
+"""How closely the drum feels like the road: agreement of speeds, force in cruise, energy.
 
-Velocity alone cannot see a wrong road load once the truck has a driver who holds his speed, so
-force and energy stand beside it.
+A driver holds his speed even against a wrong road load, so that the speed alone does not show it.
+Force and energy do.
 
     Val1 = 100 (1 - sqrt(mean e^2) / (max y - min y)),  Val2 = 100 (1 - sum |e| / sum |y|)
 
-with y the road's speed and e = road minus bench (thesis, eq. 3.37-3.41; eq. 3.40 read as a ratio of
-sums, since sample by sample it divides by zero at standstill).
+Here y is the speed on the road and e = road minus bench (thesis, eq. 3.37-3.41). Eq. 3.40 is taken
+as a ratio of sums, because sample by sample it divides by zero at standstill.
 """
 
 from collections.abc import Callable
@@ -17,10 +17,10 @@ import numpy as np
 from gateway.arrays import Array
 from gateway.errors import GatewayError
 
-# Cruise: the speed changes by less than this [m/s^2], for at least so long [s].
+# Cruise: the speed changes by less than STEADY [m/s^2] for at least SHORTEST_CRUISE [s].
 STEADY = 0.02
 SHORTEST_CRUISE = 5.0
-# Speed is differentiated over this span [s]: one digit of the drum speed is 0.3 mm/s at the rim.
+# [s] Span of the slope of the speed; one digit of the drum speed is 0.3 mm/s at the rim.
 SLOPE_SPAN = 0.5
 MOVING = 0.5
 
@@ -34,7 +34,10 @@ class Agreement:
 
 
 def agreement(wanted: Array, found: Array) -> Agreement:
-    """Val1 and Val2 of `found` against `wanted`, shape (n,) each; refuses a signal at rest."""
+    """Val1 and Val2 [%] of `found` against `wanted`, shape (n,) each.
+
+    Raises GatewayError where `wanted` does not move.
+    """
     span, total = float(np.ptp(wanted)), float(np.abs(wanted).sum())
     if span == 0.0 or total == 0.0:
         raise GatewayError("the wanted signal does not move: there is nothing to compare with")
@@ -46,7 +49,10 @@ def agreement(wanted: Array, found: Array) -> Agreement:
 
 
 def cruise(time: Array, speed: Array) -> slice | None:
-    """The longest stretch of steady travel [samples]; None when there is none of 5 s."""
+    """Samples of the longest steady travel; None without one of 5 s.
+
+    time [s], speed [m/s], shape (n,) each
+    """
     half = max(1, round(SLOPE_SPAN / 2.0 / float(np.median(np.diff(time)))))
     slope = np.zeros_like(speed)
     slope[half:-half] = (speed[2 * half :] - speed[: -2 * half]) / (
@@ -65,7 +71,10 @@ def cruise(time: Array, speed: Array) -> slice | None:
 
 
 def traction_energy(time: Array, force: Array, speed: Array) -> float:
-    """Integral of the positive part of force times speed [J]; force acts up to its sample."""
+    """Energy that drives the truck [J]: integral of the positive part of force times speed.
+
+    time [s], force [N], speed [m/s], shape (n,) each; a force acts up to its sample
+    """
     power = np.maximum(force[1:] * 0.5 * (speed[1:] + speed[:-1]), 0.0)
     return float(np.sum(power * np.diff(time)))
 
@@ -73,10 +82,12 @@ def traction_energy(time: Array, force: Array, speed: Array) -> float:
 def road_speed(
     time: Array, force: Array, mass: float, resistance: Callable[[float], float]
 ) -> Array:
-    """Speed [m/s] that a truck would have on its road under a logged force, from rest.
+    """Speed that a truck would have on its road under a logged force, from rest [m/s], shape (n,).
 
-    force : at the wheel, acting up to its sample [N]; resistance : of the road at a speed [N]. A
-    negative force on the standing truck is its brake's reaction and does not push it back.
+    force : at the wheel, acting up to its sample [N], shape (n,)
+    mass : of the truck [kg]; resistance : of the road at a speed [N]
+
+    A negative force on the standing truck is the reaction of its brake, which moves nothing.
     """
     speed = np.zeros_like(time)
     for k in range(1, len(time)):

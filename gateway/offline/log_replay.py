@@ -1,10 +1,11 @@
-"""A log of the bench through the tick: what would the gateway have asked for (pure).
+"""Replay of a log through the tick: which setpoint would the gateway have asked for (pure)?
 
-The samples are fed as the PLC would have sent them, after a second at rest in which the operator
-switches remote on: so everything that rules on the bench rules here, supervisor, regulator and
-limits. The torque integral is that of the logged torque, linear between samples. The loop is open:
-the logged bench followed the log's reference, not the setpoint that comes out, so a difference in
-speed integrates; what is compared is one setpoint with the other.
+The tick gets the samples as the PLC would have sent them, after a second at rest in which the
+operator switches remote on. So supervisor, regulator and limits work as on the bench. The torque
+integral is that of the logged torque, linear between samples.
+
+The loop is open: the logged bench followed the reference in the log and not the replay's setpoint,
+so that a difference in speed integrates. Only the two setpoints can be compared.
 """
 
 from collections.abc import Iterator, Mapping
@@ -21,7 +22,7 @@ from register_maps.register_map import RegisterMap
 from register_maps.signals import Alarm, Interlock, Measurement, PlcState, Status
 
 REST: Final = 1.0
-"""[s] Before the log: half of it with remote off, so that remote on is a wish of now."""
+"""[s] Rest before the log: half of it with remote off, so that the operator then switches it on."""
 STANDING: Final = Status.READY | Status.WARM | Status.WATCHDOG_OK | Status.EMERGENCY_STOP_OK
 RUNNING: Final = Status.ENABLED | Status.ROAD_LOAD
 ALL_CLOSED: Final = Interlock(sum(Interlock))
@@ -30,7 +31,10 @@ ALL_CLOSED: Final = Interlock(sum(Interlock))
 def replay(
     config: Config, register_map: RegisterMap, time: Array, columns: Mapping[str, Array]
 ) -> list[Output]:
-    """Every sample of a log through the tick: times [s] and columns by signal, in SI."""
+    """Put every sample of a log through the tick; return one output a sample.
+
+    time [s], columns by signal in SI, shape (n,) each
+    """
     state = initial(config, register_map)
     running, outputs = False, []
     for measurement, remote in _samples(time, columns):
@@ -45,7 +49,7 @@ def replay(
 
 
 def _samples(times: Array, columns: Mapping[str, Array]) -> Iterator[tuple[Measurement, bool]]:
-    """What the PLC would have sent, and whether remote was on."""
+    """Measurements that the PLC would have sent, and whether remote was on."""
     step_size = float(np.median(np.diff(times)))
     resting = max(4, round(REST / step_size))
     integral, before, last = 0.0, 0.0, 0.0

@@ -1,9 +1,7 @@
-"""A recording or a log once more through the tick (pure).
+"""Replay of a recording through the tick (pure).
 
-A recording holds every observation of its run, so that `cycle.step` must give every output again,
-bit for bit; anything else is a defect of ours, or other parameters. A log of the bench holds no
-commands: there the measurements are fed as a PLC would have sent them, from a stand before the
-start, and what the gateway would have asked for is compared with what the log's reference was.
+A recording has every observation of its run, so that `cycle.step` must give every output again, bit
+for bit. A difference comes from other parameters, or from a mistake in this software.
 """
 
 import struct
@@ -36,7 +34,7 @@ REASONS: Final = {int(reason): reason for reason in Reason}
 
 @dataclass(frozen=True, kw_only=True)
 class Difference:
-    """Where a replay leaves its recording; `time` as recorded [s]."""
+    """First difference of one tick between recording and replay; time : as recorded [s]."""
 
     tick: int
     time: float
@@ -46,7 +44,7 @@ class Difference:
 
 
 def observations(rows: Iterable[Row], register_map: RegisterMap) -> Iterator[Observation]:
-    """What each tick of the recording saw."""
+    """Observation of each tick of a recording."""
     for row in rows:
         yield Observation(
             now=row["now"],
@@ -68,7 +66,7 @@ def _measurement(row: Row, register_map: RegisterMap) -> Measurement | None:
 def outputs(
     config: Config, register_map: RegisterMap, seen: Iterable[Observation]
 ) -> Iterator[Output]:
-    """What the tick decides at each observation."""
+    """Output of the tick for each observation."""
     state = initial(config, register_map)
     for observation in seen:
         state, output = step(config, register_map, state, observation)
@@ -78,7 +76,7 @@ def outputs(
 def differences(
     rows: Iterable[Row], replayed: Iterable[Output], register_map: RegisterMap
 ) -> Iterator[Difference]:
-    """Where outputs are not the recorded ones, bit by bit; the first of each tick."""
+    """Differences of outputs from the recorded ones, bit by bit; the first of each tick."""
     for row, output in zip(rows, replayed, strict=True):
         for what, before, after in _pairs(row, output, register_map):
             if _bits(before) != _bits(after):
@@ -93,7 +91,7 @@ def differences(
 
 
 def _pairs(row: Row, output: Output, register_map: RegisterMap) -> Iterator[tuple[str, Any, Any]]:
-    """What is compared: name, recorded, replayed."""
+    """Compared values of one tick: name, recorded, replayed."""
     yield "state", State(row["state"]).name, output.state.name
     yield "reason", row["reason"], NOTHING if output.reason is None else int(output.reason)
     yield "demand", row["demand"], number(output.demand)

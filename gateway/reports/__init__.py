@@ -1,1 +1,1 @@
-"""Tables and pictures of a replay and of a loss measurement."""
+"""Reports for the operator: lines, tables and pictures of a replay and of the losses."""

@@ -21,7 +21,7 @@ WARMED: Final = 3.0
 
 
 def toml(losses: Losses) -> str:
-    """The friction map as a file that `[regulator] friction` takes."""
+    """Friction map as a TOML file that `[regulator] friction` takes."""
     law, shell = losses.friction, losses.shell
     coulomb, viscous, exponent = losses.fit.standard_errors
     names = [one.file for one in losses.sources]
@@ -58,7 +58,7 @@ def _rounded(value: float) -> float:
 
 
 def write_csv(path: Path, losses: Losses) -> None:
-    """Write the stretches as a table, one a line."""
+    """Write the steady stretches as CSV, one a line."""
     with path.open("w", encoding="utf-8", newline="") as file:
         columns = [field.name for field in fields(Row)]
         writer = csv.DictWriter(file, columns, lineterminator="\n")
@@ -67,7 +67,7 @@ def write_csv(path: Path, losses: Losses) -> None:
 
 
 def summary(losses: Losses) -> str:
-    """What is worth knowing, for the operator."""
+    """Lines for the operator: steady stretches, friction law, standard errors."""
     return "\n".join([*_table(losses), *_law(losses)])
 
 
@@ -92,11 +92,11 @@ def _law(losses: Losses) -> list[str]:
     slowest, fastest = to_kmh * losses.fit.slowest, to_kmh * losses.fit.fastest
     held = " (held at 0)" if losses.fit.held_at_zero else ""
     known = f"friction known to {losses.worst_percent:.2g} % (standard error) "
-    warm = "shell temperature not known: the map holds while the gear is as warm as it was"
+    warm = "shell temperature unknown: the map holds while the gear is as warm as in the run"
     if shell is not None:
         warm = f"shell {shell[0]:.1f} .. {shell[1]:.1f} degC: the map holds at that temperature"
         if shell[1] - shell[0] > WARMED:
-            warm += "; it changed while the losses were measured, and they with it: warm up first"
+            warm += "; it changed during the measurement, and the losses with it: warm up first"
     return [
         f"coulomb   {law.coulomb:9.3f} +- {coulomb:.3g} N m{held}",
         f"viscous   {law.viscous:9.3f} +- {viscous:.3g} N m (s/rad)^exponent",
@@ -107,7 +107,7 @@ def _law(losses: Losses) -> list[str]:
 
 
 def draw(path: Path, losses: Losses) -> None:
-    """Draw friction over speed, and the distances to the law."""
+    """Draw friction over speed, and the residuals."""
     from matplotlib.figure import Figure
 
     to_kmh = 3.6 * losses.bench.drum_radius

@@ -1,1 +1,1 @@
-"""The review before a start: limits, bounds, loop stability, register map."""
+"""Review of a configuration before a start: limits, bounds, loop stability, register map."""

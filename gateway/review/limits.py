@@ -1,4 +1,4 @@
-"""What is to be said of times, speeds and torques: whether a run fits into what is allowed."""
+"""Findings on times, speeds and torques: does a run fit into the limits?"""
 
 from collections.abc import Iterator
 
@@ -12,13 +12,13 @@ from register_maps.timing import SCAN
 from register_maps.units import RPM
 
 RESPONSE = 0.1
-"""[s] in which a dynamometer has to settle within 10 % (40 CFR 1066.245)."""
+"""[s] Time within which a dynamometer must settle to 10 % (40 CFR 1066.245)."""
 DRIVE_LAG = 1.0 / DRIVE
-"""[s] of the speed-controlled motor behind its reference."""
+"""[s] Lag of the speed-controlled motor behind its reference."""
 
 
 def timing(config: Config) -> Iterator[Finding]:
-    """Whether polls, time-outs and watchdog fit into each other."""
+    """Findings on polls, time-outs and watchdog: do they fit each other?"""
     period, stale = config.loop.period, config.loop.stale
     timeout, watchdog = config.plc.timeout, config.limits.watchdog
     pairs = (
@@ -49,7 +49,7 @@ def timing(config: Config) -> Iterator[Finding]:
 
 
 def delay_of(config: Config) -> float:
-    """From a change of torque to the motor's answer [s]: dead time, drive, a scan, half a poll."""
+    """Delay from a torque to the motor's response [s]: dead time, drive, a scan, half a poll."""
     return config.bench.dead_time + DRIVE_LAG + SCAN + config.loop.period / 2
 
 
@@ -65,7 +65,7 @@ def _delay(config: Config) -> Finding:
 
 
 def speeds(config: Config) -> Iterator[Finding]:
-    """Whether the cycle fits into the limits of the setpoint."""
+    """Findings on the planned run: does it fit into the limits of the setpoint?"""
     truck, bench, most = config.truck, config.bench, config.limits
     to_motor = bench.gear_ratio / bench.drum_radius
     delay = bench.dead_time + DRIVE_LAG + config.loop.period
@@ -88,7 +88,7 @@ def speeds(config: Config) -> Iterator[Finding]:
 
 
 def torque(config: Config) -> Iterator[Finding]:
-    """Torque that the bench's motor must give against what its current allows.
+    """Findings on the motor: does its current allow the torque of the planned run?
 
     xi T_m = J theta_d'' + T_f - T_w' with T_w' = m r_d^2 theta_d'' + T_RL
     """

@@ -1,8 +1,8 @@
-"""What is to be said of the loop of regulator, link and bench: gain, stability, aliasing.
+"""Findings on the loop of regulator, link and bench: gain, stability, aliasing.
 
-rho = (J_g + J_d) / (m r_d^2) (thesis, eq. 4.4) is the share of the bench's own inertia in the
-emulated one: up to 1 the loop is stable for any delay, from 0.9 on it holds only if torque and
-speed are seen over exactly the same window, by the same filter, without lead.
+rho = (J_g + J_d) / (m r_d^2) (thesis, eq. 4.4) is the inertia of the bench over the emulated
+inertia. Up to 1 the loop is stable for any delay. From 0.9 on it is stable only without lead, and
+with torque and speed over exactly the same window and behind the same filter.
 """
 
 from collections.abc import Iterator
@@ -17,14 +17,17 @@ RHO_REFUSED, RHO_WARNED = 0.9, 0.5
 
 
 def rho_of(config: Config) -> float:
-    """(J_g + J_d) / (m r_d^2)                                              (thesis, eq 4.4, 4.9)"""
+    """Loop gain rho [1].
+
+    rho = (J_g + J_d) / (m r_d^2)                                      (thesis, eq 4.4, 4.9)
+    """
     bench = config.bench
     inertia = bench.gear_inertia + bench.drum_inertia
     return inertia / (config.truck.total_mass * bench.drum_radius**2)
 
 
 def loop_of(config: Config) -> Loop:
-    """The loop as stability sees it, without the lead."""
+    """Sampled loop of a configuration, without its lead."""
     compensated = config.regulator.name != "thesis"
     return Loop(
         period=config.loop.period,
@@ -37,12 +40,12 @@ def loop_of(config: Config) -> Loop:
 
 
 def lead_of(config: Config) -> float:
-    """Lead that the regulator takes [s]; the thesis's takes none."""
+    """Lead of the regulator [s]; the regulator of the thesis has none."""
     return 0.0 if config.regulator.name == "thesis" else config.regulator.lead
 
 
 def _same_window(config: Config) -> bool:
-    """Whether the torque spans exactly the window of the speed difference."""
+    """Whether the torque belongs to exactly the window of the speed difference."""
     kind = config.regulator.torque
     return kind == "integrated" or (kind == "averaged" and config.loop.period <= SCAN)
 
@@ -52,7 +55,7 @@ def _filters_match(config: Config) -> bool:
 
 
 def gain(config: Config) -> Iterator[Finding]:
-    """rho, and whether what a high one takes is there."""
+    """Findings on rho, and on the conditions for a high rho."""
     rho = rho_of(config)
     safe = _same_window(config) and _filters_match(config) and lead_of(config) == 0.0
     severity = "info"
@@ -77,7 +80,10 @@ def gain(config: Config) -> Iterator[Finding]:
 
 
 def stability(config: Config) -> Iterator[Finding]:
-    """The sampled loop, computed; with lead its model is too strict, so that only warns."""
+    """Findings on the stability of the sampled loop.
+
+    With lead the model is too strict, so that it only warns.
+    """
     loop, rho, mass = loop_of(config), rho_of(config), config.truck.total_mass
     least = smallest_mass(loop, rho * mass)
     yield Finding(
@@ -99,7 +105,7 @@ def stability(config: Config) -> Iterator[Finding]:
 
 
 def aliasing(config: Config) -> Iterator[Finding]:
-    """Whether the torque misses what the steps of the setpoint do."""
+    """Findings on a torque that misses the response to the steps of the setpoint."""
     if _same_window(config):
         return
     phase = config.bench.dead_time % config.loop.period

@@ -1,4 +1,4 @@
-"""Whether the register map carries what the regulator reads, and every command that may come."""
+"""Findings on the register map: does it have what the regulator reads, and hold every command?"""
 
 from collections.abc import Iterator
 
@@ -11,11 +11,11 @@ from register_maps.register_map import RegisterMap
 from register_maps.signals import Control, Mode
 
 UNENDING = 2**31
-"""Commands that a counter which does not wrap has to hold: 248 days at 100 Hz."""
+"""Count of commands that a counter without wrap must hold: 248 days at 100 Hz."""
 
 
 def measurements(config: Config, register_map: RegisterMap) -> Iterator[Finding]:
-    """Whether the torque and the temperature that are configured can be read."""
+    """Findings on the torque and the temperature that the configuration needs."""
     needed = NEEDS[config.regulator.torque]
     if register_map.register(needed) is None:
         yield Finding(
@@ -33,7 +33,7 @@ def measurements(config: Config, register_map: RegisterMap) -> Iterator[Finding]
         yield Finding(
             severity="warning",
             where="regulator.friction",
-            what="friction depends on the shell's temperature, which the register map has not",
+            what="friction depends on the shell temperature, which the register map does not have",
             value=config.regulator.friction.temperature_coefficient,
             allowed="0 without a shell temperature",
         )
@@ -44,9 +44,9 @@ def _has(register_map: RegisterMap, signal: str) -> bool:
 
 
 def commands(config: Config, register_map: RegisterMap) -> Iterator[Finding]:
-    """Whether every command that the limits let pass fits into its register.
+    """Findings on commands that the limits allow and that do not fit into their registers.
 
-    What does not fit is refused when it is written, which is in the middle of a run.
+    Such a command would be refused when it is written, in the middle of a run.
     """
     for signal, why, values in _needs(config, register_map):
         register = register_map.register(signal)
@@ -69,7 +69,7 @@ def commands(config: Config, register_map: RegisterMap) -> Iterator[Finding]:
 def _needs(
     config: Config, register_map: RegisterMap
 ) -> Iterator[tuple[str, str, tuple[Value, ...]]]:
-    """Signal, what asks for it, and the ends of what is asked for [SI]."""
+    """Signal, origin and extreme values in SI of every command that may come."""
     most = config.limits
     last = int(register_map.modulus("command_sequence") or UNENDING) - 1
     yield "speed_setpoint", "limits.speed_max_rpm", (0.0, most.speed_max)

@@ -1,15 +1,15 @@
-"""Whether the sampled loop of regulator, link, drive and drum is stable, and from which mass on.
+"""Stability of the sampled loop of regulator, link, drive and drum, and the smallest stable mass.
 
-With exact parameters the regulator cancels the bench's inertia and friction; what is left of the
-loop is rho G (D - F): the drive G with its dead time, the path D of the drum's speed against the
-path F of the torque. D = F cancels for every mass and delay. They differ when the torque is read at
-an instant while the speed difference spans a window, when their filters differ, or by lead.
+With exact parameters the regulator cancels the bench's inertia and friction. The loop that remains
+is rho G (D - F): the drive G with its dead time, the path D of the drum's speed, the path F of the
+torque. D = F cancels for every mass and delay. D and F differ when the torque is a momentary value
+while the speed difference spans a window, when their filters differ, and by the lead.
 
-The loop is linear and has the period of the poll, so its stability is told by the eigenvalues of
-the map from one poll to the next (Floquet). The map is built by sending each unit state through one
+The loop is linear and has the period of the poll. Its stability follows from the eigenvalues of the
+map from one poll to the next (Floquet). The map is built by sending each unit state through one
 period in steps of 1 ms: speed of the drum in contact, reference in its dead time, filters, and the
-regulator at the end. One eigenvalue is always 1: with constant road load the truck's speed is
-neutral, driver and road close that loop.
+regulator at the end. One eigenvalue is always 1, because driver and road close the loop of the
+truck's speed.
 """
 
 from dataclasses import dataclass
@@ -24,17 +24,17 @@ DRIVE = 105.0
 """[rad/s] Bandwidth of the speed loop. It is 133 below base speed and 70 at 14 km/h. With this
 value and without lead, the smallest stable masses are those of the tests within about 10 %."""
 CONTACT = 385.0
-"""[1/s] damping of the backlash shaft in contact over the drum's inertia (thesis, Table 3.1)."""
+"""[1/s] Damping of the backlash shaft in contact over the drum's inertia (thesis, Table 3.1)."""
 MARGIN = 1e-7
-"""By which an eigenvalue may exceed 1 for the rounding of its computation."""
+"""Excess of an eigenvalue over 1 that counts as rounding."""
 LIGHTEST, HEAVIEST = 60.0, 20000.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Loop:
-    """What decides on stability. Times [s].
+    """Properties of the loop that decide on its stability. Times [s].
 
-    averaged : torque is the mean over the window of the speed difference, else that at its end
+    averaged : the torque is the mean over the window of the speed difference, otherwise at its end
     torque_filter, speed_filter : time constants of first-order filters, 0: none
     inertia_error : of the drum's inertia as the regulator knows it, relative
     trim : gain on virtual minus drum speed
@@ -51,32 +51,32 @@ class Loop:
 
 
 def spectral_radius(loop: Loop, rho: float) -> float:
-    """Largest modulus of the eigenvalues of the loop from poll to poll; over 1: it grows."""
+    """Largest modulus of the eigenvalues from poll to poll; above 1 the loop is unstable."""
     size = _size(loop)
-    period_map = np.column_stack([_period(loop, rho, unit) for unit in np.eye(size)])
+    period_map = np.column_stack([_one_period(loop, rho, unit) for unit in np.eye(size)])
     return float(np.abs(np.linalg.eigvals(period_map)).max())
 
 
 def is_stable(loop: Loop, rho: float) -> bool:
-    """Whether nothing grows."""
+    """Whether the loop is stable."""
     return spectral_radius(loop, rho) <= 1.0 + MARGIN
 
 
 def smallest_mass(loop: Loop, inertia: float) -> float:
-    """Mass from which on every heavier truck is stable [kg]; 0: also the lightest tried, 60 kg.
+    """Mass above which every truck is stable [kg]; 0: the lightest tried, 60 kg, is stable, too.
 
-    inertia : J_d / r_d^2, mass at which rho is 1 [kg]
+    inertia : J_d / r_d^2, the mass at which rho is 1 [kg]
     """
     masses = np.geomspace(HEAVIEST, LIGHTEST, 60)
     stable = HEAVIEST
     for mass in masses:
         if not is_stable(loop, inertia / mass):
-            return _bisected(loop, inertia, float(mass), stable)
+            return _bisect(loop, inertia, float(mass), stable)
         stable = float(mass)
     return 0.0
 
 
-def _bisected(loop: Loop, inertia: float, unstable: float, stable: float) -> float:
+def _bisect(loop: Loop, inertia: float, unstable: float, stable: float) -> float:
     while stable - unstable > 1.0:
         middle = 0.5 * (stable + unstable)
         if is_stable(loop, inertia / middle):
@@ -87,15 +87,15 @@ def _bisected(loop: Loop, inertia: float, unstable: float, stable: float) -> flo
 
 
 def _size(loop: Loop) -> int:
-    """Gear, drum, filters, sampled speed, virtual speed, reference, and those in the dead time."""
+    """Size of the state: seven values and the references in the dead time."""
     return 7 + round(loop.dead_time / STEP)
 
 
-def _period(loop: Loop, rho: float, state: Array) -> Array:
-    """State one poll later. The torque is counted in units of the drum's inertia: T = -w'.
+def _one_period(loop: Loop, rho: float, state: Array) -> Array:
+    """State one poll later. The torque is in units of the drum's inertia: T = -w'.
 
-    g, w : gear and drum; tau, y : filtered torque and speed; before : y at the last poll
-    v : speed of the truck
+    g, w : speed of gear and drum; tau, y : filtered torque and speed; before : y at the last poll
+    v : speed of the truck; reference : the newest one; the rest of the state is in the dead time
     """
     g, w, tau, y, before, v, reference = (float(value) for value in state[:7])
     delayed = list(state[7:])
@@ -124,5 +124,5 @@ def _period(loop: Loop, rho: float, state: Array) -> Array:
 
 
 def _share(time_constant: float) -> float:
-    """Share of the step response of a first-order filter that one step brings."""
+    """Share of the step response of a first-order filter after one step; 1 without a filter."""
     return 1.0 - exp(-STEP / time_constant) if time_constant > 0.0 else 1.0

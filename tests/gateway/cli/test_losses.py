@@ -48,7 +48,7 @@ def test_map_of_a_log_is_a_friction_file_that_tells_its_origin(tmp_path):
 
 def test_a_log_without_shell_temperature_says_so(tmp_path):
     result = losses(PROGRAM_2, "--save", tmp_path / "map.toml")
-    assert "shell temperature not known" in result.output
+    assert "shell temperature unknown" in result.output
     origin = tomllib.loads((tmp_path / "map.toml").read_text())["measured"]
     assert origin["shell_temperature_degC"] == []
 

@@ -100,7 +100,7 @@ def silent() -> Iterator[int]:
 
 
 def test_a_device_of_which_no_register_answers_is_a_failure(silent: int) -> None:
-    with pytest.raises(PlcError, match=f"127.0.0.1:{silent}, unit 7: not one register") as failed:
+    with pytest.raises(PlcError, match=f"127.0.0.1:{silent}, unit 7: no register") as failed:
         CliRunner().invoke(
             registers,
             ["read", "bench_int16", "--port", str(silent), "--unit", "7", "--timeout", "0.005"],
