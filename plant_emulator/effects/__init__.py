@@ -117,7 +117,7 @@ def complete(values: Mapping[str, Mapping[str, float]]) -> dict[str, dict[str, f
     values : by effect and parameter [SI]
     Raises ParameterError for an unknown effect or parameter, and for a value outside of its bounds.
     """
-    return {name: load(name).complete(own) for name, own in values.items()}
+    return {name: load(name).complete(table) for name, table in values.items()}
 
 
 def _parse_one(text: str) -> tuple[str, dict[str, float]]:

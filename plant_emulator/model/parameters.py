@@ -181,8 +181,8 @@ def parameter_set(name: str, table: Mapping[str, Any]) -> ParameterSet:
     origin = table.get(ORIGIN)
     if origin is not None and not isinstance(origin, Mapping):
         raise ParameterError(f"{name}: {ORIGIN}: a table that says where the values come from")
-    own = _effects(name, table.get(EFFECTS, {}))
-    return ParameterSet(name, given, origin, own).with_values({})
+    effects = _effects(name, table.get(EFFECTS, {}))
+    return ParameterSet(name, given, origin, effects).with_values({})
 
 
 def _effects(place: str, table: object) -> dict[str, dict[str, float]]:
@@ -190,8 +190,8 @@ def _effects(place: str, table: object) -> dict[str, dict[str, float]]:
     if not isinstance(table, Mapping) or not all(isinstance(t, Mapping) for t in table.values()):
         raise ParameterError(f"{place}: {EFFECTS}: one table an effect, [{EFFECTS}.NAME]")
     return {
-        name: {key: _number(place, f"{EFFECTS}.{name}.{key}", value) for key, value in own.items()}
-        for name, own in table.items()
+        name: {k: _number(place, f"{EFFECTS}.{name}.{k}", value) for k, value in values.items()}
+        for name, values in table.items()
     }
 
 

@@ -51,7 +51,7 @@ def text(parameters: ParameterSet) -> str:
     tables = [_table(p.name, _entries(p)) for p in parameters]
     if parameters.origin is not None:
         tables.insert(0, _table(ORIGIN, dict(parameters.origin)))
-    tables += [_table(f"{EFFECTS}.{name}", dict(own)) for name, own in parameters.effects.items()]
+    tables += [_table(f"{EFFECTS}.{name}", dict(v)) for name, v in parameters.effects.items()]
     return "\n".join(tables)
 
 

@@ -164,7 +164,7 @@ def values_of(
 ) -> dict[str, float]:
     """All values as `simulate` takes them [SI]; `effects` replace effects of the set."""
     both = {**parameters.effects, **(effects or {})}
-    flat = {f"{e}_{key}": v for e, own in both.items() for key, v in own.items()}
+    flat = {f"{e}_{key}": v for e, table in both.items() for key, v in table.items()}
     return {**parameters.values(), **flat}
 
 

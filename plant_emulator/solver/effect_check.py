@@ -28,30 +28,30 @@ class Parameters(SimpleNamespace):
     """A plain parameter record; errors show the name of this class."""
 
 
-def memory_names(known: Mapping[str, Effect]) -> list[str]:
+def memory_names(library: Mapping[str, Effect]) -> list[str]:
     """Names of all memories in the stage record, in the order of the state vector."""
-    return [f"{effect.name}_{memory}" for effect in known.values() for memory in effect.memories]
+    return [f"{effect.name}_{memory}" for effect in library.values() for memory in effect.memories]
 
 
-def check_effects(known: Mapping[str, Effect]) -> None:
+def check_effects(library: Mapping[str, Effect]) -> None:
     """Call each function of a user's own effects once, at rest, at the effect's plausible size.
 
     Raises ParameterError with file and line for a fault. The functions run uncompiled, because the
     compiler would not name the line of a misspelt name. A division by zero is not a fault here:
     compiled it gives infinity, and the simulation refuses a result that is not finite.
     """
-    for name in known.keys() - effects.names():
-        _check_one(known[name], known)
+    for name in library.keys() - effects.names():
+        _check_one(library[name], library)
 
 
-def _check_one(effect: Effect, known: Mapping[str, Effect]) -> None:
-    for function, arguments in _calls(effect, known):
+def _check_one(effect: Effect, library: Mapping[str, Effect]) -> None:
+    for function, arguments in _calls(effect, library):
         try:
             float(function(*arguments))
         except ArithmeticError:
             continue
         except Exception as error:
-            raise_in_effects(error, known)
+            raise_in_effects(error, library)
             line = function.__code__.co_firstlineno
             raise ParameterError(
                 f"{effect.file}:{line}: {function.__name__} gives no number: {error}"
@@ -59,12 +59,12 @@ def _check_one(effect: Effect, known: Mapping[str, Effect]) -> None:
 
 
 def _calls(
-    effect: Effect, known: Mapping[str, Effect]
+    effect: Effect, library: Mapping[str, Effect]
 ) -> Iterator[tuple[Callable[..., Any], tuple[Any, ...]]]:
-    own = {f"{effect.name}_{key}": value for key, value in effect.plausible().items()}
-    neutral = effects.neutral_values(known)
-    p = cast("Record", Parameters(**dict.fromkeys(UNITS, 1.0) | neutral | own))
-    s = cast("Record", Stage(**dict.fromkeys((*stage.STAGE, *memory_names(known)), 0.0)))
+    plausible = {f"{effect.name}_{key}": value for key, value in effect.plausible().items()}
+    neutral = effects.neutral_values(library)
+    p = cast("Record", Parameters(**dict.fromkeys(UNITS, 1.0) | neutral | plausible))
+    s = cast("Record", Stage(**dict.fromkeys((*stage.STAGE, *memory_names(library)), 0.0)))
     for law in effect.laws.values():
         yield law, (0.0, s, p)
     for memory in effect.memories.values():
@@ -74,8 +74,8 @@ def _calls(
         yield memory.advance, (0.0, SHORT, *value, *base, s, p)
 
 
-def raise_in_effects(error: Exception, known: Mapping[str, Effect]) -> None:
+def raise_in_effects(error: Exception, library: Mapping[str, Effect]) -> None:
     """Raise ParameterError with file and line if an error arose in the file of an effect."""
-    place = place_in((effect.file for effect in known.values()), error)
+    place = place_in((effect.file for effect in library.values()), error)
     if place is not None:
         raise ParameterError(place) from error

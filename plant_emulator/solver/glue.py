@@ -18,16 +18,19 @@ if TYPE_CHECKING:
     from plant_emulator.effects import Effect
 
 
-def glue(known: Mapping[str, Effect]) -> str:
-    """Source text of all these functions for the effects `known`, in their order."""
+def glue(library: Mapping[str, Effect]) -> str:
+    """Source text of all these functions for the effects `library`, in their order."""
     lines: list[str] = []
     for law in laws.LAWS:
-        lines += [f"def {law.__name__}(s, p):", f"    return {chain(law.__name__, known.values())}"]
-    states = [*stage.STATES, *memory_names(known)]
+        lines += [
+            f"def {law.__name__}(s, p):",
+            f"    return {chain(law.__name__, library.values())}",
+        ]
+    states = [*stage.STATES, *memory_names(library)]
     lines += ["def load(x, s):", *(f"    s.{name} = x[{k}]" for k, name in enumerate(states))]
     lines += ["def store(s, x):", *(f"    x[{k}] = s.{name}" for k, name in enumerate(states))]
     lines += ["def advance_memories(base, a, s, p):", "    pass"]
-    memories = zip(memory_names(known), advance_arguments(known), strict=True)
+    memories = zip(memory_names(library), advance_arguments(library), strict=True)
     lines += [
         f"    s.{name} = {name}__advance(base[{stage.FIRST_MEMORY + k}], a, {arguments}s, p)"
         for k, (name, arguments) in enumerate(memories)
@@ -44,15 +47,15 @@ def chain(law: str, effects: Iterable[Effect]) -> str:
     return value
 
 
-def advance_arguments(known: Mapping[str, Effect]) -> Iterator[str]:
+def advance_arguments(library: Mapping[str, Effect]) -> Iterator[str]:
     """Further arguments of the advance of each memory, as text.
 
     They are the value of the law that the memory follows, and the base of the memory beside it.
     """
-    number = {name: stage.FIRST_MEMORY + k for k, name in enumerate(memory_names(known))}
-    for k, effect in enumerate(known.values()):
+    number = {name: stage.FIRST_MEMORY + k for k, name in enumerate(memory_names(library))}
+    for k, effect in enumerate(library.values()):
         for memory in effect.memories.values():
-            before = islice(known.values(), k)
+            before = islice(library.values(), k)
             value = "" if memory.follows is None else f"{chain(memory.follows, before)}, "
             beside = f"{effect.name}_{memory.beside}"
             yield value + ("" if memory.beside is None else f"base[{number[beside]}], ")

@@ -118,26 +118,26 @@ def shipped_effects() -> dict[str, Effect]:
 
 
 # A user's own effects that this process uses beside the shipped effects.
-_own: list[Effect] = []
+_user_effects: list[Effect] = []
 
 
 def use_own_effects(*own: Effect) -> None:
     """Let the kernels of this process have these effects of a user's own, and no others of them."""
-    _own[:] = own
+    _user_effects[:] = own
 
 
 def kernel() -> Kernel:
     """The kernel with all shipped effects and the user's own effects; built once a process."""
-    return _kernel(tuple(_own))
+    return _kernel(tuple(_user_effects))
 
 
 @cache
-def _kernel(own: tuple[Effect, ...]) -> Kernel:
-    return build(_known(own))
+def _kernel(user_effects: tuple[Effect, ...]) -> Kernel:
+    return build(_library(user_effects))
 
 
-def _known(own: tuple[Effect, ...]) -> dict[str, Effect]:
-    return {**shipped_effects(), **{effect.name: effect for effect in own}}
+def _library(user_effects: tuple[Effect, ...]) -> dict[str, Effect]:
+    return {**shipped_effects(), **{effect.name: effect for effect in user_effects}}
 
 
 @cache
@@ -156,7 +156,7 @@ def partial_kernel(*, remembering: bool) -> Kernel:
 
 
 @cache
-def _neutral(own: tuple[Effect, ...]) -> dict[str, tuple[float, bool | None]]:
+def _neutral(user_effects: tuple[Effect, ...]) -> dict[str, tuple[float, bool | None]]:
     """Neutral value of each effect parameter, and whether its effect has memories, by name.
 
     The second is None for a user's own effects, which no partial kernel has.
@@ -164,7 +164,7 @@ def _neutral(own: tuple[Effect, ...]) -> dict[str, tuple[float, bool | None]]:
     remembering = {name: bool(effect.memories) for name, effect in shipped_effects().items()}
     return {
         parameter: (value, remembering.get(name))
-        for name, effect in _known(own).items()
+        for name, effect in _library(user_effects).items()
         for parameter, value in effects.neutral_values({name: effect}).items()
     }
 
@@ -177,7 +177,7 @@ def kernel_for(values: Mapping[str, float]) -> tuple[Kernel, Mapping[str, float]
     others = [name for name in values if name not in UNITS]
     if not others:
         return plain_kernel(), values
-    table = _neutral(tuple(_own))
+    table = _neutral(tuple(_user_effects))
     neutral = {name: table.get(name, (nan, None)) for name in others}
     kinds = {kind for name, (value, kind) in neutral.items() if values[name] != value}
     if None in kinds or len(kinds) > 1:
@@ -187,15 +187,15 @@ def kernel_for(values: Mapping[str, float]) -> tuple[Kernel, Mapping[str, float]
     return model, {name: value for name, value in values.items() if name in names}
 
 
-def build(known: Mapping[str, Effect]) -> Kernel:
+def build(library: Mapping[str, Effect]) -> Kernel:
     """Build the kernel with these effects, by the steps of the module's docstring.
 
     Raises ParameterError, with file and line, for a fault in a user's own effect.
     """
-    check_effects(known)
+    check_effects(library)
     files = [*(str(module.__file__) for module in SOURCES), __file__]
-    compiler.use_cache([*files, *(effect.file for effect in known.values())], list(known))
-    compiled = _glued(known)
+    compiler.use_cache([*files, *(effect.file for effect in library.values())], list(library))
+    compiled = _glued(library)
     if compiler.ENABLED:
         compiled[stepper.private_copy] = compiler.make_private_copy()
         compiled[stepper.write_back] = compiler.make_write_back()
@@ -203,33 +203,33 @@ def build(known: Mapping[str, Effect]) -> Kernel:
         for function in own_functions(module):
             bind(function, compiled)
     return Kernel(
-        effects=known,
-        parameters=(*UNITS, *effects.neutral_values(known)),
-        stage=(*stage.STAGE, *memory_names(known)),
-        run=pass_arrays(compiled[stepper.run], known),
-        advance=pass_arrays(compiled[stepper.advance], known),
-        starts=tuple(m.start for e in known.values() for m in e.memories.values()),
+        effects=library,
+        parameters=(*UNITS, *effects.neutral_values(library)),
+        stage=(*stage.STAGE, *memory_names(library)),
+        run=pass_arrays(compiled[stepper.run], library),
+        advance=pass_arrays(compiled[stepper.advance], library),
+        starts=tuple(m.start for e in library.values() for m in e.memories.values()),
     )
 
 
-def _glued(known: Mapping[str, Effect]) -> dict[Function, Function]:
+def _glued(library: Mapping[str, Effect]) -> dict[Function, Function]:
     """The compiled functions of the glue, by the functions of the model that they replace."""
     names: dict[str, Function] = {}
     for law in laws.LAWS:
         names[f"nominal_{law.__name__}"] = compiler.compile_function(law)
-    for effect in known.values():
+    for effect in library.values():
         helpers: dict[Function, Function] = {}
         for key, function in effect.laws.items():
             names[f"{effect.name}__{key}"] = bind(function, helpers)
         for key, memory in effect.memories.items():
             names[f"{effect.name}_{key}__advance"] = bind(memory.advance, helpers)
-    exec(compile(glue.glue(known), "<glue>", "exec"), names)  # our own text, made from names
+    exec(compile(glue.glue(library), "<glue>", "exec"), names)  # our own text, made from names
     copies = (implicit_stage.load, implicit_stage.store, implicit_stage.advance_memories)
     replaced: tuple[Function, ...] = (*laws.LAWS, *copies)
     return {f: compiler.compile_function(names[f.__name__]) for f in replaced}
 
 
-def pass_arrays(function: Function, known: Mapping[str, Effect]) -> Function:
+def pass_arrays(function: Function, library: Mapping[str, Effect]) -> Function:
     """Wrap a compiled function so that it takes records; it gets the arrays that hold them.
 
     Passing the arrays is ten times faster. If an effect is at fault, the error names file and line,
@@ -244,7 +244,7 @@ def pass_arrays(function: Function, known: Mapping[str, Effect]) -> Function:
         try:
             return function(*others, stage, p, out)
         except Exception as error:
-            raise_in_effects(error, known)
+            raise_in_effects(error, library)
             raise
 
     return call
