@@ -1,7 +1,7 @@
-"""Register maps: where in a PLC each signal lives. One TOML file a PLC, found by its file name.
+"""Register maps: which register of a PLC holds which signal. One TOML file describes one PLC.
 
-`load` reads one; `signals` is the language, `codec` turns words into values and back. The keys of
-a map file are told in `parse.py`.
+`load` reads a map. `signals` has the signals, and `codec` turns words into values and back.
+`parse.py` describes the keys of a map file.
 """
 
 import hashlib
@@ -24,7 +24,7 @@ def names() -> tuple[str, ...]:
 
 
 def load(name_or_path: str | Path) -> RegisterMap:
-    """The shipped map of that name, or the map in that file; raises `MapError`."""
+    """Shipped map of this name, or the map in the file of this path. Raises MapError."""
     if not str(name_or_path).strip():
         raise _unreadable("''", 1, "an empty name", _expected())
     shipped = _HERE / f"{name_or_path}.toml"
@@ -44,7 +44,7 @@ def load(name_or_path: str | Path) -> RegisterMap:
 def _content(path: Path) -> bytes:
     try:
         return path.read_bytes()
-    except (OSError, ValueError) as error:  # a ValueError for what cannot be a name at all
+    except (OSError, ValueError) as error:  # a ValueError for a text that cannot be a name
         why = getattr(error, "strerror", None) or str(error)
         raise _unreadable(path, 1, why, _expected()) from None
 

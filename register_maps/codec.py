@@ -1,13 +1,14 @@
-"""Words to SI values and back. Out of range raises; nothing saturates, wraps or is truncated.
+"""Words to SI values and back. A value out of range raises; nothing saturates or is truncated.
 
-A block is decoded in one go: its words become bytes, one prepared permutation puts the bytes into
-the order ABCD, one prepared `struct` takes them apart, and each raw value is checked and converted
-(`conversion.py`). The preparation is made once for a map, because this runs at every tick.
+A block is decoded at once. Its words become bytes, a prepared permutation puts the bytes into the
+order ABCD, a prepared `struct` separates the raw values, and each raw value is checked and
+converted (`conversion.py`). The preparation is made once for a map, because decoding runs at every
+tick.
 
-The map's `range` binds the gateway in both directions: a measurement outside it is refused, and so
-is a setpoint. It does not bind the PLC's side (`encode_measurement`, `decode_setpoint`), which has
-limits of its own and may have to show what a wrong value does; there only the raw type binds.
-A counter marked `wraps` may be given unwrapped: it starts again at the end of its type.
+The `range` of the map binds the gateway in both directions: it refuses measurements and setpoints
+outside. On the PLC's side (`encode_measurement`, `decode_setpoint`) only the raw type binds,
+because the PLC has limits of its own, and an emulated PLC must be able to send a wrong value. A
+counter marked `wraps` may be given unwrapped; it starts again at the end of its type.
 """
 
 import math
@@ -49,7 +50,7 @@ __all__ = [
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class _Plan:
-    """A block, prepared. `order` moves its bytes to ABCD and back; each is its own inverse."""
+    """A prepared block. `order` moves its bytes to ABCD and back: it is its own inverse."""
 
     name: str
     count: int
@@ -60,7 +61,7 @@ class _Plan:
 
 
 def _layout(registers: Sequence[Register], block: Block) -> tuple[str, tuple[int, ...] | None]:
-    """Format of `struct` over the block, and the order of its bytes (None: as they come)."""
+    """Format of `struct` for the block, and the order of its bytes (None: unchanged)."""
     code, order, at = ">", list(range(2 * block.count)), block.start
     for register in registers:
         first, size = 2 * (register.address - block.start), 2 * register.raw.words
@@ -104,11 +105,11 @@ def _register_plan(register: Register) -> _Plan:
     return _plan(register.name, [register], block, bounded=True)
 
 
-def _moved(plan: _Plan, data: bytes) -> bytes:
+def _reorder(plan: _Plan, data: bytes) -> bytes:
     return data if plan.order is None else bytes([data[place] for place in plan.order])
 
 
-def _raws(plan: _Plan, words: Sequence[int]) -> tuple[Any, ...]:
+def _unpack(plan: _Plan, words: Sequence[int]) -> tuple[Any, ...]:
     try:
         data = plan.words.pack(*words)
     except struct.error as error:
@@ -119,58 +120,61 @@ def _raws(plan: _Plan, words: Sequence[int]) -> tuple[Any, ...]:
             allowed=f"{plan.count} words of 0 .. 65535",
             kind="words",
         ) from error
-    return plan.values.unpack(_moved(plan, data))
+    return plan.values.unpack(_reorder(plan, data))
 
 
-def _words(plan: _Plan, raws: Sequence[float]) -> tuple[int, ...]:
-    return plan.words.unpack(_moved(plan, plan.values.pack(*raws)))
+def _pack(plan: _Plan, raws: Sequence[float]) -> tuple[int, ...]:
+    return plan.words.unpack(_reorder(plan, plan.values.pack(*raws)))
 
 
-def _decoded(plan: _Plan, words: Sequence[int]) -> dict[str, Any]:
+def _decode(plan: _Plan, words: Sequence[int]) -> dict[str, Any]:
     values = {
         this.signal: value_of(this, raw)
-        for this, raw in zip(plan.conversions, _raws(plan, words), strict=True)
+        for this, raw in zip(plan.conversions, _unpack(plan, words), strict=True)
     }
     values.pop(RESERVED, None)
     return values
 
 
-def _encoded(plan: _Plan, values: Mapping[str, Value]) -> tuple[int, ...]:
-    return _words(plan, [raw_of(this, values.get(this.signal)) for this in plan.conversions])
+def _encode(plan: _Plan, values: Mapping[str, Value]) -> tuple[int, ...]:
+    return _pack(plan, [raw_of(this, values.get(this.signal)) for this in plan.conversions])
 
 
 def decode_value(register: Register, words: Sequence[int]) -> Value:
-    """SI value of one register (number, flags or state); None: the PLC has it not."""
+    """SI value of one register (number, flags or state); None: not available. Raises CodecError."""
     plan = _register_plan(register)
-    return value_of(plan.conversions[0], _raws(plan, words)[0])
+    return value_of(plan.conversions[0], _unpack(plan, words)[0])
 
 
 def encode_value(register: Register, value: Value) -> tuple[int, ...]:
-    """Words of one register for an SI value; None: not available."""
+    """Words of one register for an SI value; None: not available. Raises CodecError."""
     plan = _register_plan(register)
-    return _words(plan, (raw_of(plan.conversions[0], value),))
+    return _pack(plan, (raw_of(plan.conversions[0], value),))
 
 
 def decode_measurement(register_map: RegisterMap, words: Sequence[int]) -> Measurement:
-    """What the words of the measurement block say."""
-    return Measurement(**_decoded(_measurement_plan(register_map, bounded=True), words))
+    """Measurement in the words of the measurement block. Raises CodecError."""
+    return Measurement(**_decode(_measurement_plan(register_map, bounded=True), words))
 
 
 def encode_measurement(register_map: RegisterMap, measurement: Measurement) -> tuple[int, ...]:
-    """Words of the measurement block, as the PLC shows them; constants are those of the map."""
+    """Words of the measurement block on the PLC's side; constants are those of the map."""
     values = {RESERVED: 0, **vars(measurement)}
-    return _encoded(_measurement_plan(register_map, bounded=False), values)
+    return _encode(_measurement_plan(register_map, bounded=False), values)
 
 
 def encode_setpoint(register_map: RegisterMap, setpoint: Setpoint) -> tuple[int, ...]:
-    """Words of the command block; map version and checksum are filled in where they are None."""
+    """Words of the command block; a map version or checksum of None is filled in.
+
+    Raises CodecError.
+    """
     values = {RESERVED: 0, **vars(setpoint)}
     if setpoint.map_version is None:
         values["map_version"] = register_map.version
     if setpoint.command_crc is None:
         values["command_crc"] = 0
-    words = _encoded(_command_plan(register_map, bounded=True), values)
-    checked = _checksummed(register_map)
+    words = _encode(_command_plan(register_map, bounded=True), values)
+    checked = _checksum_register(register_map)
     if checked is None or setpoint.command_crc is not None:
         return words
     first, after = _place(checked, register_map.command)
@@ -178,9 +182,12 @@ def encode_setpoint(register_map: RegisterMap, setpoint: Setpoint) -> tuple[int,
 
 
 def decode_setpoint(register_map: RegisterMap, words: Sequence[int]) -> Setpoint:
-    """What the words of the command block ask of the PLC; a checksum of 0 is not compared."""
-    setpoint = Setpoint(**_decoded(_command_plan(register_map, bounded=False), words))
-    checked = _checksummed(register_map)
+    """Setpoint in the words of the command block; a checksum of 0 is not compared.
+
+    Raises CodecError.
+    """
+    setpoint = Setpoint(**_decode(_command_plan(register_map, bounded=False), words))
+    checked = _checksum_register(register_map)
     if checked is not None and setpoint.command_crc:
         first, after = _place(checked, register_map.command)
         expected = command_crc(words[:first])
@@ -195,29 +202,29 @@ def decode_setpoint(register_map: RegisterMap, words: Sequence[int]) -> Setpoint
     return setpoint
 
 
-def _checksummed(register_map: RegisterMap) -> Register | None:
+def _checksum_register(register_map: RegisterMap) -> Register | None:
     register = register_map.register("command_crc")
     return register if register is not None and register.crc is not None else None
 
 
 def _place(register: Register, block: Block) -> tuple[int, int]:
-    """Its first word in the block, and the first after it."""
+    """Index of the register's first word in the block, and of the first word after it."""
     return register.address - block.start, register.end - block.start
 
 
 def command_crc(words: Sequence[int]) -> int:
-    """CRC-32 (that of zlib) over the words, high byte first."""
+    """CRC-32 of zlib over the words, high byte first."""
     return zlib.crc32(struct.pack(f">{len(words)}H", *words))
 
 
 def scaled(register: Register, value: float) -> float:
-    """An SI value in the register's unit, as the operator reads it."""
+    """An SI value in the unit of the register, for the operator."""
     return register.si_unit.from_si(value)
 
 
 def difference(now: float, before: float, modulus: float | None) -> float:
-    """`now - before` of a counter that may have wrapped, the shorter way round.
+    """Difference `now - before` of a counter that may have wrapped at `modulus` (None: never).
 
-    Right as long as less than half a modulus lies between the two readings.
+    It is right while less than half a modulus lies between the two readings.
     """
     return now - before if modulus is None else math.remainder(now - before, modulus)

@@ -1,9 +1,9 @@
-"""One raw value to its SI value and back, with every refusal that is possible on the way.
+"""Conversion of one raw value to its SI value and back, with every possible refusal.
 
 Raw values are compared with raw limits, so that a range holds exactly, without rounding.
 
-A float that is not finite or is subnormal is refused. Towards the wire, a value smaller than the
-smallest normal float becomes the nearest value that may be sent, zero, as any other is rounded.
+A received float that is not finite or is subnormal is refused. A value to send that is smaller than
+the smallest normal float becomes zero, which is the nearest value that may be sent.
 """
 
 import math
@@ -30,7 +30,7 @@ BYTE_ORDER = {
 
 
 class CodecError(ValueError):
-    """A value that may not pass: which register, raw words, scaled value, what is allowed."""
+    """A value that is refused: its register, raw words, scaled value, and the allowed values."""
 
     exit_code = 1
 
@@ -46,10 +46,11 @@ class CodecError(ValueError):
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Conversion:
-    """What to do with one register: SI value = raw gain + shift, for low <= raw <= high.
+    """Prepared conversion of one register: SI value = raw gain + shift, for low <= raw <= high.
 
-    make : flags or states that the raw integer becomes
+    make : type of flags or state that the raw integer becomes
     exact : the raw integer is the value
+    needed : the gateway cannot work without the signal
     """
 
     register: Register
@@ -66,7 +67,7 @@ class Conversion:
 
 
 def conversion(register: Register, *, bounded: bool) -> Conversion:
-    """Prepare a register; `bounded`: by the map's range, otherwise by the raw type only."""
+    """Prepare a register; bounded : by the range of the map, otherwise only by the raw type."""
     signal = SIGNALS.get(register.signal)
     bounded = bounded or register.constant is not None
     unit, marker = register.si_unit, register.not_available
@@ -99,44 +100,44 @@ def raw_limits(register: Register) -> tuple[float, float]:
 
 
 def as_signed(register: Register, pattern: int) -> int:
-    """Raw value that has this bit pattern in the register's integer type."""
+    """Raw value with this bit pattern in the integer type of the register."""
     negative = register.raw.low < 0 and pattern > register.raw.high
     return pattern - (1 << (16 * register.raw.words)) if negative else pattern
 
 
 def nearest_float32(value: float) -> float:
-    """Float32 nearest to the value, which may not be larger than the largest one."""
+    """Float32 nearest to a value, which must not exceed the largest float32."""
     rounded: float = struct.unpack(">f", struct.pack(">f", value))[0]
     return rounded
 
 
 def raw_words(register: Register, raw: float) -> tuple[int, ...]:
-    """Words of a raw value, in the register's order."""
+    """Words of a raw value in the word order of the register."""
     data, order = struct.pack(f">{register.raw.code}", raw), BYTE_ORDER[register.word_order]
     moved = bytes(data[order[place] % len(data)] for place in range(len(data)))
     return struct.unpack(f">{register.raw.words}H", moved)
 
 
 def value_of(this: Conversion, raw: float) -> Value:
-    """SI value of a raw one; None: the PLC says that it is not available."""
+    """SI value of a raw value; None: not available. Raises CodecError."""
     if not this.low <= raw <= this.high:
         if raw == this.not_available and not this.needed:
             return None
-        raise _refused(this, raw)
+        raise _refusal(this, raw)
     if this.make is not None:
         try:
             return this.make(raw)
         except ValueError:
-            raise _refused(this, raw, "not a state") from None
+            raise _refusal(this, raw, "not a state") from None
     if this.exact:
         return raw
     if this.floating and -SMALLEST_NORMAL < raw < SMALLEST_NORMAL and raw != 0.0:
-        raise _refused(this, raw, "not finite")
+        raise _refusal(this, raw, "not finite")
     return raw * this.gain + this.shift
 
 
 def raw_of(this: Conversion, value: Value) -> float:
-    """Raw value of an SI one: the nearest, a tie to the even one."""
+    """Raw value nearest to an SI value, a tie to the even one. Raises CodecError."""
     if this.register.constant is not None:
         return this.low
     if value is None:
@@ -169,8 +170,8 @@ def _float_raw(wanted: float) -> float:
     return 0.0 if abs(raw) < SMALLEST_NORMAL else raw
 
 
-def _refused(this: Conversion, raw: float, kind: Refusal = "range") -> CodecError:
-    """The error for a raw value that came over the wire."""
+def _refusal(this: Conversion, raw: float, kind: Refusal = "range") -> CodecError:
+    """Error for a raw value that was received."""
     register = this.register
     if not math.isfinite(raw):
         kind = "not finite"
@@ -188,7 +189,7 @@ def _refused(this: Conversion, raw: float, kind: Refusal = "range") -> CodecErro
 
 
 def _unsendable(this: Conversion, value: Value, kind: Refusal) -> CodecError:
-    """The error for an SI value that came from our side."""
+    """Error for an SI value that was to be sent."""
     register, shown = this.register, f"{value}"
     if value is not None and not this.exact:
         shown = f"{register.si_unit.from_si(value):.10g} {register.unit}"

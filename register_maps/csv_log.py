@@ -1,8 +1,9 @@
-"""A CSV log as bytes, read strictly: daemon and physics read every log through this one reader.
+"""Strict reader of a CSV log in bytes, which both programs use.
 
-UTF-8 (a byte order mark may stand before it), comma, one header line, plain or gzip-compressed by
-content; a cell may stand in quotes. The unit stands in the column's name, what comes out is SI.
-What a log has to hold is told in `log_table`. No file is opened here.
+The text is UTF-8, with or without a byte order mark, with commas and one header line. It may be
+gzip-compressed, which the content tells, and a cell may be in quotes. The name of a column contains
+its unit; the values of the result are SI. `log_table` says what a log must hold. No file is opened
+here.
 """
 
 import csv
@@ -24,14 +25,17 @@ from register_maps.signals import LOG_COLUMNS, LogColumn
 GZIP: Final = b"\x1f\x8b"
 TIME: Final = "time_s"
 CsvLogError = LogTableError
-"""What readers catch that know no other form."""
+"""Name of the error for readers that know CSV only."""
 
 Rows = list[tuple[int, list[str]]]
 """Line number and cells of every line that is not blank."""
 
 
 def parse(data: bytes, columns: Mapping[str, LogColumn] = LOG_COLUMNS) -> LogTable:
-    """The log in these bytes. columns : by name, what may stand in it; `time_s` among them"""
+    """Log in these bytes. Raises LogTableError with line and column.
+
+    columns : allowed columns by their names, among them `time_s`
+    """
     header, *rows = _rows(_text(data)) or [(1, [])]
     names = [name.strip() for name in header[1]]
     check_header(names, columns, f"line {header[0]}: ")
@@ -66,7 +70,7 @@ def _rows(text: str) -> Rows:
 
 
 def _quoted(lines: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
-    """The cells of a text in which some stand in quotes."""
+    """Line number and cells of each line of a text with quotes."""
     reader = csv.reader(lines, strict=True)
     try:
         for cells in reader:
@@ -77,25 +81,25 @@ def _quoted(lines: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
 
 
 def _columns(rows: Rows, known: dict[str, int], width: int) -> dict[str, list[float]]:
-    """The known columns, in their own units."""
+    """Known columns by name, in their own units."""
     try:
         table = list(zip(*(cells for _, cells in rows), strict=True))
         if len(table) == width:
             return {name: list(map(_number, table[k])) for name, k in known.items()}
     except ValueError:
-        pass  # a row of another length, or what is no number: told with its line
+        pass  # a row of another length or no number: `_first_fault` finds its line
     raise _first_fault(rows, known, width)
 
 
 def _number(cell: str) -> float:
-    """A decimal number; Python alone would also read 1_000 and the digits of other scripts."""
+    """A decimal number. `float` alone would also read 1_000 and the digits of other scripts."""
     if "_" in cell or not cell.isascii():
         raise ValueError(cell)
     return float(cell)
 
 
 def _first_fault(rows: Rows, known: dict[str, int], width: int) -> LogTableError:
-    """The first row of another length, or cell that is no number, with line and column."""
+    """Error for the first row of another length or cell without a number, with its place."""
     for line, cells in rows:
         if len(cells) != width:
             return LogTableError(f"line {line}: {len(cells)} values; {width} columns are expected")

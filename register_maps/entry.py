@@ -1,7 +1,7 @@
-"""One table of a map file, read key by key; whatever is wrong is said with file and line.
+"""One table of a map file, read key by key. An error names file and line.
 
-`tomllib` gives values but no lines, so `Lines` finds them in the text: it knows where each table
-header and each key of the table stands.
+`tomllib` gives values without lines, so that `Lines` finds the line of each table header and each
+key in the text.
 """
 
 import math
@@ -18,7 +18,7 @@ _QUOTES = re.compile(r'"""|' + "'''")
 
 
 class Lines:
-    """Line of each table and key: `of("register", 3, "unit")` for the third `[[register]]`."""
+    """Lines of tables and keys; `of("register", 3, "unit")` for the third `[[register]]`."""
 
     def __init__(self, text: str) -> None:
         self._found: dict[tuple[str, int, str | None], int] = {}
@@ -33,7 +33,7 @@ class Lines:
             quoted ^= len(_QUOTES.findall(line)) % 2 == 1
 
     def of(self, table: str, index: int, key: str | None) -> int:
-        """Line of the key; where it is not written, of its table; else of where it should be."""
+        """Line of the key, otherwise of its table, otherwise of the place where it should be."""
         wanted = (
             (table, index, key),
             (key or table, 1, None) if table == "" else (table, index, None),
@@ -45,7 +45,10 @@ class Lines:
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
-    """One table of the file: its values, and how to complain about one of them."""
+    """One table of the file: its values, and the error for one of them.
+
+    Each reading method raises MapError.
+    """
 
     values: Mapping[str, Any]
     table: str
@@ -54,7 +57,7 @@ class Entry:
     lines: Lines
 
     def error(self, key: str | None, expected: str) -> MapError:
-        """The error for this key, or for the whole table."""
+        """Error for this key, or for the whole table."""
         name = self.values.get("name")
         unnamed = f"{self.table} {self.index}" if self.table else "file"
         shown = name if isinstance(name, str) and name else unnamed
@@ -68,7 +71,7 @@ class Entry:
         )
 
     def known(self, keys: frozenset[str]) -> None:
-        """Refuse keys that mean nothing, and table-wide the lack of a value."""
+        """Refuse unknown keys."""
         for key in self.values:
             if key not in keys:
                 raise self.error(key, f"a known key: {', '.join(sorted(keys))}")
@@ -102,7 +105,7 @@ class Entry:
         return float(value)
 
     def flag(self, key: str) -> bool:
-        """true or false; false where it is not written."""
+        """True or false; false where the key is absent."""
         value = self.values.get(key, False)
         if not isinstance(value, bool):
             raise self.error(key, "true or false")
@@ -117,7 +120,7 @@ class Entry:
 
 
 def is_number(value: object) -> bool:
-    """Whether it is a finite number that a float can hold, and no truth value."""
+    """Whether a value is a finite number that a float can hold, and not a boolean."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return False
     return abs(value) < 1e300 and math.isfinite(value)

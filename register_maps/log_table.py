@@ -1,10 +1,9 @@
-"""What every log has to hold, whatever its file: known names and units, numbers, increasing time.
+"""Rules for every log in any file format: known names and units, numbers, increasing time.
 
-A column is called by its name and its unit together, as its file tells them: `motor_speed_rad_s` in
-CSV, `motor_speed [rad/s]` where the unit is metadata. What may stand in a log is told by
-`signals.LOG_COLUMNS`. A column that is none of them is named and left alone; one that names a
-signal in another unit is refused where the right one is missing, because its signal would be taken
-for missing too.
+The name of a column contains its unit: `motor_speed_rad_s` in CSV, `motor_speed [rad/s]` where the
+unit is metadata. `signals.LOG_COLUMNS` has the columns of a log. Any other column is named and
+ignored. A column with a signal in a wrong unit is refused where the right column is missing,
+because its signal would otherwise count as missing.
 """
 
 import re
@@ -19,13 +18,13 @@ from register_maps.signals import LOG_COLUMNS, LogColumn
 from register_maps.units import UNITS
 
 WITH_METADATA: Final = {f"{c.signal} [{c.unit}]": c for c in LOG_COLUMNS.values()}
-"""The log's columns as files call them that hold the unit as metadata."""
+"""Columns of a log by their names in files that keep the unit as metadata."""
 SAME_UNIT: Final = {"Nm": "N m", "N*m": "N m", "N\u00b7m": "N m", "\u00b0C": "degC"}
-"""Other spellings of the same units, as other programs write them."""
+"""Spellings of units by other programs, and ours."""
 LARGEST: Final = {"s": 1e10, "rad/s": 1e4, "N m": 1e6, "A": 1e5, "V": 1e5, "degC": 1e4, "m/s": 1e3}
-"""By unit, far more than any bench or truck shows: a value beyond it is a fault of the log."""
+"""Largest value by unit, far above any bench or truck: a larger value is a fault of the log."""
 FASTEST, SLOWEST = 1e-4, 10.0
-"""[s] Between two samples of a bench; a logger's clock may be 1 % off."""
+"""[s] Shortest and longest time between two samples; the clock of a logger may be 1 % off."""
 UNIT: Final = re.compile(
     r"(_?(s|ms|us|min|h|rpm|1_min|min_1|rev_s|rad_s|deg_s|rad|deg|m|mm|m_s|km_h|kmh|Hz|m?Nm|kNm|N|lbft"
     r"|[mk]?A|[mk]?V|degC|degF|[CFK]))?( \[.*\])?"
@@ -33,19 +32,19 @@ UNIT: Final = re.compile(
 
 
 class LogTableError(Exception):
-    """A log that may not be used: line or row, column, what was found and what was expected."""
+    """A log that cannot be used: line or row, column, value found and value expected."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LogTable:
-    """Signals by name, SI, `time` among them, all of one length; `other`: columns of no signal."""
+    """Signals of a log by name in SI, `time` among them, of one length; other : unknown columns."""
 
     signals: dict[str, list[float]]
     other: tuple[str, ...]
 
 
 def with_metadata(name: str, unit: str) -> str:
-    """What a column is called whose unit is metadata; where there is none its name may hold it."""
+    """Name of a column whose unit is metadata. Without a unit, the name itself may contain it."""
     unit = SAME_UNIT.get(unit.strip(), unit.strip())
     if name in LOG_COLUMNS:
         name, unit = LOG_COLUMNS[name].signal, unit or LOG_COLUMNS[name].unit
@@ -53,7 +52,7 @@ def with_metadata(name: str, unit: str) -> str:
 
 
 def check_header(names: Sequence[str], columns: Mapping[str, LogColumn], place: str = "") -> None:
-    """Refuse names of which one stands twice, has a wrong unit, or is missing and needed."""
+    """Refuse a repeated column, a wrong unit and a missing needed column. Raises LogTableError."""
     for name in names:
         if name in columns and names.count(name) > 1:
             raise LogTableError(f"{place}column {name} stands twice")
@@ -69,7 +68,7 @@ def check_header(names: Sequence[str], columns: Mapping[str, LogColumn], place: 
 
 
 def check_count(samples: int) -> None:
-    """Refuse a log that holds no interval of time."""
+    """Refuse a log of fewer than two samples."""
     if samples < 2:
         raise LogTableError(f"{samples} samples; at least 2 are needed")
 
@@ -81,10 +80,10 @@ def check_samples(
     place: Callable[[int], str],
     shown: Callable[[int, str], object],
 ) -> None:
-    """Refuse values that are not finite or that nothing shows, and a time that does not increase.
+    """Refuse values that are not finite or impossibly large, and a time that does not increase.
 
-    time : name of its column; units : of each column, by name
-    place, shown : what an error calls a row, and a value by row and name
+    time : name of the column of the time; units : of each column, by name
+    place, shown : text of an error for a row, and for a value by row and name
     """
     largest = {name: LARGEST.get(units[name], inf) for name in columns}
     later = all(a < b for a, b in pairwise(columns[time]))
@@ -112,7 +111,7 @@ def _within(values: Sequence[float], largest: float) -> bool:
 
 
 def check_sampling(times: Sequence[float]) -> None:
-    """Refuse a log of the bench that is sampled as no bench is, or that has a long hole [s]."""
+    """Refuse a log of the bench with an impossible sample time or a long hole; times [s]."""
     steps = [later - before for before, later in pairwise(times)]
     interval = median(steps)
     if not 0.99 * FASTEST <= interval <= SLOWEST:
@@ -128,15 +127,15 @@ def check_sampling(times: Sequence[float]) -> None:
 
 
 def si(column: LogColumn, values: Sequence[float]) -> list[float]:
-    """The values of a column in the SI unit of its signal."""
+    """Values of a column in the SI unit of its signal."""
     unit = UNITS[column.unit]
     return list(values) if unit.si == column.unit else [unit.to_si(v) for v in values]
 
 
 def table(names: Sequence[str], numbers: Callable[[int], list[float]]) -> LogTable:
-    """The log in a file that holds units as metadata.
+    """Log of a file that keeps units as metadata. Raises LogTableError.
 
-    names : of its columns, by `with_metadata`; numbers : values of a column by its place
+    names : of its columns, from `with_metadata`; numbers : values of a column by its index
     """
     check_header(names, WITH_METADATA)
     columns = {name: numbers(k) for k, name in enumerate(names) if name in WITH_METADATA}
@@ -161,7 +160,7 @@ def table(names: Sequence[str], numbers: Callable[[int], list[float]]) -> LogTab
 
 
 def without_package(form: str, package: str, extra: str) -> LogTableError:
-    """What to tell where the package is missing that reads and writes this form."""
+    """Error for a missing package that reads and writes this format."""
     return LogTableError(
         f"{form} needs {package}, which is not installed; expected pip install "
         f"'road-load-bench[{extra}]', or a CSV log"
@@ -170,7 +169,7 @@ def without_package(form: str, package: str, extra: str) -> LogTableError:
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
-    """A column to be written: NumPy array of numbers, truths or texts, and its unit ("": none)."""
+    """A column to write: NumPy array of numbers, booleans or texts, and its unit (empty: none)."""
 
     name: str
     unit: str

@@ -1,8 +1,8 @@
-"""An MDF4 log (ASAM MDF, version 4) as bytes: one channel a signal, its unit at the channel.
+"""Reader and writer of an MDF4 log (ASAM MDF, version 4) in bytes: one channel a signal.
 
-The time is the groups' master. The channels may stand in several groups that were sampled at the
-same times. The package asammdf is loaded when the first such log is read or written; it keeps
-what it writes in a temporary file of its own. No other file is opened here.
+A channel has its unit. The time is the master of the groups, and the channels may be in several
+groups with equal times. The package asammdf is loaded when the first such log is read or written;
+it keeps what it writes in a temporary file of its own. No other file is opened here.
 """
 
 import contextlib
@@ -28,25 +28,25 @@ from register_maps.log_table import (
 MAGIC: Final = b"MDF     4"
 FIRST_BLOCK: Final = 64
 BLOCK: Final = struct.Struct("<2s6xQQ")
-"""A block begins so: "##", its length, how many links to other blocks follow; 0 is no link."""
+"""Begin of a block: "##", its length, the count of the links after it; 0 is no link."""
 MASTER: Final = (2, 3)
-"""Types of a channel that holds its group's master: stored, and computed from the row."""
+"""Types of a master channel: stored, and computed from the row."""
 IN_SECONDS: Final = 1
-"""What a master tells, where that is the time."""
+"""Type of a master that holds the time."""
 TIME: Final = with_metadata("time_s", "")
 SAME_TIME: Final = 0.5e-4
-"""[s] Times that differ by less are the same: a CSV log does not tell them apart either."""
+"""[s] Times that differ by less count as equal, as in a CSV log."""
 UNKNOWN_START: Final = datetime(1970, 1, 1, tzinfo=UTC)
-"""A file has to tell when its time is zero; told of a log whose date nobody knows."""
+"""Date of time zero for a log without a known date; a file must have one."""
 
 
 def recognises(head: bytes) -> bool:
-    """Whether bytes that begin so are an MDF4 file."""
+    """Whether bytes with this begin are an MDF4 file."""
     return head.startswith(MAGIC)
 
 
 def parse(data: bytes) -> LogTable:
-    """The log in these bytes."""
+    """Log in these bytes. Raises LogTableError."""
     asammdf = _package()
     _check_blocks(data)
     failure = ""
@@ -56,14 +56,14 @@ def parse(data: bytes) -> LogTable:
                 return _table(file)
         except LogTableError:
             raise
-        except Exception as error:  # noqa: BLE001 - it fails in any way when a file is damaged
+        except Exception as error:  # noqa: BLE001 - a damaged file makes it fail in any way
             failure = " ".join(f"{type(error).__name__}: {error}".split())
-    # Not from the error, which would keep alive what the package left half made.
+    # Not `from error`, which would keep half-made objects of the package alive.
     raise LogTableError(f"damaged MDF4 file ({failure})")
 
 
 def _check_blocks(data: bytes) -> None:
-    """Refuse a file of which a block is not where another one says: it was cut, or damaged."""
+    """Refuse a cut or damaged file: a block is not where another block says."""
     seen, left = {0}, [FIRST_BLOCK]
     while left:
         start = left.pop()
@@ -79,9 +79,9 @@ def _check_blocks(data: bytes) -> None:
 
 
 def encode(columns: Sequence[Column], start: datetime = UNKNOWN_START) -> bytes:
-    """The columns as an MDF4 file; the one in seconds that is called time is the master.
+    """Return the columns as an MDF4 file; the column `time` [s] is the master.
 
-    start : when that time is zero
+    start : date at which that time is zero
     """
     asammdf = _package()
     [time] = [column.values for column in columns if column.name == "time"]
@@ -105,7 +105,7 @@ def encode(columns: Sequence[Column], start: datetime = UNKNOWN_START) -> bytes:
 
 
 def _samples(values: Any) -> Any:
-    """Texts as the bytes that MDF holds, truths as numbers."""
+    """Values of a column for MDF: texts as bytes, booleans as numbers."""
     if values.dtype.kind == "U":
         return values.astype("S")
     return values.astype("u1") if values.dtype.kind == "b" else values
@@ -120,7 +120,7 @@ def _package() -> Any:
 
 @contextlib.contextmanager
 def _silent(asammdf: Any) -> Iterator[None]:
-    """Keep the package from printing tracebacks of a damaged file beside our one line."""
+    """Keep the package from printing tracebacks for a damaged file."""
     logs, asammdf.logger.disabled = asammdf.logger.disabled, True
     hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
@@ -131,7 +131,7 @@ def _silent(asammdf: Any) -> Iterator[None]:
 
 
 def _table(file: Any) -> LogTable:
-    """The log in an open file."""
+    """Log in an open file."""
     places = [
         (group, index)
         for group, content in enumerate(file.groups)
@@ -157,7 +157,7 @@ def _name(channel: Any) -> str:
 
 
 def _time(file: Any, groups: Mapping[int, str]) -> list[float]:
-    """The time of all these groups [s]; of each, one column is named that it holds."""
+    """Common time of the groups [s]; groups : name of one column of each, for the error."""
     times = {name: _master(file, group, name) for group, name in groups.items()}
     (first, time), *others = times.items()
     for name, other in others:
@@ -179,16 +179,16 @@ def _master(file: Any, group: int, name: str) -> Any:
 
 
 def _check_place(group: Any, channel: Any, name: str) -> None:
-    """Refuse a channel outside its group's records: the package would read foreign memory."""
+    """Refuse a channel outside its records, where the package would read foreign memory."""
     end = 8 * channel.byte_offset + channel.bit_offset + channel.bit_count
     if end > 8 * group.channel_group.samples_byte_nr:
         raise LogTableError(f"damaged MDF4 file (column {name} lies outside its records)")
 
 
 def _numbers(file: Any, name: str, group: int, index: int) -> list[float]:
-    """The values of a channel, NaN where the file says that they are not valid."""
+    """Values of a channel, NaN where the file marks them as invalid."""
     _check_place(file.groups[group], file.groups[group].channels[index], name)
-    # The package's default leaves such values out, and shifts all that come after them.
+    # The default leaves invalid values out, which shifts all values after them.
     signal = file.get(group=group, index=index, ignore_invalidation_bits=True)
     if signal.samples.ndim != 1 or signal.samples.dtype.kind not in "fiu":
         raise LogTableError(f"column {name}: holds {signal.samples.dtype}; expected numbers")

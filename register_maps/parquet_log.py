@@ -1,7 +1,8 @@
-"""A Parquet log as bytes: one column a signal, its unit in the metadata of its field, key `unit`.
+"""Reader and writer of a Parquet log in bytes: one column a signal.
 
-A column without metadata may hold its unit in its name, as in CSV: so data frames are written. The
-package pyarrow is loaded when the first such log is read or written. No file is opened here.
+The metadata of a field has its unit under the key `unit`. Without metadata, the name of the column
+may contain the unit as in CSV, which is how data frames are written. The package pyarrow is loaded
+when the first such log is read or written. No file is opened here.
 """
 
 from collections.abc import Sequence
@@ -21,12 +22,12 @@ MAGIC: Final = b"PAR1"
 
 
 def recognises(head: bytes) -> bool:
-    """Whether bytes that begin so are a Parquet file."""
+    """Whether bytes with this begin are a Parquet file."""
     return head.startswith(MAGIC)
 
 
 def parse(data: bytes) -> LogTable:
-    """The log in these bytes."""
+    """Log in these bytes. Raises LogTableError."""
     arrow, parquet = _packages()
     try:
         file = parquet.ParquetFile(arrow.BufferReader(data))
@@ -40,7 +41,7 @@ def parse(data: bytes) -> LogTable:
 
 
 def encode(columns: Sequence[Column]) -> bytes:
-    """The columns as a Parquet file."""
+    """Return the columns as a Parquet file."""
     arrow, parquet = _packages()
     arrays = [arrow.array(column.values) for column in columns]
     fields = [
@@ -66,7 +67,7 @@ def _unit(field: Any) -> str:
 
 
 def _numbers(arrow: Any, file: Any, fields: Sequence[Any], k: int) -> list[float]:
-    """The values of a column, NaN where there is none."""
+    """Values of a column, NaN where one is missing."""
     name, kind = fields[k].name, fields[k].type
     if not (arrow.types.is_floating(kind) or arrow.types.is_integer(kind)):
         raise LogTableError(f"column {name}: holds {kind}; expected numbers")

@@ -1,4 +1,4 @@
-"""A map file's data to a `RegisterMap`. What a map may not hold is in `rules.py`.
+"""Build a `RegisterMap` from the data of a map file. `rules.py` says what a map may not hold.
 
 [map]
 name, version, description
@@ -19,12 +19,12 @@ scale, offset  scaled value = raw * scale + offset (defaults 1 and 0)
 unit         of the scaled value, a key of `units.UNITS`; it becomes the signal's SI unit
 range        [lowest, highest] scaled value; outside it a measurement or setpoint is refused
 access       "read" (in the measurement block) or "write" (in the command block)
-description, source   what it is; which paper says so
+description, source   what the register is; the document that says so
 not_available  bit pattern that means "no value" (integers; outside the range)
-constant     the scaled value that it always has; another one is refused
+constant     the only scaled value; any other value is refused
 wraps        true: a counter that starts again at the end of its type
 crc          "crc32": checksum over the words of the command block before this one
-count        how many such registers follow one another (only signal "reserved")
+count        number of such registers in a row (only signal "reserved")
 """
 
 from collections.abc import Mapping
@@ -52,7 +52,7 @@ _ORDERS, _TABLES = get_args(WordOrder), get_args(Table)
 
 
 def parse(data: Mapping[str, Any], *, file: str, lines: Lines, source_hash: str) -> RegisterMap:
-    """The map that the file's data describe; raises `MapError`."""
+    """Register map in the data of a file. Raises MapError."""
     root = Entry(values=data, table="", index=1, file=file, lines=lines)
     root.known(frozenset({"map", "register"}))
     head = _table(root, "map", data.get("map"), 1)
@@ -104,7 +104,7 @@ def _block(head: Entry, key: str, most: int) -> Block:
 
 
 def _registers(entry: Entry, default_order: WordOrder) -> list[tuple[Register, Entry]]:
-    """The register of an entry; `count` of them where it stands for several reserved ones."""
+    """Register of an entry; several where `count` repeats a reserved register."""
     entry.known(_REGISTER_KEYS)
     register = _register(entry, default_order)
     check_register(entry, register)

@@ -1,7 +1,7 @@
-"""What a register map is: registers, two blocks, and the error that says what it may not be.
+"""Records of a register map: registers, two blocks, and the error for a bad map.
 
-Records only. How a map is read from TOML, and what each key means, is in `parse.py`; what it may
-not hold is in `rules.py`; how words become values is in `codec.py`.
+`parse.py` reads a map from TOML and explains each key. `rules.py` says what a map may not hold.
+`codec.py` turns words into values.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ LARGEST_FLOAT = 3.4028234663852886e38
 
 @dataclass(frozen=True, kw_only=True)
 class RawType:
-    """How a raw value lies in words: `code` is the letter of `struct`, most significant first."""
+    """Raw type: count of words, letter of `struct` (most significant byte first), and range."""
 
     words: int
     code: str
@@ -41,7 +41,7 @@ TYPES: dict[TypeName, RawType] = {
 
 
 class MapError(Exception):
-    """A register map that may not be used: where it says what, and what would be right."""
+    """A register map that cannot be used: file, line, value found and value expected."""
 
     exit_code = 2
 
@@ -54,14 +54,14 @@ class MapError(Exception):
 
 @dataclass(frozen=True, kw_only=True)
 class Register:
-    """One value in the PLC's memory. `scaled` = raw scale + offset, in `unit`; the value is SI.
+    """One value in the memory of the PLC. Scaled value = raw value * scale + offset, in `unit`.
 
-    address : zero-based address of its first word, as it stands in the request
+    address : zero-based address of the first word, as in a request
     range : lowest and highest scaled value
     not_available : raw value with which the PLC says that it has no value
-    constant : the only scaled value that it may hold
-    wraps : a counter that runs over the end of its type
-    crc : checksum over the words of the block before it
+    constant : the only scaled value that the register may hold
+    wraps : the register is a counter that starts again at the end of its type
+    crc : the register is a checksum over the words of the block before it
     """
 
     name: str
@@ -84,28 +84,28 @@ class Register:
 
     @property
     def raw(self) -> RawType:
-        """Number of words, and what they can hold."""
+        """Raw type of the register."""
         return TYPES[self.type]
 
     @property
     def si_unit(self) -> Unit:
-        """How its scaled value becomes SI."""
+        """Unit of the scaled value, with its factor to SI."""
         return UNITS[self.unit]
 
     @property
     def reference(self) -> int:
-        """Number in the 4xxxx (3xxxx) notation of data sheets."""
+        """Number of the register in the 4xxxx (3xxxx) notation of data sheets."""
         return FIRST_REFERENCE[self.table] + self.address
 
     @property
     def end(self) -> int:
-        """First address after it."""
+        """First address after the last word."""
         return self.address + self.raw.words
 
 
 @dataclass(frozen=True, kw_only=True)
 class Block:
-    """Adjoining registers that one request carries."""
+    """Adjoining registers of one request."""
 
     table: Table
     start: int
@@ -113,7 +113,7 @@ class Block:
 
     @property
     def end(self) -> int:
-        """First address after it."""
+        """First address after the last word."""
         return self.start + self.count
 
     def holds(self, register: Register) -> bool:
@@ -129,8 +129,8 @@ class Block:
 class RegisterMap:
     """One PLC: registers by address, a block to read and a block to write.
 
-    Compared by identity, so that the codec finds its prepared plan at once; two maps hold the same
-    when their `source_hash` (SHA-256 of the file) is the same.
+    Maps are compared by identity, so that the codec finds its prepared plan at once. Two maps have
+    equal contents when `source_hash`, the SHA-256 of the file, is equal.
     """
 
     name: str
@@ -142,11 +142,11 @@ class RegisterMap:
     source_hash: str
 
     def register(self, signal: str) -> Register | None:
-        """Register that carries the signal, None: the map has it not."""
+        """Register of a signal; None: the map has none."""
         return next((found for found in self.registers if found.signal == signal), None)
 
     def modulus(self, signal: str) -> float | None:
-        """Span after which a wrapping counter starts again [SI unit of the signal], None: never."""
+        """Span after which a counter starts again [SI unit of the signal]; None: never."""
         register = self.register(signal)
         if register is None or not register.wraps:
             return None

@@ -1,4 +1,4 @@
-"""What a register map may not hold: first each register by itself, then all of them together."""
+"""Rules of a register map: first for each register alone, then for all registers together."""
 
 from collections.abc import Sequence
 from enum import IntEnum, IntFlag
@@ -16,7 +16,7 @@ _INTEGERS: tuple[TypeName, ...] = ("int16", "uint16", "int32", "uint32")
 
 
 def check_register(entry: Entry, register: Register) -> None:
-    """Refuse a register that contradicts itself or its signal."""
+    """Refuse a register that contradicts itself or its signal. Raises MapError."""
     if register.scale == 0.0:
         raise entry.error("scale", "a number other than 0")
     signal = SIGNALS.get(register.signal)
@@ -78,7 +78,7 @@ def _check_range(entry: Entry, register: Register) -> None:
 
 
 def _check_counter(entry: Entry, register: Register) -> None:
-    """A counter uses its whole type; "not available" is a pattern outside the range."""
+    """Refuse a counter without the whole range of its type, and a marker inside the range."""
     whole = (register.raw.low, register.raw.high)
     if register.wraps and register.type not in _INTEGERS:
         raise entry.error("wraps", f"false, since only {', '.join(_INTEGERS)} wrap")
@@ -94,7 +94,10 @@ def _check_counter(entry: Entry, register: Register) -> None:
 
 
 def check_together(head: Entry, placed: Placed, measurement: Block, command: Block) -> None:
-    """Refuse registers that get into each other's way, or do not make the two requests."""
+    """Refuse registers that overlap, repeat, leave a gap or do not fit the two requests.
+
+    Raises MapError.
+    """
     _check_blocks(head, measurement, command)
     _check_unique(placed)
     for register, entry in placed:
@@ -146,7 +149,7 @@ def _check_overlap(placed: Placed) -> None:
 
 
 def _check_no_gap(head: Entry, placed: Placed, command: Block) -> None:
-    """A write must not touch a word that the map does not name; reading one does no harm."""
+    """Refuse a written word without a register; a read word without one does no harm."""
     written = [register for register, _ in placed if register.access == "write"]
     named = {place for register in written for place in range(register.address, register.end)}
     for place in range(command.start, command.end):

@@ -1,8 +1,8 @@
-"""The language of the house: what is measured, what is commanded, and each name's SI unit.
+"""The signals: what is measured, what is commanded, and the SI unit of each.
 
-The fields of `Measurement` and `Setpoint` are the signals. A register map says where in a PLC a
-signal lives; the log says in which column. This file knows neither. Bits and states are those of
-the bench's PLC (its bit and state numbers are the ones here).
+The fields of `Measurement` and `Setpoint` are the signals. A register map has the register of a
+signal, and `LOG_COLUMNS` has its column in a log. The numbers of bits and states are those of the
+bench's PLC.
 """
 
 from dataclasses import MISSING, dataclass, fields
@@ -11,7 +11,7 @@ from typing import Annotated, Literal, get_args, get_type_hints
 
 
 class Status(IntFlag):
-    """What the PLC says of itself: set = it is so."""
+    """Status bits of the PLC; a set bit means that the statement holds."""
 
     READY = 1 << 0
     ENABLED = 1 << 1
@@ -26,7 +26,7 @@ class Status(IntFlag):
 
 
 class PlcState(IntEnum):
-    """The PLC's own state."""
+    """State of the PLC."""
 
     INIT = 0
     READY = 1
@@ -39,7 +39,7 @@ class PlcState(IntEnum):
 
 
 class Alarm(IntFlag):
-    """What the PLC complains of: set = alarm."""
+    """Alarm bits of the PLC; a set bit is an alarm."""
 
     OVERSPEED = 1 << 0
     OVERCURRENT = 1 << 1
@@ -53,7 +53,7 @@ class Alarm(IntFlag):
 
 
 class Interlock(IntFlag):
-    """The bench's interlocks: set = closed (satisfied), so that a broken wire reads as open."""
+    """Interlocks of the bench; a set bit is closed, so that a broken wire reads as open."""
 
     RESTRAINT = 1 << 0
     GUARD = 1 << 1
@@ -64,7 +64,7 @@ class Interlock(IntFlag):
 
 
 class Control(IntFlag):
-    """What the gateway asks of the PLC; the PLC acts on the rising edge of FAULT_RESET."""
+    """Control bits of the gateway; the PLC acts on the rising edge of FAULT_RESET."""
 
     ENABLE = 1 << 0
     FAULT_RESET = 1 << 1
@@ -73,7 +73,7 @@ class Control(IntFlag):
 
 
 class Mode(IntEnum):
-    """The PLC state that the gateway asks for."""
+    """State that the gateway asks of the PLC."""
 
     READY = 1
     WARM_UP = 2
@@ -86,8 +86,8 @@ class Mode(IntEnum):
 class Measurement:
     """One coherent reading of the PLC in SI.
 
-    A signal without a default is one that the gateway cannot do without. `None` = the map has no
-    such register, or the PLC says that the value is not available.
+    A signal without a default is one that the gateway needs. None means that the map has no such
+    register, or that the PLC reports no value.
     """
 
     sequence_start: Annotated[int, "1", "sample number, first word of the block; wraps"]
@@ -122,9 +122,10 @@ class Measurement:
 
 @dataclass(frozen=True, kw_only=True)
 class Setpoint:
-    """The command block in SI. `None` = the map has no such register.
+    """The command block in SI. None means that the map has no such register.
 
-    Encoded, a `map_version` of None becomes the map's own, a `command_crc` of None is computed.
+    The codec replaces a `map_version` of None by that of the map, and computes a `command_crc` of
+    None.
     """
 
     command_sequence: Annotated[int, "1", "number of this command; wraps"]
@@ -141,12 +142,12 @@ class Setpoint:
 
 
 RESERVED = "reserved"
-"""The signal of a register that means nothing; it may occur any number of times in a map."""
+"""Signal of a reserved register; a map may have any number of them."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Signal:
-    """A name of the language: SI unit, direction, Python type, and whether one can do without."""
+    """A signal: SI unit, direction, Python type, and whether the gateway needs it."""
 
     name: str
     unit: str
@@ -178,12 +179,12 @@ SIGNALS = _signals(Measurement, "measurement") | _signals(Setpoint, "command")
 
 @dataclass(frozen=True, kw_only=True)
 class LogColumn:
-    """A column of the CSV log.
+    """A column of a log.
 
-    signal : name in the log, without unit
+    signal : name of the signal, without unit
     unit : unit of the column, a key of `units.UNITS` (SI everywhere but the temperature)
-    measured : the field of `Measurement` that an online recording puts there, None: there is none
-    decimals : with which it is written
+    measured : field of `Measurement` that a recording puts there, None: no such field
+    decimals : digits after the point in a written log
     """
 
     column: str

@@ -1,4 +1,4 @@
-"""The times that gateway and PLC agree on. They belong to the contract of the bench's PLC."""
+"""Times on which gateway and PLC agree; they belong to the contract of the bench's PLC."""
 
 from typing import Final
 

@@ -1,7 +1,7 @@
-"""The units that a register map may use, and how each becomes SI.
+"""The units that a register map may use, and their conversion to SI.
 
-One small table. A value as the operator reads it is `scaled`; SI value = scaled * factor + shift.
-Nothing else in this house knows of rpm or degC except the borders that show them.
+A value in such a unit is a scaled value; SI value = scaled value * factor + shift. Other units than
+SI appear only where a value is read from or shown to the operator.
 """
 
 import math
@@ -16,18 +16,18 @@ ZERO_CELSIUS: Final = 273.15
 
 @dataclass(frozen=True, kw_only=True)
 class Unit:
-    """How a scaled value becomes SI: `si` is the SI unit that comes out."""
+    """Conversion of a unit to its SI unit `si`."""
 
     si: str
     factor: float = 1.0
     shift: float = 0.0
 
     def to_si(self, scaled: float) -> float:
-        """Value in the SI unit."""
+        """Value in the SI unit of a scaled value."""
         return scaled * self.factor + self.shift
 
     def from_si(self, value: float) -> float:
-        """Value in this unit, as the operator reads it."""
+        """Scaled value in this unit of an SI value."""
         return (value - self.shift) / self.factor
 
 
