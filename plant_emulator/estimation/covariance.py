@@ -59,15 +59,15 @@ def sandwich(
     hessian = information + precision
     scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
     values, vectors = np.linalg.eigh(hessian / np.outer(scale, scale))
-    told = values > ROUNDING * values[-1]
-    inverse = (vectors[:, told] / values[told]) @ vectors[:, told].T / np.outer(scale, scale)
+    known = values > ROUNDING * values[-1]
+    inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(scale, scale)
     covariance = inverse @ middle @ inverse
     covariance = 0.5 * (covariance + covariance.T)
     # Between the frequencies where it was made positive, the spectrum of a tapered autocovariance
     # may be negative; a variance that comes out so is that of white residuals.
     for k in np.flatnonzero(np.diag(covariance) <= 0.0):
         covariance[k], covariance[:, k] = inverse[k], inverse[k]
-    unknown = np.flatnonzero(np.any(np.abs(vectors[:, ~told]) > PART, axis=1))
+    unknown = np.flatnonzero(np.any(np.abs(vectors[:, ~known]) > PART, axis=1))
     covariance[unknown, unknown] = np.inf
     return np.asarray(covariance)
 

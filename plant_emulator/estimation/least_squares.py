@@ -174,7 +174,7 @@ def estimate(
     follow : an estimate nearby, of the same runs; the columns of its unknowns are then not
         simulated but follow by secants: far cheaper, and good for a first look only
     difference : norm of the change of the residual vector that slopes are taken over; a wide one
-        looks over the hollows of a rough cost, and is good for a search only
+        passes over local minima of a rough cost, and serves a search only
     """
     from scipy.optimize import least_squares
     from threadpoolctl import threadpool_limits

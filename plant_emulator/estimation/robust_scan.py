@@ -1,7 +1,7 @@
-"""Starts of a fit that are tried before a slope is followed, and the loss that judges them (pure).
+"""Scan of start values for a fit, with a robust loss that judges them (pure).
 
-Where contact comes and goes, or a frequency is unknown, the squares have many valleys, and a slope
-leads only to the next.
+Where contact comes and goes, or a frequency is unknown, the sum of squares has many local minima,
+and a descent ends in the nearest one.
 """
 
 from __future__ import annotations
@@ -23,14 +23,15 @@ ANGLES = np.linspace(-pi, pi, 24, endpoint=False)
 
 
 def cauchy_loss(residual: Array) -> float:
-    """Sum of log(1 + r^2) of a whitened residual: what lies far off counts, but little more than
-    near; the loss of Cauchy's distribution (P. J. Huber, Robust Statistics).
+    """Loss of Cauchy's distribution, sum of log(1 + r^2) (P. J. Huber, Robust Statistics).
+
+    residual : r, whitened. A sample far off counts little more than one nearby.
     """
     return float(np.sum(np.log1p(residual**2)))
 
 
 def combinations(states: Sequence[Unknown]) -> Iterator[tuple[dict[str, float], str | None]]:
-    """Starts of all states of a run together by name, but for an angle among them, and its name."""
+    """All combinations of the starts of states, by name, without an angle; and the angle's name."""
     angle = next((u.name for u in states if u.angle), None)
     others = [u for u in states if u.name != angle]
     for values in product(*(u.starts() for u in others)):
@@ -38,25 +39,28 @@ def combinations(states: Sequence[Unknown]) -> Iterator[tuple[dict[str, float], 
 
 
 def turning(ahead: Array, aside: Array, behind: Array) -> Array:
-    """Mean, cosine and sine of what turns with an angle, from its values at 0, pi/2 and pi; shape
-    (3, ...).
+    """Mean, cosine and sine part of a function of an angle, shape (3, ...).
+
+    ahead, aside, behind : its values at 0, pi/2 and pi
     """
     middle = 0.5 * (ahead + behind)
     return np.stack([middle, ahead - middle, aside - middle])
 
 
 def turns(angles: Array) -> Array:
-    """Weights of mean, cosine and sine at angles [rad], shape (n, 3)."""
+    """Weights of the mean, cosine and sine part at angles [rad], shape (n, 3)."""
     return np.stack([np.ones_like(angles), np.cos(angles), np.sin(angles)], axis=1)
 
 
 def scan_unknowns(
     residual: Residual, found: Mapping[str, float], states: Sequence[Unknown]
 ) -> dict[str, float]:
-    """States of a run where what has many valleys and angles starts in the best, all else as found.
+    """Scan the states that have many local minima, and the angles; return all states by name.
 
-    With Cauchy's loss, which forgives spikes at the wrong time; three values of an angle tell
-    the others.
+    found : all states at their present values; those that are not scanned stay there
+
+    Cauchy's loss judges the trials, because it bears spikes at the wrong time. Residuals at three
+    values of an angle give those at all others.
     """
     narrow = [u for u in states if u.step is not None or u.angle]
     if not narrow:

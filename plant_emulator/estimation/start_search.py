@@ -1,9 +1,8 @@
-"""One-dimensional scans by simulation: from first guesses to the valley that the optimum lies in.
+"""One-dimensional scans by simulation: from first guesses to the basin of the optimum.
 
-In cruise the drum floats in the gap, and a tiny torque decides where in it the deceleration finds
-it: the cost of a fit has many valleys in the gap, the damping and the start position. A scan, with
-a loss that forgives spikes at the wrong time, chooses the valley; least squares then finds its
-bottom.
+In cruise the drum floats in the gap, and a tiny torque decides where the deceleration finds it. So
+the cost of a fit has many local minima over the gap, the damping and the start position. A scan
+with a robust loss chooses the basin; least squares then finds its minimum.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ SCAN_TOLERANCE = 1e-4
 
 
 class Search:
-    """The way from a parameter set to start values in the right valley.
+    """Search from a parameter set for start values in the basin of the optimum.
 
     values : parameters [SI], scanned where free; gaps : start in the gap of every run, -1 to 1
     progress : called with a stage's name and how far it has come, 0 to 1
@@ -58,16 +57,16 @@ class Search:
         self.simulations = 0
 
     def loss(self, run: int, values: Mapping[str, float], gap: float) -> float:
-        """Cauchy's loss of a run."""
+        """Cauchy's loss of a run at these values [SI] and this gap position."""
         self.simulations += 1
         return cauchy_loss(self.recordings[run].residual(values, gap, SCAN_TOLERANCE))
 
     def total(self, values: Mapping[str, float]) -> float:
-        """Loss of all runs at the starts in the gap found so far."""
+        """Loss of all runs at the gap positions found so far."""
         return sum(self.loss(k, values, gap) for k, gap in enumerate(self.gaps))
 
     def scan(self, scans: Sequence[tuple[str, float, int]] = SCANS) -> None:
-        """Go through the scans in order, each from the best of the one before."""
+        """Make the scans in order; each starts from the best values of the one before."""
         for done, (name, factor, count) in enumerate(scans):
             if self.progress is not None:
                 self.progress("start values", done / len(scans))
@@ -82,7 +81,7 @@ class Search:
         self.values = candidates[int(np.argmin(losses))]
 
     def scan_gaps(self, count: int) -> None:
-        """Choose the start in the gap of every run among so many positions."""
+        """Choose the gap position of every run among `count` positions and the present one."""
         for k, gap in enumerate(self.gaps):
             positions = [gap, *np.linspace(-1.0, 1.0, count)]
             losses = [self.loss(k, self.values, float(g)) for g in positions]

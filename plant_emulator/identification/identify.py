@@ -2,16 +2,17 @@
 
  1. Start values without simulation (`equation_error`).
  2. One-dimensional scans of what that leaves open: dead time, gap, shaft damping, and where in the
-    gap each run starts, by simulation and with a loss that forgives spikes at the wrong time.
+    gap each run starts, by simulation and with a robust loss.
  3. Bounded least squares on all simulated channels of all logs at once, whitened by the noise
     measured in the logs (`estimation`), with the start in the gap as a free state of each run.
-    Should the residual stay above the noise, it starts again from the next best valleys.
- 4. Of logs with a truck the best fit once more with the noise of the wheel torque (`fed_noise`).
+    A residual above the noise suggests a local minimum: the fit is repeated from other basins.
+ 4. For logs with a truck, a refit that is whitened for the noise of the wheel torque
+    (`input_noise`).
 
-Prior knowledge is the value and standard deviation of each parameter in the set. It holds what the
-logs do not determine, and is given up for a parameter that the data alone determine better, so that
-a wrong set cannot pull the answer. A parameter counts as identifiable if the data alone bring its
-standard error under half of the prior one.
+The prior of a parameter is its value and standard deviation in the set. The priors hold parameters
+that the logs do not determine. The prior of a parameter is dropped where the data alone determine
+it better, so that a wrong set cannot bias the answer. A parameter is identifiable if the data alone
+bring its standard error under half of the prior one.
 """
 
 from __future__ import annotations
@@ -44,17 +45,19 @@ FINAL_TOLERANCE = 1e-8
 # Share of the prior deviation (or of the value) under which a standard error is information.
 INFORMED = 0.5
 INFORMED_WITHOUT_PRIOR = 0.1
-# chi^2 per sample above which other valleys are tried.
+# chi^2 per sample above which other basins are tried.
 NOISE_REACHED = 1.2
 RETRIES = 3
 
 
 @dataclass(frozen=True, kw_only=True)
 class EstimatedParameter:
-    """An estimated parameter [unit].
+    """An estimated parameter; all numbers in `unit`.
 
-    data_error : standard error that the data alone give; infinite: they say nothing
-    enough : the largest such error that still makes it identifiable
+    data_error : standard error from the data alone; infinite: they say nothing of it
+    enough : the largest data_error at which the parameter counts as identifiable
+    nominal : its value before
+    at_bound : whether the estimate lies at the end of its range
     """
 
     name: str
@@ -69,13 +72,17 @@ class EstimatedParameter:
 
     @property
     def identifiable(self) -> bool:
-        """Whether the data determine it, see the module's text."""
+        """Whether the data determine the parameter; see the text of the module."""
         return self.data_error <= self.enough and not self.at_bound
 
 
 @dataclass(frozen=True, kw_only=True)
 class Identification:
-    """The fit of one bench; states : of every run, by name."""
+    """The fit of one bench.
+
+    states : initial states of every run, by name [SI]
+    chi_squared : mean square of the whitened residual; 1: nothing but noise is left
+    """
 
     parameter_set: ParameterSet
     parameters: tuple[EstimatedParameter, ...]
@@ -99,11 +106,12 @@ def identify(
 ) -> Identification:
     """Estimate the free parameters of a bench from its logs.
 
-    free : names; none: all that the set calls estimated but gear_inertia, and what a logged voltage
-        shows
-    effects : values of effects that the bench has, by effect and parameter; what of them is a run's
-        own is fitted too, or taken from its log
-    progress : called with a stage's name and how far it has come, 0 to 1
+    free : names; none: all that the set calls estimated but gear_inertia, and the parameters that a
+        logged voltage shows
+    effects : values of effects that the bench has, by effect and parameter [SI]; the initial states
+        among them are fitted for every run, or taken from its log
+    progress : called with a stage's name and its done share, 0 to 1
+    Raises IdentificationError for a parameter that cannot be free.
     """
     free = free_parameters(parameters, free, voltage=any(VOLTAGE in r.channels for r in recordings))
     states = states_of(effects or {})
@@ -135,7 +143,7 @@ def fit_from(
     states: Sequence[Unknown] = (GAP,),
     progress: Progress | None = None,
 ) -> Estimate:
-    """Least squares from where a search has come to; priors that the data outdo are given up."""
+    """Fit by least squares from the values of a search, then again without the outdone priors."""
     coarse = residual_functions(recordings, search.values, free)
     truck = any(recording.inputs.truck for recording in recordings)
     tolerance = TOLERANCE if truck else FINAL_TOLERANCE
@@ -148,7 +156,7 @@ def fit_from(
 
 
 def _without_outdone_priors(first: Estimate) -> list[Unknown]:
-    """The unknowns from where a fit has come to, without the priors that its data outdo."""
+    """Unknowns that start at a fit, without the priors that are weaker than its data."""
     return [
         replace(u, start=u.value(float(z)), std=None if error < u.scaled_std else u.std)
         for u, z, error in zip(first.unknowns, first.z, first.data_errors, strict=True)
@@ -163,9 +171,10 @@ def _fit_with_input_noise(
     best: Estimate,
     progress: Progress | None,
 ) -> Estimate:
-    """The fit again with the noise of what is fed, known near the best one; see `fed_noise`.
+    """Refit with residuals that are whitened for the input noise near the best fit.
 
-    wanted : the unknowns with all priors, which the data outdo less easily then
+    wanted : the unknowns with all priors; the whitened data outdo fewer of them
+    Returns the best fit itself where no run has input noise that counts.
     """
     residuals = whitened_functions(recordings, values, free, best)
     if residuals is None:
@@ -181,7 +190,7 @@ def _fit_with_input_noise(
 def _report_cost(
     recordings: Sequence[Recording], progress: Progress | None
 ) -> Callable[[float], None] | None:
-    """What tells how far a fit has come; chi^2 falls to 1: half way is where it has fallen to 2."""
+    """Function that reports the progress of a fit from its cost; a chi^2 of 2 is half way."""
     if progress is None:
         return None
     counted = sum(int(r.use.sum()) for r in recordings)
@@ -195,7 +204,7 @@ def _next_search(
     best: Estimate,
     retry: int,
 ) -> Search:
-    """A search that starts at the fit but with the gap moved out of its valley."""
+    """Search for another basin, from the fit with gap and dead time moved off its minimum."""
     search = Search(recordings, {**values, **best.parameters()}, free)
     search.gaps = [best.states(k)[GAP_POSITION] for k in range(len(recordings))]
     if retry:
@@ -209,14 +218,14 @@ def _next_search(
 
 
 def chi_squared(found: Estimate) -> float:
-    """Mean square of the whitened residual; 1 where nothing but the noise is left."""
+    """Mean square of the whitened residual per degree of freedom; 1: nothing but noise is left."""
     return found.cost / max(1, found.samples - len(found.unknowns))
 
 
 def identification_of(
     found: Estimate, parameters: ParameterSet, free: Sequence[str], runs: int
 ) -> Identification:
-    """The estimate in the parameters' own terms."""
+    """The estimate as parameters in their own units, and the set with their values."""
     estimated = [_parameter(found, k, parameters) for k in range(len(free))]
     return Identification(
         parameter_set=parameters.with_values({p.name: p.value for p in estimated}),

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.simulation.fit_metrics import Comparison, Fit
 
-# Pairs of parameters worth a word: their values can hardly be told apart.
+# Correlation from which on a pair of parameters is reported as hardly separable.
 CORRELATED = 0.95
 # A standard error or condition number that says nothing but "not at all".
 BEYOND = 1e15

@@ -1,16 +1,17 @@
-"""What the noise of an input that is fed as measured does to a simulated run.
+"""Input noise (errors in variables): what the noise of a measured input does to a simulated run.
 
-A log with a truck is simulated with its own wheel torque, and that is measured: what acted differs
-from it by white noise of a standard deviation s. Beside the noise of the sensors, of variance 1,
-the whitened residual then holds what this makes of the simulation, to first order B n,
+A log with a truck is simulated with its own wheel torque, which is measured. The torque that acted
+differs from it by white noise of standard deviation s. So the whitened residual holds, beside the
+noise of the sensors (variance 1), the response of the simulation to that noise n, to first order
+B n, with
 
     covariance   I + B B',   B = U S V'
 
 A column of B is the answer to the mean of the noise over a window of m samples, s / sqrt(m). It is
 large where a gap closes a little earlier or later: a spike in the current and in the shaft torque,
-ten times their noise. Taken as if it told of the machine it gave drum_inertia a standard error a
-tenth of the true one. Generalised least squares (Aitken, Proc. R. Soc. Edinburgh 55 (1935) 42) use
-the residual times
+ten times their noise. A fit that took such spikes for information on the machine gave drum_inertia
+a tenth of its true standard error. Generalised least squares (Aitken, Proc. R. Soc. Edinburgh 55
+(1935) 42) use the residual times
 
     (I + U S^2 U')^(-1/2) = I - U (1 - 1 / sqrt(1 + S^2)) U'
 
@@ -37,8 +38,8 @@ if TYPE_CHECKING:
 
 # Shorter than a gap takes to close [s]; its noise changes nothing within it.
 WINDOW = 0.25
-# A log is taken in stretches, whose noise comes from within and from what was fed shortly before:
-# one twice as long takes twice as long, not four times [s].
+# A log is taken in stretches. Their noise comes from the input within them and shortly before, so
+# that a log twice as long takes twice as long, not four times [s].
 STRETCH, MEMORY = 10.0, 5.0
 # Standard deviation along a direction from which on it counts, in the noise of the sensors.
 COUNTED_DEVIATION = 1.0
@@ -48,11 +49,12 @@ TOLERANCE = 1e-4
 
 @dataclass(frozen=True, kw_only=True)
 class NoiseDirections:
-    """Directions of a run's whitened residual in which a fed input is louder than the sensors.
+    """Directions of a whitened residual in which input noise exceeds the noise of the sensors.
 
     directions : orthonormal, 0 where a sample does not count, shape (k, samples * channels), the
         channels of a sample side by side
-    deviations : of the fed input's noise along them, over that of the sensors, shape (k,)
+    deviations : standard deviations of the input noise along them, over those of the sensors,
+        shape (k,)
     """
 
     directions: csr_array
@@ -72,11 +74,13 @@ class NoiseDirections:
 def noise_directions(
     recording: Recording, values: Mapping[str, float], gap_position: float
 ) -> NoiseDirections | None:
-    """What the noise of the wheel torque does to a run at these values; None: nothing that counts.
+    """Directions of the residual that the noise of the wheel torque disturbs; None: it has none.
 
-    The slopes are differences over one standard deviation: contact makes them uneven. Windows too
-    far apart to meet in a stretch are simulated together: an answer has to end within MEMORY, else
-    what is left of it adds to that of the next.
+    values : of the model [SI]; gap_position : at the start of the run, -1 to 1
+
+    The slopes are differences over one standard deviation, because contact makes them uneven.
+    Windows that are too far apart to meet in a stretch are simulated together. The response to one
+    window must end within MEMORY; a rest of it would add to the response to the next window.
     """
     if not recording.inputs.truck:
         return None
@@ -93,7 +97,7 @@ def noise_directions(
     if not answers:
         return None
     parts = [
-        _loudest([answer[:, first : first + stretch] for answer in answers])
+        _strongest([answer[:, first : first + stretch] for answer in answers])
         for first in range(0, base.shape[1], stretch)
     ]
     if not any(len(deviations) for _, deviations in parts):
@@ -107,8 +111,9 @@ def noise_directions(
 def _answer(
     recording: Recording, values: Mapping[str, float], gap_position: float, base: Array
 ) -> Array:
-    """Change of the whitened residual; 0 where the simulation does not settle, which tells nothing
-    of these windows.
+    """Change of the whitened residual, shape (channels, samples).
+
+    It is 0 where the simulation does not settle: nothing is known of these windows then.
     """
     try:
         return recording.strict_residual(values, gap_position, TOLERANCE) - base
@@ -117,9 +122,11 @@ def _answer(
 
 
 def _disturbed(recording: Recording, length: int, every: int) -> list[Array]:
-    """The wheel torque with the mean of the first window of every so many samples off by a standard
-    deviation, then that of the second, and so on; only where the truck is not parked and a sample
-    that counts comes after.
+    """Wheel torques in which one window of every so many samples is off by a standard deviation.
+
+    The first torque changes every first window, the next one every second window, and so on. Only
+    samples change at which the truck is not parked and that a counting sample follows.
+    length : of a window [samples]; every : distance of the changed windows [samples]
     """
     run = recording.inputs
     step = noise(recording.log["wheel_torque"]) / np.sqrt(length)
@@ -130,8 +137,11 @@ def _disturbed(recording: Recording, length: int, every: int) -> list[Array]:
     return [run.wheel_torque + step * mask for mask in masks if mask.any()]
 
 
-def _loudest(answers: Sequence[Array]) -> tuple[Array, Array]:
-    """Directions in which answers, each of shape (channels, n), are louder than the sensors."""
+def _strongest(answers: Sequence[Array]) -> tuple[Array, Array]:
+    """Directions, and deviations along them, in which responses exceed the noise of the sensors.
+
+    answers : responses to the windows, each of shape (channels, n)
+    """
     columns = np.stack([answer.T.ravel() for answer in answers], axis=1)
     _, deviations, windows = np.linalg.svd(columns, full_matrices=False)
     counted = deviations > COUNTED_DEVIATION

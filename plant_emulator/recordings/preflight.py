@@ -2,7 +2,7 @@
 
 Refused, with file, time and value: a run that does not start at rest, holes longer than a few
 samples, a sampling too slow for the bench's spikes, a torque of the wrong sign, speeds of drum and
-motor that do not belong to one gear, no motion. Left out, and told: samples that a channel only
+motor that do not belong to one gear, no motion. Left out with a note: samples that a channel only
 repeats (frozen, slower than the log, at the end of its range).
 
 A repeated value is suspicious only in a channel with noise (a simulated log rests exactly), and
@@ -33,7 +33,7 @@ Use = NDArray[np.bool_]
 CHANCE = 1e-6
 SHORTEST_FROZEN = 5
 SHORTEST_CLIPPED = 4
-# Equal samples that no noise explains; the rest tells how many are due to chance.
+# Equal samples that no noise explains. The other samples show how many are equal by chance.
 CERTAINLY_FROZEN = 50
 # Share of the range above which a channel's noise is noise, not rounding.
 NOISY = 2.0 * FLOOR
@@ -86,12 +86,12 @@ def preflight(measured: Log, gear_ratio: float) -> Preflight:
     use = {}
     for name in compared_channels(measured):
         try:
-            use[name], told = _counting(measured, name)
+            use[name], more = _counting_samples(measured, name)
         except LogError as error:
             if name != VOLTAGE:
                 raise
-            told = [f"{error}; it is left out"]
-        notes += told
+            more = [f"{error}; it is left out"]
+        notes += more
     if "armature_current" not in measured and VOLTAGE not in use:
         notes.append(
             f"{measured.source}: without {NAMES['armature_current']} the flux (K_1, K_2) shows in "
@@ -203,8 +203,8 @@ def _wrong_voltage(measured: Log) -> str:
     return ""
 
 
-def _counting(measured: Log, name: str) -> tuple[Use, list[str]]:
-    """The samples of a channel that say something new, and what is to be told of the others."""
+def _counting_samples(measured: Log, name: str) -> tuple[Use, list[str]]:
+    """Samples of a channel that carry information, and notes on the samples that are left out."""
     channel = measured[name]
     nothing = np.zeros(len(channel), bool)
     repeated = _repeated(channel)

@@ -1,4 +1,4 @@
-"""A log ready to be fitted: its inputs, and what of it counts in units of its own noise."""
+"""A log ready to be fitted: inputs of its simulation, samples that count, and their noise."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 # What is known of the voltage's sensor beforehand: its offset [V] and the error of its gain, each
 # run's own. An isolating amplifier of 500 V and 0.2 % is off by 1 V; a divider by some 0.5 %.
 OFFSET, GAIN_ERROR = 1.0, 0.005
-# Residual of values that the model cannot simulate [noise]: a bad place, but no end of a search.
+# Residual where the model cannot be simulated [noise]: a search turns back there, and goes on.
 IMPOSSIBLE = 100.0
 
 
@@ -29,7 +29,7 @@ class Recording:
     """A log, the inputs of its simulation, and the noise of its compared channels [SI].
 
     use : samples that count, shape (channels, samples)
-    own : values of the model that the log itself tells, such as the shell's temperature [SI]
+    logged_values : values of the model that the log measures, such as a temperature, by name [SI]
     """
 
     log: Log
@@ -42,12 +42,14 @@ class Recording:
     def residual(
         self, values: Mapping[str, float], gap_position: float, tolerance: float = TOLERANCE
     ) -> Array:
-        """Measured minus simulated over the noise, shape (channels, samples).
+        """Whitened residual: measured minus simulated over the noise, shape (channels, samples).
 
-        The voltage's is whitened: its noise and the unknown gain and offset of its sensor together
-        have the covariance 1 + X X', X the errors over the noise, and the residual is multiplied by
-        the inverse of its square root. The errors follow from the simulated voltage: the noise of a
-        measured one would pass for a part of itself.
+        Noise, gain and offset of the voltage's sensor together have the covariance 1 + X X' with X
+        the errors over the noise. The residual of the voltage is multiplied by the inverse of the
+        square root of that covariance. The errors follow from the simulated voltage, because the
+        noise of the measured one would explain a part of itself.
+
+        Where the model cannot be simulated at these values, every sample is IMPOSSIBLE.
         """
         try:
             return self.strict_residual(values, gap_position, tolerance)
@@ -57,7 +59,7 @@ class Recording:
     def strict_residual(
         self, values: Mapping[str, float], gap_position: float, tolerance: float = TOLERANCE
     ) -> Array:
-        """The same; UnsettledError where the model cannot be simulated at these values."""
+        """Residual as in `residual`; raises UnsettledError where the model cannot be simulated."""
         found = simulate(self.inputs, values, gap_position=gap_position, tolerance=tolerance)
         difference = np.stack([self.log[name] - found[name] for name in self.channels])
         white = np.where(self.use, difference / self.noise[:, None], 0.0)
@@ -79,21 +81,24 @@ class Recording:
         )
 
     def with_wheel_torque(self, wheel_torque: Array) -> Recording:
-        """The same log simulated with another wheel torque [N m], shape (n,)."""
+        """The recording with another wheel torque as its input [N m], shape (n,)."""
         return replace(self, inputs=replace(self.inputs, wheel_torque=wheel_torque))
 
 
 def voltage_errors(voltage: Array) -> Array:
-    """What the voltage's sensor may be off by in offset and gain, a standard deviation of each [V],
-    shape (n, 2).
+    """Standard deviations of the voltage that its sensor's offset and gain make [V], shape (n, 2).
+
+    voltage : shape (n,) [V]
     """
     return np.stack([np.full(len(voltage), OFFSET), GAIN_ERROR * voltage], axis=-1)
 
 
 def whiten_sensor_errors(residual: Array, errors: Array) -> Array:
-    """A residual, shape (n,), whitened for errors of its sensor, shape (n, k), beside white noise.
+    """Whiten a residual for errors of its sensor beside white noise of variance 1; shape (n,).
 
-    (1 + X X')^(-1/2) r, by the eigenvalues of X'X.
+    (1 + X X')^(-1/2) r, computed from the eigenvalues of X'X
+
+    residual : r, shape (n,); errors : X, shape (n, k)
     """
     squares, vectors = np.linalg.eigh(errors.T @ errors)
     squares = np.maximum(squares, 1e-12)
@@ -106,10 +111,11 @@ def recording(
     hold: Hold | None = None,
     use: Mapping[str, NDArray[np.bool_]] | None = None,
 ) -> Recording:
-    """A log as it is fitted.
+    """Prepare a log for a fit: its inputs, compared channels and their noise.
 
-    use : samples that count, by channel; all where a channel is not named, but for a voltage, which
-        is then left out, of the log too; None: all of all channels
+    use : samples that count, by channel, shape (n,); None: all samples of all channels. A channel
+        without an entry counts whole. A voltage without an entry is removed, from the log too.
+    Raises IdentificationError for a channel that does not move.
     """
     if use is not None and VOLTAGE not in use:
         log = without_voltage(log)

@@ -11,7 +11,7 @@ which the drum shows less than the gear ratio says: the scale of either speed se
 itself. Lag tau and slip k of the measuring wheel and the gap's half width alpha are fitted beside
 it. Torque, current and friction are not in it, hence nothing that oil or windings change. The noise
 of delta is that of the speeds, summed up: a random walk, white between neighbouring samples. A
-truck on the drum hides which flank is in contact; such a run tells nothing here.
+truck on the drum hides which flank is in contact; such a run says nothing here.
 
 Two logs whose s differs by more than their errors and what this picture is good for are not of one
 bench, or it was changed between them; a diagnosis of both together would have no answer.
@@ -43,7 +43,7 @@ WINDOW, SETTLED = 0.2, 0.2
 DRIVEN, BRAKED = 0.25, 0.75
 # Gear and drum in contact differ by less [rad/s], and by less of their speed.
 TOGETHER, SHARE = 0.03, 0.02
-# One sample in this time [s]; fewer samples tell nothing.
+# One sample in this time [s]; fewer samples say nothing.
 APART, LEAST_SAMPLES = 0.05, 20
 # Of delta, beside the noise of the speeds: what smoothing leaves [rad].
 ROUGH = 3e-4
@@ -72,18 +72,18 @@ def check_same_bench(logs: Sequence[Log], values: Mapping[str, float]) -> None:
         apart = abs(first.share - second.share) / error
         if apart > DIFFERENT:
             raise LogError(
-                f"{second.source}: drum speed over motor speed is {_told(second)} what the gear "
-                f"ratio says while the gear drives, and {_told(first)} in {first.source}: "
+                f"{second.source}: drum speed over motor speed is {_percent(second)} what the gear "
+                f"ratio says while the gear drives, and {_percent(first)} in {first.source}: "
                 f"{apart:.0f} standard errors apart; give logs of one bench, unchanged between them"
             )
 
 
-def _told(scale: Scale) -> str:
+def _percent(scale: Scale) -> str:
     return f"{100.0 * (1.0 - scale.share):.2f} %"
 
 
 def scale_of(log: Log, values: Mapping[str, float]) -> Scale | None:
-    """The share by which the drum of a log shows less than the gear ratio says; None: not told."""
+    """Share by which the drum shows less than the gear ratio says; None: no information on it."""
     if "wheel_torque" in log:
         return None
     gear_speed, drum_speed = log["motor_speed"] / values["gear_ratio"], log["drum_speed"]

@@ -1,10 +1,10 @@
 """Reads a run of a single motor-driven axis: a CSV file, or a MATLAB file of a known bench.
 
 CSV: `time_s`, and `position_m` with `force_N`, or `position_rad` with `torque_Nm`; gzip or plain.
-MATLAB files are told by their variables:
+The variables of a MATLAB file say which bench it is of:
 
     t, qm, vir, gtau    a position-controlled screw: position [m], command [V], gain [N/V];
-                        force = gtau vir, which already holds what `pulses_N` may tell
+                        force = gtau vir, which already includes `pulses_N`
     data, Cu            a motor bench: seven columns time [s], reference, position [rad], speed,
                         torque command, torque [N m], current [A]; torque = Cu current
 """
@@ -67,7 +67,7 @@ def _csv(data: bytes, path: Path) -> AxisLog:
 
 
 def _header(data: bytes) -> bytes:
-    """The first line; nothing of a damaged file, which the reader then tells."""
+    """First line of a CSV file; empty for a damaged file, which the reader refuses."""
     try:
         text = gzip.decompress(data) if data.startswith(GZIP) else data
     except (OSError, EOFError, zlib.error):
