@@ -1,13 +1,14 @@
-"""A single motor-driven axis as the diagnosis sees it: one channel, the force, told by its motion.
+"""A single motor-driven axis as a machine that can be diagnosed: its motion explains its force.
 
-Nothing is integrated: the measured position gives velocity and acceleration, these give the force
-that the model says (`axis_effects`), and the residual is the logged force minus that, both in the
-band that the model is meant for (`axis_signals`). Linear [m, N] or rotary [rad, N m].
+The axis is linear [m, N] or rotary [rad, N m] and has one channel, the force. Nothing is
+integrated. The measured position gives velocity and acceleration; these give the force of the model
+(`axis_effects`). The residual is the logged force minus that force, both in the band that the model
+is meant for (`axis_signals`).
 
-Friction comes and goes with temperature and running in. Where several runs are fitted, each has its
-own `friction_level`, by which F_v and F_c of the axis are multiplied: 1 within LEVEL_STD. An axis
-that differs from repeat to repeat has drifted, and not another equation. A single run cannot tell
-how far runs differ; there the level is 1, in the runs that are predicted too.
+Friction changes with temperature and running in. Where several runs are fitted, each has its own
+`friction_level`, which multiplies the axis's F_v and F_c and is 1 within LEVEL_STD. An axis that
+differs from run to run has thus changed, and does not follow another equation. A single run cannot
+tell how far runs differ: its level is 1, and so is that of the runs that are predicted.
 """
 
 from __future__ import annotations
@@ -23,7 +24,12 @@ import numpy as np
 from plant_emulator.diagnosis.machine import MeasuredRun
 from plant_emulator.diagnosis.machines.axis_candidates import NAMES, UNITS, candidate, scale_of
 from plant_emulator.diagnosis.machines.axis_effects import EFFECTS
-from plant_emulator.diagnosis.machines.axis_signals import SAMPLES, AxisRun, prepared, told
+from plant_emulator.diagnosis.machines.axis_signals import (
+    SAMPLES_PER_HERTZ,
+    AxisRun,
+    informative_frequency,
+    prepare,
+)
 from plant_emulator.errors import LogError
 from plant_emulator.estimation.unknowns import Unknown
 
@@ -38,20 +44,22 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 LEVEL = "friction_level"
+# Prior standard deviation of the friction level. The friction of lubricated machines changes by
+# some per cent a kelvin around room temperature.
 LEVEL_STD = 0.1
-"""Friction of lubricated machines changes by some per cent a kelvin around room temperature."""
+# Travel of a revolution where none is given [m]; a rotary axis has 2 pi.
 SCREW_PITCH = 0.005
-"""[m] a revolution, where none is told; a rotary axis has 2 pi."""
 SUBSYSTEMS = dict(zip(NAMES, ("drum", "gear", "gear", "torque_sensor"), strict=True))
 
 
 class AxisModel:
-    """An axis and its logs; see `Model`.
+    """An axis with its logs; see `Model`.
 
-    effects : the library's, by name
-    fitted : runs that are fitted: their least squares are the nominal parameters; None: all
-    pitch : travel of a revolution [m or rad]; None: SCREW_PITCH, or 2 pi of a rotary axis
-    rate : samples a second that remain [Hz]; None: as many as the force tells something in
+    effects : the library, by name
+    fitted : runs whose least squares give the nominal parameters; None: all
+    pitch : travel of a revolution [m or rad]; None: SCREW_PITCH, or 2 pi for a rotary axis
+    rate : sample rate of the compared force [Hz]; None: that of the band in which the force is
+        informative
     """
 
     subsystems = SUBSYSTEMS
@@ -66,9 +74,9 @@ class AxisModel:
         pitch: float | None = None,
         rate: float | None = None,
     ) -> None:
-        rotary = one_kind(logs)
-        rate = rate or SAMPLES * max(told(log) for log in logs)
-        self._runs = [prepared(log, rate) for log in logs]
+        rotary = is_rotary(logs)
+        rate = rate or SAMPLES_PER_HERTZ * max(informative_frequency(log) for log in logs)
+        self._runs = [prepare(log, rate) for log in logs]
         self.scale = scale_of(self._runs, pitch or (2.0 * pi if rotary else SCREW_PITCH))
         self._effects = effects
         self.candidates = {
@@ -97,30 +105,30 @@ class AxisModel:
 
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
         """See `Model`."""
-        there = self._runs[run]
+        measured = self._runs[run]
         laws = [effect.law for name, effect in self._effects.items() if name in effects]
 
         def residual(found: Mapping[str, float]) -> Array:
             level = found.get(LEVEL, 1.0)
             p = {**found, **{name: level * found[name] for name in NAMES[1:3]}}
-            force = nominal(there.motion, p)
+            force = nominal_force(measured.motion, p)
             for law in laws:
-                force = law(force, there.motion, p, self.scale)
-            difference = (there.force - there.band(force)) / there.noise
-            return np.where(there.moves, difference, 0.0)[None, :]
+                force = law(force, measured.motion, p, self.scale)
+            difference = (measured.force - measured.band(force)) / measured.noise
+            return np.where(measured.moves, difference, 0.0)[None, :]
 
         return residual
 
     def input_noise(self, run: int, where: FitResult, state: Mapping[str, float]) -> None:  # noqa: ARG002 - `Model`'s signature
-        """See `Model`: the motion is fed, but smoothed."""
+        """See `Model`: the motion is a measured input, but a smoothed one."""
         return
 
     def nominal(self, runs: Sequence[int]) -> dict[str, float]:
-        """See `Model`: an axis has no data sheet; least squares of these runs."""
+        """See `Model`: an axis has no data sheet, so least squares of these runs."""
         return self._least_squares(runs, self.parameters)
 
     def start_values(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
-        """See `Model`: least squares, for which the axis without effects is linear."""
+        """See `Model`: least squares, because the axis without effects is linear."""
         return self.nominal(runs), [self._level() for _ in runs]
 
     def initial_states(
@@ -133,7 +141,7 @@ class AxisModel:
         return self._level()
 
     def locate(self, where: FitResult, runs: Sequence[int]) -> None:  # noqa: ARG002 - `Model`'s signature
-        """See `Model`: one channel has no blocks to tell apart."""
+        """See `Model`: one channel has no blocks that could be told apart."""
         return
 
     def with_planned_runs(self, where: FitResult, runs: Sequence[int]) -> AxisModel:  # noqa: ARG002 - `Model`'s signature
@@ -141,7 +149,7 @@ class AxisModel:
         return self
 
     def missing_experiments(self, runs: Sequence[int]) -> dict[str, tuple[str, ...]]:  # noqa: ARG002 - `Model`'s signature
-        """See `Model`: what an effect needs is told with the effect."""
+        """See `Model`: each effect says itself what it needs."""
         return {}
 
     def _level(self) -> dict[str, float]:
@@ -151,7 +159,7 @@ class AxisModel:
         from scipy.optimize import lsq_linear
 
         own = [self._runs[k] for k in runs]
-        rows = np.concatenate([regressor(r)[r.moves] / r.noise for r in own])
+        rows = np.concatenate([regressors(r)[r.moves] / r.noise for r in own])
         wanted = np.concatenate([r.force[r.moves] / r.noise for r in own])
         sizes = np.array([u.scale for u in unknowns])
         lower = [u.scaled(u.lower) for u in unknowns]
@@ -160,8 +168,8 @@ class AxisModel:
         return dict(zip(NAMES, map(float, found), strict=True))
 
     def _parameters(self, fitted: Sequence[int]) -> tuple[Unknown, ...]:
-        """The nominal parameters, each of a scale at which it makes all of the force."""
-        columns = np.concatenate([regressor(r) for r in self._runs])
+        """The nominal parameters, each with the scale at which it makes all of the force."""
+        columns = np.concatenate([regressors(r) for r in self._runs])
         sizes = self.scale.force / np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-300)
         unknowns = [
             Unknown(
@@ -178,21 +186,24 @@ class AxisModel:
         return tuple(replace(u, start=found[u.name], prior=found[u.name]) for u in unknowns)
 
 
-def nominal(m: Motion, p: Mapping[str, float]) -> Array:
-    """Force without effects [N or N m]: M q'' + F_v q' + F_c sgn q' + F_0."""
+def nominal_force(m: Motion, p: Mapping[str, float]) -> Array:
+    """Force without effects [N or N m].
+
+    F = M q'' + F_v q' + F_c sgn q' + F_0
+    """
     friction = p["viscous_friction"] * m.velocity + p["coulomb_friction"] * m.direction
     return np.asarray(p["inertia"] * m.acceleration + friction + p["offset"])
 
 
-def regressor(run: AxisRun) -> Array:
-    """Derivative of the force by each nominal parameter, shape (samples, 4)."""
+def regressors(run: AxisRun) -> Array:
+    """Derivatives of the force by the nominal parameters, in the band, shape (samples, 4)."""
     m = run.motion
     columns = (m.acceleration, m.velocity, m.direction, np.ones(len(m.velocity)))
     return np.stack([run.band(column) for column in columns], axis=1)
 
 
-def one_kind(logs: Sequence[AxisLog]) -> bool:
-    """Whether the logs are of a rotary axis; LogError where they are of both kinds."""
+def is_rotary(logs: Sequence[AxisLog]) -> bool:
+    """Whether the logs are of a rotary axis; raises LogError where they are of both kinds."""
     for log in logs[1:]:
         if log.rotary != logs[0].rotary:
             kinds = {False: "linear (m, N)", True: "rotary (rad, N m)"}
@@ -205,7 +216,7 @@ def one_kind(logs: Sequence[AxisLog]) -> bool:
 
 @dataclass(frozen=True)
 class AxisRecipe:
-    """What builds an `AxisModel` on another process; without : effects taken out of the library."""
+    """The recipe of an `AxisModel`; without : effects to take out of the library."""
 
     logs: tuple[AxisLog, ...]
     fitted: tuple[int, ...] | None = None
@@ -213,7 +224,7 @@ class AxisRecipe:
     pitch: float | None = None
 
     def build(self) -> AxisModel:
-        """The model."""
+        """Build the model."""
         library = {name: e for name, e in EFFECTS.items() if name not in self.without}
         return AxisModel(self.logs, library, fitted=self.fitted, pitch=self.pitch)
 

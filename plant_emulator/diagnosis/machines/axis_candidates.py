@@ -1,4 +1,4 @@
-"""The effects of an axis as unknowns of a fit, measured by what its own runs show (pure)."""
+"""The effects of an axis as unknowns of a fit, scaled by what the axis's own runs show."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ DIRECTIONS = {"forwards": 1.0, "backwards": -1.0}
 
 
 def scale_of(runs: Sequence[AxisRun], pitch: float) -> Scale:
-    """How large the axis is that made these runs."""
+    """Scale of the axis that made these runs; pitch : travel of a revolution [m or rad]."""
     low = min(float(r.motion.position.min()) for r in runs)
     high = max(float(r.motion.position.max()) for r in runs)
     return Scale(
@@ -43,11 +43,11 @@ def scale_of(runs: Sequence[AxisRun], pitch: float) -> Scale:
 
 
 def candidate(name: str, effect: AxisEffect, scale: Scale, *, rotary: bool) -> Candidate:
-    """An effect's declaration as unknowns of a fit."""
+    """Turn the declaration of an effect into unknowns; rotary : whether the axis is rotary."""
     sizes: dict[str, Unknown] = {}
     shapes: dict[str, Unknown] = {}
     for key, constant in effect.constants.items():
-        unknown = _unknown(f"{name}_{key}", constant, measure(constant, scale))
+        unknown = _unknown(f"{name}_{key}", constant, unit_of(constant, scale))
         (shapes if constant.neutral is None else sizes)[key] = unknown
     return Candidate(
         name=name,
@@ -71,7 +71,7 @@ def candidate(name: str, effect: AxisEffect, scale: Scale, *, rotary: bool) -> C
 
 
 def _one_way(effect: str, friction: str, way: str, unit: str) -> DerivedQuantity:
-    """The coefficient of one direction, (1 + a) F forwards and (1 - a) F backwards [unit]."""
+    """Friction coefficient of one direction: (1 + a) F forwards, (1 - a) F backwards [unit]."""
 
     def formula(p: Mapping[str, float]) -> float:
         return p[friction] * (1.0 + DIRECTIONS[way] * p[f"{effect}_ratio"])
@@ -79,8 +79,8 @@ def _one_way(effect: str, friction: str, way: str, unit: str) -> DerivedQuantity
     return DerivedQuantity(name=way, unit=unit, formula=formula)
 
 
-def measure(constant: Constant, scale: Scale) -> float:
-    """What a constant of an effect is measured by [SI]."""
+def unit_of(constant: Constant, scale: Scale) -> float:
+    """Value that a constant of an effect is measured in [SI]."""
     of = {"force": scale.force, "speed": scale.speed, "sample": scale.sample}
     return of.get(constant.of, 1.0)
 

@@ -1,14 +1,14 @@
-"""What may act on a motor-driven axis beside inertia, viscous and Coulomb friction and an offset.
+"""The effects of a motor-driven axis beside inertia, viscous and Coulomb friction and an offset.
 
-Nominal, with q the measured position, all in the axis's own unit (N or N m):
+The nominal force follows from the measured position q, in the axis's own unit (N or N m):
 
     F = M q'' + F_v q' + F_c sgn q' + F_0
 
 (M. Gautier, A. Janot, P.-O. Vandanjon, IEEE Trans. Control Systems Technology 21 (2013) 428, for
-one axis). Each effect is a function from the force so far to the force with it, and the table
-of its constants; where its sizes are neutral the force returns as it was. Friction effects: B.
-Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083, section 2. Nothing here
-knows how large an axis is: constants are in units of what the runs themselves show.
+one axis). Each effect is a function from the force so far to the force with the effect, and a table
+of its constants. With neutral sizes the force returns unchanged. Friction effects: B.
+Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083, section 2. Constants
+are in units of what the runs themselves show, so that no effect knows how large an axis is.
 """
 
 from __future__ import annotations
@@ -31,9 +31,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Scale:
-    """How large an axis is: rms force, highest speed, middle and half of its travel [SI].
+    """How large an axis is [SI].
 
-    pitch : travel of one revolution of the screw, or of the motor; sample : of the slowest log [s]
+    force : rms; speed : highest; middle, travel : middle and half of its travel
+    pitch : travel of one revolution of the screw, or of the motor
+    sample : sample time of the slowest log [s]
     """
 
     force: float
@@ -46,11 +48,12 @@ class Scale:
 
 @dataclass(frozen=True, kw_only=True)
 class Constant:
-    """One constant of an effect; `neutral`: there the effect is absent.
+    """One constant of an effect.
 
-    neutral None : it only shapes the effect; std : of what is known of it beforehand
-    of : what it is measured by: 1, the rms force, the highest speed, a sample
-    unit : where it is measured by 1
+    neutral : value at which the effect is absent; None: the constant only shapes the effect
+    std : prior standard deviation; None: no prior
+    of : what the constant is measured in: 1, the rms force, the highest speed, or a sample time
+    unit : of a constant that is measured in 1
     """
 
     plausible: float
@@ -64,10 +67,13 @@ class Constant:
 
 @dataclass(frozen=True, kw_only=True)
 class AxisEffect:
-    """An effect: its law, what it is in one line, where it sits, its constants by name.
+    """An effect of an axis.
 
-    needs : what a log must have to show it; empty: nothing special
-    by_direction : the nominal friction that it splits into one of either direction; empty: none
+    law : from the force so far to the force with the effect
+    title : the effect in one line
+    constants : by name
+    needs : what a log must have to show the effect; empty where it needs nothing special
+    by_direction : nominal friction that the effect splits into one of each direction; empty: none
     """
 
     law: Law
@@ -86,7 +92,7 @@ def viscous_asymmetry(force: Array, m: Motion, p: Values, _scale: Scale) -> Arra
 def coulomb_asymmetry(force: Array, m: Motion, p: Values, _scale: Scale) -> Array:
     """F + a F_c |sgn q'|: Coulomb friction (1 + a) F_c forwards, (1 - a) F_c backwards.
 
-    Where the axis never rests this is the offset F_0.
+    For an axis that never rests this is the offset F_0.
     """
     return force + p["coulomb_asymmetry_ratio"] * p["coulomb_friction"] * np.abs(m.direction)
 
@@ -100,8 +106,8 @@ def stribeck(force: Array, m: Motion, p: Values, _scale: Scale) -> Array:
 def concave_friction(force: Array, m: Motion, p: Values, scale: Scale) -> Array:
     """F + c sqrt(|q'|/v) sgn q', v the highest speed: friction rises ever slower with speed.
 
-    A square root, a negative square or a negative cube of the speed beside the viscous friction
-    differ by less than what one run can tell.
+    A square root, a negative square and a negative cube of the speed beside the viscous friction
+    differ by less than one run can tell.
     """
     root = np.sqrt(np.abs(m.velocity) / scale.speed)
     return force + p["concave_friction_rise"] * root * m.direction
@@ -135,9 +141,9 @@ def screw_ripple(force: Array, m: Motion, p: Values, scale: Scale) -> Array:
 def elasticity(force: Array, m: Motion, p: Values, _scale: Scale) -> Array:
     """F + b M (q_2'' - q''), with q_2'' + 2 z w q_2' + w^2 q_2 = 2 z w q' + w^2 q.
 
-    The share b of the inertia hangs on a spring and a damper: w is its natural frequency while the
-    motor is held. q_2'' from q'' by the bilinear transform that is exact at w; a log too slow for
-    w shows it at nine tenths of what it can hold.
+    The share b of the inertia hangs on a spring and a damper; w is its natural frequency while the
+    motor is held. A bilinear transform that is exact at w gives q_2'' from q''. In a log that is
+    too slow for w, nine tenths of the highest possible frequency stand for w.
     """
     from scipy.signal import lfilter
 
@@ -152,7 +158,7 @@ def elasticity(force: Array, m: Motion, p: Values, _scale: Scale) -> Array:
 def delay(force: Array, m: Motion, p: Values, _scale: Scale) -> Array:
     """F(t + T): the log holds a force T before it acts, as a command does.
 
-    From one sample on: a stamp tells no more than the sample, in which a command is held.
+    A size is at least one sample: within a sample a command is held, so that a stamp says no more.
     """
     time = m.period * np.arange(len(force))
     return np.asarray(np.interp(time + p["delay_time"], time, force))
@@ -166,6 +172,7 @@ def _force(plausible: float, lower: float, upper: float) -> Constant:
     return Constant(neutral=0.0, plausible=plausible, lower=lower, upper=upper, of="force")
 
 
+# The library, in the order in which the effects act. The delay is of the whole force: it is last.
 EFFECTS: Mapping[str, AxisEffect] = {
     "viscous_asymmetry": AxisEffect(
         law=viscous_asymmetry,
@@ -247,4 +254,3 @@ EFFECTS: Mapping[str, AxisEffect] = {
         },
     ),
 }
-"""In the order in which they act; the delay is of the whole force, so it comes last."""

@@ -1,4 +1,4 @@
-"""The bench as the diagnosis sees it."""
+"""The roller bench as a machine that can be diagnosed."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ import numpy as np
 
 from plant_emulator.diagnosis.localisation.locate import locate
 from plant_emulator.diagnosis.localisation.parity_relations import base_speed
-from plant_emulator.diagnosis.machine import Candidate, MeasuredRun
+from plant_emulator.diagnosis.machine import MeasuredRun
+from plant_emulator.diagnosis.machines.bench_candidates import candidate
 from plant_emulator.diagnosis.machines.bench_programs import (
     COLD_SHELL,
     missing_experiments,
-    planned,
+    planned_runs,
 )
+from plant_emulator.diagnosis.wording import UNITS as SIGNAL_UNITS
 from plant_emulator.effects import from_file
 from plant_emulator.estimation.equation_error import start_values
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
@@ -27,11 +29,9 @@ from plant_emulator.estimation.initial_states import (
 )
 from plant_emulator.estimation.residuals import residual_function
 from plant_emulator.estimation.start_search import Search
-from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.model.parameters import UNITS
 from plant_emulator.model.stage import GAP_POSITION, split_gap_position
 from plant_emulator.recordings.input_noise import noise_directions
-from plant_emulator.recordings.preflight import NAMES
 from plant_emulator.signals.log import VOLTAGE
 from plant_emulator.simulation.simulate import TOLERANCE, values_of
 from plant_emulator.solver.kernel import kernel, use_own_effects
@@ -48,58 +48,11 @@ if TYPE_CHECKING:
     from plant_emulator.recordings.input_noise import NoiseDirections
     from plant_emulator.recordings.recording import Recording
 
-# Tolerance of a run with a truck, whose every sample is a corner: twice as fast as the usual one,
-# and it moves the residual by less than a hundredth of the noise (rms).
-WITH_TRUCK = 1e-4
-# How what an effect needs begins that the voltage shows.
-LOG_VOLTAGE = f"log {NAMES[VOLTAGE]}"
+# Tolerance of a run with a truck. It takes half the time of the usual tolerance, because every
+# sample of such a run is a corner; it changes the residual by less than a hundredth of the noise.
+TRUCK_TOLERANCE = 1e-4
 
-
-def candidate(effect: Effect, *, voltage: bool = False) -> Candidate:
-    """An effect's declaration as unknowns of a fit; voltage : whether all logs have it."""
-    sizes: list[Unknown] = []
-    shapes: list[Unknown] = []
-    states: list[Unknown] = []
-    untold: list[Unknown] = []
-    for key, declared in effect.parameters.items():
-        unknown = Unknown(
-            name=f"{effect.name}_{key}",
-            start=declared.plausible,
-            lower=declared.lower,
-            upper=declared.upper,
-            logarithmic=False,
-            scale=declared.std or abs(declared.plausible - declared.neutral) or 1.0,
-            prior=declared.plausible,
-            std=declared.std,
-            step=declared.step,
-            angle=declared.angle,
-        )
-        if declared.std is not None:
-            (states if declared.per_run else shapes).append(unknown)
-        elif declared.per_run:
-            untold += [unknown] if declared.measured is None else []
-        elif declared.plausible != declared.neutral:
-            sizes.append(unknown)
-    free = {u.name for u in (*sizes, *shapes, *states)}
-    neutral = {f"{effect.name}_{k}": d.neutral for k, d in effect.parameters.items()}
-    plausible = {f"{effect.name}_{k}": d.plausible for k, d in effect.parameters.items()}
-    return Candidate(
-        name=effect.name,
-        subsystem=effect.subsystem,
-        sizes=tuple(sizes),
-        shapes=tuple(shapes),
-        states=tuple(states),
-        neutral={u.name: neutral[u.name] for u in sizes},
-        fixed={name: value for name, value in plausible.items() if name not in free},
-        units={f"{effect.name}_{key}": d.unit for key, d in effect.parameters.items()},
-        title=effect.description.partition("\n")[0].rstrip("."),
-        needs="" if voltage and effect.needs.startswith(LOG_VOLTAGE) else effect.needs,
-        stochastic=tuple(untold),
-        exact_form=effect.exact,
-    )
-
-
-# Where the parameters of the model belong.
+# Subsystem of each parameter of the model.
 SUBSYSTEMS = {
     "drive": ("dead_time", "speed_gain", "speed_integral_time", "current_gain"),
     "motor": (
@@ -120,22 +73,15 @@ SUBSYSTEMS = {
     "backlash_shaft": ("backlash_half_gap", "drum_shaft_damping", "drum_shaft_stiffness"),
     "drum": ("drum_inertia",),
 }
-SUBSYSTEM_OF = {name: place for place, names in SUBSYSTEMS.items() for name in names}
-CHANNEL_UNITS = {
-    "motor_speed": "rad/s",
-    "drum_speed": "rad/s",
-    "armature_current": "A",
-    "shaft_torque": "N m",
-    "armature_voltage": "V",
-}
+SUBSYSTEM_OF = {name: subsystem for subsystem, names in SUBSYSTEMS.items() for name in names}
 
 
 class BenchModel:
-    """The bench and its logs; see `Model`.
+    """The bench with its logs; see `Model`.
 
-    Effects that the parameter set has belong to the bench: what they have of each run's own is a
-    state of every fit, their sizes stay. Its blocks are then not told apart, since their relations
-    know the nominal equations only.
+    Effects of the parameter set belong to the bench. Their sizes stay as they are; what each run
+    has of its own is a state of every fit. The gap of such a bench is not located, because the
+    parity relations know the nominal equations only.
     """
 
     reaches_noise = True
@@ -168,7 +114,7 @@ class BenchModel:
             MeasuredRun(
                 source=r.log.source,
                 channels=r.channels,
-                units=tuple(CHANNEL_UNITS[name] for name in r.channels),
+                units=tuple(SIGNAL_UNITS[name] for name in r.channels),
                 time=r.log.time,
                 measured=np.stack([r.log[name] for name in r.channels]),
                 noise=r.noise,
@@ -178,16 +124,16 @@ class BenchModel:
         ]
 
     def _fixed(self, run: int, effects: Sequence[str]) -> dict[str, float]:
-        """Values that no fit changes: of the set, of the effects, and what the log tells."""
-        there = {k: v for name in effects for k, v in self.candidates[name].fixed.items()}
-        told = self._recordings[run].logged_values
-        own = {k: v for k, v in told.items() if k in there or k in self._given}
-        return {**self._values, **there, **own}
+        """Values that no fit of these effects changes: of set, effects and log."""
+        fixed = {k: v for name in effects for k, v in self.candidates[name].fixed.items()}
+        logged = self._recordings[run].logged_values
+        own = {k: v for k, v in logged.items() if k in fixed or k in self._given}
+        return {**self._values, **fixed, **own}
 
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
         """See `Model`."""
         recording = self._recordings[run]
-        tolerance = WITH_TRUCK if recording.inputs.truck else TOLERANCE
+        tolerance = TRUCK_TOLERANCE if recording.inputs.truck else TOLERANCE
         return residual_function(recording, self._fixed(run, effects), tolerance)
 
     def input_noise(
@@ -198,7 +144,7 @@ class BenchModel:
         return noise_directions(self._recordings[run], *split_gap_position(values))
 
     def nominal(self, runs: Sequence[int]) -> dict[str, float]:  # noqa: ARG002 - `Model`'s signature
-        """See `Model`: the parameter set's."""
+        """See `Model`: the values of the parameter set."""
         return {u.name: u.prior for u in self.parameters}
 
     def start_values(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
@@ -233,10 +179,10 @@ class BenchModel:
         return locate([self._recordings[k] for k in runs], self._set, where)
 
     def with_planned_runs(self, where: FitResult, runs: Sequence[int]) -> BenchModel:
-        """See `Model`: drive programs that no log shows, starting as the last run did."""
+        """See `Model`: drive programs that no log shows; they start as the last run did."""
         warm = {**self._fixed(runs[-1], where.effects), **where.values, **where.states[-1]}
         fitted = self._set.with_values({name: where.values[name] for name in self._free})
-        more = planned(self._recordings, fitted, warm, {**warm, **self._cold(where.effects)})
+        more = planned_runs(self._recordings, fitted, warm, {**warm, **self._cold(where.effects)})
         return BenchModel([*self._recordings, *more], self._set, self._effects, self._free)
 
     def missing_experiments(self, runs: Sequence[int]) -> dict[str, tuple[str, ...]]:
@@ -246,7 +192,7 @@ class BenchModel:
         )
 
     def _cold(self, effects: Sequence[str]) -> dict[str, float]:
-        """What of these effects is of another value where the gear starts cold."""
+        """Values of these effects' states that differ where the gear starts cold."""
         tables = {name: self._effects[name].parameters for name in effects}
         return {
             f"{name}_{key}": COLD_SHELL
@@ -258,9 +204,10 @@ class BenchModel:
 
 @dataclass(frozen=True)
 class BenchRecipe:
-    """What builds a `BenchModel` on another process.
+    """The recipe of a `BenchModel`.
 
-    without : effects that are taken out of the library; own : paths of a user's own effect files
+    without : effects to take out of the library
+    own : paths of the files of a user's own effects
     """
 
     recordings: tuple[Recording, ...]
@@ -268,21 +215,20 @@ class BenchRecipe:
     without: tuple[str, ...] = ()
     own: tuple[Path, ...] = ()
 
-    def contestants(self) -> dict[str, Effect]:
-        """The effects in the contest by name, of those that this process knows: without those
-        that the bench has.
-        """
+    def library(self) -> dict[str, Effect]:
+        """Effects to test, by name: those that this process knows and the bench has not."""
         left_out = {*self.without, *self.parameters.effects}
         return {n: effect for n, effect in kernel().effects.items() if n not in left_out}
 
     def build(self) -> BenchModel:
-        """The model; this process then knows the user's own effects."""
+        """Build the model; this process then knows the user's own effects."""
         use_own_effects(*(from_file(path) for path in self.own))
-        return BenchModel(self.recordings, self.parameters, self.contestants())
+        return BenchModel(self.recordings, self.parameters, self.library())
 
     def digest(self) -> str:
-        """Hash of all that the model is made of, the text of a user's own effects too: a cluster's
-        worker outlives an edit of it.
+        """Hash of all that the model is made of.
+
+        It contains the text of a user's own effects, because a worker outlives an edit of a file.
         """
         texts = [path.read_bytes() for path in self.own]
         return hashlib.sha256(pickle.dumps((self, texts))).hexdigest()

@@ -1,8 +1,8 @@
-"""Drive programs that a bench has not shown yet, as runs that can be judged before they are driven.
+"""Planned runs: drive programs that a bench has not driven yet.
 
-They are simulated without noise at a fit to the logs, and judged by the noise of those logs. A
-program was driven where a log has its reference; a log with a truck stands for both travel
-programs, whose references depend on the bench. A start with a cold gear is a run of its own.
+They are simulated without noise at a fit to the logs, and are judged by the noise of those logs. A
+log shows a program where it has its reference. A log with a truck shows both travel programs,
+because their references depend on the bench. A start with a cold gear is a run of its own.
 """
 
 from __future__ import annotations
@@ -30,43 +30,45 @@ if TYPE_CHECKING:
 
     Values = Mapping[str, float]
 
-# A log shows a program if its reference is off by less [rad/s rms], over this share of it.
-SAME_REFERENCE, SHOWN = 5.0, 0.9
-# Shell of a gear that stood over night, and from where on one is no longer cold [K].
-COLD_SHELL, NO_LONGER_COLD = 293.15, 298.15
+# A log shows a program if its reference differs by less than this [rad/s rms], over this share of
+# the program.
+SAME_REFERENCE, SHOWN_SHARE = 5.0, 0.9
+# Temperature of the gear's shell after a night, and the temperature below which it is cold [K].
+COLD_SHELL, COLD_BELOW = 293.15, 298.15
 
 
-def shows(log: Log, program: Program) -> bool:
-    """Whether the log is a run of this program."""
+def shows_program(log: Log, program: Program) -> bool:
+    """Whether a log is a run of this program."""
     if not isinstance(program, SpeedProgram):
         return "wheel_torque" in log
     if "wheel_torque" in log:
         return False
     time, reference = program.reference()
     off = log["speed_reference"] - np.interp(log.time - log.time[0], time, reference)
-    long_enough = np.ptp(log.time) >= SHOWN * program.duration
+    long_enough = np.ptp(log.time) >= SHOWN_SHARE * program.duration
     return bool(long_enough and np.sqrt(np.mean(off**2)) < SAME_REFERENCE)
 
 
 def undriven(logs: Sequence[Log]) -> list[Program]:
     """Programs that no log shows, those without a truck first."""
-    rest = [p for p in PROGRAMS.values() if not any(shows(log, p) for log in logs)]
+    rest = [p for p in PROGRAMS.values() if not any(shows_program(log, p) for log in logs)]
     return sorted(rest, key=lambda p: not isinstance(p, SpeedProgram))
 
 
-def cold(logs: Sequence[Log]) -> bool:
-    """Whether some log shows a gear that started cold."""
+def started_cold(logs: Sequence[Log]) -> bool:
+    """Whether a log shows a gear that started cold."""
     name = "shell_temperature"
-    return any(name in log and log[name][0] < NO_LONGER_COLD for log in logs)
+    return any(name in log and log[name][0] < COLD_BELOW for log in logs)
 
 
-def planned(
+def planned_runs(
     recordings: Sequence[Recording], parameters: ParameterSet, warm: Values, from_cold: Values
 ) -> Iterator[Recording]:
-    """Runs not driven yet, the least effort first: warm, from a cold start, with a truck.
+    """Simulate the runs not driven yet, of least effort first: warm, cold start, with a truck.
 
-    parameters : at the fit, for what a truck's reference follows from
-    warm, from_cold : all values of the simulation, with states as the last log or a cold start has
+    parameters : at the fit; a truck's reference follows from them
+    warm, from_cold : all values of the simulation, with the states of the last log or of a cold
+        start
     """
     logs = [r.log for r in recordings]
     rest = undriven(logs)
@@ -74,7 +76,7 @@ def planned(
     shell = _last_shell(logs)
     for speeds in (p for p in rest if isinstance(p, SpeedProgram)):
         yield from _recorded(describe(speeds), _inputs(speeds), warm, levels, shell)
-    if not cold(logs):
+    if not started_cold(logs):
         speeds = max(
             (p for p in PROGRAMS.values() if isinstance(p, SpeedProgram)), key=lambda p: p.duration
         )
@@ -99,7 +101,11 @@ def _inputs(program: SpeedProgram) -> Log:
 def _recorded(
     words: str, inputs: Log, values: Values, levels: Mapping[str, float], shell: float | None
 ) -> Iterator[Recording]:
-    """The run as these values predict it; none where they cannot be driven through it."""
+    """Simulate a run with these values; none where the model cannot follow it.
+
+    words : what to do; levels : standard deviation of each channel's noise
+    shell : temperature of the gear's shell [K]; None: not logged
+    """
     run = inputs_of(inputs)
     with suppress(UnsettledError):
         others, gap = split_gap_position(values)
@@ -118,9 +124,9 @@ def _recorded(
 
 
 def missing_experiments(logs: Sequence[Log], base_speed: float) -> dict[str, tuple[str, ...]]:
-    """By subsystem: what would tell more of it and is in none of these logs.
+    """What would show more of each subsystem and is in none of these logs, by subsystem.
 
-    base_speed : above which the field is weakened [rad/s]
+    base_speed : motor speed above which the field is weakened [rad/s]
     """
     fastest = max(float(log["motor_speed"].max()) for log in logs)
     backwards = min(float(log["speed_reference"].min()) for log in logs) < -LEAST_MOTION
@@ -132,7 +138,7 @@ def missing_experiments(logs: Sequence[Log], base_speed: float) -> dict[str, tup
             f"a run above {base_speed:.0f} rad/s, where the field is weakened",
             ("drive", "motor"),
         ),
-        (not cold(logs), "a cold start", ("gear",)),
+        (not started_cold(logs), "a cold start", ("gear",)),
         (not backwards, "a run in the other direction", ("gear",)),
         (
             not any("wheel_torque" in log for log in logs),

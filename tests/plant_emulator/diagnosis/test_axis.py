@@ -19,7 +19,7 @@ from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
 from plant_emulator.diagnosis.fitting.signature import signature
 from plant_emulator.diagnosis.machines.axis import AxisModel, AxisRecipe
 from plant_emulator.diagnosis.machines.axis_effects import EFFECTS
-from plant_emulator.diagnosis.machines.axis_signals import prepared
+from plant_emulator.diagnosis.machines.axis_signals import prepare
 from plant_emulator.diagnosis.prediction.held_out import NOMINAL, HeldOut, Plan
 from plant_emulator.errors import LogError
 from plant_emulator.signals.axis_log import AxisLog
@@ -270,7 +270,7 @@ def test_run_of_which_the_ends_leave_little_is_refused() -> None:
         source="x",
     )
     with pytest.raises(LogError, match=r"x: 0 samples are left of .* at 5 a second"):
-        prepared(short, 5.0)
+        prepare(short, 5.0)
 
 
 def test_power_of_white_noise_is_its_variance_over_half_its_rate() -> None:

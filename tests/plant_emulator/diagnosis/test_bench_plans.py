@@ -2,7 +2,11 @@
 
 import numpy as np
 
-from plant_emulator.diagnosis.machines.bench_programs import missing_experiments, shows, undriven
+from plant_emulator.diagnosis.machines.bench_programs import (
+    missing_experiments,
+    shows_program,
+    undriven,
+)
 from plant_emulator.signals.log import Array, Log
 from plant_emulator.simulation.programs import PROGRAMS, describe
 
@@ -14,9 +18,9 @@ def driven(name: str, factor: float = 1.0, **more: Array) -> Log:
 
 
 def test_log_shows_the_program_whose_reference_it_has():
-    assert shows(driven("program2"), PROGRAMS["program2"])
-    assert not shows(driven("program2", 0.9), PROGRAMS["program2"])
-    assert not shows(driven("program3"), PROGRAMS["program2"])
+    assert shows_program(driven("program2"), PROGRAMS["program2"])
+    assert not shows_program(driven("program2", 0.9), PROGRAMS["program2"])
+    assert not shows_program(driven("program3"), PROGRAMS["program2"])
     rest = [p.name for p in undriven([driven(f"program{k}") for k in (1, 2, 3)])]
     assert rest == ["program4", "program6", "program6L"]
     truck = driven("program1", wheel_torque=np.zeros(1851))

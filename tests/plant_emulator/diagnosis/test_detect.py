@@ -16,7 +16,7 @@ from plant_emulator.diagnosis.design.detectability import (
     reached,
     smallest,
 )
-from plant_emulator.diagnosis.machines.bench import candidate
+from plant_emulator.diagnosis.machines.bench_candidates import candidate
 from plant_emulator.workflows.detectability import Detectability
 
 

@@ -1,0 +1,75 @@
+"""The effects of the library as unknowns of a fit to logs of the bench."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+from plant_emulator.diagnosis.machine import Candidate
+from plant_emulator.estimation.unknowns import Unknown
+from plant_emulator.recordings.preflight import NAMES
+from plant_emulator.signals.log import VOLTAGE
+
+if TYPE_CHECKING:
+    from plant_emulator.effects import Effect, EffectParameter
+
+    Role = Literal["size", "shape", "state", "stochastic", "fixed"]
+
+# What an effect needs begins so, where the logged voltage shows it.
+LOG_VOLTAGE = f"log {NAMES[VOLTAGE]}"
+
+
+def candidate(effect: Effect, *, voltage: bool = False) -> Candidate:
+    """Turn the declaration of an effect into unknowns; voltage : whether all logs have it."""
+    name, parameters = effect.name, effect.parameters
+    unknowns: dict[str, list[Unknown]] = {r: [] for r in ("size", "shape", "state", "stochastic")}
+    fixed: dict[str, float] = {}
+    for key, declared in parameters.items():
+        role = _role(declared)
+        if role != "fixed":
+            unknowns[role].append(_unknown(f"{name}_{key}", declared))
+        if role in {"fixed", "stochastic"}:
+            fixed[f"{name}_{key}"] = declared.plausible
+    neutral = {f"{name}_{key}": declared.neutral for key, declared in parameters.items()}
+    return Candidate(
+        name=name,
+        subsystem=effect.subsystem,
+        sizes=tuple(unknowns["size"]),
+        shapes=tuple(unknowns["shape"]),
+        states=tuple(unknowns["state"]),
+        neutral={u.name: neutral[u.name] for u in unknowns["size"]},
+        fixed=fixed,
+        units={f"{name}_{key}": declared.unit for key, declared in parameters.items()},
+        title=effect.description.partition("\n")[0].rstrip("."),
+        needs="" if voltage and effect.needs.startswith(LOG_VOLTAGE) else effect.needs,
+        stochastic=tuple(unknowns["stochastic"]),
+        exact_form=effect.exact,
+    )
+
+
+def _role(declared: EffectParameter) -> Role:
+    """The part that a declared parameter plays in a fit.
+
+    A prior makes it a shape, or a state where each run has its own. Without a prior it is a size
+    where its plausible value is not neutral. A value of each run without a prior is stochastic, but
+    fixed where the log measures it.
+    """
+    if declared.std is not None:
+        return "state" if declared.per_run else "shape"
+    if declared.per_run:
+        return "stochastic" if declared.measured is None else "fixed"
+    return "size" if declared.plausible != declared.neutral else "fixed"
+
+
+def _unknown(name: str, declared: EffectParameter) -> Unknown:
+    return Unknown(
+        name=name,
+        start=declared.plausible,
+        lower=declared.lower,
+        upper=declared.upper,
+        logarithmic=False,
+        scale=declared.std or abs(declared.plausible - declared.neutral) or 1.0,
+        prior=declared.plausible,
+        std=declared.std,
+        step=declared.step,
+        angle=declared.angle,
+    )
