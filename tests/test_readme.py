@@ -53,6 +53,19 @@ def test_every_command_line_has_a_known_command_and_known_options(page: str) -> 
         command.make_parser(context).parse_args(arguments)
 
 
+@pytest.mark.parametrize("page", [page for page in PAGES if "plant_emulator/" in page])
+def test_every_named_file_of_the_package_exists(page: str) -> None:
+    folder = (ROOT / page).parent
+    places = (folder, ROOT, ROOT / page.partition("/")[0])
+    names = re.findall(r"`([\w/]+(?:/|\.py))`", text(page))
+    assert [name for name in names if not any((place / name).exists() for place in places)] == []
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_name_of_the_library_exists(page: str) -> None:
+    assert set(re.findall(r"\bpe\.(\w+)", text(page))) <= set(dir(plant_emulator))
+
+
 @pytest.mark.parametrize("page", [page for page in PAGES if "```toml" in text(page)])
 def test_every_configuration_is_valid(page: str) -> None:
     for block in re.findall(r"```toml\n(.*?)```", text(page), flags=re.DOTALL):
