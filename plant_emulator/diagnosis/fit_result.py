@@ -1,4 +1,4 @@
-"""What a fit found: the result of a joint fit, and of the fit of a random effect."""
+"""What a fit found: values, the result of a joint fit, and that of a random effect."""
 
 from __future__ import annotations
 
@@ -12,11 +12,22 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FitResult:
-    """The result of a joint fit of parameters, states and effects, as plain data.
+class FitValues:
+    """Values at which a model with some effects can be simulated and linearised.
 
     values : parameters, sizes and shapes by name
-    states : the initial states of each fitted run by name, one mapping a run
+    states : the initial states of each run by name, one mapping a run
+    """
+
+    effects: tuple[str, ...]
+    values: Mapping[str, float]
+    states: tuple[Mapping[str, float], ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitResult(FitValues):
+    """The result of a joint fit of parameters, states and effects, as plain data.
+
     cost : sum of squares, plus the priors' penalty, plus the Occam penalty
     sum_of_squares : of the whitened residuals alone
     samples : number of samples that count
@@ -32,9 +43,6 @@ class FitResult:
         certain; such an effect can follow anything that differs from run to run
     """
 
-    effects: tuple[str, ...]
-    values: Mapping[str, float]
-    states: tuple[Mapping[str, float], ...]
     cost: float
     sum_of_squares: float
     samples: int

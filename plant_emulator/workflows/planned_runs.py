@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.joint_fit import (
-    fit_null,
-    joint_unknowns,
-    to_result,
-    with_starts,
-)
+from plant_emulator.diagnosis.fit_result import FitValues
+from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.machines.bench import BenchModel, BenchRecipe
 from plant_emulator.errors import ParameterError
-from plant_emulator.estimation.least_squares import linearise_at
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import Recording
 from plant_emulator.signals.log import COMPARED, Log
@@ -29,7 +23,6 @@ from plant_emulator.workflows.simulation import simulate
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.model.parameters import ParameterSet
 
 
@@ -49,8 +42,8 @@ def planned_run(
 
 def prepare(
     runs: Sequence[str | Path | Log], parameters: ParameterSet, reference: str | None = None
-) -> tuple[BenchModel, FitResult, tuple[str, ...]]:
-    """A model of logs and planned programs, the fit at which they are judged, and notes.
+) -> tuple[BenchModel, FitValues, tuple[str, ...]]:
+    """A model of logs and planned programs, the values at which they are judged, and notes.
 
     Logs are fitted. Programs are simulated at what the logs say, or at the set as given.
     reference : what holds between samples of the reference; None: as the log says
@@ -69,8 +62,13 @@ def prepare(
     channels = max((r.channels for r in recordings), key=len, default=COMPARED)
     recordings += [planned_run(name, parameters, channels) for name in programs]
     model = BenchRecipe(tuple(recordings), parameters).build()
-    states = (*states, *({GAP_POSITION: 0.0} for _ in programs))
-    return model, _result_at(model, parameters.values(), states), (*notes, *more)
+    values = parameters.values()
+    at = FitValues(
+        effects=(),
+        values={u.name: values[u.name] for u in model.parameters},
+        states=(*states, *({GAP_POSITION: 0.0} for _ in programs)),
+    )
+    return model, at, (*notes, *more)
 
 
 def _is_program(run: str | Path | Log) -> bool:
@@ -80,13 +78,3 @@ def _is_program(run: str | Path | Log) -> bool:
         known = ", ".join(PROGRAMS)
         raise ParameterError(f"{run}: neither a log file nor a program; known: {known}")
     return run in PROGRAMS
-
-
-def _result_at(
-    model: BenchModel, values: Mapping[str, float], states: tuple[Mapping[str, float], ...]
-) -> FitResult:
-    """The result of a fit without effects that stays at these values and states."""
-    runs = range(len(states))
-    unknowns = with_starts(joint_unknowns(model, (), runs), values, states)
-    found = to_result((), linearise_at(unknowns, [model.residual(k, ()) for k in runs]), len(runs))
-    return replace(found, values={u.name: values[u.name] for u in model.parameters}, states=states)

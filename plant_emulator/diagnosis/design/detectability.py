@@ -27,7 +27,7 @@ from plant_emulator.diagnosis.fitting.signature import SIZES, bounded_size, sign
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.fit_result import FitValues
     from plant_emulator.diagnosis.fitting.signature import Signature
     from plant_emulator.diagnosis.machine import Candidate, Model
 
@@ -90,7 +90,7 @@ class EffectDetectability:
         }
 
 
-def detection_limits(model: Model, where: FitResult, runs: Sequence[int]) -> list[DetectionLimit]:
+def detection_limits(model: Model, where: FitValues, runs: Sequence[int]) -> list[DetectionLimit]:
     """Find what these runs can show of every effect, at a fit without effects."""
     tangents = NuisanceSpace(linearise(model, where, runs))
     found = {

@@ -26,6 +26,7 @@ from plant_emulator.estimation.least_squares import DIFFERENCE_NORM, estimate, l
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from plant_emulator.diagnosis.fit_result import FitValues
     from plant_emulator.diagnosis.machine import Candidate, Model
     from plant_emulator.estimation.unknowns import Estimate, Unknown
 
@@ -153,8 +154,8 @@ def fit_from(
     return fit(model, effects, runs, start.values, start.states, iterations)
 
 
-def linearise(model: Model, found: FitResult, runs: Sequence[int]) -> Estimate:
-    """Compute residuals, Jacobians and covariance at a fit, without fitting."""
+def linearise(model: Model, found: FitValues, runs: Sequence[int]) -> Estimate:
+    """Compute residuals, Jacobians and covariance at the values of a fit, without fitting."""
     unknowns = with_starts(joint_unknowns(model, found.effects, runs), found.values, found.states)
     return linearise_at(unknowns, [model.residual(k, found.effects) for k in runs])
 

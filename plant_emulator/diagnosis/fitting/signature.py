@@ -25,7 +25,7 @@ from plant_emulator.estimation.robust_scan import combinations
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.fit_result import FitValues
     from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
     from plant_emulator.diagnosis.machine import Candidate, Model
     from plant_emulator.estimation.unknowns import Estimate, Unknown
@@ -76,7 +76,7 @@ class Signature:
 
 
 def signature(
-    model: Model, name: str, found: FitResult, runs: Sequence[int], nuisance: NuisanceSpace
+    model: Model, name: str, found: FitValues, runs: Sequence[int], nuisance: NuisanceSpace
 ) -> Signature | None:
     """Signature of an effect at a fit that lacks it; None where the effect changes nothing.
 
@@ -157,7 +157,7 @@ class _Effect:
 
     model: Model
     candidate: Candidate
-    found: FitResult
+    found: FitValues
     runs: tuple[int, ...]
     nuisance: NuisanceSpace
 
