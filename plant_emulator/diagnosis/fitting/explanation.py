@@ -55,18 +55,18 @@ class Explanation:
         """Names of all accepted effects, the random ones first."""
         return (*(one.effect for one in self.random_effects), *self.final.effects)
 
-    def evidence(self, contender: Hypothesis) -> float:
+    def evidence(self, hypothesis: Hypothesis) -> float:
         """Evidence of an effect [1]: beside the other accepted effects, or alone."""
         for one in self.random_effects:
-            if one.effect == contender.effect:
+            if one.effect == hypothesis.effect:
                 return one.evidence
-        if contender.effect in self.reduced_costs:
-            fall = self.reduced_costs[contender.effect] - self.final.cost
+        if hypothesis.effect in self.reduced_costs:
+            fall = self.reduced_costs[hypothesis.effect] - self.final.cost
             return evidence_of(fall, self.final, self.null)
-        if contender.fit is None:
+        if hypothesis.fit is None:
             return 0.0
-        best = min(self.final, contender.fit, key=lambda p: p.mean_square)
-        return evidence_of(self.null.cost - contender.fit.cost, best, self.null)
+        best = min(self.final, hypothesis.fit, key=lambda p: p.mean_square)
+        return evidence_of(self.null.cost - hypothesis.fit.cost, best, self.null)
 
     def classes(self) -> list[list[str]]:
         """Classes of effects that these logs cannot tell apart, each led by an accepted effect."""

@@ -107,9 +107,9 @@ def noise_sensitivities(m: MeasuredSignals, p: Mapping[str, float]) -> tuple[Arr
         motor = [sign * p["motor_inertia"] / step, zero, -0.5 * slope, -half, zero]
         inertia = sign * p["gear_inertia"] / step / xi**2
         gear = [inertia, sign * p["drum_inertia"] / step / xi, zero, half, zero]
-        told = half / p["speed_gain"]
-        voltage = zero if m.voltage is None else told / p["current_gain"]
-        drive = [half, zero, told, zero, voltage]
+        speed_error = half / p["speed_gain"]
+        voltage = zero if m.voltage is None else speed_error / p["current_gain"]
+        drive = [half, zero, speed_error, zero, voltage]
         current = -0.5 * p["armature_resistance"] - sign * p["armature_inductance"] / step
         armature = [-0.5 * slope, zero, current, zero, half]
         return np.array([motor, gear, drive, armature])[: m.rows] * m.noise[None, :, None]

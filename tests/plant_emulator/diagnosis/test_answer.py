@@ -14,7 +14,7 @@ from plant_emulator.diagnosis.report.html_traces import path, rms
 from plant_emulator.diagnosis.report.ranking import hypotheses_to_rank, ranked_effect
 from plant_emulator.diagnosis.report.shrinkage import noise_floor, nrmsd
 from plant_emulator.signals.log import Array
-from tests.plant_emulator.diagnosis.test_contest import effect
+from tests.plant_emulator.diagnosis.line import effect
 
 POINT = FitResult(
     effects=(),

@@ -15,7 +15,7 @@ from plant_emulator.diagnosis.prediction.gap import Fold, predict
 from plant_emulator.diagnosis.prediction.held_out import HeldOut, Plan
 from plant_emulator.estimation import least_squares
 from plant_emulator.signals.log import Array
-from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, noisy, runner
+from tests.plant_emulator.diagnosis.line import TIME, Given, Line, noisy, runner
 
 EACH_IN_TURN = Plan(fitted=(0, 1, 2), folds=(((1, 2), (0,)), ((0, 2), (1,)), ((0, 1), (2,))))
 

@@ -4,7 +4,7 @@ import pytest
 
 from plant_emulator.diagnosis.report.statement import statement
 from plant_emulator.diagnosis.selection.verdict import Decision, Deviation
-from tests.plant_emulator.diagnosis.test_contest import effect
+from tests.plant_emulator.diagnosis.line import effect
 
 
 def deviation(nominal: float, estimated: float) -> Deviation:

@@ -19,7 +19,7 @@ from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.machine import Model
 from plant_emulator.errors import EmulatorError, InputError
 from plant_emulator.workflows.workers import Cluster, Processes
-from tests.plant_emulator.diagnosis.test_contest import TIME, Line, noisy
+from tests.plant_emulator.diagnosis.line import TIME, Line, noisy
 
 
 @dataclass

@@ -16,7 +16,7 @@ from plant_emulator.diagnosis.prediction.gap import Fold, refit_fold
 from plant_emulator.estimation.robust_scan import scan_unknowns
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.signals.log import Array
-from tests.plant_emulator.diagnosis.test_contest import TIME, Line, explained, linear, noisy
+from tests.plant_emulator.diagnosis.line import TIME, Line, explained, linear, noisy
 
 # One that the samples of a run of 2 s tell from others 0.5 Hz off, anywhere within 5.2 Hz.
 RATE = linear("beat_rate", 0.0, scale=3.0, std=3.0, step=0.1)

@@ -13,7 +13,7 @@ from plant_emulator.diagnosis.fitting.steps import show
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.selection.procedure import Procedure
 from plant_emulator.signals.log import Array
-from tests.plant_emulator.diagnosis.test_contest import (
+from tests.plant_emulator.diagnosis.line import (
     TIME,
     Given,
     Line,

@@ -1,6 +1,5 @@
 """The contest on a machine so small that it can be checked by hand."""
 
-import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import ClassVar
@@ -9,7 +8,6 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.answer import Location, Undetectable
-from plant_emulator.diagnosis.execution.pool import InProcess, Pool, TaskRunner
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.elsewhere import (
     from_nominal,
@@ -20,12 +18,11 @@ from plant_emulator.diagnosis.fitting.elsewhere import (
     vacated,
 )
 from plant_emulator.diagnosis.fitting.evidence import adequate, excess
-from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
+from plant_emulator.diagnosis.fitting.explanation import Hypothesis
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null, linearise
 from plant_emulator.diagnosis.fitting.looks import glance, glance_far, look
 from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
 from plant_emulator.diagnosis.fitting.signature import signature
-from plant_emulator.diagnosis.machine import Candidate, MeasuredRun
 from plant_emulator.diagnosis.report.ranking import undetectable
 from plant_emulator.diagnosis.selection import rounds as engine
 from plant_emulator.diagnosis.selection.contenders import best_of
@@ -35,134 +32,17 @@ from plant_emulator.diagnosis.selection.rules import noise_only
 from plant_emulator.diagnosis.selection.stepwise import Contest
 from plant_emulator.diagnosis.selection.subsystem import faulty_subsystem
 from plant_emulator.diagnosis.selection.verdict import decide
-from plant_emulator.estimation.unknowns import Unknown
-from plant_emulator.recordings.input_noise import NoiseDirections
 from plant_emulator.signals.log import Array
-
-TIME = np.linspace(-1.0, 1.0, 2000)
-
-
-def linear(name: str, start: float = 1.0, **more: float) -> Unknown:
-    """An unknown on a linear scale."""
-    return Unknown(name=name, start=start, lower=-50.0, upper=50.0, logarithmic=False, **more)  # type: ignore[arg-type]
-
-
-def effect(name: str, size: float = 1.0) -> Candidate:
-    """An effect with one size."""
-    return Candidate(
-        name=name,
-        subsystem=f"part of {name}",
-        sizes=(linear(f"{name}_size", size, scale=size),),
-        shapes=(),
-        states=(),
-        neutral={f"{name}_size": 0.0},
-        fixed={},
-        units={f"{name}_size": "1"},
-        title=f"The {name}",
-    )
-
-
-SHAPES: dict[str, Callable[[Array], Array]] = {
-    "cube": lambda x: x**3,
-    "wave": lambda x: np.sin(20.0 * x),
-    "kink": np.abs,
-    "near kink": lambda x: np.abs(x) + 1e-3 * np.sin(9.0 * x),
-}
-
-
-class Line:
-    """y = a + b x + effects, noise 1: linear, so that every step has a closed form."""
-
-    parameters = (linear("a", 0.0, std=10.0), linear("b", 0.0, std=10.0))
-    units: Mapping[str, str] = {"a": "1", "b": "1"}
-    subsystems: Mapping[str, str] = {"a": "level", "b": "slope"}
-    states: tuple[Unknown, ...] = ()
-    reaches_noise = True
-
-    def __init__(self, measured: Sequence[Array], names: Sequence[str] = tuple(SHAPES)) -> None:
-        self.measured = list(measured)
-        self.candidates = {name: effect(name) for name in names}
-        self.runs = [
-            MeasuredRun(
-                source=f"run {k}",
-                channels=("y",),
-                units=("1",),
-                time=TIME,
-                measured=y[None, :],
-                noise=np.ones(1),
-            )
-            for k, y in enumerate(measured)
-        ]
-
-    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
-        """See `Model`."""
-
-        def residual(v: Mapping[str, float]) -> Array:
-            y = v["a"] + v["b"] * TIME
-            for name in effects:
-                y = y + v[f"{name}_size"] * SHAPES[name](TIME)
-            return (self.measured[run] - y)[None, :]
-
-        return residual
-
-    def input_noise(
-        self, run: int, where: FitResult, state: Mapping[str, float]
-    ) -> NoiseDirections | None:
-        """See `Model`: nothing is fed."""
-        return None
-
-    def nominal(self, runs: Sequence[int]) -> dict[str, float]:
-        """See `Model`."""
-        return {u.name: u.prior for u in self.parameters}
-
-    def start_values(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
-        """See `Model`."""
-        return {"a": 0.0, "b": 0.0}, [{} for _ in runs]
-
-    def initial_states(
-        self, run: int, effects: Sequence[str], values: Mapping[str, float]
-    ) -> dict[str, float]:
-        """See `Model`."""
-        return {}
-
-    def locate(self, where: FitResult, runs: Sequence[int]) -> None:
-        """See `Model`."""
-
-
-# Identities are used again once a model is gone; numbers are not.
-NUMBERS = itertools.count()
-
-
-class Given:
-    """A recipe of a model that is there already."""
-
-    def __init__(self, model: Line) -> None:
-        self.model, self.number = model, next(NUMBERS)
-
-    def build(self) -> Line:
-        """The model."""
-        return self.model
-
-    def digest(self) -> str:
-        """Its number, that no other recipe has."""
-        return str(self.number)
-
-
-def runner(model: Line, pool: Pool | None = None) -> TaskRunner:
-    """All runs of a model, fitted in this process."""
-    runs = tuple(range(len(model.runs)))
-    return TaskRunner(pool=pool or InProcess(), recipe=Given(model), model=model, runs=runs)
-
-
-def noisy(y: Array, seed: int = 0) -> Array:
-    """With noise of 1."""
-    return y + np.random.default_rng(seed).standard_normal(len(TIME))
-
-
-def explained(model: Line) -> Explanation:
-    """The contest over all runs."""
-    exact = [name for name, one in model.candidates.items() if one.exact_form]
-    return Contest(runner(model), tuple(model.candidates), exact=exact).explain()
+from tests.plant_emulator.diagnosis.line import (
+    SHAPES,
+    TIME,
+    Line,
+    effect,
+    explained,
+    linear,
+    noisy,
+    runner,
+)
 
 
 def test_signature_is_what_a_line_cannot_follow() -> None:

@@ -1,10 +1,8 @@
 """A single axis: a synthetic one of which everything is known."""
 
-import importlib.util
 import pickle
 import re
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,14 +23,7 @@ from plant_emulator.errors import LogError
 from plant_emulator.signals.axis_log import AxisLog
 from plant_emulator.signals.frequency_bands import power
 from plant_emulator.workflows.diagnosis.plan import plan_of_runs
-
-spec = importlib.util.spec_from_file_location(
-    "axis_truth", Path(__file__).with_name("axis_truth.py")
-)
-assert spec is not None
-assert spec.loader is not None
-truth = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(truth)
+from tests.plant_emulator.diagnosis import axis_truth as truth
 
 PLANTED: dict[str, tuple[Callable[..., np.ndarray], str, float]] = {
     "viscous_asymmetry": (lambda q, v, a: 0.2 * truth.VISCOUS * np.abs(v), "ratio", 0.2),

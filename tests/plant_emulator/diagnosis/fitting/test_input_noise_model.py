@@ -13,7 +13,7 @@ from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.selection.procedure import Procedure
 from plant_emulator.recordings.input_noise import NoiseDirections
 from plant_emulator.signals.log import Array
-from tests.plant_emulator.diagnosis.test_contest import TIME, Given, Line, noisy, runner
+from tests.plant_emulator.diagnosis.line import TIME, Given, Line, noisy, runner
 
 # What the fed input's noise adds to every sample by its one standard deviation.
 FED = np.where(TIME > 0.95, 20.0, 0.0)

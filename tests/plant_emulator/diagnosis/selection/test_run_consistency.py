@@ -13,7 +13,7 @@ from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
 from plant_emulator.solver.kernel import kernel
-from tests.plant_emulator.diagnosis.test_contest import TIME, Line
+from tests.plant_emulator.diagnosis.line import TIME, Line
 
 BenchLog = Callable[[str], Log]
 NUMBER = r"(\d\S+) \+- (\d\S+) s in "

@@ -6,7 +6,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.selection.verdict import Decision, decide, deviations
-from tests.plant_emulator.diagnosis.test_contest import TIME, Line, explained, linear, noisy
+from tests.plant_emulator.diagnosis.line import TIME, Line, explained, linear, noisy
 
 LINE = 2.0 + 3.0 * TIME
 SAMPLE = np.arange(len(TIME))
