@@ -87,9 +87,9 @@ def command(
     settings = config_file.given(config or Config())
     settings = config_file.with_values(settings, assignments(values))
     if not files:
-        tell = partial(click.echo, err=True)
+        to_operator = partial(click.echo, err=True)
         view = json_file != "-"
-        files = (run_sweep(settings, speeds=speeds, hold=hold, view=view, tell=tell),)
+        files = (run_sweep(settings, speeds=speeds, hold=hold, view=view, report=to_operator),)
     losses = measure_losses(files, settings if config is not None or values else None)
     if json_file != "-":
         click.echo(report.summary(losses))

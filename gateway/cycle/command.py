@@ -58,7 +58,7 @@ class Command:
 def note_echo(
     register_map: RegisterMap, command: Command, sample: Measurement | None, now: float
 ) -> Command:
-    """Note which command the PLC accepted up to a new sample, and whether the command was ours."""
+    """Note which command the PLC accepted up to a new sample, and whether this gateway sent it."""
     if sample is None:
         return command
     if _other_master_wrote(command, sample.command_age, now):

@@ -29,9 +29,8 @@ from register_maps.signals import Measurement, Setpoint, Status
 
 UNLINKED = frozenset({State.OFF, State.CONNECT})
 FOLLOWED = Limit.NOT_FINITE | Limit.DEVIATION
-"""Limits after which the regulator continues from the setpoint instead of its demand, because the
-bench never reached the demand. After the slope limit the setpoint catches up by itself. Stale data
-end the run."""
+"""Limits after which the regulator continues from the setpoint, because the bench never reached the
+demand. After the slope limit the setpoint catches up by itself; stale data end the run."""
 BRIDGED = 2.0
 """Periods for which a demand continues along its slope without a new sample."""
 
@@ -43,8 +42,7 @@ class Observation:
     now : monotonic time of the reading [s]
     measurement : the decoded block, None: no good block, `fault` says why
     fault : of this tick's reading, otherwise of the write before it
-    shadow : never write
-    stop_requested : a signal or the end of the duration asks for a stop
+    shadow, stop_requested : never write; a signal or the end of the duration asks for a stop
     overruns : deadlines missed in a row up to this tick
     """
 
@@ -62,8 +60,7 @@ class Output:
 
     setpoint : the command block to write, None: write nothing
     demand : motor speed that the regulator wants, before the limits [rad/s]; None: no sample yet
-    state : of the supervisor
-    reason : why the last run ended, or why the bench cannot be armed
+    state, reason : of the supervisor; why the last run ended or the bench cannot be armed
     age : of the newest sample [s], None: no sample yet
     """
 

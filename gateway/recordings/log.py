@@ -34,7 +34,7 @@ class Log:
 
 
 def read(path: Path) -> Log:
-    """Log in a CSV, Parquet or MDF4 file; its content tells the format. Raises LogError."""
+    """Log in a CSV, Parquet or MDF4 file; its content shows the format. Raises LogError."""
     try:
         data = path.read_bytes()
         binary = (form for form in (parquet_log, mdf4_log) if form.recognises(data))

@@ -110,7 +110,7 @@ def _count_finished(body: bytes, size: int) -> int:
 
 
 def _check(path: Path, body: bytes, records: "np.ndarray[Any, np.dtype[np.void]]") -> None:
-    """Refuse damaged records. The record before a damaged one tells its tick."""
+    """Refuse damaged records. The record before a damaged one gives its tick."""
     size = records.itemsize
     places = range(0, len(records) * size, size)
     bad = [k for k, at in enumerate(places) if not is_intact(body[at : at + size])]

@@ -65,12 +65,12 @@ def run_sweep(
     speeds: Sequence[float] | None = None,
     hold: float | None = None,
     view: bool = True,
-    tell: Callable[[str], None],
+    report: Callable[[str], None],
 ) -> Path:
     """Hold steady speeds on the live bench; return the path of the recording.
 
     speeds : of the motor [rpm], default: 200 .. 4500 rpm; hold : each for so long [s], default: 8
-    view : show the run on standard output; tell : takes lines for the operator
+    view : show the run on standard output; report : takes lines for the operator
 
     Raises ConfigError for speeds or a configuration that do not fit, GatewayError where the sweep
     did not come to its end.
@@ -79,13 +79,13 @@ def run_sweep(
     register_map = register_maps.load(swept.plc.map)
     _refuse_errors(swept, register_map)
     assert swept.sweep is not None
-    tell(
+    report(
         f"no truck on the drum; {len(swept.sweep.speeds)} speeds, "
         f"{swept.sweep.duration:.0f} s from the moment in which the PLC is switched to remote"
     )
     progress = Progress(swept.sweep)
     ended = daemon.run(swept, register_map, view=view, over=progress)
-    tell(f"recording: {ended.recording}")
+    report(f"recording: {ended.recording}")
     if not progress.done:
         why = ended.reason.text if ended.reason is not None else "stopped by the operator"
         raise GatewayError(f"the sweep did not come to its end: {why}; see {ended.recording}")
