@@ -106,7 +106,7 @@ def test_recording_of_a_truck_on_the_drum_is_refused_by_name(measured, tmp_path)
     (recording,) = (tmp_path / "demo").glob("*.rlrec")
     refused = gateway("losses", recording, "--save", tmp_path / "map.toml")
     assert refused.exit_code == 2
-    assert "was made in road load: a truck is on the drum" in refused.stderr
+    assert "was made in road load with a truck on the drum" in refused.stderr
     assert not (tmp_path / "map.toml").exists()
 
 
