@@ -109,7 +109,10 @@ def motor_shaft_damping(s: Record, p: Record) -> float:
 
 
 def gear_coulomb_friction(s: Record, p: Record) -> float:
-    """Coulomb friction of the gear at its output [N m], >= 0 (thesis, eq. 3.27)."""
+    """Coulomb friction f_gc of the gear at its output [N m], >= 0.
+
+    T_f = (f_gc + f_g |omega_g|^delta_g) sign(omega_g)              (thesis, eq. 3.27; see `gear`)
+    """
     return p.gear_coulomb_friction
 
 

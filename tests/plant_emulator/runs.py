@@ -31,7 +31,7 @@ def linear(*corners: tuple[float, float], duration: float, period: float = 0.01)
 
 
 def with_truck(inputs: Log, wheel_torque: Array) -> Log:
-    """The same inputs with a truck on the drum [N m at its wheel]."""
+    """Inputs with a truck on the drum [N m at its wheel]."""
     return Log(inputs.time, {**inputs.signals, "wheel_torque": wheel_torque}, inputs.source)
 
 

@@ -148,7 +148,7 @@ def two_effects() -> dict[str, Any]:
 
 
 def other_values() -> dict[str, Any]:
-    """The same equations with other values."""
+    """Answer of logs that the nominal equations explain with other values."""
     answer = effect()
     answer["verdict"] |= {
         "kind": "parameter",
@@ -261,5 +261,5 @@ DETAILS = Details(
 
 
 def with_traces(*found: Trace) -> Details:
-    """The same details with other traces."""
+    """Details with these traces in place of their own."""
     return replace(DETAILS, traces=found)

@@ -79,7 +79,7 @@ def test_nothing_is_loaded_from_elsewhere(kind):
 
 
 def poisoned(value):
-    """The same answer with markup and control characters in every name."""
+    """Answer with markup and control characters in every name."""
     if isinstance(value, dict):
         kept = {"schema", "kind"}
         return {k: v if k in kept else poisoned(v) for k, v in value.items()}

@@ -48,7 +48,7 @@ def test_ramp_that_is_slow_enough_passes_the_limit(nominal: ParameterSet) -> Non
 def test_filter_is_one_of_second_order_on_the_reference(
     nominal: ParameterSet, time_constant: float, damping: float
 ) -> None:
-    """The same run with its reference filtered beforehand, by scipy."""
+    """Run whose reference scipy filtered beforehand."""
     inputs = linear((0.2, 0.0), (0.8, 100.0), (1.2, 100.0), (1.6, 40.0), duration=2.0, period=1e-3)
     system = ([1.0], [time_constant**2, 2.0 * damping * time_constant, 1.0])
     _, filtered, _ = lsim(system, inputs["speed_reference"], inputs.time)
