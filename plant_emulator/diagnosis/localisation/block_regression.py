@@ -32,7 +32,6 @@ from plant_emulator.diagnosis.localisation.parity_relations import (
     ARMATURE,
     DRIVE,
     GEAR,
-    WhitenedRelations,
     base_speed,
     interval_means,
     measured_signals,
@@ -94,20 +93,18 @@ class BlockRegression:
         self.drum = DrumSubsystem(recordings, self.signals, parameters, p, torques)
         self.drum_fit = self.drum.fit_null(null.values, [s[GAP_POSITION] for s in null.states])
         self.products = Products()
-        self.relations = [self._relations(k) for k in range(len(recordings))]
+        self.relations = [
+            whitened_relations(m, p, self._simulated(k)) for k, m in enumerate(self.signals)
+        ]
         self.blocks = tuple(
             name
             for name in (*block_basis.BLOCKS, *DRUM_SIDE_BLOCKS)
             if name != "wheel_contact" or any(m.truck for m in self.signals)
         )
 
-    def _relations(self, run: int) -> WhitenedRelations:
-        return whitened_relations(self.signals[run], self.values, self._simulated(run))
-
     def _simulated(self, run: int) -> tuple[Array, NDArray[np.bool_]] | None:
-        """Residuals of the relations in the simulated run, and whether its drive is limited.
+        """The relations' own error between samples, and whether the simulated drive is limited.
 
-        The residuals are the relations' own error between samples.
         None: the run cannot be simulated at the fit
         """
         recording, gap = self.recordings[run], self.null.states[run][GAP_POSITION]
@@ -141,11 +138,7 @@ class BlockRegression:
 
     @cached_property
     def weights(self) -> list[Array]:
-        """Weights of the drum speed samples, shape (n,) each.
-
-        Few draws span little of the noise of a flight through the gap, so that samples near a large
-        noise count less.
-        """
+        """Weights of the drum speed samples, shape (n,) each; near a large noise they are small."""
         from scipy.ndimage import maximum_filter1d
 
         return [
@@ -221,7 +214,7 @@ class BlockRegression:
         ],
         top: Mapping[str, float],
     ) -> list[Array]:
-        """Columns of the laws of a block; a law that acts in no relation of the runs has none."""
+        """Columns of a block's laws; a law that acts in no relation of the runs has none."""
         none = [None] * len(self.signals)
         runs = [block(q, top) for q in self.quantities]
         return [
@@ -243,10 +236,8 @@ class BlockRegression:
 
     def _backlash(self) -> list[Array]:
         """Columns of a gap and a damping that change in time."""
-        laws = [
-            drum_basis.backlash(m, self.drum_fit.jacobians[k][0])
-            for k, m in enumerate(self.signals)
-        ]
+        slopes = [jacobian[0] for jacobian in self.drum_fit.jacobians]
+        laws = [drum_basis.backlash(m, s) for m, s in zip(self.signals, slopes, strict=True)]
         return [self.rows.own_speed(group) for group in zip(*laws, strict=True)]
 
     def _drum_torque(self, fitted: Estimate) -> list[Array]:

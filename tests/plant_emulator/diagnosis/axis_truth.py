@@ -11,8 +11,8 @@ Array = NDArray[np.float64]
 
 MASS, VISCOUS, COULOMB, OFFSET = 80.0, 150.0, 25.0, -4.0
 PERIOD, LENGTH = 1e-3, 15.0
+# Standard deviation of the force's noise [N]; smooth noise would be signal.
 NOISE = 2.0
-"""Of the force [N]; smooth noise would be signal."""
 
 
 def motion(phase: float = 0.0) -> tuple[Array, Array, Array, Array]:

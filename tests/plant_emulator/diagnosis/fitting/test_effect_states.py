@@ -35,7 +35,7 @@ BEAT = Candidate(
 
 
 def wave(size: float, rate: float, phase: float) -> Array:
-    """Of a run."""
+    """A wave in a run."""
     return size * np.cos(2.0 * pi * rate * TIME + phase)
 
 

@@ -89,7 +89,7 @@ def test_gap_that_is_as_large_but_not_random_is_no_unrest() -> None:
 
 
 def test_gap_that_is_random_elsewhere_is_no_unrest() -> None:
-    """As restless at small slopes as at large ones, as a coarse signal is whenever it moves."""
+    """The residual is as large at small slopes as at large ones, like that of a coarse signal."""
     drawn = np.random.default_rng(3).standard_normal(len(TIME))
     one = found(noisy(2.0 + 3.0 * TIME) + 3.0 * (TIME > 0.0) * drawn)
     assert one.evidence > 1000.0

@@ -32,7 +32,7 @@ def whitened(run: Recording, nominal: ParameterSet) -> np.ndarray:
 
 
 def smooth_rms(whitened: np.ndarray, length: int = 20) -> np.ndarray:
-    """Of means over 20 samples, which would show what is no white noise; 1: it is white."""
+    """Scaled rms of means over 20 samples: 1 for white noise, more for correlated noise."""
     whole = whitened[: len(whitened) // length * length].reshape(-1, length, 3)
     return np.sqrt(np.mean(whole.sum(axis=1) ** 2, axis=0) / length)
 

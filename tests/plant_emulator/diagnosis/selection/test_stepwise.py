@@ -100,7 +100,7 @@ def test_two_effects_lie_where_the_larger_share_is() -> None:
 
 
 def of_runs(model: Line) -> Line:
-    """Line with a wave, which has a value of each run besides."""
+    """The model with a wave that has a value of its own in each run."""
     own = (linear("phase", 0.0, std=1.0),)
     model.candidates["wave"] = replace(model.candidates["wave"], states=own)
     return model
@@ -437,7 +437,7 @@ def test_effect_behind_a_fit_in_a_wrong_valley_is_found_from_the_nominal_paramet
 
 
 class Waves(Wave):
-    """One b in a slow and in a ten times faster wave, which makes ten times as many minima."""
+    """A slow wave and one ten times as fast share b: ten times as many local minima."""
 
     def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
         """See `Model`."""
