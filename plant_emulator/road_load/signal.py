@@ -8,6 +8,7 @@ nothing. Measured and simulated velocity pass it before they are decimated.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -158,12 +159,20 @@ def low_pass(values: Array, period: float, cutoff: float) -> Array:
     period : of the samples [s]; cutoff : [Hz]
     A signal that is sampled too slowly to hold anything above the cutoff stays unchanged.
     """
-    from scipy.signal import butter, sosfiltfilt
+    from scipy.signal import sosfiltfilt
 
     if cutoff * 2.0 * period >= 0.9:
         return values
-    sections = butter(ORDER, cutoff, fs=1.0 / period, output="sos")
-    found: Array = sosfiltfilt(sections, values)
+    found: Array = sosfiltfilt(_sections(cutoff, 1.0 / period), values)
+    return found
+
+
+@cache
+def _sections(cutoff: float, rate: float) -> Array:
+    """Sections of the low pass; a fit asks for the same ones hundreds of times."""
+    from scipy.signal import butter
+
+    found: Array = butter(ORDER, cutoff, fs=rate, output="sos")
     return found
 
 

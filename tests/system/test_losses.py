@@ -39,12 +39,11 @@ def gateway(*arguments: object) -> Result:
     return CliRunner().invoke(main, [str(one) for one in arguments])
 
 
-def sweep(folder: Path, parameters: Path) -> Path:
+def sweep(folder: Path, parameters: Path, period_ms: int) -> Path:
     """The recording of a sweep of steady speeds, without waiting for the clock."""
     with EmulatorProcess(parameters=str(parameters), truck_mass=None, speed=None) as emulator:
-        config = sweep_config(
-            Config().with_values({"plc.port": str(emulator.port)}), speeds=None, hold=None
-        )
+        set_up = {"plc.port": str(emulator.port), "loop.period_ms": str(period_ms)}
+        config = sweep_config(Config().with_values(set_up), speeds=None, hold=None)
         assert config.sweep is not None
         session = Session(
             config=config,
@@ -67,12 +66,15 @@ def cruise_error(folder: Path, parameters: Path, *options: object) -> float:
     return run["force"]["mean_error_newton"] / run["force"]["target_newton"]
 
 
-@pytest.fixture(scope="module", params=[1.1, 0.9], ids=["10 % up", "10 % down"])
+@pytest.fixture(
+    scope="module", params=[(1.1, 10), (0.9, 20)], ids=["10 % up", "10 % down, polled slowly"]
+)
 def measured(request, tmp_path_factory) -> tuple[float, Path, Path]:
     """Share of the thesis's friction, the bench's parameter set, the recording of its sweep."""
+    share, period_ms = request.param
     folder = tmp_path_factory.mktemp("bench")
-    parameters = bench(folder, request.param)
-    return request.param, parameters, sweep(folder, parameters)
+    parameters = bench(folder, share)
+    return share, parameters, sweep(folder, parameters, period_ms)
 
 
 def test_sweep_finds_the_friction_of_the_bench(measured, tmp_path):
@@ -91,30 +93,25 @@ def test_sweep_finds_the_friction_of_the_bench(measured, tmp_path):
 
 def test_its_map_gives_back_the_road_load(measured, tmp_path):
     share, parameters, recording = measured
-    before = cruise_error(tmp_path, parameters)
+    before = cruise_error(tmp_path / "before", parameters)
     file = tmp_path / "friction_map.toml"
     assert gateway("losses", recording, "--save", file).exit_code == 0
-    after = cruise_error(tmp_path, parameters, "--friction", file)
+    after = cruise_error(tmp_path / "after", parameters, "--friction", file)
     print(f"friction x {share}: cruise force error {before:+.1%} -> {after:+.2%} with the map")
     assert 0.2 < abs(before) < 0.4
     assert abs(after) < 0.03
 
 
-def test_recording_of_a_truck_on_the_drum_is_refused_by_name(measured, tmp_path):
-    _, parameters, _ = measured
-    cruise_error(tmp_path, parameters)
+def test_so_does_a_parameter_set_and_a_recording_with_a_truck_is_refused(tmp_path):
+    parameters = bench(tmp_path, 0.9)
+    after = cruise_error(tmp_path, parameters, "--friction", parameters)
+    print(f"cruise force error {after:+.2%} with the bench's parameter set")
+    assert abs(after) < 0.03
     (recording,) = (tmp_path / "demo").glob("*.rlrec")
     refused = gateway("losses", recording, "--save", tmp_path / "map.toml")
     assert refused.exit_code == 2
     assert "was made in road load with a truck on the drum" in refused.stderr
     assert not (tmp_path / "map.toml").exists()
-
-
-def test_so_does_a_parameter_set_with_the_right_friction(measured, tmp_path):
-    share, parameters, _ = measured
-    after = cruise_error(tmp_path, parameters, "--friction", parameters)
-    print(f"friction x {share}: cruise force error {after:+.2%} with its parameter set")
-    assert abs(after) < 0.03
 
 
 def test_recording_of_a_sweep_replays_bit_for_bit(measured):

