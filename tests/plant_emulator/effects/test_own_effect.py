@@ -304,6 +304,7 @@ def test_law_without_a_number_is_refused(tmp_path: Path) -> None:
 ONLY_MOVING = "0.0 if speed == 0.0 else"
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_mistake_that_only_the_compiler_finds_is_told_with_its_line(tmp_path: Path) -> None:
     path = written(tmp_path, FORCE.replace("BODY", f"{ONLY_MOVING} factor.speed"))

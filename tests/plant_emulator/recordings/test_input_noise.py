@@ -63,7 +63,7 @@ def test_directions_hold_what_drawn_noise_of_the_wheel_torque_does(
     base = measured.with_wheel_torque(torque).residual(nominal.values(), GAP)
     deviation = SENSORS["wheel_torque"][0]
     raw, quiet = [], []
-    for _ in range(20):
+    for _ in range(8):
         fed = measured.with_wheel_torque(torque + deviation * random.standard_normal(len(torque)))
         change = fed.residual(nominal.values(), GAP) - base
         raw.append(found.along(change))

@@ -118,7 +118,7 @@ def test_a_delay_beyond_a_sample_is_first_and_has_its_length() -> None:
 
 
 def two_masses(share: float, frequency: float, damping: float) -> AxisLog:
-    """A motor that carries a part of its mass on a spring, integrated in steps of 0.02 ms."""
+    """A motor that carries a part of its mass on a spring, integrated in steps of 0.05 ms."""
     from scipy.signal import StateSpace, lsim
 
     hung, held = share * truth.MASS, (1.0 - share) * truth.MASS
@@ -134,15 +134,15 @@ def two_masses(share: float, frequency: float, damping: float) -> AxisLog:
         [[1.0, 0.0, 0.0, 0.0]],
         [[0.0]],
     )
-    fine = np.arange(0.0, truth.LENGTH, 2e-5)
+    fine = np.arange(0.0, truth.LENGTH, 5e-5)
     tones = [(40.0, 0.4), (40.0, 3.0), (4.0, 11.0), (4.0, 19.0), (4.0, 27.0), (4.0, 33.0)]
     drive = sum(size * np.sin(2.0 * np.pi * f * fine) for size, f in tones)
     _, position, _ = lsim(system, drive, fine)
     random = np.random.default_rng(3)
-    force = np.asarray(drive)[::50]
+    force = np.asarray(drive)[::20]
     return AxisLog(
-        time=fine[::50],
-        position=position[::50],
+        time=fine[::20],
+        position=position[::20],
         force=force + 0.5 * random.standard_normal(len(force)),
         rotary=False,
         source="two masses",
@@ -292,6 +292,7 @@ def test_nominal_axis_of_a_held_out_run_is_that_of_the_other_runs() -> None:
     assert [float(e[e != 0.0].mean()) for e in left] == pytest.approx([-20.0, 20.0], abs=1.0)
 
 
+@pytest.mark.slow
 def test_two_machines_are_told_and_no_effect_is_named() -> None:
     """80 kg, and 20 kg of which each log alone agrees with the equations."""
     lighter = truth.log(lambda _q, _v, a: -60.0 * a, phase=0.7, seed=2)
