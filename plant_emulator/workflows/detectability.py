@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from plant_emulator.diagnosis.design.detectability import detection_limits, effect_detectability
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.parameter_sets import DEFAULT, with_effects
+from plant_emulator.workflows.arguments import check_reference, list_logs
 from plant_emulator.workflows.planned_runs import prepare
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ class Detectability:
 
 
 def detectability(
-    runs: Sequence[str | Path | Log],
+    runs: str | Path | Log | Sequence[str | Path | Log],
     *,
     parameters: ParameterSet | str | Path = DEFAULT,
     reference: Literal["linear", "staircase"] | None = None,
@@ -63,6 +64,8 @@ def detectability(
     reference : what holds between samples of the speed reference; None: as the log says
     Raises InputError for a log, a program or a set that cannot be used.
     """
+    runs = list_logs(runs)
+    check_reference(reference)
     if not isinstance(parameters, ParameterSet):
         parameters = with_effects.load(parameters)
     model, fitted, notes = prepare(runs, parameters, reference)

@@ -14,6 +14,7 @@ from plant_emulator.model.stage import split_gap_position
 from plant_emulator.parameter_sets import DEFAULT
 from plant_emulator.simulation.fit_metrics import Comparison, compare
 from plant_emulator.simulation.simulate import simulate, values_of
+from plant_emulator.workflows.arguments import check_reference, list_logs, list_names, list_sources
 from plant_emulator.workflows.loading import load_recordings
 from plant_emulator.workflows.provenance import log_hash, program_version, today
 from plant_emulator.workflows.simulation import effect_values, parameter_set
@@ -107,11 +108,11 @@ class IdentificationResult:
 
 
 def identify(
-    logs: Sequence[Source],
+    logs: Source | Sequence[Source],
     *,
     parameters: ParameterSet | str | Path = DEFAULT,
-    free: Sequence[str] = (),
-    hold_out: Sequence[Source] = (),
+    free: str | Sequence[str] = (),
+    hold_out: Source | Sequence[Source] = (),
     effects: Effects | Sequence[str] = (),
     reference: Hold | None = None,
     progress: Progress | None = None,
@@ -129,6 +130,8 @@ def identify(
     progress : function that is called with a step's name and its done share, 0 to 1
     Raises InputError for a log, a set, an effect or a name that cannot be used.
     """
+    logs, hold_out, free = list_logs(logs), list_sources(hold_out), list_names(free)
+    check_reference(reference)
     bench, own = parameter_set(parameters), effect_values(effects)
     recordings, notes = load_recordings([*logs, *hold_out], bench, reference)
     recordings = [with_logged_values(r, own) for r in recordings]

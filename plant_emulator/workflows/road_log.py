@@ -40,6 +40,8 @@ def read(path: str, wanted: LogColumn) -> tuple[Array, Array]:
     wanted : TORQUE or VELOCITY
     Raises LogError with file, line and column.
     """
+    if not Path(path).is_file():
+        raise LogError(f"{path}: no such file; a log of a road is needed")
     try:
         columns = {TIME: LOG_COLUMNS[TIME], wanted.column: wanted}
         found = parse(Path(path).read_bytes(), columns)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from plant_emulator import effects as library
 from plant_emulator import logs
+from plant_emulator.errors import InputError
 from plant_emulator.estimation.initial_states import fit_states, states_of, with_logged_values
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.model.stage import split_gap_position
@@ -20,6 +21,7 @@ from plant_emulator.simulation.sensor_noise import add_noise
 from plant_emulator.simulation.simulate import Hold, fit_start, inputs_of, values_of
 from plant_emulator.simulation.travel_program import simulate_travel
 from plant_emulator.solver.kernel import kernel
+from plant_emulator.workflows.arguments import check_count, check_reference, check_start
 
 if TYPE_CHECKING:
     from plant_emulator.simulation.programs import Program
@@ -53,6 +55,10 @@ def simulate(
     Raises InputError for a source, a set or an effect that cannot be used, and UnsettledError where
     the equations cannot be solved.
     """
+    check_reference(reference)
+    check_start(start)
+    if seed is not None:
+        check_count("seed", seed, 0)
     bench = parameter_set(parameters)
     values = effect_values(effects)
     source = read_source(source)
@@ -81,8 +87,10 @@ def effect_values(effects: Effects | Sequence[str]) -> Effects:
 
 def read_source(source: str | Path | Log | Program) -> Log | Program:
     """The log or the program that `source` is or names; InputError where there is none."""
-    if not isinstance(source, str | Path):
+    if isinstance(source, Log | SpeedProgram | TravelProgram):
         return source
+    if not isinstance(source, str | Path):
+        raise InputError(f"{source!r}: a log, a program, or the name of one is expected")
     name = str(source)
     if name not in PROGRAMS and Path(name).exists():
         return logs.read(name)

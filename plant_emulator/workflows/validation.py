@@ -10,6 +10,7 @@ from plant_emulator.identification.report import fit_rows, fit_table, fits_to_js
 from plant_emulator.parameter_sets import DEFAULT
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation.fit_metrics import Comparison, compare, zero_phase
+from plant_emulator.workflows.arguments import check_reference, check_start, list_logs
 from plant_emulator.workflows.simulation import effect_values, parameter_set, simulate_log
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ class ValidationResult:
 
 
 def validate(
-    logs: Sequence[Source],
+    logs: Source | Sequence[Source],
     *,
     parameters: ParameterSet | str | Path = DEFAULT,
     effects: Effects | Sequence[str] = (),
@@ -77,8 +78,11 @@ def validate(
     cutoff : of a zero-phase low pass through which both go first [Hz]; None: no filter
     Raises InputError for a log, a set or an effect that cannot be used.
     """
+    check_reference(reference)
+    check_start(start)
     bench, own = parameter_set(parameters), effect_values(effects)
-    measured = [one if isinstance(one, Log) else log_files.read(one) for one in logs]
+    sources: list[Source] = list_logs(logs)
+    measured = [one if isinstance(one, Log) else log_files.read(one) for one in sources]
     pairs = [(log, simulate_log(log, bench, own, reference, start)) for log in measured]
     if cutoff is not None:
         pairs = [(zero_phase(log, cutoff), zero_phase(other, cutoff)) for log, other in pairs]

@@ -16,6 +16,14 @@ from plant_emulator.diagnosis.wording import KINDS, percent
 from plant_emulator.errors import DiagnosisError
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.parameter_sets import DEFAULT, with_effects
+from plant_emulator.workflows.arguments import (
+    check_choice,
+    check_count,
+    check_reference,
+    list_logs,
+    list_names,
+    list_sources,
+)
 from plant_emulator.workflows.diagnosis.calibration import load_model_form_errors, trial_cases
 from plant_emulator.workflows.diagnosis.runs import axis_runs, bench_runs
 from plant_emulator.workflows.diagnosis.saved_set import parameter_set
@@ -90,12 +98,12 @@ class Diagnosis:
 
 
 def diagnose(
-    logs: Sequence[Source],
+    logs: Source | Sequence[Source],
     *,
-    hold_out: Sequence[Source] = (),
+    hold_out: Source | Sequence[Source] = (),
     parameters: ParameterSet | str | Path = DEFAULT,
     model: Literal["bench", "axis"] = "bench",
-    without: Sequence[str] = (),
+    without: str | Sequence[str] = (),
     effects: Sequence[str | Path] = (),
     reference: Literal["linear", "staircase"] | None = None,
     workers: int = 1,
@@ -120,8 +128,10 @@ def diagnose(
     Raises InputError for a log, a set or an option that cannot be used, and EmulatorError where
     a worker is lost.
     """
-    if not logs:
-        raise DiagnosisError("no log is given; at least one is needed")
+    logs, hold_out, without = list_logs(logs), list_sources(hold_out), list_names(without)
+    check_choice("model", model, ("bench", "axis"))
+    check_reference(reference)
+    check_count("workers", workers, 1)
     axis = model == "axis"
     given = None if axis else _set(parameters, effects)
     if given is None:
