@@ -16,16 +16,16 @@ import numpy as np
 
 from gateway.arrays import Array
 from gateway.configuration.config import Config
+from gateway.cycle.checks import ALL_CLOSED
 from gateway.cycle.cycle import Observation, Output, initial, step
 from gateway.cycle.supervisor import State
 from register_maps.register_map import RegisterMap
-from register_maps.signals import Alarm, Interlock, Measurement, PlcState, Status
+from register_maps.signals import Alarm, Measurement, PlcState, Status
 
 REST: Final = 1.0
 """[s] Rest before the log: half of it with remote off, so that the operator then switches it on."""
 STANDING: Final = Status.READY | Status.WARM | Status.WATCHDOG_OK | Status.EMERGENCY_STOP_OK
 RUNNING: Final = Status.ENABLED | Status.ROAD_LOAD
-ALL_CLOSED: Final = Interlock(sum(Interlock))
 
 
 def replay(

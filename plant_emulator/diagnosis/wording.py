@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     )
 
 UNKNOWN = "not known"
+UNBROKEN = "\N{NO-BREAK SPACE}"
 WITHOUT_UNIT = (None, "", "1")
 UNITS = {column.signal: column.unit for column in LOG_COLUMNS.values()}
 KINDS = {

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 # Eigenvalue of an information matrix of unit diagonal that is 0 but for rounding [the largest], and
 # the part that an unknown has in such a direction.
 ROUNDING, PART = 1e-14, 1e-6
+# Half width of a 95 % confidence interval of a normal distribution [standard errors].
+NORMAL_95 = 1.959964
 
 
 def data_errors(information: Array) -> Array:

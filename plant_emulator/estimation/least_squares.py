@@ -36,6 +36,8 @@ SMALLEST_DIFFERENCE, LARGEST_DIFFERENCE = 1e-6, 1e-3
 # Step of the first differences, before any slope is known.
 FIRST_DIFFERENCE = 1e-5
 MAX_ITERATIONS = 60
+# Mean square above which a fit may lie in a local minimum, so that other starts are tried.
+SUSPECT_MEAN_SQUARE = 1.5
 # Relative fall of the cost that ends a fit: some 1e-6 in units of chi squared.
 COST_SETTLED = 1e-10
 Z_SETTLED = 1e-9

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from plant_emulator.estimation.covariance import NORMAL_95
 from plant_emulator.road_load.covariance import covariance_of, residual_variance
 from plant_emulator.road_load.fit import LOWER, UPPER
 from plant_emulator.road_load.prior import NAMES, OFFSET, vector
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from plant_emulator.road_load.fit import RoadFit
     from plant_emulator.signals.log import Array
 
-NORMAL_95 = 1.959964
 COLLINEAR = 0.95
 CONTRADICTION = 4.0
 """Distance of the gain from its prior [standard deviations] that a wrong mass or ratio explains."""

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.errors import ParameterError
+from plant_emulator.signals.log import Log
 
 if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
@@ -72,6 +73,11 @@ class SpeedProgram:
         for sweep in self.sweeps:
             value = value + sweep.values(time)
         return time, value
+
+    def inputs(self) -> Log:
+        """A log of the speed reference alone."""
+        time, reference = self.reference()
+        return Log(time, {"speed_reference": reference}, self.name)
 
 
 @dataclass(frozen=True, kw_only=True)

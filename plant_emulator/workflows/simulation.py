@@ -67,7 +67,7 @@ def simulate(
     elif isinstance(source, TravelProgram):
         log = simulate_travel(source, bench, values)
     else:
-        log = kernel_level.simulate(inputs_of(inputs(source), reference), values_of(bench, values))
+        log = kernel_level.simulate(inputs_of(source.inputs(), reference), values_of(bench, values))
     return log if seed is None else add_noise(log, seed)
 
 
@@ -95,12 +95,6 @@ def read_source(source: str | Path | Log | Program) -> Log | Program:
     if name not in PROGRAMS and Path(name).exists():
         return logs.read(name)
     return program(name)
-
-
-def inputs(program: SpeedProgram) -> Log:
-    """The speed reference of a drive program, as a log."""
-    time, reference = program.reference()
-    return Log(time, {"speed_reference": reference}, program.name)
 
 
 def simulate_log(

@@ -21,7 +21,12 @@ import numpy as np
 
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.estimation.covariance import correlation_time, structure
-from plant_emulator.estimation.least_squares import DIFFERENCE_NORM, estimate, linearise_at
+from plant_emulator.estimation.least_squares import (
+    DIFFERENCE_NORM,
+    SUSPECT_MEAN_SQUARE,
+    estimate,
+    linearise_at,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -41,8 +46,6 @@ SIGNIFICANT_ERRORS = 3.0
 # Share of the largest size allowed from which on an effect stands for something else. An effect
 # that imitated another law of a first effect had come to 0.99 and more.
 AT_BOUND = 0.95
-# Mean square from which on a fit may lie in a local minimum.
-SUSPECT_MEAN_SQUARE = 1.5
 # Standard deviation of the shrinkage prior of a size [plausible sizes].
 SHRINKAGE = 2.0
 # A fit from another start replaces a fit where its cost is lower by more than this [chi squared].

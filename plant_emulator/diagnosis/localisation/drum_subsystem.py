@@ -15,7 +15,7 @@ import numpy as np
 from plant_emulator.diagnosis.localisation.drum_simulation import compile_once, drum_speed
 from plant_emulator.diagnosis.localisation.parity_relations import NOISES, smoothed_speed
 from plant_emulator.estimation.initial_states import GAP
-from plant_emulator.estimation.least_squares import estimate, linearise_at
+from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE, estimate, linearise_at
 from plant_emulator.estimation.robust_scan import cauchy_loss
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.model.stage import GAP_POSITION
@@ -36,8 +36,6 @@ FREE = ("backlash_half_gap", "drum_shaft_damping")
 # Positions in the gap that a scan tries, and draws of the speed's noise.
 GAP_POSITIONS = 17
 DRAWS = 10
-# Mean square above which a fit may lie in a local minimum, so that other starts are tried.
-SUSPECT_MEAN_SQUARE = 1.5
 # Relative fall of the cost that ends a fit.
 COST_TOLERANCE = 1e-4
 # Prior standard deviation of the sizes of an unknown torque on the drum [10 N m].

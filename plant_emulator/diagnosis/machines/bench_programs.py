@@ -75,13 +75,13 @@ def planned_runs(
     levels = noise_levels(recordings)
     shell = _last_shell(logs)
     for speeds in (p for p in rest if isinstance(p, SpeedProgram)):
-        yield from _recorded(describe(speeds), _inputs(speeds), warm, levels, shell)
+        yield from _recorded(describe(speeds), speeds.inputs(), warm, levels, shell)
     if not started_cold(logs):
         speeds = max(
             (p for p in PROGRAMS.values() if isinstance(p, SpeedProgram)), key=lambda p: p.duration
         )
         words = f"{speeds.name} from a cold start"
-        yield from _recorded(words, _inputs(speeds), from_cold, levels, COLD_SHELL)
+        yield from _recorded(words, speeds.inputs(), from_cold, levels, COLD_SHELL)
     for cycle in (p for p in rest if isinstance(p, TravelProgram)):
         with suppress(UnsettledError):
             inputs = simulate_travel(cycle, parameters)
@@ -91,11 +91,6 @@ def planned_runs(
 def _last_shell(logs: Sequence[Log]) -> float | None:
     known = [log["shell_temperature"] for log in logs if "shell_temperature" in log]
     return float(known[-1][0]) if known else None
-
-
-def _inputs(program: SpeedProgram) -> Log:
-    time, reference = program.reference()
-    return Log(time, {"speed_reference": reference}, program.name)
 
 
 def _recorded(

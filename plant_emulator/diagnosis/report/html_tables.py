@@ -9,7 +9,6 @@ import numpy as np
 
 from plant_emulator.diagnosis.report.html_parts import (
     PLUS_MINUS,
-    UNBROKEN,
     bar,
     cell,
     code,
@@ -22,6 +21,7 @@ from plant_emulator.diagnosis.report.markup import Markup, join, tag
 from plant_emulator.diagnosis.wording import (
     EXPLAINED,
     RESIDUAL,
+    UNBROKEN,
     gap_rows,
     in_words,
     number,
@@ -31,6 +31,7 @@ from plant_emulator.diagnosis.wording import (
     share_of,
     size,
 )
+from plant_emulator.estimation.covariance import NORMAL_95
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -46,7 +47,6 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.prediction.trace import Trace
 
 # Half width of a 95 % interval in standard errors.
-NORMAL_95 = 1.96
 
 
 def gap_by_channel(gap: HeldOutGap, traces: Sequence[Trace]) -> Markup:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from plant_emulator.diagnosis.wording import (
     EXPLAINED_GAP,
     KINDS,
+    UNBROKEN,
     UNITS,
     closed_share,
     describe_deviation,
@@ -48,7 +49,6 @@ STATEMENT, LEAST_STATEMENT = 4, 3
 LEAST_OTHERS = 2
 # Spaces within a quantity such as "2.83 N m", at which no line may end.
 WITHIN_QUANTITY = re.compile(r"(?<=\d) (?=[%A-Za-z])|(?<=[\d ]N) (?=m\b)|(?<=kg) (?=m\^2)")
-UNBROKEN = "\N{NO-BREAK SPACE}"
 
 
 def lines(answer: Answer, width: int = 80) -> list[str]:

@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fitting.evidence import excess
-from plant_emulator.diagnosis.fitting.joint_fit import SUSPECT_MEAN_SQUARE, WORTHWHILE_FALL
+from plant_emulator.diagnosis.fitting.joint_fit import WORTHWHILE_FALL
 from plant_emulator.diagnosis.fitting.steps import advance, follow, refit, shake, sift, swap
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.selection.rules import noise_only
+from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -12,7 +12,7 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fitting.evidence import EVIDENCE_THRESHOLD, NOISE_MEAN_SQUARE
-from plant_emulator.diagnosis.fitting.joint_fit import SUSPECT_MEAN_SQUARE, WORTHWHILE_FALL
+from plant_emulator.diagnosis.fitting.joint_fit import WORTHWHILE_FALL
 from plant_emulator.diagnosis.fitting.steps import contend, contend_far, follow, plod, refit, show
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.selection.contenders import (
@@ -31,6 +31,7 @@ from plant_emulator.diagnosis.selection.nominal import POLISHED, FromNominal, co
 from plant_emulator.diagnosis.selection.restarts import Restarts
 from plant_emulator.diagnosis.selection.rules import SECOND, noise_only
 from plant_emulator.diagnosis.selection.subsystem import locate_gap
+from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from plant_emulator import effects, logs, parameter_sets
 from plant_emulator.cli import main
-from plant_emulator.errors import DiagnosisError
+from plant_emulator.errors import DiagnosisError, InputError
 from plant_emulator.signals.log import Log
 from plant_emulator.workflows.diagnosis.diagnose import Diagnosis, diagnose
 from plant_emulator.workflows.diagnosis.plan import plan_of_runs
@@ -89,7 +89,7 @@ def test_log_of_another_machine_is_refused(log: Log) -> None:
 
 
 def test_no_log_is_refused() -> None:
-    with pytest.raises(DiagnosisError, match="at least one is needed"):
+    with pytest.raises(InputError, match="at least one is needed"):
         diagnose([])
 
 
