@@ -15,7 +15,7 @@ from plant_emulator import parameter_sets
 from plant_emulator.signals.log import Array, Log
 from plant_emulator.simulation import programs
 from plant_emulator.simulation.simulate import LARGEST_STEP, inputs_of, simulate
-from plant_emulator.solver.stepper import CHANNELS
+from plant_emulator.solver.stepper import CHANNELS, Inputs
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -51,12 +51,14 @@ class Study:
         run, p = self.run, model.parameter_record(self.values)
         stage, work = model.stage_record(), model.work()
         out = np.zeros((len(self.time), len(CHANNELS)))
-        inputs = (run.time, run.reference, run.slope, run.corners, run.wheel_torque, run.parked)
+        inputs = Inputs(
+            run.time, run.reference, run.slope, run.corners, run.wheel_torque, run.parked
+        )
 
         def action() -> Array:
             work[:] = 0.0
             x = model.state(p, 0.0)
-            model.run(*inputs, (tolerance, step), x, work, stage, p, out)
+            model.run(inputs, (tolerance, step), x, work, stage, p, out)
             return out
 
         return action

@@ -52,7 +52,9 @@ class Gateway:
         return read(path)
 
     def states(self) -> list[str]:
-        """The states of the recording, each stretch once."""
+        """The states of the recording, each stretch once; none before its header is written."""
+        if not any(path.stat().st_size for path in self.recordings.glob("*.rlrec")):
+            return []
         found = self.recording
         names = [found.state(state) for state in found.records["state"]]
         return [name for name, before in zip(names, ["", *names], strict=False) if name != before]
