@@ -215,7 +215,7 @@ class BenchRecipe:
     without: tuple[str, ...] = ()
     own: tuple[Path, ...] = ()
 
-    def library(self) -> dict[str, Effect]:
+    def known_effects(self) -> dict[str, Effect]:
         """Effects to test, by name: those that this process knows and the bench has not."""
         left_out = {*self.without, *self.parameters.effects}
         return {n: effect for n, effect in kernel().effects.items() if n not in left_out}
@@ -223,7 +223,7 @@ class BenchRecipe:
     def build(self) -> BenchModel:
         """Build the model; this process then knows the user's own effects."""
         use_own_effects(*(from_file(path) for path in self.own))
-        return BenchModel(self.recordings, self.parameters, self.library())
+        return BenchModel(self.recordings, self.parameters, self.known_effects())
 
     def digest(self) -> str:
         """Hash of all that the model is made of.
