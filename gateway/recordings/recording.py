@@ -126,8 +126,6 @@ def _check(path: Path, body: bytes, records: "np.ndarray[Any, np.dtype[np.void]]
 
 def is_recording(path: Path) -> bool:
     """Whether the file begins like a recording."""
-    if not path.is_file():
-        raise RecordingError("no such file", file=path, expected="a recording or a log")
     with path.open("rb") as file:
         return file.read(len(MAGIC)) == MAGIC
 
