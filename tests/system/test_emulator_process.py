@@ -97,7 +97,7 @@ def test_signal_ends_it_cleanly_with_its_log_written(number, tmp_path):
 
 
 def test_duration_is_in_emulated_seconds():
-    process = started("--duration", "5", "--speed", "50")
+    process = started("--duration", "5", "--speed", "5")
     out, errors = process.communicate(timeout=30)
     assert process.returncode == 0
     assert out.count("\n") == 1
