@@ -6,6 +6,17 @@ from collections.abc import Callable
 
 import pytest
 
+# Fixtures that take 10 s and more. All tests that use one of them run in the same process.
+COSTLY = ("all_met", "diagnosed", "measured")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Let the tests of a costly fixture follow each other in one worker."""
+    for item in items:
+        for name in COSTLY:
+            if name in getattr(item, "fixturenames", ()):
+                item.add_marker(pytest.mark.xdist_group(name))
+
 
 def pytest_report_header() -> str:
     """The processor whose code computes: the last bits of every figure depend on it."""

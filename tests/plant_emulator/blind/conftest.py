@@ -1,6 +1,7 @@
 """A kernel with the library and the trial's own laws, for these tests only."""
 
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -12,10 +13,16 @@ from plant_emulator.effects import Effect
 from plant_emulator.solver import kernel as kernels
 
 
-@pytest.fixture(scope="package", autouse=True)
+@cache
+def own_laws() -> tuple[Effect, ...]:
+    """The laws of the trial: always the same objects, hence one kernel."""
+    return tuple(laws.load(name) for name in laws.names())
+
+
+@pytest.fixture(scope="module", autouse=True)
 def all_effects() -> Iterator[dict[str, Effect]]:
-    """Effects of the library and laws of the trial, registered in this process meanwhile."""
-    kernels.use_own_effects(*(laws.load(name) for name in laws.names()))
+    """Effects of the library and laws of the trial, registered while a module is tested."""
+    kernels.use_own_effects(*own_laws())
     yield dict(kernels.kernel().effects)
     kernels.use_own_effects()
 
