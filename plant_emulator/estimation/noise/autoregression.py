@@ -1,0 +1,143 @@
+"""Autoregressive noise, from residuals that may have holes (pure).
+
+    u(t) = sum_k a_k u(t - k) + innovation
+
+Levinson's recursion gives the predictors of all orders from the autocovariance (L. Ljung, System
+Identification (1999), section 10.1). A hole breaks a series: the samples behind it are predicted
+from each other only, by predictors of lower order. A hole so costs a few samples and invents none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from plant_emulator.signals.log import Array
+
+# A step of time over the usual step that breaks a series.
+BREAK = 1.5
+# Largest reflection coefficient: a pole on the unit circle has no variance.
+LARGEST_REFLECTION = 0.9999
+
+
+@dataclass(frozen=True, kw_only=True)
+class Autoregression:
+    """Autoregressive noise.
+
+    predictors : coefficients a of the orders 0, 1, ..., p
+    deviations : standard deviations of the innovations of the same orders
+    """
+
+    predictors: tuple[Array, ...] = (np.zeros(0),)
+    deviations: tuple[float, ...] = (1.0,)
+
+    @property
+    def order(self) -> int:
+        """Number of samples that the noise remembers."""
+        return len(self.predictors) - 1
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of the noise."""
+        return self.deviations[0]
+
+    @property
+    def innovation_deviation(self) -> float:
+        """Standard deviation of what the past does not predict."""
+        return self.deviations[-1]
+
+    @property
+    def correlation_time(self) -> float:
+        """Number of samples that an independent sample is worth, for the mean of the noise."""
+        whole = max(1e-3, 1.0 - float(self.predictors[-1].sum()))
+        return float((self.innovation_deviation / whole / self.deviation) ** 2)
+
+    def spectrum(self, frequency: Array, interval: float) -> Array:
+        """One-sided power spectral density [units^2/Hz]; interval : between samples [s]."""
+        lags = np.arange(1, self.order + 1)
+        turns = np.exp(-2j * np.pi * np.outer(frequency, lags) * interval)
+        transfer = 1.0 - turns @ self.predictors[-1]
+        return np.asarray(2.0 * interval * self.innovation_deviation**2 / np.abs(transfer) ** 2)
+
+    def innovations(self, series: Array, known: NDArray[np.int_]) -> Array:
+        """Whitened series: what the past does not predict, over its deviation, shape (n,).
+
+        known : number of samples that precede each one without a break
+        """
+        order = self.order
+        left = series.copy()
+        if order:
+            from scipy.signal import lfilter
+
+            whole = lfilter(np.concatenate([[1.0], -self.predictors[-1]]), [1.0], series)
+            left = np.where(known >= order, whole, left)
+        for k in np.flatnonzero((known > 0) & (known < order)):
+            m = int(known[k])
+            left[k] -= self.predictors[m] @ series[k - m : k][::-1]
+        return np.asarray(left / np.asarray(self.deviations)[np.minimum(known, order)])
+
+
+def samples_since_break(time: Array) -> NDArray[np.int_]:
+    """Number of samples that precede each one without a hole, shape (n,)."""
+    if len(time) == 0:
+        return np.zeros(0, int)
+    step = np.diff(time, prepend=time[0])
+    usual = float(np.median(step[1:])) if len(time) > 1 else 1.0
+    place = np.arange(len(time))
+    starts = np.where(step > BREAK * usual, place, 0)
+    return np.asarray(place - np.maximum.accumulate(starts))
+
+
+def autocovariance(runs: Sequence[Array], known: Sequence[NDArray[np.int_]], longest: int) -> Array:
+    """Autocovariance of unbroken samples of all runs at the lags 0 to `longest`.
+
+    known : number of samples that precede each one without a break
+    """
+    found = np.zeros(longest + 1)
+    for lag in range(longest + 1):
+        products = [
+            (v[lag:] * v[: len(v) - lag])[k[lag:] >= lag] for v, k in zip(runs, known, strict=True)
+        ]
+        count = sum(map(len, products))
+        found[lag] = sum(float(p.sum()) for p in products) / max(1, count)
+    # The taper keeps the matrix of the autocovariance positive.
+    return found * (1.0 - np.arange(longest + 1) / max(len(v) for v in runs))
+
+
+def levinson(covariance: Array) -> tuple[list[Array], list[float]]:
+    """Predictors of all orders, and the variances of their innovations."""
+    predictors, variances = [np.zeros(0)], [float(covariance[0])]
+    for m in range(1, len(covariance)):
+        before = predictors[-1]
+        missed = covariance[m] - before @ covariance[m - 1 : 0 : -1]
+        reflection = float(np.clip(missed / variances[-1], -LARGEST_REFLECTION, LARGEST_REFLECTION))
+        predictors.append(np.append(before - reflection * before[::-1], reflection))
+        variances.append(variances[-1] * (1.0 - reflection**2))
+    return predictors, variances
+
+
+def fit_autoregression(
+    runs: Sequence[Array], times: Sequence[Array], longest: int, price: float
+) -> Autoregression:
+    """Fit the autoregression of the least criterion n log(variance) + order * price.
+
+    runs, times : residual and time [s] of the samples that count, by run
+    longest : highest order; price : of an order, 2 after Akaike and log n after Schwarz
+    """
+    count = sum(map(len, runs))
+    known = [samples_since_break(t) for t in times]
+    longest = min(longest, max(0, count // 4))
+    predictors, variances = levinson(autocovariance(runs, known, longest))
+    criteria = [count * np.log(max(v, 1e-300)) + m * price for m, v in enumerate(variances)]
+    order = int(np.argmin(criteria))
+    return Autoregression(
+        predictors=tuple(predictors[: order + 1]),
+        deviations=tuple(np.sqrt(variances[: order + 1]).tolist()),
+    )

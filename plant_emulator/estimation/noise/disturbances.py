@@ -1,0 +1,117 @@
+"""What sits on the noise of a channel: outliers, lines of the mains, jittered stamps (pure)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.estimation.noise.channel_noise import Whitener, line_columns
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from plant_emulator.estimation.noise.channel_noise import ChannelNoise, NoiseSeries
+    from plant_emulator.signals.log import Array
+
+# Departure from both neighbours that no signal of a machine makes [of the usual departure], and
+# the distance of the neighbours that an outlier leaves them [of its departure].
+OUTLYING, NEIGHBOURS = 7.0, 0.3
+# Mains [Hz], and how far off they may be [Hz].
+MAINS, MAINS_OFF = (50.0, 60.0), 0.2
+# Gain of log evidence that a line or a jitter needs: odds of e^15.
+EVIDENCE = 15.0
+# A row lies between its neighbours: largest deviation of its stamp [intervals].
+LARGEST_JITTER = 0.3
+
+
+def outlying(value: Array, use: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Mark single samples far from both neighbours, which lie near each other; shape (n,)."""
+    index = np.flatnonzero(use)
+    found = np.zeros(len(value), bool)
+    if len(index) < 5:
+        return found
+    v = value[index]
+    off = np.abs(v[1:-1] - 0.5 * (v[2:] + v[:-2]))
+    apart = np.abs(v[2:] - v[:-2])
+    usual = 1.4826 * float(np.median(off))
+    found[index[1:-1]] = (off > OUTLYING * usual) & (apart < NEIGHBOURS * off)
+    return found
+
+
+def without_lines(s: NoiseSeries, use: NDArray[np.bool_], lines: Sequence[float]) -> Array:
+    """The residual without its lines, by least squares, shape (n,)."""
+    if not lines:
+        return s.value
+    columns = line_columns(s.time, lines)
+    found = np.linalg.lstsq(columns[use], s.value[use], rcond=None)[0]
+    return np.asarray(s.value - columns @ found)
+
+
+def likely_lines(
+    series: Sequence[NoiseSeries], uses: Sequence[NDArray[np.bool_]], deviation: float
+) -> tuple[float, ...]:
+    """Frequencies of the mains and their double [Hz], beside white noise; empty: not likely.
+
+    An autoregression that was fitted to a line hides the line, hence the white noise.
+    deviation : of the noise
+    """
+    longest = max(float(np.ptp(s.time)) for s in series)
+    best: tuple[float, float] = (EVIDENCE, 0.0)
+    for mains in MAINS:
+        frequencies = np.arange(mains - MAINS_OFF, mains + MAINS_OFF, 0.25 / longest)
+        gains = np.zeros(len(frequencies))
+        for s, use in zip(series, uses, strict=True):
+            value = s.value[use] - s.value[use].mean()
+            power = periodogram(s.time[use], value, frequencies)
+            gains += power / deviation**2 - np.log(max(2, len(value)))
+        k = int(np.argmax(gains))
+        best = max(best, (float(gains[k]), float(frequencies[k])))
+    return (best[1], 2.0 * best[1]) if best[1] else ()
+
+
+def periodogram(time: Array, value: Array, frequencies: Array) -> Array:
+    """Squared amplitude |sum v exp(-i 2 pi f t)|^2 / n at evenly spaced frequencies."""
+    turn = np.exp(-2j * np.pi * frequencies[0] * time) * value
+    step = np.exp(-2j * np.pi * (frequencies[1] - frequencies[0]) * time)
+    found = np.empty(len(frequencies))
+    for k in range(len(frequencies)):
+        found[k] = np.abs(turn.sum()) ** 2
+        turn *= step
+    return found / max(1, len(value))
+
+
+def likely_jitter(
+    noise: ChannelNoise, series: Sequence[NoiseSeries], uses: Sequence[NDArray[np.bool_]]
+) -> tuple[float, float]:
+    """Jitter of the stamps [s], and the factor on the other noise beside it; (0, 1): not likely.
+
+    The variance 1 + (jitter slope)^2 of the innovations, by maximum likelihood.
+    """
+    from scipy.optimize import minimize_scalar
+
+    interval = float(np.median(np.diff(series[0].time)))
+    pairs = list(zip(series, uses, strict=True))
+    left = [Whitener(noise, use, np.ones(len(s.time)), s.time).white(s.value) for s, use in pairs]
+    square = np.concatenate([v[use] ** 2 for v, use in zip(left, uses, strict=True)])
+    slope = np.concatenate([s.slope[use] for s, use in pairs]) / noise.colour.innovation_deviation
+
+    def loss(jitter: float) -> tuple[float, float]:
+        variance = 1.0 + (jitter * slope) ** 2
+        scale = float(np.mean(square / variance))
+        return 0.5 * float(np.sum(np.log(variance * scale))), scale
+
+    if not slope.any():
+        return 0.0, 1.0
+    found = minimize_scalar(
+        lambda x: loss(float(np.exp(x)))[0],
+        bounds=(-12.0, float(np.log(LARGEST_JITTER * interval))),
+        method="bounded",
+    )
+    if loss(0.0)[0] - float(found.fun) < EVIDENCE:
+        return 0.0, 1.0
+    jitter = float(np.exp(found.x))
+    factor = float(np.sqrt(loss(jitter)[1]))
+    return jitter * factor, factor

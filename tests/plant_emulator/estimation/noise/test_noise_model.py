@@ -1,0 +1,163 @@
+"""The noise model against noise of known spectrum; expected values from theory."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from plant_emulator.estimation.noise.autoregression import levinson, samples_since_break
+from plant_emulator.estimation.noise.channel_noise import LAGS, NoiseSeries
+from plant_emulator.estimation.noise.disturbances import outlying
+from plant_emulator.estimation.noise.estimate import estimate_channel_noise
+
+RATE = 100.0
+
+
+def series(
+    value: np.ndarray, use: np.ndarray | None = None, slope: np.ndarray | None = None
+) -> NoiseSeries:
+    n = len(value)
+    return NoiseSeries(
+        time=np.arange(n) / RATE,
+        value=value,
+        use=np.ones(n, bool) if use is None else use,
+        slope=np.zeros(n) if slope is None else slope,
+    )
+
+
+def first_order(n: int, pole: float, seed: int) -> np.ndarray:
+    """AR(1) noise of variance 1."""
+    draw = np.random.default_rng(seed).standard_normal(n)
+    found = np.empty(n)
+    found[0] = draw[0]
+    for k in range(1, n):
+        found[k] = pole * found[k - 1] + np.sqrt(1.0 - pole**2) * draw[k]
+    return found
+
+
+def white(n: int, seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).standard_normal(n)
+
+
+def test_white_noise_keeps_its_deviation_and_gets_no_colour() -> None:
+    noise, (whitener,) = estimate_channel_noise([series(white(5000, 1))])
+    assert noise.colour.order == 0
+    assert noise.lines == ()
+    assert noise.jitter == 0.0
+    assert noise.deviation == pytest.approx(1.0, abs=4.0 / np.sqrt(2 * 5000))
+    assert np.mean(whitener.white(white(5000, 2)) ** 2) == pytest.approx(1.0, abs=0.1)
+
+
+def test_levinson_finds_the_pole_of_a_first_order_process() -> None:
+    predictors, variances = levinson(0.7 ** np.arange(4.0))
+    assert predictors[1] == pytest.approx([0.7])
+    assert predictors[3] == pytest.approx([0.7, 0.0, 0.0], abs=1e-12)
+    assert variances == pytest.approx([1.0, 0.51, 0.51, 0.51])
+
+
+def test_noise_correlated_over_30_ms_is_whitened_and_keeps_its_whole_deviation() -> None:
+    pole = float(np.exp(-0.01 / 0.03))
+    noise, _ = estimate_channel_noise([series(first_order(5000, pole, seed)) for seed in (3, 4, 5)])
+    assert noise.colour.predictors[-1][0] == pytest.approx(pole, abs=0.05)
+    assert noise.deviation == pytest.approx(1.0, abs=0.06)
+    assert noise.colour.innovation_deviation == pytest.approx(np.sqrt(1.0 - pole**2), abs=0.03)
+    assert noise.colour.correlation_time == pytest.approx((1.0 + pole) / (1.0 - pole), rel=0.2)
+    assert abs(noise.ljung_box_excess) < 5.0 * np.sqrt(2.0 * LAGS)
+
+
+def test_spectrum_is_that_of_the_process() -> None:
+    pole = 0.7
+    noise, _ = estimate_channel_noise([series(first_order(20000, pole, 6))])
+    frequency = np.array([1.0, 10.0, 40.0])
+    turn = np.exp(-2j * np.pi * frequency / RATE)
+    theory = 2.0 / RATE * (1.0 - pole**2) / np.abs(1.0 - pole * turn) ** 2
+    assert noise.colour.spectrum(frequency, 1.0 / RATE) == pytest.approx(theory, rel=0.25)
+
+
+def test_mains_are_found_where_the_sampling_folds_them() -> None:
+    runs = []
+    for seed in (7, 8):
+        value = white(5000, seed)
+        t = np.arange(5000) / RATE
+        value += 1.5 * np.sqrt(2.0) * np.cos(2 * np.pi * 49.98 * t + seed)
+        value += np.sqrt(2.0) * np.cos(2 * np.pi * 99.96 * t + 2 * seed)
+        runs.append(series(value))
+    noise, whiteners = estimate_channel_noise(runs)
+    assert noise.lines[0] == pytest.approx(49.98, abs=0.02) or noise.lines[0] == pytest.approx(
+        50.02, abs=0.02
+    )
+    assert noise.deviation == pytest.approx(1.0, abs=0.1)
+    left = np.concatenate([w.white(s.value) for w, s in zip(whiteners, runs, strict=True)])
+    assert np.mean(left**2) == pytest.approx(1.0, abs=0.1)
+
+
+def test_single_spikes_are_left_out_and_counted() -> None:
+    value = white(5000, 9)
+    places = np.arange(100, 4900, 320)
+    value[places] += 20.0
+    use = np.ones(5000, bool)
+    assert set(np.flatnonzero(outlying(value, use))) == set(places)
+    noise, (whitener,) = estimate_channel_noise([series(value)])
+    assert noise.outliers == pytest.approx(len(places) / 5000)
+    assert noise.deviation == pytest.approx(1.0, abs=0.06)
+    assert not whitener.white(value)[places].any()
+
+
+def test_a_burst_of_several_samples_is_no_outlier() -> None:
+    value = white(2000, 10)
+    value[500:510] += 20.0 * np.sin(np.pi * np.arange(1, 11) / 11)
+    assert not outlying(value, np.ones(2000, bool))[500:510].any()
+
+
+def test_jittered_stamps_show_as_variance_along_the_slope() -> None:
+    rng = np.random.default_rng(11)
+    t = np.arange(8000) / RATE
+    slope = 2000.0 * np.cos(2 * np.pi * 0.2 * t)
+    value = rng.standard_normal(8000) + slope * rng.uniform(-2e-3, 2e-3, 8000)
+    noise, (whitener,) = estimate_channel_noise([series(value, slope=slope)])
+    assert noise.jitter == pytest.approx(2e-3 / np.sqrt(3.0), rel=0.1)
+    assert noise.deviation == pytest.approx(1.0, abs=0.06)
+    assert np.mean(whitener.white(value) ** 2) == pytest.approx(1.0, abs=0.06)
+
+
+def test_a_hole_breaks_the_series() -> None:
+    assert samples_since_break(np.array([0.0, 1.0, 2.0, 5.0, 6.0])).tolist() == [0, 1, 2, 0, 1]
+
+
+def test_lost_and_held_samples_leave_the_others_white() -> None:
+    value = first_order(9000, 0.8, 12)
+    use = np.zeros(9000, bool)
+    use[::3] = True
+    use[3000:3050] = False
+    noise, (whitener,) = estimate_channel_noise([series(value, use=use)])
+    assert noise.colour.predictors[-1][0] == pytest.approx(0.8**3, abs=0.07)
+    left = whitener.white(value)
+    assert not left[~use].any()
+    assert np.mean(left[use] ** 2) == pytest.approx(1.0, abs=0.1)
+
+
+def test_slow_wander_beside_white_noise_is_whitened() -> None:
+    pole = float(np.exp(-0.01 / 3.0))
+    runs = [
+        series(white(5000, seed) + first_order(5000, pole, 100 + seed)) for seed in (13, 14, 15)
+    ]
+    noise, whiteners = estimate_channel_noise(runs)
+    left = np.concatenate([w.white(s.value) for w, s in zip(whiteners, runs, strict=True)])
+    assert noise.colour.order > 12
+    assert abs(noise.ljung_box_excess) < 10.0 * np.sqrt(2.0 * LAGS)
+    assert np.mean(left**2) == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_cause_that_acts_at_times_does_not_pass_for_noise() -> None:
+    value = first_order(6000, 0.7, 16)
+    moving = (np.arange(6000) // 600) % 3 == 1
+    value[moving] += 4.0 * np.sin(np.arange(6000)[moving] / 7.0)
+    noise, (whitener,) = estimate_channel_noise([series(value)])
+    assert noise.deviation == pytest.approx(1.0, abs=0.1)
+    assert noise.unsteady == pytest.approx(1.0 / 3.0, abs=0.1)
+    assert np.mean(whitener.white(value)[~moving] ** 2) == pytest.approx(1.0, abs=0.1)
+
+
+def test_steady_noise_has_no_loud_blocks() -> None:
+    noise, _ = estimate_channel_noise([series(first_order(6000, 0.7, 17))])
+    assert noise.unsteady == 0.0
