@@ -50,7 +50,12 @@ class Gateway:
             code = self.process.wait(seconds)
         except subprocess.TimeoutExpired:
             return
-        raise AssertionError(f"ended with {code}: {(self.folder / 'gateway.txt').read_text()}")
+        raise AssertionError(f"ended with {code}: {self.output}")
+
+    @property
+    def output(self) -> str:
+        """What it has written to its terminal so far."""
+        return (self.folder / "gateway.txt").read_text()
 
     def stop(self, number: int = signal.SIGTERM) -> int:
         """Send a signal; its exit code."""

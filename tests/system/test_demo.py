@@ -64,6 +64,7 @@ def test_driver_who_holds_his_speed_feels_road_load_and_spends_its_energy(
     assert abs(run["energy"]["error_percent"]) < 2.0
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize(
     ("regulator", "load", "val1", "val2"),
     [("thesis", "0", 98.0, 98.0), ("compensated", "1600", 98.4, 98.3)],
@@ -100,7 +101,9 @@ def test_friction_that_is_ten_percent_off_is_felt_in_force_and_not_in_speed(tmp_
     assert run["velocity"]["val1"] > 98.0
 
 
-@pytest.mark.parametrize(("mode", "code"), [(["--fast"], 0), ([], 1)])
+@pytest.mark.parametrize(
+    ("mode", "code"), [(["--fast"], 0), pytest.param([], 1, marks=pytest.mark.realtime)]
+)
 def test_run_that_the_gateway_trips_fails_and_leaves_its_figures(tmp_path, mode, code):
     """A gear of 40 instead of 62.6: motor and drum speed do not belong together."""
     (tmp_path / "geared.toml").write_text(TABLE.read_text().replace("value = 62.6", "value = 40.0"))
@@ -115,6 +118,7 @@ def test_run_that_the_gateway_trips_fails_and_leaves_its_figures(tmp_path, mode,
     assert list(tmp_path.glob("*.rlrec"))
 
 
+@pytest.mark.realtime
 def test_real_time_run_leaves_everything_behind(tmp_path):
     (run,) = demo(tmp_path, "--load", "0", "--duration", "12")
     assert run["missed_deadlines"] <= 0.01 * run["cycles"]

@@ -70,6 +70,7 @@ def test_log_that_could_not_be_written_is_refused_at_the_start(tmp_path, name, w
 
 
 @pytest.mark.slow
+@pytest.mark.realtime
 def test_real_time_is_held_and_reported():
     with EmulatorProcess(speed=10.0, truck_mass=None) as emulator:
         wait_for("READY", emulator)

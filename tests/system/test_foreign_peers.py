@@ -145,6 +145,7 @@ def c_plc(program: Path, remote_after: float) -> Iterator[tuple[int, subprocess.
         process.communicate(timeout=10)
 
 
+@pytest.mark.realtime
 def test_plc_made_with_libmodbus_is_controlled_into_run(libmodbus_plc, tmp_path):
     with (
         c_plc(libmodbus_plc, remote_after=3.0) as (port, process),
@@ -152,7 +153,7 @@ def test_plc_made_with_libmodbus_is_controlled_into_run(libmodbus_plc, tmp_path)
     ):
         # the operator's switch comes at 3 s; then 3 s of a truck that pushes
         daemon.runs_for(7.0)
-        assert daemon.stop() == 0
+        assert daemon.stop() == 0, daemon.output
         process.terminate()
         said, _ = process.communicate(timeout=10)
     words = said.split()
@@ -216,6 +217,7 @@ def tshark(require_program) -> str:
     return require_program("tshark")
 
 
+@pytest.mark.realtime
 def test_tshark_sees_one_read_and_one_write_a_tick_in_run(tshark, tmp_path):
     with EmulatorProcess(driver="pi") as emulator, gateway(tmp_path, emulator.port) as daemon:
         until_armed(emulator)
@@ -223,7 +225,7 @@ def test_tshark_sees_one_read_and_one_write_a_tick_in_run(tshark, tmp_path):
         until(lambda: emulator.status()["state"] == "ROAD_LOAD")
         with captured(tshark, tmp_path, emulator.port) as capture:
             daemon.runs_for(2.0)
-        assert daemon.stop() == 0
+        assert daemon.stop() == 0, daemon.output
     requests = capture.requests()
     assert set(requests) == {3, 16}
     # whatever the capture cut at its ends: read and write alternate without an exception
@@ -232,6 +234,7 @@ def test_tshark_sees_one_read_and_one_write_a_tick_in_run(tshark, tmp_path):
     assert Counter(requests)[3] > 150
 
 
+@pytest.mark.realtime
 def test_tshark_sees_not_one_write_in_shadow(tshark, tmp_path):
     with (
         EmulatorProcess() as emulator,
@@ -240,7 +243,7 @@ def test_tshark_sees_not_one_write_in_shadow(tshark, tmp_path):
     ):
         emulator.set_remote(on=True)
         daemon.runs_for(3.0)
-        assert daemon.stop() == 0
+        assert daemon.stop() == 0, daemon.output
     requests = capture.requests()
     assert Counter(requests)[3] > 100
     assert set(requests) == {3}

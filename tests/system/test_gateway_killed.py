@@ -7,7 +7,7 @@ import pytest
 from plant_emulator.emulator.process import EmulatorProcess
 from tests.system.gateway_process import gateway, until, until_armed
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 
 WATCHDOG = 0.2
 SCAN = 0.01

@@ -152,6 +152,7 @@ def live(folder: Path, port: int, *options: object) -> "subprocess.Popen[str]":
 
 
 @pytest.mark.slow
+@pytest.mark.realtime
 def test_live_sweep_ends_by_itself_and_leaves_the_map(tmp_path):
     """The truck on the emulated drum has a driver; in mode speed he does not drive."""
     file = tmp_path / "map.toml"
@@ -171,6 +172,7 @@ def test_live_sweep_ends_by_itself_and_leaves_the_map(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.realtime
 def test_sweep_that_the_operator_ends_leaves_no_map_and_exit_code_1(tmp_path):
     file = tmp_path / "map.toml"
     with EmulatorProcess(truck_mass=None) as emulator:

@@ -17,7 +17,7 @@ from gateway.recordings.recording import Recording, read
 from gateway.runtime.daemon import fault_of
 from plant_emulator.emulator.process import EmulatorProcess
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.realtime]
 
 
 @pytest.fixture
