@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 # Fixtures that take 10 s and more. All tests that use one of them run in the same process.
-COSTLY = ("diagnosed", "measured")
+COSTLY = ("all_effects", "diagnosed", "measured")
 
 # A machine that runs tests may stop for longer than a gateway waits (another machine borrows its
 # processor). So a test bound to real time fails only when it fails this often.
@@ -23,6 +23,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
+@pytest.hookimpl(tryfirst=True)  # pytest-xdist reads the groups in its own hook
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Choose by real time; let the tests of a costly fixture follow each other in one worker."""
     wanted = config.getoption("--realtime")

@@ -212,6 +212,7 @@ def test_an_output_that_was_tried_is_neither_left_behind_nor_changed(tmp_path: P
     assert old.read_text() == "kept"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "begins"), [("picture", b"\x89PNG"), ("p.PDF", b"%PDF")])
 def test_a_picture_is_drawn_to_exactly_the_name_given(
     log: Path, tmp_path: Path, name: str, begins: bytes

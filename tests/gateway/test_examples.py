@@ -26,6 +26,7 @@ def test_every_example_is_short_and_says_how_it_is_called(script: Path) -> None:
     assert f"python {script.name}" in text
 
 
+@pytest.mark.slow
 def test_a_heavier_truck_gains_less_speed_from_the_same_torque() -> None:
     told = run("replay_with_another_mass", LOG, 0, 800, 1600)
     assert re.findall(r"(\d+) kg", told) == ["3640", "4440", "5240"]
@@ -34,6 +35,7 @@ def test_a_heavier_truck_gains_less_speed_from_the_same_torque() -> None:
     assert "at most 0 rpm apart" in told.splitlines()[1]
 
 
+@pytest.mark.slow
 def test_the_log_of_the_thesis_regulator_is_closest_to_the_thesis_regulator(tmp_path: Path) -> None:
     told = run("compare_regulators", LOG, tmp_path / "regulators.png")
     thesis, compensated = (float(one) for one in re.findall(r"'val1': ([\d.]+)", told))

@@ -28,6 +28,7 @@ def wait_for(state: str, emulator: EmulatorProcess, limit: float = 10.0) -> None
         time.sleep(0.01)
 
 
+@pytest.mark.slow
 def test_stepped_emulator_stands_still_until_it_is_stepped():
     with EmulatorProcess(speed=None) as emulator:
         assert emulator.status()["time"] == 0.01
@@ -38,6 +39,7 @@ def test_stepped_emulator_stands_still_until_it_is_stepped():
     assert emulator.report == "100 scans"
 
 
+@pytest.mark.slow
 def test_switches_and_faults_are_turned_from_outside():
     with EmulatorProcess(speed=None) as emulator:
         emulator.set_remote(on=True)
@@ -55,6 +57,7 @@ def test_emulator_that_cannot_start_says_why():
         pass
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "why"),
     [("no/run.csv", "No such file or directory"), ("run.xlsx", "no log format of that name")],
@@ -82,6 +85,7 @@ def test_real_time_is_held_and_reported():
     assert "real-time factor 1.0" in emulator.report or "0.99" in emulator.report
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_signal_ends_it_cleanly_with_its_log_written(number, tmp_path):
     process = started("--log", str(tmp_path / "run.csv"))
@@ -97,6 +101,7 @@ def test_signal_ends_it_cleanly_with_its_log_written(number, tmp_path):
     assert len(logs.read(tmp_path / "run.csv").time) > 5
 
 
+@pytest.mark.slow
 def test_duration_is_in_emulated_seconds():
     process = started("--duration", "5", "--speed", "5")
     out, errors = process.communicate(timeout=30)

@@ -27,11 +27,13 @@ def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_saved_truck_is_a_configuration_that_holds(saved: Path) -> None:
     result = CliRunner().invoke(gateway.cli.main, ["check", "-c", str(saved)])
     assert result.exit_code == 0, result.output
 
 
+@pytest.mark.slow
 def test_gateway_asks_for_the_identified_force(saved: Path) -> None:
     """5240 kg * 9.81 m/s^2 * C_rr = 510.1 N, at 1 m/s within 1 % of the label."""
     config = load(saved)

@@ -641,6 +641,7 @@ def velocity(loop, mass):
     return val1, 100.0 * (1.0 - np.abs(error).sum() / np.abs(road).sum())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load_mass", [0.0, 1600.0])
 @pytest.mark.parametrize(
     ("name", "period", "val1", "val2"),
@@ -686,6 +687,7 @@ def test_instantaneous_torque_shows_the_weakness_of_the_thesis():
     assert 88.0 < velocity(loop, 3640.0)[0] < 95.0
 
 
+@pytest.mark.slow
 def test_peaks_of_the_torque_do_not_grow_for_it():
     """84 .. 100 Nm with the thesis's regulator, at most 15 % more."""
     peaks = {}

@@ -24,6 +24,7 @@ def started(config: Config) -> ClosedLoop:
     return loop
 
 
+@pytest.mark.slow
 def test_each_speed_is_held_for_its_time_one_after_the_other():
     loop = started(sweep_config(Config(), SPEEDS, hold=4.0))
     loop.run(40.0)

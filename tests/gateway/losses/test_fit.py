@@ -43,6 +43,7 @@ def test_the_law_of_exact_stretches_is_found_again(values):
     assert not found.held_at_zero
 
 
+@pytest.mark.slow
 def test_95_percent_intervals_hold_the_truth_90_to_99_percent_of_the_time():
     random, noise, repeats = np.random.default_rng(7), 1.0, 300
     held = np.zeros(4)

@@ -35,6 +35,7 @@ def refusal(result: Result) -> str:
 # --- simulate ---------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("program", "samples"), [("program1", 1851), ("program2", 2501), ("program6", 3001)]
 )

@@ -47,6 +47,7 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Result]:
     return folder, CliRunner().invoke(main, ["identify", *arguments])
 
 
+@pytest.mark.slow
 def test_answer_has_the_keys_of_its_schema(fitted: tuple[Path, Result]) -> None:
     folder, result = fitted
     assert result.exit_code == 0, result.output
@@ -177,6 +178,7 @@ def test_what_is_left_out_is_told(identify: Command, tmp_path: Path) -> None:
     assert "armature_current_A stands still, first at 5.010 s; 3.2 % is left out" in result.stderr
 
 
+@pytest.mark.slow
 def test_fit_that_does_not_converge_says_so_and_fails(
     identify: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -201,6 +203,7 @@ def test_saved_set_is_the_set(tmp_path: Path) -> None:
     assert parameter_sets.load(str(path)).parameters == nominal.parameters
 
 
+@pytest.mark.slow
 def test_log_of_another_rate_is_fitted_as_well(identify: Command, tmp_path: Path) -> None:
     """Every other sample: 50 Hz."""
     text = gzip.decompress(Path(RUNS[0]).read_bytes()).decode().splitlines()

@@ -74,6 +74,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Result, Path]:
     return call(DATA / TORQUE, DATA / VELOCITY, *options, *plot), folder
 
 
+@pytest.mark.slow
 def test_answer_has_the_schema_and_the_labels_values(done: tuple[Result, Path]) -> None:
     result, folder = done
     assert result.exit_code == 0, result.output
@@ -108,6 +109,7 @@ def test_plot_is_a_png(done: tuple[Result, Path]) -> None:
     assert (done[1] / "truck.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_library_function_gives_the_answer_of_the_command(done: tuple[Result, Path]) -> None:
     result, folder = done
     found = identify_truck(DATA / TORQUE, DATA / VELOCITY, mass=3640.0)
@@ -227,6 +229,7 @@ def test_velocity_of_another_run_fails(write: Callable[..., tuple[str, str]]) ->
     assert "both logs of one run?" in refusal(result, 1)
 
 
+@pytest.mark.slow
 def test_search_that_did_not_converge_is_reported() -> None:
     unsettled = replace(case("road_1").fit, settled=False)
     found = answer_of(unsettled)

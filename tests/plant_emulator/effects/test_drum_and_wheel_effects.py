@@ -120,6 +120,7 @@ def test_without_a_truck_there_is_no_tyre(nominal: ParameterSet) -> None:
         np.testing.assert_array_equal(log[name], plain[name])
 
 
+@pytest.mark.slow
 def test_running_bench_knows_whether_a_truck_stands_on_it(nominal: ParameterSet) -> None:
     loss = {"tyre_rolling_loss": {"force": 500.0}}
     torque = {

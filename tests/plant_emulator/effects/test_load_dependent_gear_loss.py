@@ -120,6 +120,7 @@ def test_running_bench_settles_through_a_reversal(
     assert bench.unsettled == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("program", "without"), [("program1", 7.0), ("program6", 20.0)])
 def test_loss_of_an_independent_bench_is_told_to_the_noise(
     nominal: ParameterSet, bench_log: Callable[[str], Log], program: str, without: float

@@ -485,6 +485,7 @@ def test_scan_time_is_shown_up_to_what_its_register_holds():
 WORDS = st.one_of(st.just(0), st.integers(0, 10), st.integers(0, 65535))
 
 
+@pytest.mark.slow
 @given(
     blocks=st.lists(st.lists(WORDS, min_size=16, max_size=16), max_size=20),
     start=st.integers(0, 4830 * 5),

@@ -147,6 +147,7 @@ def test_samples_that_do_not_count_change_no_autocovariance() -> None:
     assert autocovariance(holed)[:2] == pytest.approx([1.0, 0.5], rel=0.1)
 
 
+@pytest.mark.slow
 def test_intervals_under_coloured_residuals_cover_the_truth() -> None:
     """White-noise errors would be three times too small and cover half of the cases."""
     x = np.linspace(-1.0, 1.0, 1500)

@@ -121,6 +121,7 @@ def test_promised_errors_are_those_of_fits_for_every_parameter_and_program(
     assert 0.6 < np.sqrt(np.mean(errors**2)) < 1.5
 
 
+@pytest.mark.slow
 def test_gear_inertia_is_not_determined_by_any_program(
     nominal: ParameterSet, bench_log: Reader
 ) -> None:

@@ -50,6 +50,7 @@ def test_all_estimated_parameters_but_the_gear_inertia_are_free(nominal: Paramet
     assert set(free_parameters(nominal)) == set(FREE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", list(DEVIATIONS))
 def test_parameters_of_the_independent_bench_are_found(
     nominal: ParameterSet, fitted: Callable[[str], Identification], case: str
@@ -121,6 +122,7 @@ def off(nominal: ParameterSet, seed: int) -> ParameterSet:
     )
 
 
+@pytest.mark.slow
 def test_starts_far_off_all_reach_the_optimum(
     nominal: ParameterSet, recordings: Callable[..., list[Recording]]
 ) -> None:
@@ -216,6 +218,7 @@ def test_what_is_not_free_is_believed_by_the_start(
     assert start["drum_inertia"] == pytest.approx(312.69, rel=0.01)
 
 
+@pytest.mark.slow
 def test_temperature_at_the_start_belongs_to_its_run(nominal: ParameterSet) -> None:
     """Two runs with the same gear, one cold, one half warm; what the shell shows is taken."""
     own = {"viscosity_coefficient": 0.02, "start_temperature": 305.15, "shell_temperature": 305.15}

@@ -19,6 +19,7 @@ RUNS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
 def test_model_is_the_thesis_equations(nominal: ParameterSet, name: str) -> None:
     corners, gap_position = RUNS[name]

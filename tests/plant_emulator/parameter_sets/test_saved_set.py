@@ -82,6 +82,7 @@ def test_run_is_followed_from_its_own_start_of_the_sets_effects(nominal: Paramet
     assert rms(log, asked) > 2.0 * SENSORS["shaft_torque"][0]
 
 
+@pytest.mark.slow
 def test_diagnosis_finds_each_runs_own_start_of_the_sets_effects(nominal: ParameterSet) -> None:
     """Two runs of a bench whose gear is eccentric, from other angles than the set's."""
     wobble = {**effects.load("gear_eccentricity").plausible(), "phase": 0.0}

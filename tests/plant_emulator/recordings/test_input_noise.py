@@ -50,6 +50,7 @@ def test_direction_of_deviation_three_comes_out_with_variance_one() -> None:
     assert np.count_nonzero(across) == 2, "all else stays"
 
 
+@pytest.mark.slow
 def test_directions_hold_what_drawn_noise_of_the_wheel_torque_does(
     measured: Recording, true_log: Log, nominal: ParameterSet
 ) -> None:
@@ -83,12 +84,14 @@ def test_samples_that_do_not_count_stay_zero(true_log: Log, nominal: ParameterSe
     assert not quiet[row, ~counted].any()
 
 
+@pytest.mark.slow
 def test_log_without_a_truck_feeds_nothing(nominal: ParameterSet, true_log: Log) -> None:
     signals = {k: v for k, v in add_noise(true_log, 1).signals.items() if k != "wheel_torque"}
     alone = recording(Log(true_log.time, signals, true_log.source))
     assert noise_directions(alone, nominal.values(), GAP) is None
 
 
+@pytest.mark.slow
 def test_drum_inertia_of_a_noisy_log_lies_within_its_standard_error(
     true_log: Log, nominal: ParameterSet
 ) -> None:
@@ -98,6 +101,7 @@ def test_drum_inertia_of_a_noisy_log_lies_within_its_standard_error(
     assert abs(inertia.value - 312.69) < 3.5 * inertia.standard_error
 
 
+@pytest.mark.slow
 def test_window_whose_simulation_does_not_settle_tells_nothing(
     measured: Recording, nominal: ParameterSet, monkeypatch: pytest.MonkeyPatch
 ) -> None:

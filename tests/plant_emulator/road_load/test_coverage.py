@@ -57,6 +57,7 @@ def test_95_percent_intervals_cover_the_truth_at_their_rate() -> None:
     assert 0.90 - slack <= covered.mean() <= 0.99 + slack
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "loggers",
     [
@@ -74,6 +75,7 @@ def test_other_loggers_give_the_same_truck(loggers: dict[str, float]) -> None:
     assert np.max(np.abs(distances(truth, found))) < 3.5
 
 
+@pytest.mark.slow
 def test_waves_of_the_road_widen_the_intervals() -> None:
     """A grade of 0.2 permille (waves of 0.5 mm) outweighs the load cell's noise."""
     level, uneven = Truth(), Truth(grade=2e-4)
@@ -84,6 +86,7 @@ def test_waves_of_the_road_widen_the_intervals() -> None:
     assert found.estimates["crr"].standard_error > 2.0 * error
 
 
+@pytest.mark.slow
 def test_a_road_too_steep_to_be_level_is_reported() -> None:
     found = identify(Truth(grade=5e-3), 1)
     assert not found.converged
@@ -98,6 +101,7 @@ def test_without_braking_the_efficiency_is_as_unsure_as_the_gain() -> None:
     assert any(text.startswith("crr from crr_v") for text in found.not_separable)
 
 
+@pytest.mark.slow
 def test_a_log_that_begins_on_the_move_needs_no_standstill() -> None:
     truth = Truth()
     (torque_time, torque), (time, velocity) = record(truth, 2)

@@ -50,6 +50,7 @@ def case(name: str) -> Case:
     return Case(found, answer_of(found), LABELS[name])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOGS)
 def test_every_estimate_is_within_three_standard_errors_of_its_label(name: str) -> None:
     found = case(name)

@@ -47,6 +47,7 @@ def test_reference_is_never_negative(nominal: ParameterSet) -> None:
     assert run("program6", nominal)["speed_reference"].min() == 0.0
 
 
+@pytest.mark.slow
 def test_drum_stands_while_the_truck_is_parked(nominal: ParameterSet) -> None:
     log = run("program6", nominal)
     assert not log["drum_speed"][log.time <= 2.0].any()

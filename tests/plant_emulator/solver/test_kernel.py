@@ -54,6 +54,7 @@ print(json.dumps({
 """
 
 
+@pytest.mark.slow
 def test_compiled_and_uncompiled_agree(nominal: ParameterSet) -> None:
     answer = subprocess.run(
         [sys.executable, "-c", UNCOMPILED],

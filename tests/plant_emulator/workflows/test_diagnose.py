@@ -39,6 +39,7 @@ def diagnosis(log: Log) -> Diagnosis:
     return diagnose([log], without=LEFT_OUT, settings={"script": "first.py"})
 
 
+@pytest.mark.slow
 def test_hidden_effect_is_named_with_its_size(diagnosis: Diagnosis) -> None:
     (entry,) = diagnosis.answer.ranking
     (size,) = entry.parameters
@@ -46,6 +47,7 @@ def test_hidden_effect_is_named_with_its_size(diagnosis: Diagnosis) -> None:
     assert abs(size.value - effects.load(HIDDEN).plausible()["offset"]) < 4.0 * size.standard_error
 
 
+@pytest.mark.slow
 def test_command_gives_the_answer_of_the_library(path: str, diagnosis: Diagnosis) -> None:
     left_out = [word for name in LEFT_OUT for word in ("--without", name)]
     told = CliRunner().invoke(main, ["diagnose", path, *left_out, "--workers", "1", "--json", "-"])
@@ -60,6 +62,7 @@ def test_print_shows_the_screen_of_the_command(diagnosis: Diagnosis) -> None:
     assert len(rows) < 24
 
 
+@pytest.mark.slow
 def test_repr_says_verdict_effect_and_share(diagnosis: Diagnosis) -> None:
     assert repr(diagnosis).startswith(f"<Diagnosis: Effect found, {HIDDEN}; ")
     assert repr(diagnosis).endswith(" % of the held-out gap closed>")

@@ -45,6 +45,7 @@ def dies(_model: Any, _item: int) -> int:
     os._exit(9)
 
 
+@pytest.mark.slow
 def test_answers_come_in_the_order_of_the_items() -> None:
     workers = Processes(2)
     try:

@@ -107,6 +107,7 @@ def test_beat_of_another_frequency_and_phase_in_every_run_is_found() -> None:
         assert abs(states["beat_rate"]) == pytest.approx(abs(rate), abs=0.05)
 
 
+@pytest.mark.slow
 def test_beat_that_noise_alone_shows_is_not_named() -> None:
     """The best of some 20 frequencies takes 2 (1 + 1/2 + ... + 1/20) = 7 from a run's squares."""
     model = Beating([noisy(np.full_like(TIME, 2.0), seed) for seed in range(8)])

@@ -98,6 +98,7 @@ def first_order(random: np.random.Generator, memory: float, samples: int) -> Arr
     return np.asarray(lfilter([1.0], [1.0, -memory], driven, zi=[memory * start])[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("memory", "samples", "least"), [(0.0, 1850, 0.91), (0.9, 1850, 0.88), (0.97, 3000, 0.85)]
 )

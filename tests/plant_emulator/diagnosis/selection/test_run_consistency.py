@@ -82,6 +82,7 @@ def test_two_drifted_benches_differ_in_what_was_shifted_most(
     assert second == pytest.approx(0.929165 * nominal.value("dead_time"), abs=4.0 * other)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bench", ["practice_002", "practice_008"])
 def test_runs_of_one_drifted_bench_do_not_differ(
     bench: str, bench_log: BenchLog, nominal: ParameterSet

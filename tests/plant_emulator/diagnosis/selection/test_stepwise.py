@@ -382,6 +382,7 @@ def test_excess_is_what_the_noise_does_not_explain() -> None:
     assert excess(replace(point, sum_of_squares=900.0)) == 0.0
 
 
+@pytest.mark.slow
 def test_correlated_residual_takes_evidence_away() -> None:
     """Noise with a memory of 20 samples: shapes fit it by chance, and must hardly be named.
 
