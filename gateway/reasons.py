@@ -37,6 +37,7 @@ class Reason(IntEnum):
     STALE = 23, "no fresh sample in time"
     PLC_CLOCK = 24, "clock of the PLC stands still or differs from ours"
     TORQUE_IMPLAUSIBLE = 25, "mean torque between two samples is impossible"
+    PLC_RESTARTED = 26, "PLC has restarted: its sample number or its clock jumped back"
     PLC_NOT_READY = 30, "PLC is not ready"
     PLC_FAULT = 31, "PLC reports a fault"
     EMERGENCY_STOP = 32, "emergency stop"

@@ -2,6 +2,11 @@
 
 Writing begins in ARMED with enable off, because the PLC starts on the rising edge of enable.
 Writing continues in SAFE, because a lost last command would leave the command before it in force.
+
+Enable is on from the start of a run, and only while each tick sees that the PLC is in this run. A
+PLC that has restarted takes any enable for a rising edge. So a tick of a run that has no reading
+writes nothing, and a ramp-down without a reading goes on with enable off. Enable that was once off
+stays off until the next start.
 """
 
 from dataclasses import dataclass, replace
@@ -10,13 +15,12 @@ from math import inf
 from gateway.configuration.config import Config
 from gateway.cycle.limits import Limited
 from gateway.cycle.samples import LINK_IS_DOWN
-from gateway.cycle.supervisor import State
+from gateway.cycle.supervisor import State, Supervisor
 from gateway.reasons import Reason
 from register_maps.register_map import RegisterMap
 from register_maps.signals import Control, Measurement, Mode, Setpoint, Status
 
 WRITING = frozenset({State.ARMED, State.RUN, State.RAMPDOWN, State.SAFE})
-ENABLING = frozenset({State.RUN, State.RAMPDOWN})
 NOT_BY_WAITING = LINK_IS_DOWN | {Reason.NOT_ENCODABLE}
 """Faults that the next write will meet again."""
 RECENT, JITTER = 0.25, 0.1
@@ -34,6 +38,7 @@ class Command:
     number : number of the last block, None: no block has been written
     speed, written : last setpoint [rad/s] and its time; a tick without a block counts as setpoint 0
     sent : time of the last block
+    enabled : enable of the last block
     unanswered : count of blocks after the block that was echoed last
     echo, echo_moved : the last echo, and the time of its last change or of the start of the run
     other_wrote : time at which the PLC last accepted a block of another master
@@ -46,6 +51,7 @@ class Command:
     speed: float = 0.0
     written: float = 0.0
     sent: float = -inf
+    enabled: bool = False
     unanswered: int = 0
     echo: int | None = None
     echo_moved: float = -inf
@@ -107,12 +113,27 @@ def fault(command: Command, now: float, stale: float) -> Reason | None:
 
 
 def reset(command: Command, now: float) -> Command:
-    """Note that this tick writes nothing, so that the setpoint counts as zero."""
-    return replace(command, speed=0.0, written=now)
+    """Note that this state writes nothing, so that the setpoint counts as zero."""
+    return replace(command, speed=0.0, written=now, enabled=False)
+
+
+def stays_enabled(
+    config: Config, command: Command, supervisor: Supervisor, seen: Measurement | None
+) -> bool:
+    """Whether this tick may write enable; `seen` is the reading of this tick, None: no reading.
+
+    The start of a run writes it until the PLC has confirmed. From then on the PLC has to show, in
+    every tick, that it is still in this run.
+    """
+    if supervisor.state is State.RUN and not supervisor.confirmed:
+        return True
+    if supervisor.state not in (State.RUN, State.RAMPDOWN) or seen is None:
+        return False
+    return command.enabled and is_confirmed(config, seen.status)
 
 
 def next_command(
-    register_map: RegisterMap, command: Command, limited: Limited, now: float
+    register_map: RegisterMap, command: Command, limited: Limited, now: float, *, enable: bool
 ) -> Command:
     """Return the next command, one number up. The first number follows from the time and the echo.
 
@@ -131,6 +152,7 @@ def next_command(
         speed=limited.speed,
         written=now,
         sent=now,
+        enabled=enable,
         unanswered=command.unanswered + 1,
     )
 
@@ -147,10 +169,14 @@ def is_confirmed(config: Config, status: Status) -> bool:
 
 
 def block(
-    config: Config, register_map: RegisterMap, command: Command, limited: Limited, *, enable: bool
+    config: Config, register_map: RegisterMap, command: Command, limited: Limited
 ) -> Setpoint:
-    """Command block of a command and its limited setpoint, in SI."""
-    number = command.number or 0
+    """Command block of a command and its limited setpoint, in SI.
+
+    A PLC without enable ramps down by itself, at the slope of the ramp-down.
+    """
+    number, enable = command.number or 0, command.enabled
+    down, up = config.limits.rate_down, config.limits.rate_up
     return Setpoint(
         command_sequence=number,
         gateway_heartbeat=number,
@@ -158,7 +184,7 @@ def block(
         mode=run_mode(config) if enable else Mode.READY,
         speed_setpoint=limited.speed,
         speed_rate=limited.rate,
-        ramp_limit=max(config.limits.rate_up, config.limits.rate_down),
+        ramp_limit=max(up, down) if enable else down,
         current_limit=config.limits.current,
         watchdog_timeout=config.limits.watchdog,
         map_version=register_map.version,

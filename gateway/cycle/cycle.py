@@ -41,7 +41,7 @@ class Observation:
 
     now : monotonic time of the reading [s]
     measurement : the decoded block, None: no good block, `fault` says why
-    fault : of this tick's reading, otherwise of the write before it
+    fault : of this tick's reading, otherwise of the last write before it
     shadow, stop_requested : never write; a signal or the end of the duration asks for a stop
     overruns : deadlines missed in a row up to this tick
     """
@@ -136,7 +136,7 @@ def step(
     state = _regulate(config, replace(state, supervisor=supervisor), now)
     limited = _limit(config, state, now)
     state = _follow_limits(config, state, limited, now)
-    state, setpoint = _write(config, register_map, state, limited, now)
+    state, setpoint = _write(config, register_map, state, limited, observation)
     return state, Output(
         setpoint=setpoint,
         demand=None if state.demand is None else state.demand.speed,
@@ -161,7 +161,7 @@ def _facts(config: Config, state: CycleState, observation: Observation) -> Facts
             newest,
             state=before,
             overruns=observation.overruns,
-            echo_age=0.0 if sent.echo is None else state.samples.sequence_moved - sent.echo_moved,
+            echo_age=_echo_age(config, state),
             other_age=now - sent.other_wrote,
         ),
         remote=Status.REMOTE in status,
@@ -170,6 +170,15 @@ def _facts(config: Config, state: CycleState, observation: Observation) -> Facts
         stop_requested=observation.stop_requested,
         shadow=observation.shadow,
     )
+
+
+def _echo_age(config: Config, state: CycleState) -> float:
+    """Time for which blocks were sent and not echoed [s]; 0 without an echo in the map."""
+    sent = state.command
+    if sent.echo is None:
+        return 0.0
+    since = state.samples.sequence_moved - sent.echo_moved
+    return min(since, sent.unanswered * config.loop.period)
 
 
 def _start_bumpless(state: CycleState, now: float) -> CycleState:
@@ -240,12 +249,18 @@ def _follow_limits(config: Config, state: CycleState, limited: Limited, now: flo
 
 
 def _write(
-    config: Config, register_map: RegisterMap, state: CycleState, limited: Limited, now: float
+    config: Config,
+    register_map: RegisterMap,
+    state: CycleState,
+    limited: Limited,
+    observation: Observation,
 ) -> tuple[CycleState, Setpoint | None]:
-    """Make the command block of this tick; None: this state writes nothing."""
-    if state.supervisor.state not in command.WRITING:
+    """Make the command block of this tick; None: this state or this tick writes nothing."""
+    now, seen, supervisor = observation.now, observation.measurement, state.supervisor
+    if supervisor.state not in command.WRITING:
         return replace(state, command=command.reset(state.command, now)), None
-    after = command.next_command(register_map, state.command, limited, now)
-    return replace(state, command=after), command.block(
-        config, register_map, after, limited, enable=state.supervisor.state in command.ENABLING
-    )
+    if supervisor.state is State.RUN and seen is None:
+        return state, None
+    enable = command.stays_enabled(config, state.command, supervisor, seen)
+    after = command.next_command(register_map, state.command, limited, now, enable=enable)
+    return replace(state, command=after), command.block(config, register_map, after, limited)

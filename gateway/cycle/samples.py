@@ -8,6 +8,9 @@ gap.
 The regulator never sees an impossible window. A window is impossible when the PLC's clock has not
 advanced over it, or has advanced unlike our clock, or when no sensor could show its mean torque.
 One such window is left out. When no usable window has come for too long, there is no fresh sample.
+
+A sample number or a clock that jumps back tells of a PLC that has restarted. What it shows right
+after its start is not believed, because its inputs may not have been read yet.
 """
 
 from dataclasses import dataclass, replace
@@ -25,6 +28,11 @@ LINK_IS_DOWN = frozenset({Reason.NOT_CONNECTED, Reason.CONNECTION_LOST})
 """Faults that waiting for the next poll does not cure."""
 OUT_OF_STEP, JITTER = 0.5, 0.05
 """Allowed difference of two clocks over a window: a share of the window, and an addition [s]."""
+FASTEST, LEAP = 1e-3, 100
+"""[s] Shortest period of a PLC, and samples to spare. A sample number that leads by more than the
+time allows belongs to a counter that started anew behind the middle of its range."""
+RESTARTING = 1.0
+"""[s] Time after a restart during which no sample counts as fresh."""
 MEMORY = 0.5
 """[s] Time over which a clock that is always too fast or too slow is noticed."""
 APART, SWING = 20.0, 200.0
@@ -46,6 +54,7 @@ class Samples:
     used : time of the last usable window [s]
     window_fault : why a later window is impossible
     ahead : lead of the PLC's clock over ours within the last MEMORY [s]
+    restarted : time at which the PLC was last found to have restarted [s]
     """
 
     newest: Measurement | None = None
@@ -60,6 +69,7 @@ class Samples:
     used: float = -inf
     window_fault: Reason = Reason.STALE
     ahead: float = 0.0
+    restarted: float = -inf
 
     def age(self, now: float) -> float:
         """Age of the newest sample at this time [s]."""
@@ -96,6 +106,8 @@ def fault(samples: Samples, now: float, stale: float) -> Reason | None:
     """Reason for which there is no fresh sample; None: there is one."""
     if samples.down or samples.newest is None:
         return samples.fault or Reason.STALE
+    if now - samples.restarted <= RESTARTING:
+        return Reason.PLC_RESTARTED
     if samples.age(now) <= stale:
         return samples.window_fault if now - samples.used > stale else None
     if samples.fault is not None:
@@ -111,6 +123,9 @@ def windowed(config: Config, register_map: RegisterMap, samples: Samples) -> Sam
         return samples
     own = samples.sequence_moved - samples.before_came
     duration = difference(now.plc_time, before.plc_time, register_map.modulus("plc_time"))
+    if duration < 0.0 or not _follows(register_map, now, before, own):
+        moved = samples.sequence_moved
+        return replace(samples, restarted=moved, window_fault=Reason.PLC_RESTARTED)
     if not _in_step(duration, own):
         return replace(samples, window_fault=Reason.PLC_CLOCK)
     samples = replace(samples, ahead=samples.ahead * exp(-own / MEMORY) + duration - own)
@@ -128,6 +143,12 @@ def windowed(config: Config, register_map: RegisterMap, samples: Samples) -> Sam
         shell_temperature=_shell_temperature(now),
     )
     return replace(samples, window=window, used=samples.sequence_moved)
+
+
+def _follows(register_map: RegisterMap, now: Measurement, before: Measurement, own: float) -> bool:
+    """Whether a sample number may follow another after this time by our clock [s]."""
+    span = register_map.modulus("sequence_start")
+    return 0.0 < difference(now.sequence_start, before.sequence_start, span) < own / FASTEST + LEAP
 
 
 def _in_step(duration: float, own: float) -> bool:

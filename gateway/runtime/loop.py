@@ -153,7 +153,8 @@ class Loop:
             overruns=self._overruns,
         )
         self._state, output = step(self._config, self._map, self._state, observation)
-        self._writing = self._write(output)
+        unseen = self._writing.fault if reading.measurement is None else None
+        self._writing = self._write(output, unseen)
         latency, lateness = self._clock.now() - woken, woken - deadline
         self.latency.add(latency)
         self.lateness.add(lateness)
@@ -191,10 +192,13 @@ class Loop:
         except CodecError as error:
             return Reading(words=words, fault=REFUSED[error.kind])
 
-    def _write(self, output: Output) -> Writing:
-        """Write the command block, unless there is none or the run is in shadow mode."""
+    def _write(self, output: Output, unseen: Reason | None) -> Writing:
+        """Write the command block, unless there is none or the run is in shadow mode.
+
+        unseen : fault of the write before, which the fault of this tick's reading has hidden
+        """
         if output.setpoint is None or self._shadow:
-            return Writing()
+            return Writing(fault=unseen)
         try:
             words = encode_setpoint(self._map, output.setpoint)
         except CodecError:

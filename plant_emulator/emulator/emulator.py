@@ -91,6 +91,9 @@ class Emulator:
         if self.remote_after is not None and self.plc.time >= self.remote_after:
             self.remote_after = None
             self.switches = replace(self.switches, remote=True)
+        if faults.RESTART in faults.active(self.faults, self.plc.time) - self._active:
+            self.plc.restart()
+            self.server.command = None
         measurement = self.plc.scan(self.server.command, self.switches, self._scan_time_max)
         self._publish(measurement)
         if self._rows is not None:

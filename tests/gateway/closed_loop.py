@@ -90,7 +90,8 @@ class ClosedLoop:
         self.state, output = cycle.step(self.config, self.map, self.state, seen)
         self.observations.append(seen)
         self.outputs.append(output)
-        self.write_fault = None if output.setpoint is None else self.refused
+        unseen = self.write_fault if failed else None
+        self.write_fault = unseen if output.setpoint is None else self.refused
         if output.setpoint is not None and self.refused is None:
             self.words = encode_setpoint(self.map, output.setpoint)
 

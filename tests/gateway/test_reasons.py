@@ -22,6 +22,7 @@ CODES = {
     "STALE": 23,
     "PLC_CLOCK": 24,
     "TORQUE_IMPLAUSIBLE": 25,
+    "PLC_RESTARTED": 26,
     "PLC_NOT_READY": 30,
     "PLC_FAULT": 31,
     "EMERGENCY_STOP": 32,

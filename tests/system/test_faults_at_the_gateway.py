@@ -30,6 +30,7 @@ REASONS = {
     "wrong_count": {"WRONG_COUNT"},
     "wrong_transaction": {"WRONG_TRANSACTION"},
     "word_order": {"TEST_WORD"},
+    "restart": {"PLC_RESTARTED"},
     **{f"exception_{code}": {f"EXCEPTION_{code}"} for code in range(1, 12)},
 }
 

@@ -1,8 +1,9 @@
 """Faults of a PLC or its network. Each fault is switched on by its name.
 
-A fault acts in one of three places, and each place has one function: the image that the PLC
-publishes (`image`), the bytes of a reply (`reply`), and the listening port (`refuses`). The
-functions do no input or output: `image` returns words, `reply` returns timed chunks of bytes.
+A fault acts in one of four places. Three have a function here: the image that the PLC publishes
+(`image`), the bytes of a reply (`reply`), and the listening port (`refuses`). The functions do no
+input or output: `image` returns words, `reply` returns timed chunks of bytes. The fourth place is
+the PLC itself: RESTART happens once, in the scan in which the fault begins.
 """
 
 from collections.abc import Iterable
@@ -16,6 +17,7 @@ Words = tuple[int, ...]
 
 IMAGE_FAULTS = ("frozen_heartbeat", "frozen_image", "nan", "torn_image", "word_order")
 EXCEPTION_FAULTS = tuple(f"exception_{code}" for code in range(1, 12))
+RESTART = "restart"
 FRAME_FAULTS = ("wrong_function", "wrong_count", "wrong_transaction")
 NAMES = (
     *IMAGE_FAULTS,
@@ -24,6 +26,7 @@ NAMES = (
     "late_reply",
     "drop_mid_reply",
     "refuse_connection",
+    RESTART,
 )
 
 # [s] Longer than any sensible time-out of a 100 Hz client.

@@ -53,7 +53,7 @@ class Plc:
     ) -> None:
         self.bench, self.register_map = bench, register_map
         self.backlash, self.truck = backlash, truck
-        self.scans = 0
+        self.scans = self._started = 0
         self.state = PlcState.INIT
         self.alarm = Alarm(0)
         self.inbox = Inbox(register_map)
@@ -74,6 +74,20 @@ class Plc:
     def time(self) -> float:
         """PLC time: the time of the last measurement [s]."""
         return self.scans * SCAN
+
+    def restart(self) -> None:
+        """Start the PLC anew: counters, clock, command and state; the bench keeps its motion.
+
+        `time` goes on, because it is the time of the experiment.
+        """
+        self._started = self.scans
+        self.state, self.alarm = PlcState.INIT, Alarm(0)
+        self.inbox = Inbox(self.register_map)
+        self.path = [0.0] * STEPS
+        self.fast_task = FastTask(STEP)
+        self.road_load_since = None
+        if self.truck is not None:
+            self.truck.follow(self.state, self.time)
 
     def scan(
         self, words: Sequence[int] | None, switches: Switches, scan_time_max: float = 0.0
@@ -186,11 +200,11 @@ class Plc:
         return Status(sum(bit for bit, holds in bits.items() if holds))
 
     def _measurement(self, scan_time_max: float) -> Measurement:
-        now = self.samples
+        now, scans = self.samples, self.scans - self._started
         return Measurement(
-            sequence_start=self.scans,
-            plc_heartbeat=self.scans,
-            plc_time=self.time,
+            sequence_start=scans,
+            plc_heartbeat=scans,
+            plc_time=scans * SCAN,
             status=self._status(),
             plc_state=self.state,
             alarm=self.alarm,
@@ -212,7 +226,7 @@ class Plc:
             command_age=min(self.inbox.age(self.time), self._age_max),
             scan_time_max=min(scan_time_max, self._scan_time_max),
             interlock=self.switches.interlock,
-            sequence_end=self.scans,
+            sequence_end=scans,
         )
 
 

@@ -9,7 +9,7 @@ from gateway.configuration.config import Config, from_document
 from gateway.cycle import command
 from gateway.cycle.command import Command
 from gateway.cycle.limits import Limit, Limited
-from gateway.cycle.supervisor import State
+from gateway.cycle.supervisor import State, Supervisor
 from gateway.reasons import Reason
 from register_maps import load
 from register_maps.signals import Control, Measurement, Mode, Status
@@ -35,12 +35,42 @@ def test_before_the_first_tick_nothing_is_written_nor_known():
     assert (begin.speed, begin.written) == (0.0, 0.0)
     assert (begin.echo_moved, begin.got_through) == (-inf, -inf)
     assert (begin.sent, begin.other_wrote, begin.unanswered) == (-inf, -inf, 0)
-    assert not begin.down
+    assert (begin.down, begin.enabled) == (False, False)
 
 
-def test_writing_begins_in_armed_and_enables_from_run_to_the_end_of_the_rampdown():
+def test_writing_begins_in_armed():
     assert {State.ARMED, State.RUN, State.RAMPDOWN, State.SAFE} == command.WRITING
-    assert {State.RUN, State.RAMPDOWN} == command.ENABLING
+
+
+IN_RUN = replace(READING, status=Status.ENABLED | Status.ROAD_LOAD)
+
+
+def enable(state, seen, *, confirmed=True, before=True):
+    supervisor = Supervisor(state=state, confirmed=confirmed)
+    return command.stays_enabled(Config(), Command(enabled=before), supervisor, seen)
+
+
+@pytest.mark.parametrize("state", [State.ARMED, State.SAFE])
+def test_enable_is_off_outside_of_run_and_rampdown(state):
+    assert not enable(state, IN_RUN)
+    assert not enable(state, IN_RUN, confirmed=False)
+
+
+@pytest.mark.parametrize("seen", [None, READING, IN_RUN])
+def test_start_of_a_run_enables_until_the_plc_has_confirmed(seen):
+    assert enable(State.RUN, seen, confirmed=False, before=False)
+
+
+@pytest.mark.parametrize("state", [State.RUN, State.RAMPDOWN])
+def test_enable_stays_only_while_this_tick_shows_the_plc_in_the_run(state):
+    assert enable(state, IN_RUN)
+    assert not enable(state, None)
+    assert not enable(state, READING)
+
+
+@pytest.mark.parametrize("state", [State.RUN, State.RAMPDOWN])
+def test_enable_that_was_off_stays_off(state):
+    assert not enable(state, IN_RUN, before=False)
 
 
 @pytest.mark.parametrize(
@@ -50,26 +80,29 @@ def test_writing_begins_in_armed_and_enables_from_run_to_the_end_of_the_rampdown
 def test_the_first_number_is_of_the_moment_and_up_from_the_echo(now, number):
     """One up and the microseconds modulo 30011; so it is never the echo's."""
     seen = command.note_echo(MAP, Command(), READING, now)
-    first = command.next_command(MAP, seen, PASSED, now)
+    first = command.next_command(MAP, seen, PASSED, now, enable=False)
     assert first.number == number
-    assert command.next_command(MAP, first, PASSED, now + 0.01).number == number + 1
+    assert command.next_command(MAP, first, PASSED, now + 0.01, enable=False).number == number + 1
 
 
 def test_without_an_echo_the_first_number_counts_from_one():
-    assert command.next_command(MAP, Command(), PASSED, 0.0).number == 1
+    assert command.next_command(MAP, Command(), PASSED, 0.0, enable=False).number == 1
 
 
 def test_a_first_number_wraps_too():
-    assert command.next_command(MAP, Command(echo=65530), PASSED, 0.00001).number == 5
+    assert command.next_command(MAP, Command(echo=65530), PASSED, 0.00001, enable=False).number == 5
 
 
 def test_number_zero_counts_as_one_that_was_written():
-    assert command.next_command(MAP, Command(number=0, echo=41), PASSED, 5.0).number == 1
+    assert (
+        command.next_command(MAP, Command(number=0, echo=41), PASSED, 5.0, enable=False).number == 1
+    )
 
 
 def test_numbers_wrap_with_the_register_of_16_bits():
     numbers = [
-        command.next_command(MAP, Command(number=n), PASSED, 5.0).number for n in (65534, 65535)
+        command.next_command(MAP, Command(number=n), PASSED, 5.0, enable=False).number
+        for n in (65534, 65535)
     ]
     assert numbers == [65535, 0]
 
@@ -77,11 +110,13 @@ def test_numbers_wrap_with_the_register_of_16_bits():
 def test_a_map_without_the_number_does_not_wrap_it():
     kept = tuple(one for one in MAP.registers if one.signal != "command_sequence")
     bare = replace(MAP, registers=kept)
-    assert command.next_command(bare, Command(number=65535), PASSED, 5.0).number == 65536
+    assert (
+        command.next_command(bare, Command(number=65535), PASSED, 5.0, enable=False).number == 65536
+    )
 
 
 def test_what_was_written_is_kept_with_its_time():
-    after = command.next_command(MAP, Command(), PASSED, 5.0)
+    after = command.next_command(MAP, Command(), PASSED, 5.0, enable=False)
     assert (after.speed, after.written, after.sent, after.unanswered) == (120.0, 5.0, 5.0, 1)
     stopped = command.reset(after, 6.0)
     assert (stopped.speed, stopped.written, stopped.sent) == (0.0, 6.0, 5.0)
@@ -218,7 +253,7 @@ def test_without_a_fault_there_is_no_complaint_however_long_nothing_was_written(
 def test_the_block_holds_setpoint_limits_and_bits(enable, control, mode):
     """2000 and 3000 rpm/s: the steeper, 314.16 rad/s^2, bounds both ways."""
     config = Config().with_values({"limits.rate_up_rpm_s": "2000"})
-    written = command.block(config, MAP, Command(number=9), PASSED, enable=enable)
+    written = command.block(config, MAP, Command(number=9, enabled=enable), PASSED)
     assert (written.command_sequence, written.gateway_heartbeat) == (9, 9)
     assert (written.control, written.mode) == (control, mode)
     assert (written.speed_setpoint, written.speed_rate) == (120.0, 7.0)
@@ -231,7 +266,7 @@ SWEEP = from_document({"sweep": {"speeds_rpm": [1000.0], "hold_s": 5.0, "rate_rp
 
 
 def test_a_sweep_of_steady_speeds_is_run_in_the_mode_of_speed():
-    written = command.block(SWEEP, MAP, Command(), PASSED, enable=True)
+    written = command.block(SWEEP, MAP, Command(enabled=True), PASSED)
     assert (written.control, written.mode) == (Control.ENABLE, Mode.SPEED)
 
 
@@ -251,5 +286,5 @@ def test_confirmed_is_what_is_enabled_in_the_mode_of_the_run(config, status, con
 
 
 def test_a_block_before_any_number_has_number_zero():
-    written = command.block(Config(), MAP, Command(), PASSED, enable=False)
+    written = command.block(Config(), MAP, Command(), PASSED)
     assert (written.command_sequence, written.gateway_heartbeat) == (0, 0)

@@ -200,7 +200,7 @@ def later(number, *, duration=0.01, torque=-8.0, mean=-8.0):
         (0.5, 0.3, None),
         (1.0, 2.2, Reason.PLC_CLOCK),
         (0.0, 0.01, Reason.PLC_CLOCK),
-        (-0.001, 0.01, Reason.PLC_CLOCK),
+        (-0.001, 0.01, Reason.PLC_RESTARTED),
     ],
 )
 def test_a_window_may_differ_from_our_clock_by_half_of_the_longer_and_50_ms(
@@ -308,3 +308,56 @@ def test_windows_that_cannot_be_used_make_stale_what_is_fresh():
 def test_a_window_of_exactly_the_stale_age_is_still_of_use():
     seen = replace(after(FIRST, LATER, begin=0.0, every=0.0), heartbeat_moved=0.1)
     assert samples.fault(replace(seen, sequence_moved=0.1), 0.1, 0.1) is None
+
+
+def restarted(before, now, every=0.03):
+    """Whether the PLC counts as restarted between two readings this far apart [s]."""
+    return after(before, now, every=every).restarted > -inf
+
+
+def changed(**values):
+    return replace(LATER, **values)
+
+
+@pytest.mark.parametrize("plc_time", [0.99, 0.0, 0.9999])
+def test_clock_that_jumps_back_is_a_restart(plc_time):
+    assert restarted(FIRST, changed(plc_time=plc_time))
+
+
+def test_sample_number_that_jumps_back_is_a_restart():
+    assert restarted(FIRST, changed(sequence_start=6, sequence_end=6))
+    assert not restarted(FIRST, changed(sequence_start=8, sequence_end=8))
+
+
+def test_sample_number_that_starts_anew_behind_the_middle_of_its_range_is_a_restart():
+    """40000 samples of 10 ms after its start; from 40000 to 1 are 25537 steps forward."""
+    old = replace(FIRST, sequence_start=40000, sequence_end=40000)
+    assert restarted(old, changed(sequence_start=1, sequence_end=1))
+
+
+@pytest.mark.parametrize(("ahead", "found"), [(129, False), (131, True)])
+def test_sample_number_may_lead_by_what_a_scan_of_1_ms_allows_and_100(ahead, found):
+    """0.03 s between the readings."""
+    number = FIRST.sequence_start + ahead
+    assert restarted(FIRST, changed(sequence_start=number, sequence_end=number)) is found
+
+
+def test_sample_number_that_wraps_is_no_restart():
+    old = replace(FIRST, sequence_start=65535, sequence_end=65535)
+    assert not restarted(old, changed(sequence_start=2, sequence_end=2))
+
+
+def test_no_sample_counts_as_fresh_for_a_second_after_a_restart():
+    seen = after(
+        FIRST,
+        later(1, duration=-0.5),
+        replace(later(2), plc_time=0.51, shaft_torque_integral=53.92),
+    )
+    assert samples.fault(seen, 101.01, 5.0) is Reason.PLC_RESTARTED
+    assert samples.fault(seen, 101.02, 5.0) is None
+
+
+def test_restart_over_a_lost_link_is_noticed_with_the_first_sample():
+    lost = [Reason.CONNECTION_LOST] * 50
+    seen = after(FIRST, *lost, changed(plc_time=0.0))
+    assert samples.fault(seen, seen.sequence_moved, 0.1) is Reason.PLC_RESTARTED

@@ -1,6 +1,6 @@
 """The clock of the gateway. Time is the test's; the PLC is the emulator, scanned as time passes."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -186,6 +186,32 @@ def test_a_setpoint_that_the_map_cannot_hold_is_ramped_down_from(
     run.for_ticks(10)
     assert emulator.status()["speed_reference"] == 0.0
     run.link.close()
+
+
+class Refusing(TcpLink):
+    """A link whose writes fail, and from then on every second reading."""
+
+    refuses, reads = False, 0
+
+    def read(self, address: int, count: int, function: int = 3) -> tuple[int, ...]:
+        self.reads += 1
+        if self.refuses and self.reads % 2:
+            raise LinkError(Reason.TIMEOUT, "no reply in time")
+        return super().read(address, count, function)
+
+    def write(self, address: int, words: Sequence[int]) -> None:
+        if self.refuses:
+            raise LinkError(Reason.EXCEPTION_2, "exception 2")
+        super().write(address, words)
+
+
+def test_fault_of_a_write_is_not_forgotten_over_a_tick_without_a_reading(run: Run) -> None:
+    link = Refusing("127.0.0.1", run.bench.emulator.port, unit=1, timeout=1.0)
+    run.link = run.loop._link = link
+    running(run)
+    link.refuses = True
+    assert run.into(State.RAMPDOWN, 15) <= 15
+    assert run.output.reason is Reason.EXCEPTION_2
 
 
 def test_shadow_writes_nothing(emulator: EmulatorProcess, tmp_path: Path) -> None:

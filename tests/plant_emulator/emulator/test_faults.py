@@ -18,6 +18,7 @@ KNOWN = [
     "torn_image",
     "drop_mid_reply",
     "refuse_connection",
+    "restart",
     "wrong_function",
     "wrong_count",
     "wrong_transaction",

@@ -1,0 +1,129 @@
+"""A PLC that restarts, in each state, with and without readings: nothing starts unasked.
+
+A PLC takes enable for a rising edge when the first command after its start has it. The emulated PLC
+does so as well, with remote still on.
+"""
+
+import pytest
+
+from gateway.configuration.config import Config
+from gateway.cycle.supervisor import State
+from gateway.reasons import Reason
+from register_maps.signals import Control, PlcState, Status
+from register_maps.timing import SCAN
+from tests.gateway.closed_loop import ClosedLoop, undisturbed
+
+CONFIG = Config()
+
+
+@pytest.fixture
+def running():
+    loop = ClosedLoop(CONFIG)
+    loop.start()
+    loop.run(4.5)
+    assert loop.drum_speed[-1] > 1.0
+    return loop
+
+
+def restart(loop):
+    """Restart the PLC: it forgets the command block, the switches stay as they are."""
+    loop.plc.restart()
+    loop.words = None
+
+
+def nothing_starts(loop, duration=4.0):
+    """Run on; the PLC enters no state that drives the bench, and no block has enable."""
+    first, drum = len(loop.outputs), loop.drum_speed[-1]
+    for _ in range(round(duration / SCAN)):
+        loop.run(SCAN)
+        assert loop.plc.state not in (PlcState.SPEED, PlcState.ROAD_LOAD)
+    written = [output.setpoint for output in loop.outputs[first:] if output.setpoint]
+    assert not any(block.control & Control.ENABLE for block in written)
+    assert max(loop.drum_speed[first:]) <= drum + 0.2
+    assert loop.drum_speed[-1] == pytest.approx(0.0, abs=0.05)
+
+
+def test_restart_in_run_ends_it_with_its_reason_and_starts_nothing(running):
+    restart(running)
+    running.run(2 * SCAN)
+    assert (running.last.state, running.last.reason) == (State.RAMPDOWN, Reason.PLC_RESTARTED)
+    nothing_starts(running)
+    assert (running.last.state, running.last.reason) == (State.SAFE, Reason.PLC_RESTARTED)
+
+
+def test_restart_in_the_rampdown_starts_nothing(running):
+    running.stop_requested = True
+    running.run(0.3)
+    assert running.last.state is State.RAMPDOWN
+    assert Control.ENABLE in running.last.setpoint.control
+    restart(running)
+    nothing_starts(running)
+
+
+def test_restart_in_safe_starts_nothing(running):
+    running.operate(remote=False)
+    running.run(3.0)
+    running.operate(remote=True)
+    restart(running)
+    nothing_starts(running)
+
+
+@pytest.mark.parametrize("lost", [Reason.TIMEOUT, Reason.CONNECTION_LOST, Reason.EXCEPTION_6])
+@pytest.mark.parametrize("before", [0.0, 0.02, 0.05, 0.08, 0.5])
+@pytest.mark.parametrize("after", [0.0, 0.02, 0.3])
+def test_restart_hidden_by_lost_readings_starts_nothing(running, lost, before, after):
+    """Writes still arrive while readings fail."""
+    running.disturb = lambda _, reading: lost
+    running.run(before)
+    restart(running)
+    if after:
+        running.run(after)
+    running.disturb = undisturbed
+    nothing_starts(running)
+
+
+def test_restart_while_the_start_waits_for_its_confirmation_starts_nothing():
+    loop = ClosedLoop(CONFIG)
+    loop.run(0.2)
+    loop.operate(remote=True)
+    loop.run(SCAN)
+    assert loop.last.state is State.RUN
+    restart(loop)
+    nothing_starts(loop)
+
+
+def test_remote_that_a_booting_plc_shows_late_is_no_wish_of_the_operator():
+    """For 0.3 s after its start the PLC has not read its inputs: remote shows as off."""
+    loop = ClosedLoop(CONFIG)
+    loop.operate(remote=True)
+    loop.run(0.5)
+    assert loop.last.state is State.ARMED
+    restart(loop)
+    loop.disturb = lambda _, reading: (
+        reading
+        if reading.plc_time > 0.3
+        else type(reading)(**{**vars(reading), "status": reading.status & ~Status.REMOTE})
+    )
+    loop.run(5.0)
+    assert loop.last.state is State.ARMED
+    assert State.RUN not in {output.state for output in loop.outputs}
+
+
+def test_without_enable_the_plc_ramps_down_at_the_slope_of_the_rampdown():
+    """1000 rpm/s = 104.72 rad/s^2, although a setpoint may rise faster."""
+    loop = ClosedLoop(CONFIG.with_values({"limits.rate_down_rpm_s": "1000"}))
+    loop.start()
+    loop.run(4.5)
+    loop.disturb = lambda _, reading: Reason.TIMEOUT
+    loop.run(0.5)
+    assert loop.last.setpoint.control == Control(0)
+    assert loop.last.setpoint.ramp_limit == pytest.approx(104.7198)
+
+
+def test_run_goes_on_over_lost_readings_without_a_block_in_their_ticks(running):
+    first = len(running.outputs)
+    running.disturb = lambda loop, reading: Reason.TIMEOUT if loop.plc.scans % 10 < 5 else reading
+    running.run(2.0)
+    assert running.last.state is State.RUN
+    for seen, output in zip(running.observations[first:], running.outputs[first:], strict=True):
+        assert (seen.measurement is None) == (output.setpoint is None)
