@@ -91,9 +91,6 @@ class Emulator:
         if self.remote_after is not None and self.plc.time >= self.remote_after:
             self.remote_after = None
             self.switches = replace(self.switches, remote=True)
-        if faults.RESTART in faults.active(self.faults, self.plc.time) - self._active:
-            self.plc.restart()
-            self.server.command = None
         measurement = self.plc.scan(self.server.command, self.switches, self._scan_time_max)
         self._publish(measurement)
         if self._rows is not None:
@@ -111,6 +108,9 @@ class Emulator:
         )
         self._previous = fresh
         if names != self._active:
+            if faults.RESTART in names - self._active:
+                self.plc.restart()
+                self.server.command = None
             self._active = names
             if self.on_faults_changed is not None:
                 self.on_faults_changed(names)

@@ -3,7 +3,7 @@
 A fault acts in one of four places. Three have a function here: the image that the PLC publishes
 (`image`), the bytes of a reply (`reply`), and the listening port (`refuses`). The functions do no
 input or output: `image` returns words, `reply` returns timed chunks of bytes. The fourth place is
-the PLC itself: RESTART happens once, in the scan in which the fault begins.
+the PLC itself: RESTART happens once, after the scan in which the fault begins.
 """
 
 from collections.abc import Iterable

@@ -11,6 +11,7 @@ import pytest
 from plant_emulator import logs
 from plant_emulator.emulator.control_channel import ControlChannel
 from plant_emulator.emulator.emulator import Emulator, Options, build, encode
+from plant_emulator.emulator.plc import faults
 from plant_emulator.emulator.plc.faults import FaultError
 from plant_emulator.emulator.plc.plc import Plc
 from plant_emulator.emulator.plc.surroundings import CLOSED
@@ -164,6 +165,22 @@ def test_frozen_image_stays_until_the_fault_ends():
     channel.answer('{"do": "faults", "names": []}')
     channel.answer('{"do": "step", "scans": 1}')
     assert shown(emulator).sequence_start == 7
+
+
+def test_restart_begins_the_counters_and_forgets_the_command_once():
+    emulator = build(Options(truck_mass=None, remote=True))
+    emulator.scan()
+    drive(emulator, 5, 300 * RPM)
+    emulator.faults = (faults.parse("restart@0.08"),)
+    samples = []
+    for _ in range(6):
+        emulator.scan()
+        seen = shown(emulator)
+        samples.append((seen.sequence_start, round(seen.plc_time, 2)))
+    assert samples == [(7, 0.07), (8, 0.08), (1, 0.01), (2, 0.02), (3, 0.03), (4, 0.04)]
+    assert Status.ENABLED not in shown(emulator).status
+    assert Status.REMOTE in shown(emulator).status
+    assert emulator.server.command is None
 
 
 def test_effects_reach_the_bench():
