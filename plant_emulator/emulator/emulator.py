@@ -38,6 +38,9 @@ LOGGED = (
     "shell_temperature",
 )
 
+# Seed of the noise of declared sensors: every serving of a set shows the same noise.
+NOISE_SEED = 0
+
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
@@ -189,7 +192,7 @@ def build(options: Options) -> Emulator:
     # The first call compiles the bench, which must not delay the first scan.
     Bench(parameters, chosen).advance([0.0] * STEPS)
     plc = Plc(
-        Bench(parameters, chosen, truck=options.truck_mass is not None),
+        Bench(parameters, chosen, truck=options.truck_mass is not None, seed=NOISE_SEED),
         register_map,
         backlash=Backlash(
             ratio=parameters.value("gear_ratio"),

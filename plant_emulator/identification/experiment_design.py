@@ -147,7 +147,8 @@ def _linearisations(
     A first linearisation only sets the steps of the differences.
     """
     time, reference = program.reference()
-    run = inputs_of(Log(time, {"speed_reference": reference}, program.name))
+    sensors = found.parameter_set.sensors
+    run = inputs_of(Log(time, {"speed_reference": reference}, program.name), sensors=sensors)
     near: Estimate | None = None
     for position in GAP_POSITIONS:
         unknowns = _unknowns(found, position)

@@ -13,6 +13,7 @@ from math import isfinite, pi
 from typing import Any, Literal
 
 from plant_emulator.errors import ParameterError
+from plant_emulator.model.sensors import SENSORS, Sensor, sensors_of
 
 Kind = Literal["given", "estimated", "calculated"]
 KINDS: tuple[Kind, ...] = ("given", "estimated", "calculated")
@@ -115,12 +116,14 @@ class ParameterSet:
     origin : how the values were identified (hashes of the logs, date, version); None for a set from
         a publication
     effects : effects of this bench beyond the nominal model: effect -> parameter -> value [SI]
+    sensors : declared sensors by channel
     """
 
     name: str
     parameters: Mapping[str, Parameter]
     origin: Mapping[str, Any] | None = None
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    sensors: Mapping[str, Sensor] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Parameter:
         return self.parameters[name]
@@ -171,7 +174,7 @@ def check_value(place: str, parameter: Parameter) -> None:
 
 def parameter_set(name: str, table: Mapping[str, Any]) -> ParameterSet:
     """The parameter set that the tables of a file hold; ParameterError names file and key."""
-    unknown = sorted(set(table) - set(UNITS) - {ORIGIN, EFFECTS})
+    unknown = sorted(set(table) - set(UNITS) - {ORIGIN, EFFECTS, SENSORS})
     if unknown:
         raise ParameterError(f"{name}: {unknown[0]} is no parameter; known: {', '.join(UNITS)}")
     missing = sorted(set(UNITS) - set(table))
@@ -182,7 +185,8 @@ def parameter_set(name: str, table: Mapping[str, Any]) -> ParameterSet:
     if origin is not None and not isinstance(origin, Mapping):
         raise ParameterError(f"{name}: {ORIGIN}: a table that says where the values come from")
     effects = _effects(name, table.get(EFFECTS, {}))
-    return ParameterSet(name, given, origin, effects).with_values({})
+    sensors = sensors_of(name, table.get(SENSORS, {}))
+    return ParameterSet(name, given, origin, effects, sensors).with_values({})
 
 
 def _effects(place: str, table: object) -> dict[str, dict[str, float]]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from plant_emulator.errors import ParameterError
 from plant_emulator.model.parameters import EFFECTS, ORIGIN, ParameterSet, parameter_set
+from plant_emulator.model.sensors import SENSORS
 
 if TYPE_CHECKING:
     from plant_emulator.model.parameters import Parameter
@@ -47,11 +48,14 @@ def save(parameters: ParameterSet, path: str | Path) -> None:
 
 
 def text(parameters: ParameterSet) -> str:
-    """TOML text of a set: its origin, one table for each parameter, one for each effect."""
+    """TOML text of a set: its origin, a table for each parameter, each effect and each sensor."""
     tables = [_table(p.name, _entries(p)) for p in parameters]
     if parameters.origin is not None:
         tables.insert(0, _table(ORIGIN, dict(parameters.origin)))
     tables += [_table(f"{EFFECTS}.{name}", dict(v)) for name, v in parameters.effects.items()]
+    tables += [
+        _table(f"{SENSORS}.{name}", dict(s.entries())) for name, s in parameters.sensors.items()
+    ]
     return "\n".join(tables)
 
 

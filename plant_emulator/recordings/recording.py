@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from plant_emulator.model.sensors import Sensor
+
 # What is known of the voltage's sensor beforehand: its offset [V] and the error of its gain, each
 # run's own. An isolating amplifier of 500 V and 0.2 % is off by 1 V; a divider by some 0.5 %.
 OFFSET, GAIN_ERROR = 1.0, 0.005
@@ -110,11 +112,14 @@ def recording(
     log: Log,
     hold: Hold | None = None,
     use: Mapping[str, NDArray[np.bool_]] | None = None,
+    sensors: Mapping[str, Sensor] | None = None,
 ) -> Recording:
     """Prepare a log for a fit: its inputs, compared channels and their noise.
 
     use : samples that count, by channel, shape (n,); None: all samples of all channels. A channel
         without an entry counts whole. A voltage without an entry is removed, from the log too.
+    sensors : declared sensors by channel; a value that its task only holds does not count, and a
+        declared noise takes the place of the estimate
     Raises IdentificationError for a channel that does not move.
     """
     if use is not None and VOLTAGE not in use:
@@ -122,10 +127,17 @@ def recording(
     channels = compared_channels(log)
     everything = np.ones(len(log.time), bool)
     counted = np.stack([(use or {}).get(name, everything) for name in channels])
-    levels = [noise(log[name], counted[k]) for k, name in enumerate(channels)]
+    inputs = inputs_of(log, hold, sensors)
+    if inputs.sensing is not None:
+        counted &= np.stack([inputs.sensing.renewed(name) for name in channels])
+    known = {name: sensor.noise for name, sensor in (sensors or {}).items()}
+    levels = [
+        known.get(name) or noise(log[name], use)
+        for name, use in zip(channels, counted, strict=True)
+    ]
     if not all(level > 0.0 for level in levels):
         still = channels[int(np.argmin(levels))]
         raise IdentificationError(
             f"{log.source}: {still} does not move; a run that excites it is needed"
         )
-    return Recording(log, inputs_of(log, hold), channels, np.array(levels), counted)
+    return Recording(log, inputs, channels, np.array(levels), counted)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.errors import EmulatorError, UnsettledError
+from plant_emulator.simulation.sensing import RunningSensor
 from plant_emulator.simulation.simulate import values_of
 from plant_emulator.solver.kernel import Kernel, kernel_for, vector
 from plant_emulator.solver.stepper import CHANNELS
@@ -59,6 +60,7 @@ class Bench:
     effects : effect -> parameter -> value [SI]
     gap_position : start in the backlash gap, -1 to 1; step : length of a step [s]
     truck : whether a truck stands on the drum
+    seed : of the noise of the set's declared sensors; None: they show no noise
     kernel : the kernel to use; None: the smallest that has these effects
     """
 
@@ -70,6 +72,7 @@ class Bench:
         gap_position: float = 0.0,
         truck: bool = False,
         step: float = STEP,
+        seed: int | None = None,
         kernel: Kernel | None = None,
     ) -> None:
         values: Mapping[str, float] = values_of(parameters, effects)
@@ -84,6 +87,10 @@ class Bench:
         self._history = vector([0.0] * (ceil(self._longest_dead_time / step) + 3))
         self._newest = 0
         self._step = step
+        self._sensors = {
+            CHANNELS.index(name): RunningSensor(sensor, seed)
+            for name, sensor in parameters.sensors.items()
+        }
         self._motor_angle = 0.0
         self._drum_angle = 0.0
         self._truck = (0.0, 0.0)
@@ -134,6 +141,7 @@ class Bench:
             raise UnsettledError(f"bench at {self.time:g} s: its state is not finite any more")
         self._motor_angle += sums[MOTOR_SPEED] * self._step
         self._drum_angle += sums[DRUM_SPEED] * self._step
+        self._sense(out)
         return BenchSamples(
             motor_speed=out[:, MOTOR_SPEED],
             drum_speed=out[:, DRUM_SPEED],
@@ -149,6 +157,12 @@ class Bench:
     def limit_current(self, limit: float) -> None:
         """Limit the current reference of the drive to the lesser of this and its own limit [A]."""
         self._p.armature_current_limit = min(limit, self._own_current_limit)
+
+    def _sense(self, out: Array) -> None:
+        """Let the declared sensors show the channels of these steps."""
+        for column, sensor in self._sensors.items():
+            time = self.time + self._step * np.arange(1.0 - len(out), 1.0)
+            out[:, column] = sensor.show(time, out[:, column])
 
     def _load(self, wheel_torque: float, brake_torque: float) -> None:
         """Set the truck's torques if they changed: writing to a record costs more than a step."""

@@ -7,7 +7,7 @@ during the interval before the sample.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import TYPE_CHECKING, Literal
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from plant_emulator.errors import UnsettledError
 from plant_emulator.signals.log import COMPARED, Array, Log
+from plant_emulator.simulation.sensing import Sensing, sensing_of
 from plant_emulator.simulation.sensor_noise import SENSORS
 from plant_emulator.solver.kernel import kernel_for
 from plant_emulator.solver.stepper import CHANNELS, Inputs
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from plant_emulator.model.parameters import ParameterSet
+    from plant_emulator.model.sensors import Sensor
     from plant_emulator.solver.kernel import Kernel
 
 Hold = Literal["linear", "staircase"]
@@ -48,6 +50,7 @@ class RunInputs:
 
     truck : whether a truck is on the drum; without a truck the log has no wheel torque
     source : name of the run in messages; interval : median time between samples [s]
+    sensing : what the declared sensors show; None: every value shows its quantity at once
     """
 
     time: Array
@@ -59,12 +62,16 @@ class RunInputs:
     truck: bool
     source: str
     interval: float
+    sensing: Sensing | None = None
 
 
-def inputs_of(log: Log, hold: Hold | None = None) -> RunInputs:
+def inputs_of(
+    log: Log, hold: Hold | None = None, sensors: Mapping[str, Sensor] | None = None
+) -> RunInputs:
     """The inputs of a run, from the speed reference and the wheel torque of its log.
 
     hold : form of the reference between samples; None: staircase in a log with a truck, else linear
+    sensors : declared sensors by channel
     """
     time, reference = log.time, log["speed_reference"]
     truck = "wheel_torque" in log
@@ -86,6 +93,25 @@ def inputs_of(log: Log, hold: Hold | None = None) -> RunInputs:
         truck=truck,
         source=log.source,
         interval=float(np.median(np.diff(time))),
+        sensing=sensing_of(log, sensors or {}),
+    )
+
+
+def refined(run: RunInputs) -> RunInputs:
+    """The inputs at the finer samples that the lags of the sensors need."""
+    if run.sensing is None:
+        return run
+    fine, rows = run.sensing.time, run.sensing.rows
+    places = np.arange(len(fine))
+    before = np.searchsorted(rows, places, side="right") - 1
+    ending = np.searchsorted(rows, places)
+    return replace(
+        run,
+        time=fine,
+        reference=run.reference[before] + run.slope[before] * (fine - run.time[before]),
+        slope=run.slope[before],
+        wheel_torque=run.wheel_torque[ending],
+        parked=run.parked[ending],
     )
 
 
@@ -120,6 +146,7 @@ def simulate(
     equations were not solved.
     """
     model, values = (kernel, values) if kernel is not None else kernel_for(values)
+    coarse, run = run, refined(run)
     out = np.zeros((len(run.time), len(CHANNELS)))
     p = model.parameter_record(values)
     x = model.state(p, gap_position * values["backlash_half_gap"])
@@ -139,9 +166,11 @@ def simulate(
     )
     _refuse_unsolved(run, stage.unsettled, out)
     signals = {name: out[:, k] for k, name in enumerate(CHANNELS)}
+    if run.sensing is not None:
+        signals = {name: run.sensing.show(name, values) for name, values in signals.items()}
     if not run.truck:  # a log with this column would be read as a staircase with a parked truck
         del signals["wheel_torque"]
-    return Log(run.time, {"speed_reference": run.reference, **signals}, run.source)
+    return Log(coarse.time, {"speed_reference": coarse.reference, **signals}, run.source)
 
 
 def _refuse_unsolved(run: RunInputs, unsettled: float, out: Array) -> None:

@@ -68,7 +68,9 @@ def load_recordings(
     check_distinct([(log.source, samples(log)) for log in taken])
     check_same_bench(taken, parameters.values())
     hold = cast("Hold | None", reference)
-    recordings = [recording(log, hold, use) for log, use in zip(taken, uses, strict=True)]
+    recordings = [
+        recording(log, hold, use, parameters.sensors) for log, use in zip(taken, uses, strict=True)
+    ]
     return recordings, notes
 
 

@@ -15,7 +15,7 @@ from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import Recording
 from plant_emulator.signals.log import COMPARED, Log
 from plant_emulator.simulation.programs import PROGRAMS
-from plant_emulator.simulation.sensor_noise import SENSORS
+from plant_emulator.simulation.sensor_noise import noise_of
 from plant_emulator.simulation.simulate import inputs_of
 from plant_emulator.workflows.loading import load_recordings, with_common_voltage
 from plant_emulator.workflows.simulation import simulate
@@ -33,9 +33,9 @@ def planned_run(
     log = simulate(name, parameters=parameters, start="middle")
     return Recording(
         log,
-        inputs_of(log),
+        inputs_of(log, sensors=parameters.sensors),
         channels,
-        np.array([SENSORS[channel][0] for channel in channels]),
+        np.array([noise_of(channel, parameters.sensors) for channel in channels]),
         np.ones((len(channels), len(log.time)), bool),
     )
 

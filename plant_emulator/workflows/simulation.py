@@ -67,8 +67,9 @@ def simulate(
     elif isinstance(source, TravelProgram):
         log = simulate_travel(source, bench, values)
     else:
-        log = kernel_level.simulate(inputs_of(source.inputs(), reference), values_of(bench, values))
-    return log if seed is None else add_noise(log, seed)
+        run = inputs_of(source.inputs(), reference, bench.sensors)
+        log = kernel_level.simulate(run, values_of(bench, values))
+    return log if seed is None else add_noise(log, seed, bench.sensors)
 
 
 def parameter_set(parameters: ParameterSet | str | Path) -> ParameterSet:
@@ -111,10 +112,11 @@ def simulate_log(
     own = {name: table for name, table in parameters.effects.items() if name not in effects}
     library = kernel().effects if own else {}
     if start == "fit" and any(p.per_run for e in own for p in library[e].parameters.values()):
-        measured = with_logged_values(recording(without_voltage(log), reference), own)
+        measured = recording(without_voltage(log), reference, sensors=parameters.sensors)
+        measured = with_logged_values(measured, own)
         states = fit_states(measured, values, states_of(own))
         values, gap = split_gap_position({**values, **measured.logged_values, **states})
         return kernel_level.simulate(measured.inputs, values, gap_position=gap)
-    run = inputs_of(log, reference)
+    run = inputs_of(log, reference, parameters.sensors)
     gap = fit_start(log, run, values) if start == "fit" else 0.0
     return kernel_level.simulate(run, values, gap_position=gap)

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from plant_emulator.model.parameters import ParameterSet
+    from plant_emulator.model.sensors import Sensor
     from plant_emulator.simulation.programs import Program
 
     Values = Mapping[str, float]
@@ -73,19 +74,19 @@ def planned_runs(
     logs = [r.log for r in recordings]
     rest = undriven(logs)
     levels = noise_levels(recordings)
-    shell = _last_shell(logs)
+    shell, sensors = _last_shell(logs), parameters.sensors
     for speeds in (p for p in rest if isinstance(p, SpeedProgram)):
-        yield from _recorded(describe(speeds), speeds.inputs(), warm, levels, shell)
+        yield from _recorded(describe(speeds), speeds.inputs(), warm, levels, shell, sensors)
     if not started_cold(logs):
         speeds = max(
             (p for p in PROGRAMS.values() if isinstance(p, SpeedProgram)), key=lambda p: p.duration
         )
         words = f"{speeds.name} from a cold start"
-        yield from _recorded(words, speeds.inputs(), from_cold, levels, COLD_SHELL)
+        yield from _recorded(words, speeds.inputs(), from_cold, levels, COLD_SHELL, sensors)
     for cycle in (p for p in rest if isinstance(p, TravelProgram)):
         with suppress(UnsettledError):
             inputs = simulate_travel(cycle, parameters)
-            yield from _recorded(describe(cycle), inputs, warm, levels, shell)
+            yield from _recorded(describe(cycle), inputs, warm, levels, shell, sensors)
 
 
 def _last_shell(logs: Sequence[Log]) -> float | None:
@@ -94,14 +95,19 @@ def _last_shell(logs: Sequence[Log]) -> float | None:
 
 
 def _recorded(
-    words: str, inputs: Log, values: Values, levels: Mapping[str, float], shell: float | None
+    words: str,
+    inputs: Log,
+    values: Values,
+    levels: Mapping[str, float],
+    shell: float | None,
+    sensors: Mapping[str, Sensor],
 ) -> Iterator[Recording]:
     """Simulate a run with these values; none where the model cannot follow it.
 
     words : what to do; levels : standard deviation of each channel's noise
     shell : temperature of the gear's shell [K]; None: not logged
     """
-    run = inputs_of(inputs)
+    run = inputs_of(inputs, sensors=sensors)
     with suppress(UnsettledError):
         others, gap = split_gap_position(values)
         log = simulate(run, others, gap_position=gap)
