@@ -10,6 +10,8 @@ from typing import Final
 
 RPM: Final = 2.0 * math.pi / 60.0
 """One revolution per minute [rad/s]."""
+KMH: Final = 1.0 / 3.6
+"""One kilometre per hour [m/s]."""
 ZERO_CELSIUS: Final = 273.15
 """Zero degrees Celsius [K]."""
 

@@ -29,7 +29,7 @@ RightHandSide = Callable[[float, Array], list[float]]
 STATES = 8
 SMOOTHED_OVER = 1e-4
 # The power |omega_g|^delta_g has no finite slope at rest; a Jacobian needs one [rad/s].
-REST = 1e-9
+SMALLEST_SPEED = 1e-9
 # Longest step [s]: at rest all derivatives vanish, and a free step would leap over the whole run.
 LARGEST_STEP = 0.5
 # Absolute tolerance over relative tolerance [the unit of each state].
@@ -196,7 +196,10 @@ def symbolic(corners: Corners, p: Values) -> dict[str, Any]:
     weakened = p["flux_constant_1"] / (p["flux_constant_2"] + ca.fabs(omega_m))
     k_phi = ca.fmin(p["flux_constant"], weakened)
     t_mg = p["motor_shaft_stiffness"] * q
-    viscous = p["gear_viscous_friction"] * (ca.fabs(omega_g) + REST) ** p["gear_friction_exponent"]
+    viscous = (
+        p["gear_viscous_friction"]
+        * (ca.fabs(omega_g) + SMALLEST_SPEED) ** p["gear_friction_exponent"]
+    )
     t_f = (p["gear_coulomb_friction"] + viscous) * ca.tanh(omega_g / SMOOTHED_OVER)
     twist = d + p["drum_shaft_damping"] / p["drum_shaft_stiffness"] * (omega_g - omega_d)
     t_gd = p["drum_shaft_stiffness"] * (twist - limited(twist, p["backlash_half_gap"]))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from gateway.configuration.keys import declare
 from gateway.friction import THESIS, Friction
-from register_maps.units import RPM
+from register_maps.units import KMH, RPM
 
 MILLI = 1e-3
 PERCENT = 1e-2
@@ -82,7 +82,7 @@ class TruckConfig:
     f1: float | None = declare("f1_N_per_m_s", None, lower=-1e4, upper=1e4)
     f2: float | None = declare("f2_N_per_m2_s2", None, lower=-1e3, upper=1e3)
     grade: float = declare("grade_percent", 0.0, scale=PERCENT, lower=-50.0, upper=50.0)
-    top_speed: float = declare("top_speed_km_h", 14.0, scale=1.0 / 3.6, lower=0.1, upper=100.0)
+    top_speed: float = declare("top_speed_km_h", 14.0, scale=KMH, lower=0.1, upper=100.0)
     acceleration: float = declare("acceleration_m_s2", 0.65, lower=0.0, upper=10.0)
     braking: float = declare("braking_m_s2", 1.05, lower=0.0, upper=10.0)
 

@@ -126,7 +126,7 @@ def step(
     """Return state and output after one tick."""
     now = observation.now
     read = samples.take(state.samples, observation.measurement, observation.fault, now)
-    read = samples.windowed(config, register_map, read)
+    read = samples.with_window(config, register_map, read)
     sent = command.note_reply(state.command, observation.measurement, observation.fault)
     sent = command.note_echo(register_map, sent, read.newest if read.is_new else None, now)
     state = replace(state, samples=read, command=sent)

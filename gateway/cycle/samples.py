@@ -35,7 +35,7 @@ RESTARTING = 1.0
 """[s] Time after a restart during which no sample counts as fresh."""
 MEMORY = 0.5
 """[s] Time over which a clock that is always too fast or too slow is noticed."""
-APART, SWING = 20.0, 200.0
+TORQUE_MISMATCH, TORQUE_SWING = 20.0, 200.0
 """[N m] Allowed difference of a window's mean torque from the PLC's mean over its last scan. The
 first number holds for a window of one scan; the second is added for a window of many scans."""
 
@@ -79,7 +79,7 @@ class Samples:
 def take(
     samples: Samples, measurement: Measurement | None, fault: Reason | None, now: float
 ) -> Samples:
-    """Return the samples after one reading, without its window; `windowed` adds that."""
+    """Return the samples after one reading, without its window; `with_window` adds that."""
     samples = replace(samples, is_new=False, window=None)
     if measurement is None:
         first = samples.fault or fault or Reason.STALE
@@ -116,7 +116,7 @@ def fault(samples: Samples, now: float, stale: float) -> Reason | None:
     return Reason.HEARTBEAT_FROZEN if frozen else Reason.SEQUENCE_FROZEN
 
 
-def windowed(config: Config, register_map: RegisterMap, samples: Samples) -> Samples:
+def with_window(config: Config, register_map: RegisterMap, samples: Samples) -> Samples:
     """Return the samples with the window that a new sample ends, or with its fault."""
     now, before = samples.newest, samples.before
     if not samples.is_new or now is None or before is None:
@@ -168,8 +168,8 @@ def _is_possible(
             return False
     if of_scan is None:
         return True
-    rest = max(0.0, 1.0 - SCAN / duration)
-    return abs(torque - of_scan) <= APART + SWING * rest
+    unseen = max(0.0, 1.0 - SCAN / duration)
+    return abs(torque - of_scan) <= TORQUE_MISMATCH + TORQUE_SWING * unseen
 
 
 NEEDS = {

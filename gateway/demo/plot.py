@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gateway.arrays import Array
-from register_maps.units import RPM
+from register_maps.units import KMH, RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-KMH = 3.6
 # Colours of Okabe and Ito, distinct for every kind of colour vision.
 ROAD, BENCH, ASKED, WARM = "#999999", "#0072B2", "#E69F00", "#D55E00"
 
@@ -60,14 +59,14 @@ def draw(runs: Sequence[Curves], path: Path) -> None:
 def _speed(axes: "Axes", curves: Curves) -> None:
     axes.set_title(curves.title, loc="left", fontsize=13, fontweight="bold")
     axes.text(0.5, 0.06, curves.note, transform=axes.transAxes, ha="center", fontsize=10)
-    axes.plot(curves.time, KMH * curves.road_speed, color=ROAD, linewidth=4.5, label="road")
-    axes.plot(curves.time, KMH * curves.bench_speed, color=BENCH, linewidth=1.4, label="bench")
+    axes.plot(curves.time, curves.road_speed / KMH, color=ROAD, linewidth=4.5, label="road")
+    axes.plot(curves.time, curves.bench_speed / KMH, color=BENCH, linewidth=1.4, label="bench")
     axes.set_ylabel("speed [km/h]")
     axes.legend(loc="upper right", frameon=False)
 
 
 def _error(axes: "Axes", curves: Curves) -> None:
-    error = KMH * (curves.bench_speed - curves.road_speed)
+    error = (curves.bench_speed - curves.road_speed) / KMH
     axes.fill_between(curves.time, error, color=WARM, alpha=0.75, linewidth=0.0)
     axes.axhline(0.0, color="black", linewidth=0.6)
     axes.set_ylabel("bench - road\n[km/h]")

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from register_maps.units import RPM
+from register_maps.units import KMH, RPM
 
 LINE_EVERY: Final = 5.0
 """[s] Time of the cycle between two lines, where no table can be drawn."""
@@ -57,7 +57,7 @@ class Screen:
         elif moment.time >= self._next_line:
             self._next_line = LINE_EVERY * (math.floor(moment.time / LINE_EVERY) + 1)
             self._console.print(
-                f"  {moment.time:5.1f} s  {moment.state:9s} {3.6 * moment.rim_speed:5.1f} km/h  "
+                f"  {moment.time:5.1f} s  {moment.state:9s} {moment.rim_speed / KMH:5.1f} km/h  "
                 f"setpoint {moment.setpoint / RPM:6.0f} rpm  torque {moment.shaft_torque:6.1f} Nm",
                 highlight=False,
             )
@@ -71,7 +71,7 @@ class Screen:
             ("state", moment.state),
             ("setpoint", f"{moment.setpoint / RPM:.0f} rpm"),
             ("motor", f"{moment.motor_speed / RPM:.0f} rpm"),
-            ("drum", f"{moment.drum_speed:.2f} rad/s, {3.6 * moment.rim_speed:.1f} km/h"),
+            ("drum", f"{moment.drum_speed:.2f} rad/s, {moment.rim_speed / KMH:.1f} km/h"),
             ("shaft torque", f"{moment.shaft_torque:.1f} Nm"),
             ("latency", f"{1e3 * moment.latency:.2f} ms"),
             ("missed deadlines", str(moment.missed)),

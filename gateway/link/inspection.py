@@ -15,8 +15,8 @@ from register_maps.conversion import conversion, raw_words
 from register_maps.register_map import Register, RegisterMap, WordOrder
 from register_maps.signals import RESERVED
 
-MOVING: Final = frozenset({"sequence_start", "plc_heartbeat", "plc_time", "sequence_end"})
-NEVER_ZERO: Final = MOVING | {"status", "shell_temperature_1", "shell_temperature_2"}
+COUNTERS: Final = frozenset({"sequence_start", "plc_heartbeat", "plc_time", "sequence_end"})
+NEVER_ZERO: Final = COUNTERS | {"status", "shell_temperature_1", "shell_temperature_2"}
 MBPOLL_TYPES: Final = {"int32": ":int", "uint32": ":int", "float32": ":float"}
 MBPOLL_TABLES: Final = {"holding": "4", "input": "3"}
 
@@ -184,7 +184,7 @@ def _decodes(register: Register, words: Words, order: WordOrder) -> bool:
 
 
 def _still(register: Register, words: Sequence[Words]) -> str:
-    if len(words) > 1 and len(set(words)) == 1 and register.signal in MOVING:
+    if len(words) > 1 and len(set(words)) == 1 and register.signal in COUNTERS:
         return "not moving: the PLC's program does not run, or this is not its counter"
     if register.signal in NEVER_ZERO and not any(map(any, words)):
         return "constant zero: a running PLC has another value here"

@@ -20,7 +20,7 @@ from gateway.losses.sections import LossesError, Section
 
 FEWEST: Final = 4
 """Least count of speeds: one more than the law has parameters, so that residuals remain."""
-APART: Final = 1.05
+SAME_SPEED_RATIO: Final = 1.05
 """Ratio from which two speeds count as two."""
 SPREAD: Final = 2.5
 """Least ratio of fastest and slowest speed, which separates exponent and constant part."""
@@ -96,10 +96,10 @@ def fit(sections: Sequence[Section]) -> Fit:
 
 
 def count_speeds(speeds: Iterable[float]) -> int:
-    """Count of different speeds; speeds within a ratio of APART count as one."""
+    """Count of different speeds; speeds within a ratio of SAME_SPEED_RATIO count as one."""
     counted, last = 0, 0.0
     for one in sorted(speeds):
-        if one > APART * last:
+        if one > SAME_SPEED_RATIO * last:
             counted, last = counted + 1, one
     return counted
 

@@ -33,13 +33,13 @@ LONGEST: Final = 2.4 * HALF
 STEADY: Final = 0.5
 """[rad/s^2] Slope of the motor speed; the drum's inertia takes 2.5 N m, under 1 % of the
 friction."""
-MOVING: Final = 5.0
+LEAST_SPEED: Final = 5.0
 """[rad/s] Motor speed below which the bench stands."""
 SHORTEST, WORTH_NAMING = 1.0, 0.2
 """[s] Least duration of a stretch that is used, and of a stretch that is named as left out."""
 COARSEST: Final = 0.5 * HALF
 """[s] Longest time between two samples."""
-APART: Final = 0.1
+SPEED_MISMATCH: Final = 0.1
 """Relative difference of drum and gear that shows a wrong ratio, scale or a frozen channel."""
 DRIFT: Final = 0.02
 """Largest relative change of the speed over a stretch."""
@@ -141,7 +141,7 @@ def steady(trace: Trace, bench: BenchConfig, torque_offset: float = 0.0) -> Stea
 def _stretches(trace: Trace) -> Iterator[slice]:
     """Samples in which the motor turns at a constant speed, stretch by stretch."""
     still = np.abs(_slope(trace.time, trace.motor_speed)) < STEADY
-    turning = still & (np.abs(trace.motor_speed) > MOVING)
+    turning = still & (np.abs(trace.motor_speed) > LEAST_SPEED)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], turning.astype(np.int8), [0]))))
     for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
         if trace.time[last] - trace.time[first] >= WORTH_NAMING:
@@ -183,7 +183,7 @@ def _rejection(trace: Trace, part: slice, gear_ratio: float) -> str:
     if change > DRIFT * speed.mean():
         return f"speed drifts by {100.0 * change / speed.mean():.1f} %; expected {DRIFT:.0%}"
     gear, drum = speed.mean() / gear_ratio, float(trace.drum_speed[part].mean())
-    if abs(gear - drum) > APART * gear:
+    if abs(gear - drum) > SPEED_MISMATCH * gear:
         return f"gear {gear:.3f} rad/s and drum {drum:.3f} rad/s do not belong together"
     spread, mean = float(np.ptp(_batch_means(torque))), abs(float(torque.mean()))
     if spread > UNSTEADY * mean:

@@ -22,7 +22,8 @@ STEADY = 0.02
 SHORTEST_CRUISE = 5.0
 # [s] Span of the slope of the speed; one digit of the drum speed is 0.3 mm/s at the rim.
 SLOPE_SPAN = 0.5
-MOVING = 0.5
+# [m/s] Speed above which the truck cruises.
+CRUISE_SPEED = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +59,7 @@ def cruise(time: Array, speed: Array) -> slice | None:
     slope[half:-half] = (speed[2 * half :] - speed[: -2 * half]) / (
         time[2 * half :] - time[: -2 * half]
     )
-    steady = (np.abs(slope) < STEADY) & (speed > MOVING)
+    steady = (np.abs(slope) < STEADY) & (speed > CRUISE_SPEED)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], steady.astype(np.int8), [0]))))
     starts, ends = edges[::2], edges[1::2] - 1
     if not len(starts):

@@ -22,7 +22,7 @@ from gateway.cycle.supervisor import State
 from register_maps.register_map import RegisterMap
 from register_maps.signals import Alarm, Measurement, PlcState, Status
 
-REST: Final = 1.0
+RESTING_TIME: Final = 1.0
 """[s] Rest before the log: half of it with remote off, so that the operator then switches it on."""
 STANDING: Final = Status.READY | Status.WARM | Status.WATCHDOG_OK | Status.EMERGENCY_STOP_OK
 RUNNING: Final = Status.ENABLED | Status.ROAD_LOAD
@@ -51,7 +51,7 @@ def replay(
 def _samples(times: Array, columns: Mapping[str, Array]) -> Iterator[tuple[Measurement, bool]]:
     """Measurements that the PLC would have sent, and whether remote was on."""
     step_size = float(np.median(np.diff(times)))
-    resting = max(4, round(REST / step_size))
+    resting = max(4, round(RESTING_TIME / step_size))
     integral, before, last = 0.0, 0.0, 0.0
     for index in range(-resting, len(times)):
         row = {name: float(column[max(index, 0)]) for name, column in columns.items()}

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from gateway.losses.result import DIRECTION, Losses, Row
-from register_maps.units import RPM
+from register_maps.units import KMH, RPM
 
 WARMED: Final = 3.0
 """[K] Change of the shell that counts as warming; the sensors of the logs scatter by 1 K."""
@@ -87,7 +87,7 @@ def _table(losses: Losses) -> list[str]:
 
 
 def _law(losses: Losses) -> list[str]:
-    law, shell, to_kmh = losses.friction, losses.shell, 3.6 * losses.bench.drum_radius
+    law, shell, to_kmh = losses.friction, losses.shell, losses.bench.drum_radius / KMH
     coulomb, viscous, exponent = losses.fit.standard_errors
     slowest, fastest = to_kmh * losses.fit.slowest, to_kmh * losses.fit.fastest
     held = " (held at 0)" if losses.fit.held_at_zero else ""
@@ -110,7 +110,7 @@ def draw(path: Path, losses: Losses) -> None:
     """Draw friction over speed, and the residuals."""
     from matplotlib.figure import Figure
 
-    to_kmh = 3.6 * losses.bench.drum_radius
+    to_kmh = losses.bench.drum_radius / KMH
     omega = np.linspace(0.0, 1.05 * losses.fit.fastest, 200)[1:]
     torque, band = losses.fit.torque(omega), 2.0 * losses.fit.torque_error(omega)
     measured = np.array([[one.gear_speed, one.friction] for one in losses.sections])

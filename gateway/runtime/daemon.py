@@ -31,7 +31,7 @@ from register_maps.register_map import RegisterMap
 BY_OPERATOR: Final = frozenset({Reason.STOP_REQUESTED, Reason.REMOTE_OFF})
 AT_FAULT: Final = frozenset({State.CONNECT, State.ARMED, State.RAMPDOWN, State.SAFE})
 """States whose reason is a fault of the PLC; in ARMED it is a command that does not arrive."""
-APART: Final = 1.0
+SECOND_SIGNAL_AFTER: Final = 1.0
 """[s] A second signal sooner than this repeats the first: some send to process and to group."""
 
 
@@ -57,10 +57,10 @@ class _Stop:
         self._first = 0.0
         self.asked = False
 
-    def signalled(self, number: int, _frame: object) -> None:
+    def handle_signal(self, number: int, _frame: object) -> None:
         """Handle a signal: the first asks for a stop, the second ends at once."""
         now = time.monotonic()
-        if self.asked and now - self._first > APART:
+        if self.asked and now - self._first > SECOND_SIGNAL_AFTER:
             raise GatewayError(f"stopped at once by a second {signal.Signals(number).name}")
         self._first = now if not self.asked else self._first
         self.asked = True
@@ -123,7 +123,8 @@ def _new_file(config: Config) -> Path:
 @contextmanager
 def _signals(stop: _Stop) -> Iterator[None]:
     before = {
-        number: signal.signal(number, stop.signalled) for number in (signal.SIGINT, signal.SIGTERM)
+        number: signal.signal(number, stop.handle_signal)
+        for number in (signal.SIGINT, signal.SIGTERM)
     }
     try:
         yield

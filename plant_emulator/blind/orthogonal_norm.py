@@ -3,7 +3,7 @@
 The true law changes the noise-free logs at its hidden size. The whitened change is projected
 orthogonally to the tangents of the nuisance parameters and initial states at the truth, with their
 priors. A large norm is checked by a nonlinear fit of the nuisance parameters to the noise-free
-logs, because they can imitate more than their tangents show. The smaller norm counts.
+logs, because these can follow more of the change than their tangents show. The smaller norm counts.
 """
 
 from __future__ import annotations

@@ -138,7 +138,7 @@ def _save(found: Diagnosis, path: str, own: tuple[str, ...]) -> None:
             )
     if verdict.kind == "unknown":
         click.echo(
-            f"note: {path}: the cause is unknown: no effect is in it, and its parameters may "
-            "have moved to imitate one",
+            f"note: {path}: the cause is unknown: no effect is in it, and the cause may have "
+            "biased its parameters",
             err=True,
         )

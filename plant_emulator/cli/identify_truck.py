@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from plant_emulator.cli import _options
+from plant_emulator.model.dimensions import DRUM_RADIUS, TRUCK_RATIO, WHEEL_RADIUS
 from register_maps.command_line.parameters import Command, Number, OutputFile
 
 EXAMPLE = """
@@ -24,17 +25,22 @@ Example:
 @click.option(
     "--ratio",
     type=Number(1, 1000),
-    default=14.0,
+    default=TRUCK_RATIO,
     show_default=True,
     help="Motor speed over wheel speed.",
 )
 @click.option(
-    "--wheel-radius", type=Number(0.02, 2), default=0.1715, show_default=True, metavar="M"
+    "--wheel-radius",
+    type=Number(0.02, 2),
+    default=WHEEL_RADIUS,
+    show_default=True,
+    metavar="M",
+    help="Radius of the truck's drive wheel.",
 )
 @click.option(
     "--drum-radius",
     type=Number(0.05, 5),
-    default=0.645,
+    default=DRUM_RADIUS,
     show_default=True,
     metavar="M",
     help="Radius of the bench's drum: crr_v refers to the drum's speed.",

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 GAP = Unknown(name=GAP_POSITION, start=0.0, lower=-1.0, upper=1.0, logarithmic=False)
 # Gap positions that a scan tries.
-GAP_POSITIONS = 41
+GAP_SCAN_POINTS = 41
 
 
 def states_of(own: Effects, known: Mapping[str, Effect] | None = None) -> tuple[Unknown, ...]:
@@ -108,7 +108,7 @@ def scan_states(
     """
     starts = {u.name: u.start for group in groups for u in group}
     search = Search([recording], {**values, **starts}, ())
-    search.scan_gaps(GAP_POSITIONS)
+    search.scan_gaps(GAP_SCAN_POINTS)
     found = {GAP_POSITION: search.gaps[0], **starts}
     for group in groups:
         found = scan_unknowns(residual, found, group)

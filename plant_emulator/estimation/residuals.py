@@ -35,7 +35,7 @@ def whitened_function(residual: Residual, noise: NoiseDirections | None) -> Resi
     """The residual function, whitened for the noise of a measured input; None: as it is."""
     if noise is None:
         return residual
-    return lambda found: noise.whitened(residual(found))
+    return lambda found: noise.whiten(residual(found))
 
 
 def residual_functions(

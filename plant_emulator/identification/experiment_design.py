@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from plant_emulator.simulation.simulate import RunInputs
 
 # Where in the gap a planned run may start, -1 to 1.
-GAP_POSITIONS = (-0.8, -0.4, 0.0, 0.4, 0.8)
+PLANNED_GAP_POSITIONS = (-0.8, -0.4, 0.0, 0.4, 0.8)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,7 +150,7 @@ def _linearisations(
     sensors = found.parameter_set.sensors
     run = inputs_of(Log(time, {"speed_reference": reference}, program.name), sensors=sensors)
     near: Estimate | None = None
-    for position in GAP_POSITIONS:
+    for position in PLANNED_GAP_POSITIONS:
         unknowns = _unknowns(found, position)
         with suppress(UnsettledError):
             residual = _planned_residual(run, {**values, **_starts(unknowns)}, noise)

@@ -64,7 +64,7 @@ class NoiseDirections:
         """Components of a residual, shape (channels, samples), along the directions, shape (k,)."""
         return np.asarray(self.directions @ residual.T.ravel())
 
-    def whitened(self, residual: Array) -> Array:
+    def whiten(self, residual: Array) -> Array:
         """The residual with noise of variance 1 in every direction, shape (channels, samples)."""
         taken = 1.0 - 1.0 / np.sqrt(1.0 + self.deviations**2)
         much = self.directions.T @ (taken * self.along(residual))
@@ -92,7 +92,7 @@ def noise_directions(
     stretch, memory = (length * round(span / WINDOW) for span in (STRETCH, MEMORY))
     answers = [
         _answer(recording.with_wheel_torque(torque), values, gap_position, base)
-        for torque in _disturbed(recording, length, stretch + memory)
+        for torque in _disturbed_torques(recording, length, stretch + memory)
     ]
     if not answers:
         return None
@@ -121,7 +121,7 @@ def _answer(
         return np.zeros_like(base)
 
 
-def _disturbed(recording: Recording, length: int, every: int) -> list[Array]:
+def _disturbed_torques(recording: Recording, length: int, every: int) -> list[Array]:
     """Wheel torques in which one window of every so many samples is off by a standard deviation.
 
     The first torque changes every first window, the next one every second window, and so on. Only

@@ -144,7 +144,7 @@ def velocity_fit(fit: RoadFit) -> Fit:
     run = fit.run
     covered = (run.velocity.time >= run.time[0]) & (run.velocity.time <= run.time[-1])
     covered &= run.velocity.valid
-    simulated = run.compared(fit.values, run.velocity.time[covered])
+    simulated = run.simulated_velocity(fit.values, run.velocity.time[covered])
     return measures(run.velocity.values[covered], simulated, run.velocity.source)
 
 

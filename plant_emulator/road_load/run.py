@@ -97,7 +97,7 @@ class RoadRun:
         shrink = self.velocity.period / self.spacing
         return max(noise(self.velocity.values), QUIETEST[1]) * float(np.sqrt(shrink))
 
-    def simulated(self, parameters: RoadParameters) -> Array:
+    def simulate(self, parameters: RoadParameters) -> Array:
         """Simulated velocity after the low pass, at the torque's samples from `first` on [m/s]."""
         torque = self.torque.values[self.first :]
         period = self.torque.period
@@ -106,15 +106,15 @@ class RoadRun:
         )
         return low_pass(found, period, self.cutoff)
 
-    def compared(self, parameters: RoadParameters, time: Array) -> Array:
+    def simulated_velocity(self, parameters: RoadParameters, time: Array) -> Array:
         """Simulated velocity at these times on the velocity's clock [m/s]."""
         late = parameters.clock_skew * (time - self.velocity.start) + parameters.clock_ahead
         torque_time = self.torque.time[self.first :]
-        return np.interp(time + late, torque_time, self.simulated(parameters))
+        return np.interp(time + late, torque_time, self.simulate(parameters))
 
     def residual(self, parameters: RoadParameters) -> Array:
         """Measured minus simulated velocity [m/s], shape (m,)."""
-        return self.measured - self.compared(parameters, self.time)
+        return self.measured - self.simulated_velocity(parameters, self.time)
 
 
 def prepare(torque: Signal, velocity: Signal, truck: Truck) -> RoadRun:

@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from plant_emulator.model.dimensions import DRUM_RADIUS, TRUCK_RATIO, WHEEL_RADIUS
 from plant_emulator.road_load.kernel import compiled, travel
 from plant_emulator.simulation.truck import GRAVITY
 
@@ -32,9 +33,9 @@ class Truck:
     """
 
     mass: float
-    ratio: float = 14.0
-    wheel_radius: float = 0.1715
-    drum_radius: float = 0.645
+    ratio: float = TRUCK_RATIO
+    wheel_radius: float = WHEEL_RADIUS
+    drum_radius: float = DRUM_RADIUS
 
     @property
     def weight(self) -> float:

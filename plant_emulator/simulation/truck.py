@@ -16,11 +16,13 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from plant_emulator.model.dimensions import DRUM_RADIUS, WHEEL_RADIUS
+from register_maps.units import KMH
+
 if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 GRAVITY = 9.81
-KMH = 1.0 / 3.6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,8 +30,8 @@ class Forklift:
     """A truck: mass [kg], radii [m], rolling resistance crr [1] and crr_v [s/rad of the drum]."""
 
     mass: float = 3640.0
-    wheel_radius: float = 0.1715
-    drum_radius: float = 0.645
+    wheel_radius: float = WHEEL_RADIUS
+    drum_radius: float = DRUM_RADIUS
     crr: float = 0.0117
     crr_v: float = 9.3882e-6
 

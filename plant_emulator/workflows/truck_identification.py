@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from plant_emulator.model.dimensions import DRUM_RADIUS, TRUCK_RATIO, WHEEL_RADIUS
 from plant_emulator.road_load.answer import answer_of
 from plant_emulator.road_load.fit import fit
 from plant_emulator.road_load.run import prepare
@@ -75,9 +76,9 @@ def identify_truck(
     velocity_log: str | Path,
     *,
     mass: float,
-    ratio: float = 14.0,
-    wheel_radius: float = 0.1715,
-    drum_radius: float = 0.645,
+    ratio: float = TRUCK_RATIO,
+    wheel_radius: float = WHEEL_RADIUS,
+    drum_radius: float = DRUM_RADIUS,
     gain_uncertainty: float = 0.02,
 ) -> TruckIdentification:
     """Identify a truck's road load and gear efficiency from two logs of a level road.

@@ -90,8 +90,8 @@ class Advice:
         source, norms = self._best_separation(explained, pairs)
         if max(norms, default=0.0) < DETECTABLE_NORM:
             needs = self._needs(name for pair in pairs for name in pair)
-            return undecided(pairs, needs, tried=bool(norms))
-        return separated(source, pairs, norms)
+            return advise_needs(pairs, needs, tried=bool(norms))
+        return advise_run(source, pairs, norms)
 
     def _best_separation(
         self, explained: Explanation, pairs: Sequence[tuple[str, str]]
@@ -123,7 +123,7 @@ class Advice:
         }
         source = max(shown, key=lambda source: len(shown[source]), default="")
         if source and shown[source]:
-            return f"Drive {source}: it would show {shown_of(shown[source], len(hidden))}."
+            return f"Drive {source}: it would show {name_shown(shown[source], len(hidden))}."
         needs = self._needs(hidden)
         what = join_items(needs, MOST_NAMED, "; ")
         return f"To see what these logs could not show: {what}." if needs else None
@@ -202,7 +202,7 @@ def separation(norms: Sequence[float]) -> tuple[int, float]:
     return len(clear), min(clear, default=max(norms, default=0.0))
 
 
-def shown_of(names: Sequence[str], hidden: int) -> str:
+def name_shown(names: Sequence[str], hidden: int) -> str:
     """Name the effects that a run shows, of so many that the logs could not."""
     if hidden == 1:
         return f"{names[0]}, which these logs could not"
@@ -210,7 +210,7 @@ def shown_of(names: Sequence[str], hidden: int) -> str:
     return f"{len(names)} of the {hidden} effects that these logs could not: {shown}"
 
 
-def separated(source: str, pairs: Sequence[tuple[str, str]], norms: Sequence[float]) -> str:
+def advise_run(source: str, pairs: Sequence[tuple[str, str]], norms: Sequence[float]) -> str:
     """Advise to drive a run; say which pairs it tells apart and which it does not."""
     clear: dict[str, list[str]] = {}
     rest = []
@@ -224,7 +224,9 @@ def separated(source: str, pairs: Sequence[tuple[str, str]], norms: Sequence[flo
     return f"Drive {source}: there {'; '.join(named)} times the noise{more}."
 
 
-def undecided(pairs: Sequence[tuple[str, str]], needs: Sequence[str], *, tried: bool) -> str | None:
+def advise_needs(
+    pairs: Sequence[tuple[str, str]], needs: Sequence[str], *, tried: bool
+) -> str | None:
     """Say what would tell effects apart that no planned run does; None where nothing is known."""
     which = ", ".join(f"{name} from {other}" for name, other in pairs)
     what = join_items(needs, MOST_NAMED, "; ")

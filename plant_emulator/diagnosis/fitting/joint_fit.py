@@ -44,7 +44,7 @@ TRIAL_ITERATIONS = 10
 # A size differs from neutral for certain from so many of its standard errors on.
 SIGNIFICANT_ERRORS = 3.0
 # Share of the largest size allowed from which on an effect stands for something else. An effect
-# that imitated another law of a first effect had come to 0.99 and more.
+# that stood for another law of a first effect came to 0.99 and more.
 AT_BOUND = 0.95
 # Standard deviation of the shrinkage prior of a size [plausible sizes].
 SHRINKAGE = 2.0

@@ -163,7 +163,10 @@ class BlockRegression:
     def nuisance(self) -> tuple[Array, ...]:
         """The nuisance columns that no linearisation of the drum subsystem changes."""
         none = [None] * len(self.signals)
-        found = self.rows.shared(self.deviations, none), self.rows.own_speed(self.speed_noise)
+        found = (
+            self.rows.shared_columns(self.deviations, none),
+            self.rows.own_speed(self.speed_noise),
+        )
         if all(m.voltage is None for m in self.signals):
             return found
         return (*found, self._voltage_sensor())
@@ -189,10 +192,10 @@ class BlockRegression:
             (r.value - (d @ self.prior_offsets)[: len(r.value)])[..., None]
             for r, d in zip(self.relations, self.deviations, strict=True)
         ]
-        y = self.rows.shared(relation, [s[:, None] for s in speed])
+        y = self.rows.shared_columns(relation, [s[:, None] for s in speed])
         scale = np.array([min(u.scaled_std, 1.0) for u in fitted.unknowns])
         slopes = [(fitted.jacobians[k][0] * scale)[:, ~is_torque_size(fitted)] for k in runs]
-        own = self.rows.shared([None] * len(self.signals), slopes)
+        own = self.rows.shared_columns([None] * len(self.signals), slopes)
         return LinearModel(y[:, 0], [*self.nuisance, own], self.products)
 
     @cached_property
@@ -220,7 +223,7 @@ class BlockRegression:
         return [
             self.rows.own_relations([law.rows for law in group])
             if group[0].own
-            else self.rows.shared([law.rows for law in group], none)
+            else self.rows.shared_columns([law.rows for law in group], none)
             for group in zip(*runs, strict=True)
             if any(
                 law.rows[: len(r.value)].any() for law, r in zip(group, self.relations, strict=True)
@@ -232,7 +235,10 @@ class BlockRegression:
         none = [None] * len(self.signals)
         laws = [drum_basis.speed_sensor(m, self.values["gear_ratio"]) for m in self.signals]
         *shared, own = zip(*laws, strict=True)
-        return [*(self.rows.shared(none, group) for group in shared), self.rows.own_speed(own)]
+        return [
+            *(self.rows.shared_columns(none, group) for group in shared),
+            self.rows.own_speed(own),
+        ]
 
     def _backlash(self) -> list[Array]:
         """Columns of a gap and a damping that change in time."""
@@ -244,7 +250,7 @@ class BlockRegression:
         """Columns of an unknown torque on the drum, in the gear's relation and the drum speed."""
         torque = is_torque_size(fitted)
         speed = [-fitted.jacobians[k][0][:, torque] for k in range(len(self.signals))]
-        return [self.rows.shared(self._torque_on_gear(), speed) * TORQUE_STD]
+        return [self.rows.shared_columns(self._torque_on_gear(), speed) * TORQUE_STD]
 
     @cached_property
     def with_torque(self) -> list[tuple[LinearModel, list[Array]]]:
@@ -273,7 +279,7 @@ class BlockRegression:
     def _torque_sizes_by_gear(self) -> Array:
         """Sizes of the torque on the drum that the gear's relation alone says [10 N m]."""
         none = [None] * len(self.signals)
-        group = TORQUE_STD * self.rows.shared(self._torque_on_gear(), none)
+        group = TORQUE_STD * self.rows.shared_columns(self._torque_on_gear(), none)
         mean = self.model.marginal_likelihood([group]).mean
         return np.asarray(TORQUE_STD * mean[-group.shape[1] :])
 

@@ -22,7 +22,7 @@ SPEED_WINDOW, TIME_STEP = 0.3, 2.0
 # Unit of the unknown torque [N m], and of the sensor's error [its noise].
 TORQUE_UNIT, ERROR_UNIT = 10.0, 0.1
 # Speed at which friction counts as one of motion [rad/s at the drum].
-MOVING = 0.05
+FRICTION_SPEED = 0.05
 
 
 def torque(m: MeasuredSignals, ratio: float, largest: float) -> Array:
@@ -31,7 +31,7 @@ def torque(m: MeasuredSignals, ratio: float, largest: float) -> Array:
     ratio : of the gear; largest : motor speed of all runs [rad/s]
     """
     speed, angle = smooth(m.time, m.speed, SPEED_WINDOW) / ratio, turned_angle(m.time, m.drum_speed)
-    moving = np.tanh(speed / MOVING)[:, None]
+    moving = np.tanh(speed / FRICTION_SPEED)[:, None]
     by_speed = -moving * linear_splines(np.abs(speed), np.linspace(0.0, largest / ratio, 4))
     return np.asarray(TORQUE_UNIT * np.column_stack([by_speed, np.sin(angle), np.cos(angle)]))
 

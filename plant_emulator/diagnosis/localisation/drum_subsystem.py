@@ -34,10 +34,10 @@ if TYPE_CHECKING:
 # Free parameters. The drum's inertia shapes the drum speed only together with the damping.
 FREE = ("backlash_half_gap", "drum_shaft_damping")
 # Positions in the gap that a scan tries, and draws of the speed's noise.
-GAP_POSITIONS = 17
+SCANNED_POSITIONS = 17
 DRAWS = 10
 # Relative fall of the cost that ends a fit.
-COST_TOLERANCE = 1e-4
+DRUM_COST_TOLERANCE = 1e-4
 # Prior standard deviation of the sizes of an unknown torque on the drum [10 N m].
 TORQUE_STD = 5.0
 # Constant torques that a fit starts from [10 N m].
@@ -97,7 +97,7 @@ class DrumSubsystem:
 
     def scan(self, found: Mapping[str, float]) -> list[float]:
         """Find the best of some positions in the gap at the start, for every run."""
-        positions = np.linspace(-1.0, 1.0, GAP_POSITIONS)
+        positions = np.linspace(-1.0, 1.0, SCANNED_POSITIONS)
         losses = [
             [self.loss(k, {**found, GAP_POSITION: float(g)}) for g in positions]
             for k in range(len(self.recordings))
@@ -126,7 +126,7 @@ class DrumSubsystem:
 
     def fit(self, start: Mapping[str, float], gaps: Sequence[float]) -> Estimate:
         """Fit by least squares from these values and positions in the gap."""
-        return estimate(self.unknowns(start, gaps), self._functions(), settled=COST_TOLERANCE)
+        return estimate(self.unknowns(start, gaps), self._functions(), settled=DRUM_COST_TOLERANCE)
 
     def linearise(self, start: Mapping[str, float], gaps: Sequence[float]) -> Estimate:
         """Compute residuals and Jacobians at these values, without fitting."""

@@ -25,7 +25,7 @@ SLOPE_WINDOW = 0.5
 RAMP = 3.0
 # The motor moves from this speed on [rad/s]. After a stop the speed integrator unwinds, and the
 # motor creeps at up to 0.3 rad/s.
-MOVING = 1.0
+MOVING_SPEED = 1.0
 # The gear crosses the backlash within this time after standstill [s].
 BREAKAWAY_TIME = 0.5
 
@@ -40,9 +40,9 @@ def phases(time: Array, reference: Array, motor_speed: Array) -> NDArray[np.int_
     found = np.full(len(time), CRUISE)
     found[slope > RAMP] = ACCELERATION
     found[slope < -RAMP] = DECELERATION
-    still = np.abs(speed) < MOVING
+    still = np.abs(speed) < MOVING_SPEED
     found[still] = STANDSTILL
-    leaving = still & (np.abs(reference) > MOVING)
+    leaving = still & (np.abs(reference) > MOVING_SPEED)
     begin = np.flatnonzero(still[:-1] & ~still[1:])
     for k in begin:
         leaving |= ~still & (time > time[k]) & (time <= time[k] + BREAKAWAY_TIME)

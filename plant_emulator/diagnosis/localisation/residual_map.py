@@ -11,7 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.answer import Cell
-from plant_emulator.diagnosis.localisation.operating_phases import PHASES, field_weakened, phases
+from plant_emulator.diagnosis.localisation.operating_phases import (
+    MOVING_SPEED,
+    PHASES,
+    field_weakened,
+    phases,
+)
 from plant_emulator.signals.smoothing import smooth
 
 if TYPE_CHECKING:
@@ -23,13 +28,11 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 # Edges of the bins: frequency [Hz], as far as the sampling goes.
-BANDS = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
+FREQUENCY_EDGES = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 SPEEDS = (0.0, 25.0, 50.0, 100.0, 200.0, 300.0, 400.0)  # [rad/s at the motor]
 TIMES = (0.0, 5.0, 10.0, 20.0, 40.0, 80.0)  # [s since the start]
 # There is a load from this torque at the sensor on [N m]: four deviations of its noise.
 LOADED = 1.0
-# The motor moves in a direction from this speed on [rad/s].
-MOVING = 1.0
 
 
 def residual_map(
@@ -60,8 +63,8 @@ def bins(recording: Recording, base_speed: float) -> dict[tuple[str, str], NDArr
     found["load", "driving"] = torque * speed < -LOADED * np.abs(speed)
     found["load", "braking"] = torque * speed > LOADED * np.abs(speed)
     found["load", "none"] = np.abs(torque) <= LOADED
-    found["direction", "forward"] = speed > MOVING
-    found["direction", "backward"] = speed < -MOVING
+    found["direction", "forward"] = speed > MOVING_SPEED
+    found["direction", "backward"] = speed < -MOVING_SPEED
     return found | {("time", n): m for n, m in _ranges(time - time[0], TIMES, "s")}
 
 
@@ -112,7 +115,7 @@ def _cell(channel: str, key: tuple[str, str], square: float, noise: float, sampl
 def _frequency_cells(recordings: Sequence[Recording], residuals: Sequence[Array]) -> Iterator[Cell]:
     """Cells of the frequency bands: gap and noise within each band (Parseval's theorem)."""
     for channel in dict.fromkeys(c for r in recordings for c in r.channels):
-        for low, high in pairwise(BANDS):
+        for low, high in pairwise(FREQUENCY_EDGES):
             squares = variance = samples = degrees = 0.0
             for r, residual in zip(recordings, residuals, strict=True):
                 if channel not in r.channels:

@@ -26,7 +26,7 @@ class StackedRows:
     relations: Sequence[WhitenedRelations]
     weights: Sequence[Array]
 
-    def shared(self, relation: Columns, speed: Columns) -> Array:
+    def shared_columns(self, relation: Columns, speed: Columns) -> Array:
         """Columns whose coefficients all runs share, whitened, shape (rows, k).
 
         relation : of each run's relations, shape (ROWS, n - 1, k), not whitened; None: zeros
@@ -46,13 +46,13 @@ class StackedRows:
     def own_relations(self, columns: Sequence[Array]) -> Array:
         """Columns of the relations with coefficients of each run's own, whitened."""
         nothing = [None] * len(columns)
-        placed = [self.shared(only_run(columns, k), nothing) for k in range(len(columns))]
+        placed = [self.shared_columns(only_run(columns, k), nothing) for k in range(len(columns))]
         return np.concatenate(placed, axis=1)
 
     def own_speed(self, columns: Sequence[Array]) -> Array:
         """Columns of the drum speed with coefficients of each run's own, weighted."""
         nothing = [None] * len(columns)
-        placed = [self.shared(nothing, only_run(columns, k)) for k in range(len(columns))]
+        placed = [self.shared_columns(nothing, only_run(columns, k)) for k in range(len(columns))]
         return np.concatenate(placed, axis=1)
 
 

@@ -50,13 +50,13 @@ def shows_program(log: Log, program: Program) -> bool:
     return bool(long_enough and np.sqrt(np.mean(off**2)) < SAME_REFERENCE)
 
 
-def undriven(logs: Sequence[Log]) -> list[Program]:
+def remaining_programs(logs: Sequence[Log]) -> list[Program]:
     """Programs that no log shows, those without a truck first."""
     rest = [p for p in PROGRAMS.values() if not any(shows_program(log, p) for log in logs)]
     return sorted(rest, key=lambda p: not isinstance(p, SpeedProgram))
 
 
-def started_cold(logs: Sequence[Log]) -> bool:
+def has_cold_start(logs: Sequence[Log]) -> bool:
     """Whether a log shows a gear that started cold."""
     name = "shell_temperature"
     return any(name in log and log[name][0] < COLD_BELOW for log in logs)
@@ -72,21 +72,25 @@ def planned_runs(
         start
     """
     logs = [r.log for r in recordings]
-    rest = undriven(logs)
+    rest = remaining_programs(logs)
     levels = noise_levels(recordings)
     shell, sensors = _last_shell(logs), parameters.sensors
     for speeds in (p for p in rest if isinstance(p, SpeedProgram)):
-        yield from _recorded(describe(speeds), speeds.inputs(), warm, levels, shell, sensors)
-    if not started_cold(logs):
+        yield from _simulate_recording(
+            describe(speeds), speeds.inputs(), warm, levels, shell, sensors
+        )
+    if not has_cold_start(logs):
         speeds = max(
             (p for p in PROGRAMS.values() if isinstance(p, SpeedProgram)), key=lambda p: p.duration
         )
         words = f"{speeds.name} from a cold start"
-        yield from _recorded(words, speeds.inputs(), from_cold, levels, COLD_SHELL, sensors)
+        yield from _simulate_recording(
+            words, speeds.inputs(), from_cold, levels, COLD_SHELL, sensors
+        )
     for cycle in (p for p in rest if isinstance(p, TravelProgram)):
         with suppress(UnsettledError):
             inputs = simulate_travel(cycle, parameters)
-            yield from _recorded(describe(cycle), inputs, warm, levels, shell, sensors)
+            yield from _simulate_recording(describe(cycle), inputs, warm, levels, shell, sensors)
 
 
 def _last_shell(logs: Sequence[Log]) -> float | None:
@@ -94,7 +98,7 @@ def _last_shell(logs: Sequence[Log]) -> float | None:
     return float(known[-1][0]) if known else None
 
 
-def _recorded(
+def _simulate_recording(
     words: str,
     inputs: Log,
     values: Values,
@@ -139,7 +143,7 @@ def missing_experiments(logs: Sequence[Log], base_speed: float) -> dict[str, tup
             f"a run above {base_speed:.0f} rad/s, where the field is weakened",
             ("drive", "motor"),
         ),
-        (not started_cold(logs), "a cold start", ("gear",)),
+        (not has_cold_start(logs), "a cold start", ("gear",)),
         (not backwards, "a run in the other direction", ("gear",)),
         (
             not any("wheel_torque" in log for log in logs),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.report import html_maps, html_traces
 from plant_emulator.diagnosis.report import html_tables as tables
-from plant_emulator.diagnosis.report.html_parts import PLUS_MINUS, code, scrolled
+from plant_emulator.diagnosis.report.html_parts import PLUS_MINUS, code, scroll_region
 from plant_emulator.diagnosis.report.html_pictures import line, waterfall
 from plant_emulator.diagnosis.report.html_remainder import remainder_by_band
 from plant_emulator.diagnosis.report.html_style import STYLE
@@ -125,7 +125,7 @@ def _shrinkage(gap: HeldOutGap, details: Details) -> Markup:
             "above the noise. Dashed box: gap that this step removed. Whiskers: 95 % interval "
             "(block bootstrap)."
         )
-        drawn = scrolled(waterfall(details.waterfall), "Waterfall")
+        drawn = scroll_region(waterfall(details.waterfall), "Waterfall")
         parts.append(tag("figure", drawn, tag("figcaption", caption)))
     share = closed_share(gap)
     if share:
@@ -223,7 +223,7 @@ def _legend(traces: Sequence[Trace]) -> Markup:
 
 def _figure(trace: Trace, columns: int) -> Markup:
     name = f"{in_words(trace.channel)} [{trace.unit}]"
-    drawn = scrolled(html_traces.draw(trace, columns), name)
+    drawn = scroll_region(html_traces.draw(trace, columns), name)
     words = tag("figcaption", tag("strong", name), f": {html_traces.summary(trace)}")
     return tag("figure", words, drawn)
 
@@ -231,7 +231,7 @@ def _figure(trace: Trace, columns: int) -> Markup:
 def _repeat(logs: Logs, details: Details) -> Markup:
     kinds = {"Fitted": logs.estimation, "Held out": logs.held_out}
     named = {title: ", ".join(names) or "none" for title, names in kinds.items()}
-    parts = [tables.named({**named, **details.settings})]
+    parts = [tables.definition_list({**named, **details.settings})]
     if details.notes:
         notes = [tag("li", note, class_="any") for note in details.notes]
         parts += [tag("h3", "Notes on the logs"), tag("ul", *notes)]

@@ -25,10 +25,10 @@ def table(
         tag("tbody", *rows),
         class_=look,
     )
-    return scrolled(whole, caption)
+    return scroll_region(whole, caption)
 
 
-def scrolled(content: Markup, label: str) -> Markup:
+def scroll_region(content: Markup, label: str) -> Markup:
     """Content that scrolls, also by keyboard, where it is wider than the screen."""
     return tag("div", content, class_="wide", tabindex="0", role="region", aria_label=label)
 

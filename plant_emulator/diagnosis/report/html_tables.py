@@ -58,7 +58,10 @@ def gap_by_channel(gap: HeldOutGap, traces: Sequence[Trace]) -> Markup:
             "tr",
             row_head(in_words(channel)),
             *(cell(_range_share(step.get(channel, nan))) for step in steps.values()),
-            *(cell(text) for text in _pooled([t for t in traces if t.channel == channel], both)),
+            *(
+                cell(text)
+                for text in _pooled_texts([t for t in traces if t.channel == channel], both)
+            ),
         )
         for channel in gap.noise_floor
     ]
@@ -77,7 +80,7 @@ def _range_share(share: float) -> str:
     return number(share) if isnan(share) else f"{100.0 * share:.3f}"
 
 
-def _pooled(traces: Sequence[Trace], both: bool) -> list[str]:
+def _pooled_texts(traces: Sequence[Trace], both: bool) -> list[str]:
     """Rms before the effects, rms after where `both`, and noise of a channel over its runs."""
     if not traces:
         return [""] * (2 + both)
@@ -122,11 +125,11 @@ def ranking(entries: Sequence[RankedEffect]) -> Markup:
             right("held-out gain"),
             f"parameter: value {PLUS_MINUS} standard error (95{UNBROKEN}% interval)",
         ],
-        [_ranked(entry, most) for entry in entries],
+        [_ranking_row(entry, most) for entry in entries],
     )
 
 
-def _ranked(entry: RankedEffect, most: float) -> Markup:
+def _ranking_row(entry: RankedEffect, most: float) -> Markup:
     known = isfinite(entry.evidence)
     evidence = f"{entry.evidence:.1f}" if known else number(None)
     sizes = [
@@ -201,7 +204,7 @@ def undetectable(entries: Sequence[Undetectable]) -> Markup:
     )
 
 
-def named(entries: Mapping[str, str]) -> Markup:
+def definition_list(entries: Mapping[str, str]) -> Markup:
     """A list of names, each with its text."""
     pairs = [
         join(tag("dt", name), tag("dd", value, class_="hash")) for name, value in entries.items()

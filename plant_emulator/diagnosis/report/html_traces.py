@@ -174,12 +174,12 @@ def path(x: Array, y: Array, columns: int) -> str:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(int)))
     found = []
     for first, end in zip(edges[::2], edges[1::2], strict=True):
-        kept = first + thinned(x[first:end], y[first:end], (RIGHT - LEFT) / columns)
+        kept = first + extreme_indices(x[first:end], y[first:end], (RIGHT - LEFT) / columns)
         found.append(_polyline(x[kept], y[kept]))
     return "".join(found)
 
 
-def thinned(x: Array, y: Array, pitch: float) -> NDArray[np.intp]:
+def extreme_indices(x: Array, y: Array, pitch: float) -> NDArray[np.intp]:
     """Indices of the smallest and the largest y in every column of this width, and of both ends."""
     if len(x) <= 3:
         return np.arange(len(x))

@@ -62,8 +62,8 @@ def ranked_effect(
     model_form_errors : relative, of every size by name; see `calibration.model_form_error`
     """
     name = hypothesis.effect
-    point = with_random_effects(explained) if name in accepted else hypothesis.fit
-    sizes = () if point is None else _sizes(point, candidate, model_form_errors or {})
+    fit = with_random_effects(explained) if name in accepted else hypothesis.fit
+    sizes = () if fit is None else _sizes(fit, candidate, model_form_errors or {})
     return RankedEffect(
         effect=name,
         subsystem=candidate.subsystem,
@@ -75,19 +75,19 @@ def ranked_effect(
 
 
 def _sizes(
-    point: FitResult, candidate: Candidate, model_form_errors: Mapping[str, float]
+    fit: FitResult, candidate: Candidate, model_form_errors: Mapping[str, float]
 ) -> Iterator[Quantity]:
     """Sizes and shapes of an effect in a fit; the standard errors hold the model-form error."""
     usual = {u.name: abs(u.start - candidate.neutral[u.name]) for u in candidate.sizes}
     # Only the size of a random effect is estimated.
     shapes = () if candidate.stochastic else candidate.shapes
     for name in (u.name for u in (*candidate.sizes, *shapes)):
-        value = point.values[name]
+        value = fit.values[name]
         form_error = model_form_errors.get(name, 0.0) * reference_size(value, usual.get(name, 0.0))
         yield Quantity(
             name=name.removeprefix(f"{candidate.name}_"),
             value=value,
-            standard_error=hypot(point.standard_errors[name], form_error),
+            standard_error=hypot(fit.standard_errors[name], form_error),
             unit=candidate.units[name],
         )
 

@@ -42,7 +42,7 @@ def after(*readings, begin=100.0, config=CONFIG, every=0.01):
     for number, reading in enumerate(readings):
         fault = None if isinstance(reading, Measurement) else reading
         seen = samples.take(seen, None if fault else reading, fault, begin + every * number)
-        seen = samples.windowed(config, MAP, seen)
+        seen = samples.with_window(config, MAP, seen)
     return seen
 
 
@@ -231,7 +231,7 @@ def test_what_a_clock_is_ahead_is_forgotten_to_the_13_5_hundredths_in_a_second()
     """exp(-2) = 0.1353353."""
     begin = replace(after(FIRST), ahead=0.5)
     seen = samples.take(begin, replace(LATER, plc_time=2.0), None, 101.0)
-    assert samples.windowed(CONFIG, MAP, seen).ahead == pytest.approx(0.06766764)
+    assert samples.with_window(CONFIG, MAP, seen).ahead == pytest.approx(0.06766764)
 
 
 @pytest.mark.parametrize(("ahead", "used"), [(0.25, True), (-0.25, True), (0.251, False)])
@@ -239,7 +239,7 @@ def test_a_quarter_of_a_second_ahead_is_just_not_too_much(ahead, used):
     """No time passes for us, a quarter of a millisecond for the PLC."""
     begin = replace(after(FIRST), ahead=ahead - 2.0**-12)
     now = replace(LATER, plc_time=1.0 + 2.0**-12, shaft_torque_integral=None)
-    seen = samples.windowed(CONFIG, MAP, samples.take(begin, now, None, 100.0))
+    seen = samples.with_window(CONFIG, MAP, samples.take(begin, now, None, 100.0))
     assert seen.ahead == pytest.approx(ahead, abs=1e-12)
     assert (seen.window is not None) is used
 

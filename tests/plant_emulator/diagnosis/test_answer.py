@@ -29,7 +29,7 @@ POINT = FitResult(
 )
 
 
-def contender(effect: str, fall: float) -> Hypothesis:
+def hypothesis(effect: str, fall: float) -> Hypothesis:
     """An effect that alone lowers the cost by so much."""
     point = replace(POINT, effects=(effect,), cost=POINT.cost - fall)
     return Hypothesis(
@@ -41,7 +41,7 @@ def explanation(falls: dict[str, float], accepted: tuple[str, ...]) -> Explanati
     return Explanation(
         null=POINT,
         final=replace(POINT, effects=accepted),
-        hypotheses=tuple(contender(name, fall) for name, fall in falls.items()),
+        hypotheses=tuple(hypothesis(name, fall) for name, fall in falls.items()),
         alternatives={},
         unconverged="",
     )

@@ -44,9 +44,9 @@ def test_direction_of_deviation_three_comes_out_with_variance_one() -> None:
     one = NoiseDirections(
         directions=csr_array(direction.T.reshape(1, -1)), deviations=np.array([3.0])
     )
-    along = [float(np.sum(direction * one.whitened(r))) for r in draws]
+    along = [float(np.sum(direction * one.whiten(r))) for r in draws]
     assert np.var(along) == pytest.approx(1.0, abs=0.1)
-    across = one.whitened(draws[0]) - draws[0]
+    across = one.whiten(draws[0]) - draws[0]
     assert np.count_nonzero(across) == 2, "all else stays"
 
 
@@ -68,7 +68,7 @@ def test_directions_hold_what_drawn_noise_of_the_wheel_torque_does(
         fed = measured.with_wheel_torque(torque + deviation * random.standard_normal(len(torque)))
         change = fed.residual(nominal.values(), GAP) - base
         raw.append(found.along(change))
-        quiet.append(found.along(found.whitened(change)))
+        quiet.append(found.along(found.whiten(change)))
     assert np.mean(np.square(raw)) > 20.0
     assert np.mean(np.square(quiet)) < 2.0
 
@@ -80,7 +80,7 @@ def test_samples_that_do_not_count_stay_zero(true_log: Log, nominal: ParameterSe
     found = noise_directions(part, nominal.values(), GAP)
     assert found is not None
     row = part.channels.index("armature_current")
-    quiet = found.whitened(part.residual(nominal.values(), GAP))
+    quiet = found.whiten(part.residual(nominal.values(), GAP))
     assert not quiet[row, ~counted].any()
 
 

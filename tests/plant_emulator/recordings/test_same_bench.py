@@ -11,7 +11,12 @@ from plant_emulator import effects
 from plant_emulator.cli import main
 from plant_emulator.errors import LogError
 from plant_emulator.model.parameters import ParameterSet
-from plant_emulator.recordings.same_bench import DIFFERENT, PICTURE, check_same_bench, scale_of
+from plant_emulator.recordings.same_bench import (
+    DIFFERENT_ERRORS,
+    EQUATION_ERROR,
+    check_same_bench,
+    scale_of,
+)
 from plant_emulator.signals.log import Log
 from plant_emulator.workflows.simulation import simulate
 
@@ -70,14 +75,14 @@ def test_scale_of_the_nominal_bench_is_nothing(
     for program in ("program1", "program2", "program3", "program4"):
         found = scale_of(bench_log(f"bench_nominal/{program}"), values)
         assert found is not None
-        assert abs(found.share) < PICTURE
+        assert abs(found.share) < EQUATION_ERROR
 
 
 def test_difference_of_a_sensors_scale_is_told_from_six_errors_on(
     bench_log: BenchLog, values: Mapping[str, float]
 ) -> None:
     log = bench_log("bench_practice/practice_002/program2")
-    limit = DIFFERENT * PICTURE
+    limit = DIFFERENT_ERRORS * EQUATION_ERROR
     for scale, refused in ((0.9 * limit, False), (1.2 * limit, True)):
         signals = {**log.signals, "drum_speed": (1.0 + scale) * log["drum_speed"]}
         pair = [log, replace(log, signals=signals)]

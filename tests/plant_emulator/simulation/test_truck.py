@@ -7,6 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gateway.configuration.sections import BenchConfig, TruckConfig
+from plant_emulator.parameter_sets import load
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation.fit_metrics import fit
 from plant_emulator.simulation.programs import sample_times
@@ -24,6 +26,12 @@ from plant_emulator.simulation.truck import (
 ReadLog = Callable[[str], Log]
 TOP_SPEED = 14 / 3.6
 EMPTY, LOADED = Forklift(mass=3640.0), Forklift(mass=5240.0)
+
+
+def test_radii_are_those_of_table_3_1_and_of_the_daemon() -> None:
+    shipped, bench, road = load(), BenchConfig(), TruckConfig()
+    assert shipped.value("drum_radius") == bench.drum_radius == EMPTY.drum_radius == 0.645
+    assert shipped.value("wheel_radius") == road.wheel_radius == EMPTY.wheel_radius == 0.1715
 
 
 # --- road load --------------------------------------------------------------------------------

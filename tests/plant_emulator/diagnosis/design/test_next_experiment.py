@@ -161,7 +161,7 @@ def explanation(model: Slope) -> Explanation:
     points = {
         name: fit(model, (name,), (0,), null.values, null.states) for name in ("square", "straight")
     }
-    contenders = [
+    hypotheses = [
         Hypothesis(effect=name, orthogonal_norm=0.0, total_norm=0.0, confounded_with="b", fit=point)
         for name, point in points.items()
     ]
@@ -169,7 +169,7 @@ def explanation(model: Slope) -> Explanation:
     return Explanation(
         null=null,
         final=points["square"],
-        hypotheses=tuple(contenders),
+        hypotheses=tuple(hypotheses),
         alternatives={"square": costs},
         unconverged="",
     )
@@ -241,7 +241,7 @@ def test_run_that_shows_what_these_logs_cannot_is_named_with_it():
     )
 
 
-def test_run_in_which_drift_imitates_an_effect_does_not_show_it():
+def test_run_in_which_parameters_follow_an_effect_does_not_show_it():
     model = machine(fast=FAST)
     assert advice(model, explanation(model), "none", ["line"]) is None
 

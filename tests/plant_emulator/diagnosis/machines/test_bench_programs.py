@@ -4,8 +4,8 @@ import numpy as np
 
 from plant_emulator.diagnosis.machines.bench_programs import (
     missing_experiments,
+    remaining_programs,
     shows_program,
-    undriven,
 )
 from plant_emulator.signals.log import Array, Log
 from plant_emulator.simulation.programs import PROGRAMS, describe
@@ -21,10 +21,15 @@ def test_log_shows_the_program_whose_reference_it_has():
     assert shows_program(driven("program2"), PROGRAMS["program2"])
     assert not shows_program(driven("program2", 0.9), PROGRAMS["program2"])
     assert not shows_program(driven("program3"), PROGRAMS["program2"])
-    rest = [p.name for p in undriven([driven(f"program{k}") for k in (1, 2, 3)])]
+    rest = [p.name for p in remaining_programs([driven(f"program{k}") for k in (1, 2, 3)])]
     assert rest == ["program4", "program6", "program6L"]
     truck = driven("program1", wheel_torque=np.zeros(1851))
-    assert [p.name for p in undriven([truck])] == ["program1", "program2", "program3", "program4"]
+    assert [p.name for p in remaining_programs([truck])] == [
+        "program1",
+        "program2",
+        "program3",
+        "program4",
+    ]
 
 
 def test_what_logs_lack_is_told_of_the_blocks_that_it_tells_of():
