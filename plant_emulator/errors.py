@@ -2,13 +2,22 @@
 
 import re
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 
 class EmulatorError(Exception):
-    """A request failed."""
+    """A request failed.
+
+    argument : name of the argument that holds the bad value; the message then begins with the name,
+        and a command puts its option there
+    """
 
     exit_code = 1
+
+    def __init__(self, message: str = "", *, argument: str = "") -> None:
+        self.argument = argument
+        super().__init__(f"{argument} {message}" if argument else message)
 
 
 class InputError(EmulatorError):
@@ -35,6 +44,16 @@ class IdentificationError(InputError):
 
 class DiagnosisError(InputError):
     """Logs cannot be diagnosed as asked."""
+
+
+@contextmanager
+def report_unwritable(path: object) -> Iterator[None]:
+    """Raise InputError, which names the file, where the operating system refuses to write it."""
+    try:
+        yield
+    except OSError as error:
+        why = error.strerror or str(error)
+        raise InputError(f"{path}: {why}; a file that can be written is needed") from error
 
 
 def place_in(files: Iterable[str], error: Exception) -> str | None:

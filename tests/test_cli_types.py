@@ -229,3 +229,11 @@ def test_a_picture_is_drawn_to_exactly_the_name_given(
 def test_a_picture_of_an_unknown_form_is_refused(package: str, log: Path) -> None:
     command = "replay" if package == "gateway" else "validate"
     assert "ends in .png, .pdf, .svg" in said(run(package, command, log, "--plot", "a.xlsx"))
+
+
+def test_an_error_about_an_argument_names_the_option_of_the_command() -> None:
+    log = DATA / "program1.csv.gz"
+    free = said(run("plant_emulator", "identify", log, "--free", "inertia"))
+    assert free.startswith("--free inertia: no parameter of the bench; known: ")
+    without = said(run("plant_emulator", "diagnose", log, "--without", "stribek"))
+    assert without.startswith("--without stribek: no effect of that name; known: ")

@@ -125,9 +125,14 @@ def _check(path: Path, body: bytes, records: "np.ndarray[Any, np.dtype[np.void]]
 
 
 def is_recording(path: Path) -> bool:
-    """Whether the file begins like a recording."""
-    with path.open("rb") as file:
-        return file.read(len(MAGIC)) == MAGIC
+    """Whether the file begins like a recording. Raises RecordingError if it cannot be read."""
+    try:
+        with path.open("rb") as file:
+            return file.read(len(MAGIC)) == MAGIC
+    except OSError as error:
+        raise RecordingError(
+            error.strerror or "cannot be read", file=path, expected="a log or a recording"
+        ) from error
 
 
 def _header(path: Path, content: bytes) -> tuple[dict[str, Any], int]:

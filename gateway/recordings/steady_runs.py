@@ -10,7 +10,6 @@ import numpy as np
 
 from gateway.arrays import Array
 from gateway.configuration.config import Config
-from gateway.errors import ConfigError
 from gateway.losses.sections import LossesError, Trace
 from gateway.recordings import log, recording
 from gateway.recordings.export import new_samples, unwrap_time
@@ -44,13 +43,8 @@ def read(path: Path) -> SteadyRun:
 
     Raises ConfigError for a file that cannot be used, LossesError where a truck is on the drum.
     """
-    try:
-        is_recording = recording.is_recording(path)
-        changed = datetime.fromtimestamp(path.stat().st_mtime, UTC)
-    except OSError as error:
-        raise ConfigError(
-            error.strerror or "cannot be read", file=path, expected="a log or a recording"
-        ) from error
+    is_recording = recording.is_recording(path)
+    changed = datetime.fromtimestamp(path.stat().st_mtime, UTC)
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     if not is_recording:
         return SteadyRun(path=path, date=changed, sha256=digest, trace=_of_log(log.read(path)))

@@ -24,7 +24,7 @@ parameters = click.option(
 )
 effect = click.option(
     "--effect",
-    "effect_texts",
+    "effects",
     multiple=True,
     metavar="NAME[:PARAM=VALUE,...]",
     help="Add an effect to the nominal bench; a PARAM left out has its plausible size.",

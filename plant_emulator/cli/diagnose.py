@@ -47,7 +47,7 @@ Examples:
 )
 @click.option(
     "--effects",
-    "own",
+    "effect_files",
     multiple=True,
     metavar="FILE.py",
     help="File of your own effect beside the library; may be repeated.",
@@ -68,7 +68,7 @@ def command(
     parameters: str,
     model: Literal["bench", "axis"],
     without: tuple[str, ...],
-    own: tuple[str, ...],
+    effect_files: tuple[str, ...],
     reference: Literal["linear", "staircase"] | None,
     workers: int,
     scheduler: str | None,
@@ -94,7 +94,7 @@ def command(
             parameters=parameters,
             model=model,
             without=without,
-            effects=own,
+            effect_files=effect_files,
             reference=reference,
             workers=workers,
             scheduler=scheduler,
@@ -104,7 +104,7 @@ def command(
     for note in found.notes:
         click.echo(f"note: {note}", err=True)
     if save:
-        _save(found, save, own)
+        _save(found, save, effect_files)
     if report:
         found.write_report(report)
     if json_file:
@@ -116,20 +116,20 @@ def command(
 def _refuse_options_of_the_bench() -> None:
     """Refuse options that a single axis would ignore."""
     given = click.get_current_context().get_parameter_source
-    options = {"save": "--save", "own": "--effects"}
+    options = {"save": "--save", "effect_files": "--effects"}
     options |= {"parameters": "--parameters", "reference": "--reference"}
     for name, option in options.items():
         if given(name) is not ParameterSource.DEFAULT:
             raise click.UsageError(f"{option} belongs to --model bench")
 
 
-def _save(found: Diagnosis, path: str, own: tuple[str, ...]) -> None:
+def _save(found: Diagnosis, path: str, effect_files: tuple[str, ...]) -> None:
     """Write the parameter set, and note what its user has to know."""
     from plant_emulator import parameter_sets
 
     parameter_sets.save(found.parameter_set, path)
     verdict = found.answer.verdict
-    for file in own:
+    for file in effect_files:
         if (name := Path(file).stem) in verdict.effects:
             click.echo(
                 f"note: {path}: serve, simulate and validate know {name} once {file} lies in "

@@ -41,7 +41,7 @@ def command(
     parameters: str,
     free: tuple[str, ...],
     held_out: tuple[str, ...],
-    effect_texts: tuple[str, ...],
+    effects: tuple[str, ...],
     reference: Literal["linear", "staircase"] | None,
     save: str | None,
     table: str | None,
@@ -64,7 +64,7 @@ def command(
             parameters=parameters,
             free=free,
             hold_out=held_out,
-            effects=effect_texts,
+            effects=effects,
             reference=reference,
             progress=report,
         )

@@ -34,7 +34,7 @@ Examples:
 def command(
     program: str,
     parameters: str,
-    effect_texts: tuple[str, ...],
+    effects: tuple[str, ...],
     seed: int | None,
     reference: Literal["linear", "staircase"] | None,
     start: Literal["fit", "middle"],
@@ -52,7 +52,7 @@ def command(
     log = simulate(
         program,
         parameters=parameters,
-        effects=effect_texts,
+        effects=effects,
         seed=seed,
         reference=reference,
         start=start,

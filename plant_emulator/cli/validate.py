@@ -36,7 +36,7 @@ Example:
 def command(
     logs: tuple[str, ...],
     parameters: str,
-    effect_texts: tuple[str, ...],
+    effects: tuple[str, ...],
     reference: Literal["linear", "staircase"] | None,
     start: Literal["fit", "middle"],
     cutoff: float | None,
@@ -53,7 +53,7 @@ def command(
     found = validate(
         logs,
         parameters=parameters,
-        effects=effect_texts,
+        effects=effects,
         reference=reference,
         start=start,
         cutoff=cutoff,

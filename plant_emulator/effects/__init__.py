@@ -22,6 +22,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import pkgutil
+from collections.abc import Mapping
 from itertools import combinations
 from keyword import iskeyword
 from typing import TYPE_CHECKING
@@ -36,7 +37,7 @@ from plant_emulator.effects.declaration import (
 from plant_emulator.errors import ParameterError, place_in
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
     from types import ModuleType
 
@@ -117,6 +118,9 @@ def complete(values: Mapping[str, Mapping[str, float]]) -> dict[str, dict[str, f
     values : by effect and parameter [SI]
     Raises ParameterError for an unknown effect or parameter, and for a value outside of its bounds.
     """
+    for name, table in values.items():
+        if not isinstance(table, Mapping):
+            raise ParameterError(f"effect {name}: {table!r}; a mapping of parameters is expected")
     return {name: load(name).complete(table) for name, table in values.items()}
 
 
@@ -128,13 +132,11 @@ def _parse_one(text: str) -> tuple[str, dict[str, float]]:
         key, _, number = item.partition("=")
         if key not in effect.parameters:
             known = ", ".join(effect.parameters)
-            raise ParameterError(
-                f"--effect {text}: {key} is no parameter of {name}; known: {known}"
-            )
+            raise ParameterError(f"effect {text}: {key} is no parameter of {name}; known: {known}")
         try:
             values[key] = float(number)
         except ValueError:
-            raise ParameterError(f"--effect {text}: {key}={number!r}; a number is needed") from None
+            raise ParameterError(f"effect {text}: {key}={number!r}; a number is needed") from None
     return name, effect.complete(values)
 
 

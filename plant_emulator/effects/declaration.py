@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf, isfinite
+from numbers import Real
 from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
@@ -116,12 +117,15 @@ class Effect:
     def complete(self, values: Mapping[str, float]) -> dict[str, float]:
         """Values of all parameters [SI]: those given, else the plausible ones.
 
-        Raises ParameterError for an unknown parameter and for a value outside of its bounds.
+        Raises ParameterError for an unknown parameter, and for a value that is no number or outside
+        of its bounds.
         """
         for key, value in values.items():
             if key not in self.parameters:
                 known = ", ".join(self.parameters)
                 raise ParameterError(f"effect {self.name}: {key} is no parameter; known: {known}")
+            if not _is_number(value):
+                raise ParameterError(f"effect {self.name}: {key}={value!r}; a number is expected")
             bounds = self.parameters[key]
             if not isfinite(value) or not bounds.lower <= value <= bounds.upper:
                 raise ParameterError(
@@ -153,6 +157,10 @@ class Effect:
 
     def __repr__(self) -> str:
         return f"<Effect {self.name} ({self.subsystem}): {', '.join(self.parameters)}>"
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real)
 
 
 def read_effect(name: str, module: ModuleType) -> Effect:

@@ -62,15 +62,19 @@ def free_parameters(
     for name in names:
         if name not in parameters.values():
             known = ", ".join(parameters.values())
-            raise IdentificationError(f"--free {name}: no parameter of the bench; known: {known}")
+            raise IdentificationError(
+                f"{name}: no parameter of the bench; known: {known}", argument="free"
+            )
         if parameters.value(name) == 0.0:
             raise IdentificationError(
-                f"--free {name}: it is 0 in {parameters.name}; a fit needs a value above 0"
+                f"{name}: it is 0 in {parameters.name}; a fit needs a value above 0",
+                argument="free",
             )
         if parameters[name].kind == "calculated":
             raise IdentificationError(
-                f"--free {name}: it is calculated from others; give it a value of its own, "
-                'kind = "estimated", in a parameter set'
+                f"{name}: it is calculated from others; give it a value of its own, "
+                'kind = "estimated", in a parameter set',
+                argument="free",
             )
     estimated = [
         p.name

@@ -74,12 +74,21 @@ def finite(value: float) -> float | None:
 def fits_to_json(comparisons: Sequence[Comparison]) -> dict[str, dict[str, dict[str, float]]]:
     """Val1, Val2 and NRMSD by log and channel, as in the documents of both commands."""
     return {
-        one.source: {
+        source: {
             name: {"val1": fit.val1, "val2": fit.val2, "nrmsd": fit.nrmsd}
             for name, fit in one.fits.items()
         }
-        for one in comparisons
+        for source, one in zip(distinct([c.source for c in comparisons]), comparisons, strict=True)
     }
+
+
+def distinct(names: Sequence[str]) -> list[str]:
+    """The names, each made distinct from equal names before it: `log`, `log (2)`."""
+    found: list[str] = []
+    for name in names:
+        number = 1 + sum(one == name for one in names[: len(found)])
+        found.append(name if number == 1 else f"{name} ({number})")
+    return found
 
 
 def correlated(found: Identification) -> list[tuple[str, str, float]]:

@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from plant_emulator.errors import LogError
+from plant_emulator.errors import LogError, report_unwritable
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -46,11 +46,15 @@ def read(path: str | Path) -> Log:
 
 
 def write(log: Log, path: str | Path) -> None:
-    """Write a log in the format of the file's suffix; LogError where the suffix is unknown."""
+    """Write a log in the format of the file's suffix.
+
+    Raises LogError for an unknown suffix, and InputError for a file that cannot be written.
+    """
     path = Path(path)
     for module in formats():
         if path.name.endswith(module.SUFFIXES):
-            module.write(log, path)
+            with report_unwritable(path):
+                module.write(log, path)
             return
     known = ", ".join(suffix for module in formats() for suffix in module.SUFFIXES)
     raise LogError(f"{path}: no log format of that name; known: {known}")

@@ -8,7 +8,7 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from plant_emulator.errors import ParameterError
+from plant_emulator.errors import ParameterError, report_unwritable
 from plant_emulator.model.parameters import EFFECTS, ORIGIN, ParameterSet, parameter_set
 from plant_emulator.model.sensors import SENSORS
 
@@ -43,8 +43,9 @@ def load(name: str | Path = DEFAULT) -> ParameterSet:
 
 
 def save(parameters: ParameterSet, path: str | Path) -> None:
-    """Write a set as a TOML file that `load` reads."""
-    Path(path).write_text(text(parameters), encoding="utf-8")
+    """Write a set as a TOML file that `load` reads; InputError where it cannot be written."""
+    with report_unwritable(path):
+        Path(path).write_text(text(parameters), encoding="utf-8")
 
 
 def text(parameters: ParameterSet) -> str:

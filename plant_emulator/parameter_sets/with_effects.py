@@ -15,15 +15,18 @@ if TYPE_CHECKING:
     from plant_emulator.model.parameters import ParameterSet
 
 
-def load(name: str | Path = parameter_sets.DEFAULT, own: Sequence[str] = ()) -> ParameterSet:
+def load(
+    name: str | Path = parameter_sets.DEFAULT, effect_files: Sequence[str | Path] = ()
+) -> ParameterSet:
     """Load the set of that name or path and check its effects.
 
-    own : files of a user's own effects, which the set may have
+    effect_files : files of a user's own effects, which the set may have
     Raises ParameterError with file and key, also for an unknown effect or effect parameter.
     """
     found = parameter_sets.load(name)
     if found.effects:
-        mine = {effect.name: effect for effect in effects.from_files([Path(file) for file in own])}
+        files = [Path(file) for file in effect_files]
+        mine = {effect.name: effect for effect in effects.from_files(files)}
         for key, values in found.effects.items():
             _check(found.name, key, values, mine)
     return found
@@ -32,8 +35,8 @@ def load(name: str | Path = parameter_sets.DEFAULT, own: Sequence[str] = ()) -> 
 def _check(place: str, name: str, values: Mapping[str, float], own: Mapping[str, Effect]) -> None:
     if name not in own and name not in effects.names():
         raise ParameterError(
-            f"{place}: effects.{name}: unknown; one of your own needs its file "
-            "(diagnose --effects FILE.py, or in plant_emulator/effects); known: "
+            f"{place}: effects.{name}: unknown; an effect of your own needs its file: give it to "
+            "diagnose, or put it into plant_emulator/effects; known: "
             f"{', '.join([*effects.names(), *own])}"
         )
     effect = own[name] if name in own else effects.load(name)

@@ -39,6 +39,10 @@ class Log:
     other: tuple[str, ...] = field(default=())
 
     def __getitem__(self, signal: str) -> Array:
+        """The samples of a signal [SI], shape (n,); KeyError names the signals of the log."""
+        if signal not in self.signals:
+            known = ", ".join(self.signals)
+            raise KeyError(f"{self.source}: no signal {signal!r}; known: {known}")
         return self.signals[signal]
 
     def __contains__(self, signal: str) -> bool:

@@ -141,12 +141,13 @@ def identify(
     found = identify_bench(estimation, bench, free, effects=own, progress=progress)
     spent = process_time() - begin
     values, states = values_of(found.parameter_set, own), states_of(own)
+    names = report.distinct([r.log.source for r in estimation])
     return IdentificationResult(
         fit=found,
         fitted=tuple(_compare(r, values, s) for r, s in zip(estimation, found.states, strict=True)),
         held_out=tuple(_compare(r, values, fit_states(r, values, states)) for r in prediction),
         experiments=tuple(experiments(found, estimation, values)),
-        hashes={r.log.source: log_hash(s) for r, s in zip(estimation, logs, strict=True)},
+        hashes=dict(zip(names, map(log_hash, logs), strict=True)),
         notes=tuple(notes),
         cpu_seconds=spent,
     )

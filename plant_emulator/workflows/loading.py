@@ -47,12 +47,18 @@ NEEDED = ("speed_reference", "motor_speed", "drum_speed", "shaft_torque")
 
 
 def load_recordings(
-    sources: Sequence[Source], parameters: ParameterSet, reference: str | None = None
+    sources: Sequence[Source],
+    parameters: ParameterSet,
+    reference: str | None = None,
+    *,
+    common_channels: bool = False,
 ) -> tuple[list[Recording], list[str]]:
     """Load the logs of one bench; return the recordings, and notes on what the user should know.
 
     sources : logs, or the paths of their files
     reference : what holds between samples of the speed reference; None: as the log says
+    common_channels : leave a voltage out that only some logs have. A pooled fit uses the voltages
+        that there are. A held-out run can be predicted only in channels that the fitted runs have.
     Raises LogError for a log that cannot be used.
     """
     taken: list[Log] = []
@@ -71,14 +77,14 @@ def load_recordings(
     recordings = [
         recording(log, hold, use, parameters.sensors) for log, use in zip(taken, uses, strict=True)
     ]
+    if common_channels:
+        recordings, more = with_common_voltage(recordings)
+        notes += more
     return recordings, notes
 
 
 def with_common_voltage(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
-    """The recordings, all with their voltage or all without it; and a note if one loses it.
-
-    A diagnosis could neither fit what only some voltages show, nor predict it in the other runs.
-    """
+    """The recordings, all with their voltage or all without it, and a note where one loses it."""
     lacking = [r for r in recordings if VOLTAGE not in r.channels]
     if not lacking or len(lacking) == len(recordings):
         return list(recordings), []

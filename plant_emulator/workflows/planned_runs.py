@@ -17,7 +17,7 @@ from plant_emulator.signals.log import COMPARED, Log
 from plant_emulator.simulation.programs import PROGRAMS
 from plant_emulator.simulation.sensor_noise import noise_of
 from plant_emulator.simulation.simulate import inputs_of
-from plant_emulator.workflows.loading import load_recordings, with_common_voltage
+from plant_emulator.workflows.loading import load_recordings
 from plant_emulator.workflows.simulation import simulate
 
 if TYPE_CHECKING:
@@ -50,8 +50,7 @@ def prepare(
     Raises ParameterError for a name that is neither a log file nor a program.
     """
     recorded = [run for run in runs if not _is_program(run)]
-    recordings, notes = load_recordings(recorded, parameters, reference)
-    recordings, more = with_common_voltage(recordings)
+    recordings, notes = load_recordings(recorded, parameters, reference, common_channels=True)
     states: tuple[Mapping[str, float], ...] = ()
     if recordings:
         fitted = fit_null(
@@ -68,7 +67,7 @@ def prepare(
         values={u.name: values[u.name] for u in model.parameters},
         states=(*states, *({GAP_POSITION: 0.0} for _ in programs)),
     )
-    return model, at, (*notes, *more)
+    return model, at, tuple(notes)
 
 
 def _is_program(run: str | Path | Log) -> bool:

@@ -80,10 +80,20 @@ def parameter_set(parameters: ParameterSet | str | Path) -> ParameterSet:
 
 
 def effect_values(effects: Effects | Sequence[str]) -> Effects:
-    """Values of effects by effect and parameter [SI]; see `simulate` for what may be given."""
+    """Values of effects by effect and parameter [SI]; see `simulate` for what may be given.
+
+    Raises InputError for anything else.
+    """
     if isinstance(effects, Mapping):
         return library.complete(effects)
-    return library.parse([effects] if isinstance(effects, str) else list(effects))
+    texts = [effects] if isinstance(effects, str) else effects
+    if not _are_texts(texts):
+        raise InputError(f"effects={effects!r}; a mapping by effect, or texts, are expected")
+    return library.parse(list(texts))
+
+
+def _are_texts(given: object) -> bool:
+    return isinstance(given, Sequence) and all(isinstance(one, str) for one in given)
 
 
 def read_source(source: str | Path | Log | Program) -> Log | Program:

@@ -31,12 +31,16 @@ def _run_step(function: Callable[[Model, Any], Any], recipe: Recipe, item: Any) 
 
 
 @contextmanager
-def _report_loss(errors: tuple[type[Exception], ...], advice: str) -> Iterator[None]:
+def _report_loss(
+    errors: tuple[type[Exception], ...], advice: str, argument: str = ""
+) -> Iterator[None]:
     """Turn the errors of a lost worker into an EmulatorError of one line."""
     try:
         yield
     except errors as error:
-        raise EmulatorError(f"{advice} ({type(error).__name__}: {error})") from error
+        raise EmulatorError(
+            f"{advice} ({type(error).__name__}: {error})", argument=argument
+        ) from error
 
 
 def end_with_parent() -> None:
@@ -65,7 +69,7 @@ class Processes:
             _report_loss,
             (BrokenExecutor,),
             f"one of {workers} processes ended before its answer, as when memory runs out; fewer "
-            "--workers need less",
+            "workers need less",
         )
 
     def map(
@@ -100,7 +104,8 @@ class Cluster:
             from distributed.comm.registry import get_backend
         except ImportError as error:
             raise EmulatorError(
-                f"--scheduler {address}: {error}; pip install 'road-load-bench[cluster]' brings it"
+                f"{address}: {error}; pip install 'road-load-bench[cluster]' brings it",
+                argument="scheduler",
             ) from error
         try:  # before the client starts its thread, which an error would leave behind
             scheme, place = parse_address(address)
@@ -108,17 +113,21 @@ class Cluster:
             parse_host_port(place)
         except ValueError as error:
             raise InputError(
-                f"--scheduler {address}: {error}; an address like tcp://host:8786 is expected"
+                f"{address}: {error}; an address like tcp://host:8786 is expected",
+                argument="scheduler",
             ) from error
         try:
             self._client: Any = distributed.Client(address, timeout=10)  # type: ignore[no-untyped-call]  # Dask declares none here
         except OSError as error:
-            raise EmulatorError(f"--scheduler {address}: no scheduler answers ({error})") from error
+            raise EmulatorError(
+                f"{address}: no scheduler answers ({error})", argument="scheduler"
+            ) from error
         self._recipes: dict[str, Any] = {}
         self._watched = partial(
             _report_loss,
             (distributed.KilledWorker, CommClosedError, CancelledError),
-            f"--scheduler {address}: a worker or the scheduler ended before its answer",
+            f"{address}: a worker or the scheduler ended before its answer",
+            "scheduler",
         )
 
     def map(

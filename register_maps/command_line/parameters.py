@@ -1,4 +1,4 @@
-"""Parameters of commands: finite numbers and output files, and a command that guards its inputs."""
+"""Parameters of commands: finite numbers and output files, and a command that guards its files."""
 
 import math
 import os
@@ -79,7 +79,11 @@ def obstacle(path: Path) -> str:
 
 
 class Command(click.Command):
-    """A command that never writes an output over one of its inputs or over another output."""
+    """A command that guards its files and names its options.
+
+    It never writes an output over one of its inputs or over another output. An error of the library
+    that names an argument is told with the option of that argument.
+    """
 
     def invoke(self, ctx: click.Context) -> Any:
         """Check every output, then run the command."""
@@ -89,7 +93,14 @@ class Command(click.Command):
             if isinstance(option.type, OutputFile) and value is not None and str(value) != "-":
                 self.refuse(option, Path(value), outputs, ctx)
                 outputs.append((option, Path(value)))
-        return super().invoke(ctx)
+        try:
+            return super().invoke(ctx)
+        except Exception as error:
+            for option in self.params:
+                if option.name and option.name == getattr(error, "argument", ""):
+                    text = str(error).removeprefix(option.name)
+                    error.args = (f"{option.opts[0]}{text}",)
+            raise
 
     def refuse(
         self,

@@ -68,3 +68,13 @@ def test_a_configuration_may_be_a_file(tmp_path: Path) -> None:
 def test_a_value_that_may_not_be_is_refused(values: dict[str, object], message: str) -> None:
     with pytest.raises(gateway.GatewayError, match=message):
         gateway.replay(LOG, values=values)
+
+
+def test_a_file_that_is_not_there_is_an_error_of_the_gateway(tmp_path: Path) -> None:
+    absent = tmp_path / "absent.csv"
+    with pytest.raises(gateway.GatewayError, match=r"absent\.csv: No such file or directory"):
+        gateway.replay(absent)
+
+
+def test_a_shell_is_offered_the_public_names_only() -> None:
+    assert dir(gateway) == sorted(gateway.__all__)

@@ -105,7 +105,7 @@ def test_a_worker_that_is_lost_is_told_in_one_line(
     address = request.getfixturevalue("scheduler")
     cluster = Cluster(address)
     try:
-        with pytest.raises(EmulatorError, match=f"--scheduler {address}: a worker .* ended"):
+        with pytest.raises(EmulatorError, match=f"scheduler {address}: a worker .* ended"):
             list(cluster.map(dies, Number(3), [1, 2]))
     finally:
         cluster.close()

@@ -64,24 +64,24 @@ class Folder:
         new = {"schema": SCHEMA, "seed": seed, "program_sha256": program, "cases": {}}
         if not file.is_file():
             if self.path.is_dir() and any(self.path.iterdir()):
-                raise InputError(f"{self.path}: not empty and not a trial; give another --out")
+                raise InputError(f"{self.path}: not empty and not a trial; give another folder")
             return new
         try:
             old: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
             there = (old["schema"], old["seed"], old["program_sha256"], dict(old["cases"]))
         except (ValueError, KeyError, TypeError) as error:
             raise InputError(
-                f"{file}: not a manifest of a trial ({error!r}); give another --out"
+                f"{file}: not a manifest of a trial ({error!r}); give another folder"
             ) from error
         if there[:2] != (SCHEMA, seed):
             raise InputError(
-                f"{file}: a trial of seed {there[1]}; --seed {there[1]} continues it, "
-                "another --out begins a new one"
+                f"{file}: a trial of seed {there[1]}; seed {there[1]} continues it, "
+                "another folder begins a new one"
             )
         if there[2] != program:
             raise InputError(
                 f"{file}: begun by another version of the program ({there[2][:12]}..., now "
-                f"{program[:12]}...); continue with that version, or give another --out"
+                f"{program[:12]}...); continue with that version, or give another folder"
             )
         return old
 

@@ -13,7 +13,7 @@ from plant_emulator.diagnosis.report.document import to_json
 from plant_emulator.diagnosis.report.html import html
 from plant_emulator.diagnosis.report.terminal import lines
 from plant_emulator.diagnosis.wording import KINDS, percent
-from plant_emulator.errors import DiagnosisError
+from plant_emulator.errors import DiagnosisError, report_unwritable
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.parameter_sets import DEFAULT, with_effects
 from plant_emulator.workflows.arguments import (
@@ -84,8 +84,9 @@ class Diagnosis:
         return "\n".join(lines(self.answer, width))
 
     def write_report(self, path: str | Path) -> None:
-        """Write the report to an HTML file."""
-        Path(path).write_text(self.to_html(), encoding="utf-8")
+        """Write the report to an HTML file; InputError where the file cannot be written."""
+        with report_unwritable(path):
+            Path(path).write_text(self.to_html(), encoding="utf-8")
 
     def __str__(self) -> str:
         return self.to_text()
@@ -104,7 +105,7 @@ def diagnose(
     parameters: ParameterSet | str | Path = DEFAULT,
     model: Literal["bench", "axis"] = "bench",
     without: str | Sequence[str] = (),
-    effects: Sequence[str | Path] = (),
+    effect_files: str | Path | Sequence[str | Path] = (),
     reference: Literal["linear", "staircase"] | None = None,
     workers: int = 1,
     scheduler: str | None = None,
@@ -118,7 +119,7 @@ def diagnose(
     parameters : a parameter set, the name of a shipped one, or the path of its file
     model : the roller bench, or a single motor-driven axis
     without : names of effects to take out of the library
-    effects : files of your own effects beside the library
+    effect_files : files of your own effects beside the library
     reference : what holds between samples of the speed reference; None: as the log says
     workers : processes that fit side by side; more than one needs `if __name__ == "__main__":`
         in a script, because every process imports it
@@ -129,15 +130,23 @@ def diagnose(
     a worker is lost.
     """
     logs, hold_out, without = list_logs(logs), list_sources(hold_out), list_names(without)
+    effect_files = list_sources(effect_files)
     check_choice("model", model, ("bench", "axis"))
     check_reference(reference)
     check_count("workers", workers, 1)
     axis = model == "axis"
-    given = None if axis else _set(parameters, effects)
+    given = None if axis else _set(parameters, effect_files)
     if given is None:
         runs = axis_runs(logs, hold_out, without=without)
     else:
-        runs = bench_runs(logs, hold_out, given, without=without, own=effects, reference=reference)
+        runs = bench_runs(
+            logs,
+            hold_out,
+            given,
+            without=without,
+            effect_files=effect_files,
+            reference=reference,
+        )
     pool = make_pool(workers, scheduler)
     try:
         with threadpool_limits(1):
@@ -156,7 +165,7 @@ def diagnose(
     return Diagnosis(findings=findings, given=given, fitted=runs.fitted)
 
 
-def _set(parameters: ParameterSet | str | Path, own: Sequence[str | Path]) -> ParameterSet:
+def _set(parameters: ParameterSet | str | Path, effect_files: Sequence[str | Path]) -> ParameterSet:
     if isinstance(parameters, ParameterSet):
         return parameters
-    return with_effects.load(parameters, [str(file) for file in own])
+    return with_effects.load(parameters, effect_files)

@@ -56,5 +56,5 @@ def _both_move(log: Log, first: NDArray[np.bool_]) -> None:
             raise DiagnosisError(
                 f"{log.source}: no held-out run is possible: in the {which} {100 * share:.0f} % "
                 f"of it motor_speed_rad_s moves by {span:.1f} rad/s only, {LEAST_MOTION:g} or more "
-                "are needed; give another run beside it, or with --hold-out"
+                "are needed; give another run beside it, or one to hold out"
             )

@@ -21,7 +21,6 @@ from plant_emulator.workflows.loading import (
     check_distinct,
     check_unlabelled,
     load_recordings,
-    with_common_voltage,
 )
 from plant_emulator.workflows.provenance import file_hash, program_version, today
 
@@ -59,33 +58,35 @@ def bench_runs(
     parameters: ParameterSet,
     *,
     without: Sequence[str] = (),
-    own: Sequence[str | Path] = (),
+    effect_files: Sequence[str | Path] = (),
     reference: str | None = None,
 ) -> Runs:
     """The runs of logs of the bench.
 
-    without : effects that are taken out of the library; own : files of effects beside it
+    without : effects that are taken out of the library; effect_files : files of effects beside it
     reference : what holds between samples of the reference; None: as the log says
     Raises InputError for a log that cannot be used.
     """
-    files = tuple(Path(file).absolute() for file in own)
+    files = tuple(Path(file).absolute() for file in effect_files)
     named = [effect.name for effect in effects.from_files(files)]
     _check_names(without, [*effects.names(), *named])
     recordings, notes = load_recordings(
-        [_bench_source(one) for one in (*logs, *held_out)], parameters, reference
+        [_bench_source(one) for one in (*logs, *held_out)],
+        parameters,
+        reference,
+        common_channels=True,
     )
-    recordings, more = with_common_voltage(recordings)
     recordings, plan = plan_recordings(recordings, len(logs))
     settings = {
         "parameters": parameters.name,
         "without": ", ".join(without) or "-",
-        "own effects": ", ".join(map(str, own)) or "-",
+        "own effects": ", ".join(map(str, effect_files)) or "-",
     }
     return Runs(
         recipe=BenchRecipe(tuple(recordings), parameters, tuple(without), files),
         plan=plan,
-        notes=(*notes, *more),
-        settings=_settings(settings, [*logs, *held_out, parameters.name, *own]),
+        notes=tuple(notes),
+        settings=_settings(settings, [*logs, *held_out, parameters.name, *effect_files]),
         fitted=tuple(recordings[k] for k in plan.fitted),
     )
 
@@ -101,7 +102,7 @@ def axis_runs(
     check_distinct([(log.source, np.stack([log.time, log.position, log.force])) for log in read])
     if len(read) < 2:
         raise DiagnosisError(
-            f"{read[0].source}: one run of an axis cannot be held out; give another with --hold-out"
+            f"{read[0].source}: one run of an axis cannot be held out; give another run"
         )
     _check_names(without, AXIS_EFFECTS)
     plan = plan_of_runs(len(read), len(logs))
@@ -130,7 +131,9 @@ def _check_names(without: Sequence[str], library: Collection[str]) -> None:
     for name in without:
         if name not in library:
             known = ", ".join(sorted(library))
-            raise DiagnosisError(f"--without {name}: no effect of that name; known: {known}")
+            raise DiagnosisError(
+                f"{name}: no effect of that name; known: {known}", argument="without"
+            )
 
 
 def _settings(own: Mapping[str, str], sources: Sequence[object]) -> dict[str, str]:

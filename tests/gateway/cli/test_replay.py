@@ -23,6 +23,7 @@ from gateway.configuration.config import Config
 from gateway.cycle.cycle import CycleState, Observation, initial, step
 from gateway.cycle.record import NOTHING, Layout, Tick
 from gateway.cycle.supervisor import State
+from gateway.errors import ConfigError
 from gateway.recordings import log, recording
 from gateway.recordings.header import header
 from gateway.recordings.recording import encode_header
@@ -306,5 +307,5 @@ def test_the_same_log_through_a_heavier_truck_goes_slower(tmp_path: Path) -> Non
 
 
 def test_a_file_that_is_not_there_is_bad_input(tmp_path: Path) -> None:
-    with pytest.raises(OSError, match=r"none\.rlrec"):
+    with pytest.raises(ConfigError, match=r"none\.rlrec"):
         call(replay, tmp_path / "none.rlrec")

@@ -57,7 +57,7 @@ def test_answer_changed_on_disk_is_refused(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("seed", "program", "said"),
     [
-        (2, "program", "a trial of seed 1; --seed 1 continues it"),
+        (2, "program", "a trial of seed 1; seed 1 continues it"),
         (1, "another", "begun by another version of the program"),
     ],
 )

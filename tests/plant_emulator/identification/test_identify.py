@@ -189,8 +189,8 @@ def test_fit_works_without_the_current(nominal: ParameterSet, bench_log: Reader)
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("inertia", "--free inertia: no parameter of the bench; known: armature_resistance"),
-        ("drum_shaft_stiffness", "--free drum_shaft_stiffness: it is calculated from others"),
+        ("inertia", "free inertia: no parameter of the bench; known: armature_resistance"),
+        ("drum_shaft_stiffness", "free drum_shaft_stiffness: it is calculated from others"),
     ],
 )
 def test_parameter_that_cannot_be_free_is_told(nominal: ParameterSet, name: str, said: str) -> None:

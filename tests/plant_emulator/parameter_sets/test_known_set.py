@@ -38,7 +38,9 @@ def test_an_effect_that_nobody_knows_is_told_with_its_file(
     nominal: ParameterSet, tmp_path: Path
 ) -> None:
     path = saved(nominal, tmp_path, stiff_oil={"factor": 0.1})
-    with pytest.raises(ParameterError, match=r"bench\.toml: effects\.stiff_oil: unknown; .*--effe"):
+    with pytest.raises(
+        ParameterError, match=r"bench\.toml: effects\.stiff_oil: unknown; .*needs its file"
+    ):
         with_effects.load(path)
 
 

@@ -9,6 +9,7 @@ import pytest
 import plant_emulator as pe
 
 LOG = Path(__file__).parents[2] / "data" / "bench_nominal" / "program1.csv.gz"
+LAG, SIZE = "torque_sensor_lag", "time_constant"
 
 
 @pytest.mark.parametrize(
@@ -23,6 +24,13 @@ LOG = Path(__file__).parents[2] / "data" / "bench_nominal" / "program1.csv.gz"
         (lambda: pe.validate(LOG, start="x"), "start='x'"),
         (lambda: pe.identify(LOG, reference="x"), "reference='x'"),
         (lambda: pe.detectability(LOG, reference="x"), "reference='x'"),
+        (lambda: pe.identify(LOG, free="inertia"), "free inertia: no parameter of the bench"),
+        (lambda: pe.diagnose(LOG, without="stribek"), "without stribek: no effect of that name"),
+        (lambda: pe.simulate("program1", effects=None), "effects=None"),  # type: ignore[arg-type]
+        (lambda: pe.simulate("program1", effects={LAG: None}), f"effect {LAG}: None"),  # type: ignore[dict-item]
+        (lambda: pe.simulate("program1", effects={LAG: {SIZE: None}}), f"{SIZE}=None"),  # type: ignore[dict-item]
+        (lambda: pe.simulate("program1", effects={LAG: {SIZE: "x"}}), f"{SIZE}='x'"),  # type: ignore[dict-item]
+        (lambda: pe.simulate("program1", effects=f"{LAG}:{SIZE}=x"), f"{SIZE}='x'"),
         (lambda: pe.identify_truck("a.csv", "b.csv", mass=3640.0), "a.csv: no such file"),
     ],
 )
@@ -30,6 +38,7 @@ def test_wrong_argument_is_named_with_its_value(call: Callable[[], Any], argumen
     with pytest.raises(pe.InputError) as error:
         call()
     assert argument in str(error.value)
+    assert "--" not in str(error.value)  # an option belongs to a command
 
 
 @pytest.mark.parametrize("analysis", [pe.validate, pe.identify, pe.diagnose, pe.detectability])
@@ -40,3 +49,24 @@ def test_analysis_without_any_log_is_refused(analysis: Callable[[list[str]], Any
 
 def test_a_single_path_counts_as_a_list_of_one() -> None:
     assert pe.validate(str(LOG)).to_json() == pe.validate([str(LOG)]).to_json()
+
+
+def test_a_log_that_is_given_twice_stands_twice_in_the_answer() -> None:
+    answer = pe.validate([LOG, LOG]).to_json()
+    assert list(answer["logs"]) == [str(LOG), f"{LOG} (2)"]
+    assert answer["logs"][f"{LOG} (2)"] == answer["logs"][str(LOG)]
+
+
+def test_a_missing_folder_is_an_input_error_with_the_file(tmp_path: Path) -> None:
+    log, absent = pe.read_log(LOG), tmp_path / "absent"
+    for write in (
+        lambda: pe.write_log(log, absent / "run.csv"),
+        lambda: pe.save_parameters(pe.load_parameters(), absent / "mine.toml"),
+    ):
+        with pytest.raises(pe.InputError, match=r"absent.*No such file or directory; a file that"):
+            write()
+
+
+def test_an_unknown_signal_is_told_with_those_of_the_log() -> None:
+    with pytest.raises(KeyError, match=r"no signal 'torque'; known: .*shaft_torque"):
+        pe.read_log(LOG)["torque"]

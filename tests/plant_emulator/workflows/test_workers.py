@@ -57,7 +57,7 @@ def test_answers_come_in_the_order_of_the_items() -> None:
 def test_lost_process_is_told_in_one_line() -> None:
     workers = Processes(2)
     try:
-        with pytest.raises(EmulatorError, match=r"2 processes ended.*fewer --workers") as one:
+        with pytest.raises(EmulatorError, match=r"2 processes ended.*fewer workers") as one:
             list(workers.map(dies, Number(3), [1, 2]))
         with pytest.raises(EmulatorError, match="one of 2 processes ended"):  # and it stays so
             list(workers.map(times, Number(3), [1, 2]))
@@ -139,7 +139,7 @@ def test_nuisance_space_is_returned_though_another_thread_lets_it_go(
 @pytest.mark.parametrize("address", ["nonsense", "foo://host:1", "tcp://127.0.0.1:x", "tcp://"])
 def test_address_that_cannot_be_is_wrong_usage(address: str) -> None:
     pytest.importorskip("distributed")
-    with pytest.raises(InputError, match=f"--scheduler {address}: .*tcp://host:8786"):
+    with pytest.raises(InputError, match=f"scheduler {address}: .*tcp://host:8786"):
         Cluster(address)
 
 
