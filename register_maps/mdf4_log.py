@@ -78,10 +78,10 @@ def _check_blocks(data: bytes) -> None:
         left += struct.unpack_from(f"<{links}Q", data, start + BLOCK.size)
 
 
-def encode(columns: Sequence[Column], start: datetime = UNKNOWN_START) -> bytes:
+def encode(columns: Sequence[Column], start: datetime = UNKNOWN_START, comment: str = "") -> bytes:
     """Return the columns as an MDF4 file; the column `time` [s] is the master.
 
-    start : date at which that time is zero
+    start : date at which that time is zero; comment : of the file
     """
     asammdf = _package()
     [time] = [column.values for column in columns if column.name == "time"]
@@ -99,6 +99,7 @@ def encode(columns: Sequence[Column], start: datetime = UNKNOWN_START) -> bytes:
     sink = io.BytesIO()
     with _silent(asammdf), asammdf.MDF(version="4.10") as file:
         file.start_time = start
+        file.header.comment = comment
         file.append(signals)
         file.save(sink)
     return sink.getvalue()

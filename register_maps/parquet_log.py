@@ -5,9 +5,11 @@ may contain the unit as in CSV, which is how data frames are written. The packag
 when the first such log is read or written. No file is opened here.
 """
 
-from collections.abc import Sequence
+import contextlib
+import io
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module
-from typing import Any, Final
+from typing import Any, BinaryIO, Final
 
 from register_maps.log_table import (
     Column,
@@ -42,16 +44,29 @@ def parse(data: bytes) -> LogTable:
 
 def encode(columns: Sequence[Column]) -> bytes:
     """Return the columns as a Parquet file."""
+    sink = io.BytesIO()
+    write([columns], sink, {})
+    return sink.getvalue()
+
+
+def write(blocks: Iterable[Sequence[Column]], sink: BinaryIO, metadata: Mapping[str, str]) -> None:
+    """Write blocks of rows with the same columns one after the other as a Parquet file.
+
+    metadata : of the file, by name
+    """
     arrow, parquet = _packages()
-    arrays = [arrow.array(column.values) for column in columns]
-    fields = [
-        arrow.field(column.name, array.type, metadata={"unit": column.unit})
-        for column, array in zip(columns, arrays, strict=True)
-    ]
-    sink = arrow.BufferOutputStream()
-    parquet.write_table(arrow.Table.from_arrays(arrays, schema=arrow.schema(fields)), sink)
-    data: bytes = sink.getvalue().to_pybytes()
-    return data
+    with contextlib.ExitStack() as opened:
+        writer = None
+        for columns in blocks:
+            arrays = [arrow.array(column.values) for column in columns]
+            fields = [
+                arrow.field(column.name, array.type, metadata={"unit": column.unit})
+                for column, array in zip(columns, arrays, strict=True)
+            ]
+            if writer is None:
+                schema = arrow.schema(fields, metadata=dict(metadata))
+                writer = opened.enter_context(parquet.ParquetWriter(sink, schema))
+            writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
 
 
 def _packages() -> tuple[Any, Any]:

@@ -205,6 +205,7 @@ _LOG_COLUMNS: tuple[tuple[str, str, str, bool, str | None, int], ...] = (
     ("wheel_torque_Nm", "wheel_torque", "N m", False, None, 4),
     ("armature_voltage_V", "armature_voltage", "V", False, "armature_voltage", 4),
     ("shell_temperature_degC", "shell_temperature", "degC", False, "shell_temperature_1", 2),
+    ("truck_on_drum", "truck_on_drum", "1", False, None, 4),
 )
 
 LOG_COLUMNS = {

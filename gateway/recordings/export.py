@@ -1,14 +1,20 @@
 """Export of a recording as a log: the columns of a log, and the gateway's own columns.
 
-A log has one row for each new sample of the PLC, timed by the PLC's clock. Ticks without a reading
-and repeated samples have no row, because the time of a log increases and its values are finite.
+A log has one row for each new sample of the PLC, timed by the PLC's clock. Ticks without a reading,
+repeated samples and samples without a needed value have no row, because the time of a log increases
+and its values are finite. With every tick, the time is that of the gateway, and cells may be empty.
+
+The PLC says at a sample which reference it will have reached at the end of the next scan, and moves
+it there in a straight line. The reference at a sample therefore follows from the sample before.
+
+A recording may be large. It is read twice, piece by piece: first to see what it holds, then to
+write.
 """
 
-import csv
-import gzip
-from collections.abc import Callable, Set
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from datetime import datetime, timedelta
-from pathlib import Path
+from math import inf
 from typing import Any, Final
 
 import numpy as np
@@ -16,12 +22,11 @@ from numpy.typing import NDArray
 
 from gateway.arrays import Array
 from gateway.cycle.record import READ, WRITTEN
-from gateway.errors import ConfigError
-from gateway.recordings.recording import Recording
-from register_maps import mdf4_log, parquet_log
-from register_maps.log_table import Column, LogTableError
-from register_maps.register_map import RegisterMap
-from register_maps.signals import LOG_COLUMNS, SIGNALS
+from gateway.recordings.header import map_of
+from gateway.recordings.recording import Recording, Stream, reason_name, state_name
+from register_maps.poll_quality import PollQuality
+from register_maps.signals import LOG_COLUMNS, SIGNALS, Status
+from register_maps.timing import SCAN
 from register_maps.units import UNITS
 
 Columns = dict[str, Any]
@@ -38,6 +43,8 @@ OWN: Final = {
     "missed_deadlines": "missed",
     "dropped_records": "dropped",
 }
+NAMED: Final = {"state": "state", "reason": "reason", "tick_error": "fault"}
+"""Columns of names. A column called fault would look like an answer to a diagnosis."""
 SUFFIXES: Final = {
     "1": "",
     "s": "_s",
@@ -48,117 +55,187 @@ SUFFIXES: Final = {
     "V": "_V",
     "K": "_K",
 }
+NEEDED: Final = tuple(
+    f"measured_{c.measured}"
+    for c in LOG_COLUMNS.values()
+    if c.needed and c.measured not in (None, "speed_reference")
+)
+REFERENCE: Final = "measured_speed_reference"
+TRUCK: Final = "truck_on_drum"
 
 
-def columns(recording: Recording, register_map: RegisterMap) -> Columns:
-    """Every column that the recording can fill, by its name with unit."""
-    rows = recording.records[new_samples(recording)]
-    found: Columns = {}
-    for column in LOG_COLUMNS.values():
-        if column.measured is not None:
-            unit = UNITS[column.unit]
-            found[column.column] = (rows[f"measured_{column.measured}"] - unit.shift) / unit.factor
-    found["time_s"] = unwrap_time(found["time_s"], register_map.modulus("plc_time"))
-    found |= {name: rows[field] for name, field in OWN.items()}
-    found["gateway_time_s"] = rows["now"] - recording.header["started"]
-    found["written"] = (rows["flags"] & WRITTEN) > 0
-    found["state"] = np.array([recording.state(code) for code in rows["state"]])
-    found["reason"] = np.array([recording.reason(code) for code in rows["reason"]])
-    found["fault"] = np.array([recording.reason(code) for code in rows["fault"]])
-    found |= _other_signals(rows, {column.measured for column in LOG_COLUMNS.values()})
-    return {name: values for name, values in found.items() if not _missing(values)}
+@dataclass(frozen=True, kw_only=True)
+class Extent:
+    """Which ticks become rows, by the time of the rows.
+
+    every : every tick, also without a new sample; begin, end : of the time [s]
+    """
+
+    every: bool = False
+    begin: float = -inf
+    end: float = inf
 
 
-def start_date(recording: Recording) -> datetime:
-    """Date at which the time of the columns is zero: that of the first sample."""
-    date = datetime.fromisoformat(recording.header["date"])
-    rows = recording.records[new_samples(recording)]
-    waited = float(rows["now"][0] - recording.header["started"]) if len(rows) else 0.0
-    return date + timedelta(seconds=waited)
+@dataclass(kw_only=True)
+class Survey:
+    """What a recording holds: samples, and how often each field has a value.
+
+    waited : from the start of the recording to time zero [s]
+    truck : whether the bench was in road load, with a truck on the drum
+    """
+
+    samples: int = 0
+    waited: float = 0.0
+    truck: bool = False
+    finite: dict[str, int] = field(default_factory=dict)
+    quality: PollQuality = field(default_factory=lambda: PollQuality(interval=SCAN))
 
 
-def new_samples(recording: Recording) -> NDArray[np.intp]:
-    """Indices of the ticks that read a new sample."""
-    read = np.flatnonzero(recording.records["flags"] & READ)
-    samples = recording.records["measured_plc_time"][read]
+class Export:
+    """A recording as columns, piece by piece."""
+
+    def __init__(self, recording: Stream, extent: Extent) -> None:
+        self.recording, self.extent = recording, extent
+        self._modulus = map_of(recording.header).modulus("plc_time")
+        self.survey = Survey()
+        for rows, time in self._rows():
+            self._take(rows, time)
+
+    @property
+    def start_date(self) -> datetime:
+        """Date at which the time of the columns is zero."""
+        date = datetime.fromisoformat(self.recording.header["date"])
+        return date + timedelta(seconds=self.survey.waited)
+
+    def _take(self, rows: Any, time: Array) -> None:
+        """Add a piece to the survey."""
+        known = self.survey
+        if not known.samples and not self.extent.every:
+            known.waited = float(rows["now"][0] - self.recording.header["started"])
+        status = rows["measured_status"]
+        driven = np.nan_to_num(status).astype(int) & int(Status.ROAD_LOAD)
+        known.truck = known.truck or bool(np.any(driven))
+        inside = rows[self._inside(time)]
+        known.samples += len(inside)
+        for name in (n for n in rows.dtype.names if rows[n].dtype.kind == "f"):
+            found = int(np.isfinite(inside[name]).sum())
+            known.finite[name] = known.finite.get(name, 0) + found
+
+    def blocks(self) -> Iterator[Columns]:
+        """The columns of the log, some rows at a time; the first block may have no rows."""
+        begun = False
+        for rows, time in self._rows():
+            inside = self._inside(time)
+            if inside.any() or not begun:
+                begun = True
+                yield {k: v[inside] for k, v in self._columns(rows, time).items()}
+        if not begun:
+            empty = np.zeros(0, dtype=np.dtype(self.recording.layout.formats))
+            yield self._columns(empty, np.zeros(0))
+
+    def _inside(self, time: Array) -> NDArray[np.bool_]:
+        return np.asarray((time >= self.extent.begin) & (time <= self.extent.end))
+
+    def _rows(self) -> Iterator[tuple[Any, Array]]:
+        """Records that become rows, with their times [s] and `speed_reference` at those times."""
+        if self.extent.every:
+            started = self.recording.header["started"]
+            yield from ((rows, rows["now"] - started) for rows in self.recording.chunks())
+        else:
+            yield from self._samples()
+
+    def _samples(self) -> Iterator[tuple[Any, Array]]:
+        """New samples with their times since the first one, by the PLC's clock [s]."""
+        self.survey.quality = PollQuality(interval=SCAN)
+        last, elapsed, echo = np.nan, 0.0, 0.0
+        for rows in self.recording.chunks():
+            new, repeated = new_samples(rows, last)
+            self.survey.quality.repeated += repeated
+            if not len(new):
+                continue
+            found = rows[new].copy()
+            clock = found["measured_plc_time"]
+            time = unwrap_time(np.append(last, clock), self._modulus)[1:] + elapsed
+            steps = np.diff(time, prepend=elapsed)
+            self.survey.quality.count(steps[0 if np.isfinite(last) else 1 :].tolist())
+            told = self._told(found)
+            before = np.append(echo, told[:-1])
+            share = np.divide(
+                np.maximum(steps - SCAN, 0.0), steps, where=steps > 0.0, out=0 * steps
+            )
+            found[REFERENCE] = before + share * (told - before)
+            last, elapsed, echo = clock[-1], float(time[-1]), float(told[-1])
+            whole = np.all([np.isfinite(found[name]) for name in NEEDED], axis=0)
+            yield found[whole], time[whole]
+
+    def _told(self, rows: Any) -> Array:
+        """Reference at the end of the next scan [rad/s]; without its register, the setpoint."""
+        told: Array = rows[REFERENCE]
+        asked = np.nan_to_num(rows["setpoint_speed_setpoint"])
+        return np.where(np.isfinite(told), told, asked)
+
+    def _columns(self, rows: Any, time: Array) -> Columns:
+        """Every column that the recording can fill, by its name with unit."""
+        found: Columns = {}
+        for column in LOG_COLUMNS.values():
+            if column.measured is not None and self._filled(column.measured, log=True):
+                unit = UNITS[column.unit]
+                values = (rows[f"measured_{column.measured}"] - unit.shift) / unit.factor
+                found[column.column] = values
+        found["time_s"] = time
+        if self.survey.truck:
+            found[TRUCK] = np.ones(len(rows))
+        kept = {name: key for name, key in OWN.items() if self.survey.finite.get(key, 1)}
+        found |= {name: rows[key] for name, key in kept.items()}
+        found["gateway_time_s"] = rows["now"] - self.recording.header["started"]
+        found["written"] = (rows["flags"] & WRITTEN) > 0
+        header = self.recording.header
+        for name, key in NAMED.items():
+            say = state_name if key == "state" else reason_name
+            found[name] = np.array([say(header, int(code)) for code in rows[key]], dtype=str)
+        return found | self._other_signals(rows)
+
+    def _filled(self, signal: str, *, log: bool) -> bool:
+        """Whether a signal has values; in a log without every tick, at every sample."""
+        count = self.survey.finite.get(f"measured_{signal}", 0)
+        if log and not self.extent.every:
+            return count == self.survey.samples
+        return count > 0 or not self.survey.samples
+
+    def _other_signals(self, rows: Any) -> Columns:
+        """Measured signals that are no column of a log, in SI."""
+        taken = {column.measured for column in LOG_COLUMNS.values()}
+        return {
+            f"{signal.name}{SUFFIXES[signal.unit]}": rows[f"measured_{signal.name}"]
+            for signal in SIGNALS.values()
+            if signal.kind == "measurement"
+            and signal.name not in taken
+            and self._filled(signal.name, log=False)
+        }
+
+
+def new_samples(records: Any, last: float = np.nan) -> tuple[NDArray[np.intp], int]:
+    """Indices of the ticks that read a new sample, and the number that read one again.
+
+    last : PLC's time of the sample before the records [s]; NaN: there is none
+    """
+    read = np.flatnonzero(records["flags"] & READ)
+    samples = records["measured_plc_time"][read]
     known = np.isfinite(samples)
     read, samples = read[known], samples[known]
-    new: NDArray[np.intp] = read[np.diff(samples, prepend=np.nan) != 0.0]
-    return new
+    new: NDArray[np.intp] = read[np.diff(samples, prepend=last) != 0.0]
+    return new, len(read) - len(new)
 
 
 def unwrap_time(time: Array, modulus: float | None) -> Array:
-    """Time since the first sample [s] from a clock that wraps at `modulus` (None: never)."""
-    steps = np.diff(time, prepend=time[:1])
+    """Time since the first sample [s] from a clock that wraps at `modulus` (None: never).
+
+    A first sample that is not a number is the time of the second one.
+    """
+    steps = np.nan_to_num(np.diff(time, prepend=time[:1]))
     return np.cumsum(steps if modulus is None else np.mod(steps, modulus))
 
 
-def _other_signals(rows: Any, taken: Set[str | None]) -> Columns:
-    """Measured signals that are no column of a log, in SI."""
-    return {
-        f"{signal.name}{SUFFIXES[signal.unit]}": rows[f"measured_{signal.name}"]
-        for signal in SIGNALS.values()
-        if signal.kind == "measurement" and signal.name not in taken
-    }
-
-
-def _missing(values: Any) -> bool:
-    return values.dtype.kind == "f" and bool(len(values)) and bool(np.isnan(values).all())
-
-
-def write_csv(path: Path, found: Columns) -> None:
-    """Write the columns as CSV so that reading gives the same numbers again."""
-    opened: Callable[..., Any] = gzip.open if path.name.endswith(".gz") else open
-    with opened(path, "wt", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(found)
-        writer.writerows(
-            zip(*(map(_text, values.tolist()) for values in found.values()), strict=True)
-        )
-
-
-def _text(value: object) -> str:
-    if isinstance(value, bool):
-        return str(int(value))
-    return "" if value != value else str(value)  # noqa: PLR0124 - true for NaN, which is written as nothing
-
-
-def with_units(found: Columns) -> list[Column]:
-    """Columns with signal and unit apart, for files that keep the unit as metadata."""
-    return [
-        Column(name=signal, unit=unit, values=values)
-        for (signal, unit), values in zip(map(split_unit, found), found.values(), strict=True)
-    ]
-
-
-def split_unit(column: str) -> tuple[str, str]:
-    """Signal and unit in the name of a column."""
-    if column in LOG_COLUMNS:
-        return LOG_COLUMNS[column].signal, LOG_COLUMNS[column].unit
-    # The longest, because _rad_s ends in _s; no suffix fits every name.
-    fitting = {suffix: unit for unit, suffix in SUFFIXES.items() if column.endswith(suffix)}
-    suffix = max(fitting, key=len)
-    return column.removesuffix(suffix), fitting[suffix]
-
-
-def write(path: Path, found: Columns, start: datetime) -> None:
-    """Write the columns in the format of the file's ending. Raises ConfigError for another ending.
-
-    start : date at which the time of the columns is zero
-    """
-    try:
-        if path.name.endswith((".csv", ".csv.gz")):
-            write_csv(path, found)
-        elif path.name.endswith(".parquet"):
-            path.write_bytes(parquet_log.encode(with_units(found)))
-        elif path.name.endswith(".mf4"):
-            path.write_bytes(mdf4_log.encode(with_units(found), start))
-        else:
-            raise ConfigError(
-                "unknown format",
-                place="--to",
-                value=str(path),
-                expected="one of .csv, .csv.gz, .parquet, .mf4",
-            )
-    except LogTableError as error:
-        raise ConfigError(str(error), place="--to") from error
+def of_recording(recording: Recording) -> NDArray[np.intp]:
+    """Indices of the ticks of a recording that read a new sample."""
+    return new_samples(recording.records)[0]

@@ -25,11 +25,11 @@ class Log:
     columns: dict[str, Array]
 
     def missing(self) -> list[str]:
-        """Names of the optional columns that the log lacks."""
+        """Names of the optional columns that the log lacks; a mark such as a truck is no sensor."""
         return [
             column.column
             for column in LOG_COLUMNS.values()
-            if column.signal not in self.columns and column.signal != "time"
+            if column.signal not in self.columns and column.signal != "time" and column.unit != "1"
         ]
 
 

@@ -10,10 +10,11 @@ refused.
 """
 
 import json
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, BinaryIO, Final
 
 import numpy as np
 
@@ -24,6 +25,11 @@ from gateway.errors import ConfigError
 SUFFIX: Final = ".rlrec"
 SCHEMA: Final = "recording/1"
 CHUNK: Final = 1000
+PIECE: Final = 5000
+"""Records that a stream reads at once: some megabytes."""
+HEAD: Final = len(MAGIC) + 4
+TAIL: Final = 1 << 16
+"""[bytes] Piece in which zeros at the end of a file are sought."""
 
 
 class RecordingError(ConfigError):
@@ -62,16 +68,26 @@ class Recording:
 
     def state(self, code: int) -> str:
         """Name of a state."""
-        return str(self.header["states"][str(code)])
+        return state_name(self.header, code)
 
     def reason(self, code: int) -> str:
         """Name of a reason or fault; empty: none."""
-        return str(self.header["reasons"][str(code)][0]) if code != NOTHING else ""
+        return reason_name(self.header, code)
 
     def stop_reason(self) -> str:
         """Name of the reason for which the gateway first left RUN; empty: it did not."""
         after = self.records[self.records["state"] == State.RAMPDOWN]
         return self.reason(int(after["reason"][0])) if len(after) else ""
+
+
+def state_name(header: dict[str, Any], code: int) -> str:
+    """Name of a state by the header of its recording."""
+    return str(header["states"][str(code)])
+
+
+def reason_name(header: dict[str, Any], code: int) -> str:
+    """Name of a reason or fault by the header of its recording; empty: none."""
+    return str(header["reasons"][str(code)][0]) if code != NOTHING else ""
 
 
 def encode_header(header: dict[str, Any]) -> bytes:
@@ -85,9 +101,7 @@ def read(path: Path) -> Recording:
     try:
         content = path.read_bytes()
     except OSError as error:
-        raise RecordingError(
-            error.strerror or "cannot be read", file=path, expected=f"a recording ({SUFFIX})"
-        ) from error
+        raise _unreadable(path, error) from error
     header, start = _header(path, content)
     layout = Layout(read_count=header["read_count"], write_count=header["write_count"])
     body = content[start:]
@@ -97,6 +111,72 @@ def read(path: Path) -> Recording:
     _check(path, body, records)
     note = f"{path}: {left} bytes of an unfinished last record left out" if left else ""
     return Recording(path=path, header=header, layout=layout, records=records, note=note)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stream:
+    """A recording that is read piece by piece; every reading begins at its first record."""
+
+    path: Path
+    header: dict[str, Any]
+    layout: Layout
+    start: int
+    note: str
+    count: int
+
+    def __len__(self) -> int:
+        return self.count
+
+    def chunks(self) -> "Iterator[np.ndarray[Any, np.dtype[np.void]]]":
+        """The records, some at a time. Raises DamageError for a damaged one."""
+        size, tick = self.layout.size, 0
+        with self.path.open("rb") as file:
+            file.seek(self.start)
+            for first in range(0, self.count, PIECE):
+                body = file.read(min(PIECE, self.count - first) * size)
+                records = np.frombuffer(body, dtype=np.dtype(self.layout.formats))
+                _check(self.path, body, records, tick)
+                tick = int(records["tick"][-1]) + 1
+                yield records
+
+
+def stream(path: Path) -> Stream:
+    """The recording in a file, without its records. Raises RecordingError."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(HEAD)
+            length = int.from_bytes(head[len(MAGIC) : len(MAGIC) + 4], "little")
+            header, start = _header(path, head + file.read(length))
+            layout = Layout(read_count=header["read_count"], write_count=header["write_count"])
+            end = file.seek(0, os.SEEK_END)
+            whole = _whole_records(file, start, end, layout.size)
+    except OSError as error:
+        raise _unreadable(path, error) from error
+    left = end - start - whole * layout.size
+    note = f"{path}: {left} bytes of an unfinished last record left out" if left else ""
+    return Stream(path=path, header=header, layout=layout, start=start, note=note, count=whole)
+
+
+def _whole_records(file: BinaryIO, start: int, end: int, size: int) -> int:
+    """Count of the records before one that a crash left unfinished; see `_count_finished`."""
+    last = end
+    while last > start:
+        begin = max(start, last - TAIL)
+        file.seek(begin)
+        kept = file.read(last - begin).rstrip(b"\0")
+        if kept:
+            last = begin + len(kept)
+            break
+        last = begin
+    count = -(-(last - start) // size)
+    file.seek(start + max(0, count - 1) * size)
+    return max(0, count - 1) + _count_finished(file.read(size), size)
+
+
+def _unreadable(path: Path, error: OSError) -> RecordingError:
+    return RecordingError(
+        error.strerror or "cannot be read", file=path, expected=f"a recording ({SUFFIX})"
+    )
 
 
 def _count_finished(body: bytes, size: int) -> int:
@@ -109,13 +189,18 @@ def _count_finished(body: bytes, size: int) -> int:
     return last - torn
 
 
-def _check(path: Path, body: bytes, records: "np.ndarray[Any, np.dtype[np.void]]") -> None:
-    """Refuse damaged records. The record before a damaged one gives its tick."""
+def _check(
+    path: Path, body: bytes, records: "np.ndarray[Any, np.dtype[np.void]]", first: int = 0
+) -> None:
+    """Refuse damaged records. The record before a damaged one gives its tick.
+
+    first : tick of the first record
+    """
     size = records.itemsize
     places = range(0, len(records) * size, size)
     bad = [k for k, at in enumerate(places) if not is_intact(body[at : at + size])]
     if bad:
-        tick = int(records[bad[0] - 1]["tick"]) + 1 if bad[0] else 0
+        tick = int(records[bad[0] - 1]["tick"]) + 1 if bad[0] else first
         raise DamageError(
             f"checksum differs, {len(bad)} of {len(records)} records damaged",
             file=path,

@@ -12,7 +12,7 @@ from gateway.arrays import Array
 from gateway.configuration.config import Config
 from gateway.losses.sections import LossesError, Trace
 from gateway.recordings import log, recording
-from gateway.recordings.export import new_samples, unwrap_time
+from gateway.recordings.export import of_recording, unwrap_time
 from gateway.recordings.header import config_of, map_of
 from gateway.recordings.log import LogError
 from register_maps.register_map import RegisterMap
@@ -80,7 +80,7 @@ def _of_log(found: log.Log) -> Trace:
 
 
 def _of_recording(found: recording.Recording, register_map: RegisterMap) -> Trace:
-    rows = found.records[new_samples(found)]
+    rows = found.records[of_recording(found)]
     if len(rows) < 2:
         raise LossesError(f"{found.path}: holds no samples of the PLC; expected a run")
     if np.any(rows["measured_status"].astype(int) & Status.ROAD_LOAD):

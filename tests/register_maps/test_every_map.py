@@ -229,6 +229,7 @@ def test_log_columns_are_those_of_the_log_file():
         "wheel_torque_Nm": ("N m", False),
         "armature_voltage_V": ("V", False),
         "shell_temperature_degC": ("degC", False),
+        "truck_on_drum": ("1", False),
     }
     for column in LOG_COLUMNS.values():
         if column.measured is not None:

@@ -25,6 +25,7 @@ KNOWN = [
     ("wheel_torque_Nm", "wheel_torque", False),
     ("armature_voltage_V", "armature_voltage", False),
     ("shell_temperature_degC", "shell_temperature", False),
+    ("truck_on_drum", "truck_on_drum", False),
 ]
 HEADER = "time_s,speed_reference_rad_s,motor_speed_rad_s,drum_speed_rad_s,shaft_torque_Nm"
 ROWS = ("0.00,1.0,2.0,0.03,-4.0", "0.01,1.5,2.5,0.04,-5.0", "0.02,2.0,3.0,0.05,-6.0")
