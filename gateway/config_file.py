@@ -28,7 +28,7 @@ def load(path: str | Path) -> Config:
     return _refuse_unknown_regulator(from_document(document, place=place), place)
 
 
-def given(config: Config | str | Path) -> Config:
+def as_config(config: Config | str | Path) -> Config:
     """The configuration itself, or the configuration in the file of this path."""
     return config if isinstance(config, Config) else load(config)
 
@@ -55,7 +55,7 @@ def _refuse_unknown_regulator(config: Config, place: Place) -> Config:
     """Refuse a regulator that does not exist; otherwise return the configuration."""
     name = config.regulator.name
     if name not in regulators.names():
-        raise regulators.unknown(name, place("regulator", "name"))
+        raise regulators.unknown_error(name, place("regulator", "name"))
     return config
 
 

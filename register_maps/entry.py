@@ -70,7 +70,7 @@ class Entry:
             expected=expected,
         )
 
-    def known(self, keys: frozenset[str]) -> None:
+    def refuse_unknown(self, keys: frozenset[str]) -> None:
         """Refuse unknown keys."""
         for key in self.values:
             if key not in keys:

@@ -54,9 +54,9 @@ _ORDERS, _TABLES = get_args(WordOrder), get_args(Table)
 def parse(data: Mapping[str, Any], *, file: str, lines: Lines, source_hash: str) -> RegisterMap:
     """Register map in the data of a file. Raises MapError."""
     root = Entry(values=data, table="", index=1, file=file, lines=lines)
-    root.known(frozenset({"map", "register"}))
+    root.refuse_unknown(frozenset({"map", "register"}))
     head = _table(root, "map", data.get("map"), 1)
-    head.known(_MAP_KEYS)
+    head.refuse_unknown(_MAP_KEYS)
     default_order = head.choice("word_order", _ORDERS, "ABCD")
     rows = data.get("register")
     if not isinstance(rows, list) or not rows:
@@ -105,7 +105,7 @@ def _block(head: Entry, key: str, most: int) -> Block:
 
 def _registers(entry: Entry, default_order: WordOrder) -> list[tuple[Register, Entry]]:
     """Register of an entry; several where `count` repeats a reserved register."""
-    entry.known(_REGISTER_KEYS)
+    entry.refuse_unknown(_REGISTER_KEYS)
     register = _register(entry, default_order)
     check_register(entry, register)
     if "count" not in entry.values:

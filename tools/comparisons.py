@@ -96,7 +96,7 @@ def compare(
     label = f"{peer}, rtol {theirs:g}"
     ways = {
         name: study.raw(kernel.plain_kernel(), tolerance),
-        f"{name}_simulate": lambda: study.simulated(tolerance),
+        f"{name}_simulate": lambda: study.simulate(tolerance),
     }
     for key, action in ways.items():
         times = side_by_side(action, lambda: solve(theirs))

@@ -83,7 +83,7 @@ def right(case: Case, answer: Mapping[str, Any], *, withheld: bool) -> bool:
     )
 
 
-def placed(case: Case, answer: Mapping[str, Any]) -> bool:
+def is_located(case: Case, answer: Mapping[str, Any]) -> bool:
     """Whether the answer's subsystem is one of the label's; a label may ask for none."""
     return not case.places or answer["location"]["subsystem"] in case.places
 
@@ -115,7 +115,7 @@ def line(case: Case, answer: Mapping[str, Any], seconds: float, *, withheld: boo
         named,
         "right" if right(case, answer, withheld=withheld) else "WRONG",
         answer["location"]["subsystem"] or "-",
-        "right" if placed(case, answer) else "WRONG",
+        "right" if is_located(case, answer) else "WRONG",
         "-" if closed is None else f"{100.0 * closed:.1f} %",
         f"{over[worst]:.2f} ({worst})",
         f"{seconds:.0f} s",
@@ -149,7 +149,7 @@ def main(folder: Path, *, withhold: bool, only: str | None) -> None:
             cases, pool.map(lambda c, name: diagnose(folder, c, name), cases, names), strict=True
         ):
             click.echo(line(case, answer, seconds, withheld=withhold))
-            found.append((right(case, answer, withheld=withhold), placed(case, answer)))
+            found.append((right(case, answer, withheld=withhold), is_located(case, answer)))
     named, there = (sum(column) for column in zip(*found, strict=True))
     click.echo(f"\nright: {named} of {len(found)}; in the right place: {there} of {len(found)}")
 

@@ -63,7 +63,7 @@ class Study:
 
         return action
 
-    def simulated(self, tolerance: float, largest_step: float = LONG_STEP) -> Array:
+    def simulate(self, tolerance: float, largest_step: float = LONG_STEP) -> Array:
         """Simulate as a user does; the compared channels, shape (n, channels)."""
         log = simulate(self.run, self.values, tolerance=tolerance, largest_step=largest_step)
         return np.column_stack([log[name] for name in peers.CHANNELS])
@@ -71,7 +71,7 @@ class Study:
     @cached_property
     def converged(self) -> Array:
         """The compared channels at a tolerance far below all others, shape (n, channels)."""
-        return self.simulated(CONVERGED, LARGEST_STEP)
+        return self.simulate(CONVERGED, LARGEST_STEP)
 
     def error(self, found: Array) -> float:
         """NRMSD of the worst channel [%], against the converged solution."""
@@ -83,7 +83,7 @@ class Study:
         """Our loosest tolerance with all errors from there on in the bound; its error [%]."""
         found, error = 0.0, inf
         for tolerance in reversed(LADDER):
-            now = self.error(self.simulated(tolerance))
+            now = self.error(self.simulate(tolerance))
             if now > ERROR_BOUND:
                 break
             found, error = tolerance, now

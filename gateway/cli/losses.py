@@ -84,7 +84,7 @@ def command(
         raise click.UsageError("--speeds and --hold are for a live sweep; a file has had its own")
     if not files and config is None:
         raise click.UsageError("missing LOG|RECORDING, or -c CONFIG for a sweep on the live bench")
-    settings = config_file.given(config or Config())
+    settings = config_file.as_config(config or Config())
     settings = config_file.with_values(settings, assignments(values))
     if not files:
         to_operator = partial(click.echo, err=True)

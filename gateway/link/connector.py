@@ -46,12 +46,12 @@ class Connector:
             self._start()
         return self._finish() if self._pending is not None else None
 
-    def failed(self, delay: float | None = None) -> None:
+    def note_failure(self, delay: float | None = None) -> None:
         """Note that a connection ended. The next attempt waits for `delay` or the back-off [s]."""
         self._next_attempt = self._clock() + (self._delay if delay is None else delay)
         self._delay = min(2.0 * self._delay, LAST_DELAY)
 
-    def succeeded(self) -> None:
+    def note_success(self) -> None:
         """Note a good reply, which resets the back-off."""
         self._delay = FIRST_DELAY
 
@@ -86,7 +86,7 @@ class Connector:
     def _give_up(self, error: int) -> None:
         self.close()
         self.problem = os.strerror(error)
-        self.failed()
+        self.note_failure()
 
 
 def resolve(host: str, port: int) -> tuple[socket.AddressFamily, tuple[str, int]]:

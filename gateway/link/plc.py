@@ -170,7 +170,7 @@ class TcpLink:
         if reply is None:
             raise self._fail(_wrong_count("reply cannot be decoded"))
         self._failures = 0
-        self._connector.succeeded()
+        self._connector.note_success()
         return reply
 
     def _fail(self, rejection: Rejection) -> LinkError:
@@ -186,7 +186,7 @@ class TcpLink:
 
     def _hang_up(self, delay: float | None) -> None:
         self.close()
-        self._connector.failed(delay)
+        self._connector.note_failure(delay)
 
     def _error(self, rejection: Rejection) -> LinkError:
         return LinkError(rejection.reason, f"{self._peer} unit {self._unit}: {rejection.text}")

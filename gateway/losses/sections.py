@@ -33,7 +33,7 @@ LONGEST: Final = 2.4 * HALF
 STEADY: Final = 0.5
 """[rad/s^2] Slope of the motor speed; the drum's inertia takes 2.5 N m, under 1 % of the
 friction."""
-LEAST_SPEED: Final = 5.0
+STANDSTILL_SPEED: Final = 5.0
 """[rad/s] Motor speed below which the bench stands."""
 SHORTEST, WORTH_NAMING = 1.0, 0.2
 """[s] Least duration of a stretch that is used, and of a stretch that is named as left out."""
@@ -141,7 +141,7 @@ def steady(trace: Trace, bench: BenchConfig, torque_offset: float = 0.0) -> Stea
 def _stretches(trace: Trace) -> Iterator[slice]:
     """Samples in which the motor turns at a constant speed, stretch by stretch."""
     still = np.abs(_slope(trace.time, trace.motor_speed)) < STEADY
-    turning = still & (np.abs(trace.motor_speed) > LEAST_SPEED)
+    turning = still & (np.abs(trace.motor_speed) > STANDSTILL_SPEED)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], turning.astype(np.int8), [0]))))
     for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
         if trace.time[last] - trace.time[first] >= WORTH_NAMING:

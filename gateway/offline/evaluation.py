@@ -17,8 +17,8 @@ import numpy as np
 from gateway.arrays import Array
 from gateway.errors import GatewayError
 
-# Cruise: the speed changes by less than STEADY [m/s^2] for at least SHORTEST_CRUISE [s].
-STEADY = 0.02
+# Cruise: the speed changes by less than STEADY_SLOPE [m/s^2] for at least SHORTEST_CRUISE [s].
+STEADY_SLOPE = 0.02
 SHORTEST_CRUISE = 5.0
 # [s] Span of the slope of the speed; one digit of the drum speed is 0.3 mm/s at the rim.
 SLOPE_SPAN = 0.5
@@ -59,7 +59,7 @@ def cruise(time: Array, speed: Array) -> slice | None:
     slope[half:-half] = (speed[2 * half :] - speed[: -2 * half]) / (
         time[2 * half :] - time[: -2 * half]
     )
-    steady = (np.abs(slope) < STEADY) & (speed > CRUISE_SPEED)
+    steady = (np.abs(slope) < STEADY_SLOPE) & (speed > CRUISE_SPEED)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], steady.astype(np.int8), [0]))))
     starts, ends = edges[::2], edges[1::2] - 1
     if not len(starts):

@@ -24,7 +24,7 @@ class Log:
     time: Array
     columns: dict[str, Array]
 
-    def missing(self) -> list[str]:
+    def missing_columns(self) -> list[str]:
         """Names of the optional columns that the log lacks; a mark such as a truck is no sensor."""
         return [
             column.column

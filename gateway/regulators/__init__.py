@@ -47,7 +47,7 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(found.name for found in iter_modules(__path__) if found.name != "window"))
 
 
-def unknown(name: str, place: str) -> ConfigError:
+def unknown_error(name: str, place: str) -> ConfigError:
     """Return the error for a name that no regulator has; `place` says where the name stands."""
     return ConfigError("unknown regulator", place=place, value=name, expected=" or ".join(names()))
 
@@ -59,5 +59,5 @@ def load(name: str) -> Regulator:
     Raises ConfigError where there is none.
     """
     if name not in names():
-        raise unknown(name, "regulator.name")
+        raise unknown_error(name, "regulator.name")
     return cast("Regulator", import_module(f"{__name__}.{name}"))

@@ -35,7 +35,7 @@ def toml(losses: Losses) -> str:
         f"date = {date.isoformat(timespec='seconds')}",
         f"sources = {json.dumps(names)}",
         f"sha256 = {json.dumps([one.sha256 for one in losses.sources])}",
-        f"shell_temperature_degC = {list(map(_rounded, shell)) if shell else '[]  # not logged'}",
+        f"shell_temperature_degC = {list(map(_round, shell)) if shell else '[]  # not logged'}",
         f"gear_speed_rad_s = [{losses.fit.slowest:.4f}, {losses.fit.fastest:.4f}]",
         f"coulomb_standard_error_Nm = {coulomb:.4g}",
         f"viscous_standard_error = {viscous:.4g}",
@@ -53,7 +53,7 @@ def toml(losses: Losses) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _rounded(value: float) -> float:
+def _round(value: float) -> float:
     return round(value, 2)
 
 

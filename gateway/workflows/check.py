@@ -25,7 +25,7 @@ def check(
 
     Raises ConfigError for a configuration and MapError for a register map that cannot be used.
     """
-    settings = config_file.with_values(config_file.given(config), values or {})
+    settings = config_file.with_values(config_file.as_config(config), values or {})
     register_map = register_maps.load(settings.plc.map)
     found = review(settings, register_map)
     if not live:

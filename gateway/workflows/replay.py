@@ -95,10 +95,10 @@ def replay(
     path, changes = Path(log_or_recording), dict(values or {})
     if recording.is_recording(path):
         found = recording.read(path)
-        own = config_of(found.header) if config is None else config_file.given(config)
+        own = config_of(found.header) if config is None else config_file.as_config(config)
         settings = config_file.with_values(own, changes)
         return _replay_recording(found, settings, is_exact=config is None and not changes)
-    settings = config_file.with_values(config_file.given(config or Config()), changes)
+    settings = config_file.with_values(config_file.as_config(config or Config()), changes)
     return _replay_log(log.read(path), settings)
 
 
@@ -139,7 +139,7 @@ def _replay_log(found: log.Log, config: Config) -> Replay:
         found.columns["speed_reference"],
         outputs,
     )
-    missing = ", ".join(found.missing())
+    missing = ", ".join(found.missing_columns())
     warning = _wrong_sign(found, config)
     return Replay(
         path=found.path,

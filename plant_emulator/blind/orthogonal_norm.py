@@ -65,12 +65,12 @@ def _norm(case: Case, hidden: Hidden, logs: Sequence[Log], parameters: Parameter
     whole = [simulate_run(start) for simulate_run, start in zip(complete, starts, strict=True)]
     change = [after - before for after, before in zip(whole, base, strict=True)]
     tangents = NuisanceSpace(
-        linearise_at(wanted, [_less(p, b) for p, b in zip(without, base, strict=True)])
+        linearise_at(wanted, [_minus(p, b) for p, b in zip(without, base, strict=True)])
     )
     norm = float(np.linalg.norm(tangents.orthogonal(np.concatenate([c.ravel() for c in change]))))
     if norm <= DETECTABLE:
         return norm
-    away = [_less(p, w) for p, w in zip(without, whole, strict=True)]
+    away = [_minus(p, w) for p, w in zip(without, whole, strict=True)]
     bounded = [or_impossible(one, w) for one, w in zip(away, whole, strict=True)]
     return min(norm, _norm_after_fit(wanted, bounded))
 
@@ -104,7 +104,7 @@ def or_impossible(residual: Residual, like: Array) -> Residual:
     return found
 
 
-def _less(simulated: Residual, base: Array) -> Residual:
+def _minus(simulated: Residual, base: Array) -> Residual:
     """A simulation minus the constant `base`."""
     return lambda found: simulated(found) - base
 
@@ -118,9 +118,9 @@ def _simulation(
     effects = {h.law: h.in_run(run) for h in hidden}
     fixed = values_of(parameters.with_values(case.parameters), effects)
 
-    def simulated(found: Mapping[str, float]) -> Array:
+    def whitened_run(found: Mapping[str, float]) -> Array:
         values, gap = split_gap_position({**fixed, **found})
         out = simulate(inputs, values, gap_position=gap)
         return np.stack([out[name] for name in COMPARED]) / levels
 
-    return simulated
+    return whitened_run

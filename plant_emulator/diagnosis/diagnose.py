@@ -157,7 +157,7 @@ class Diagnose:
                 remainder=remainder,
             ),
             final=tests.final,
-            fixed={name: self._fixed(name) for name in tests.decision.effects},
+            fixed={name: self._fixed_values(name) for name in tests.decision.effects},
         )
 
     def _test(self) -> _Tests:
@@ -185,7 +185,7 @@ class Diagnose:
             location=location,
             gap=gap,
             ranking=tuple(
-                self._ranked(one, tests, gaps.gain(one.effect), derived.get(one.effect, ()))
+                self._rank(one, tests, gaps.gain(one.effect), derived.get(one.effect, ()))
                 for one in hypotheses_to_rank(tests.explained)
             ),
             undetectable=hidden,
@@ -229,7 +229,7 @@ class Diagnose:
         faulty = subsystem.faulty_subsystem(tests.decision, self.model.candidates, shares)
         return subsystem.location(faulty, shares, located)
 
-    def _ranked(
+    def _rank(
         self,
         hypothesis: Hypothesis,
         tests: _Tests,
@@ -251,7 +251,7 @@ class Diagnose:
             return None
         return confidence(self.cases, tests.decision.kind, _evidence(tests))
 
-    def _fixed(self, name: str) -> dict[str, float]:
+    def _fixed_values(self, name: str) -> dict[str, float]:
         fixed = self.model.candidates[name].fixed
         return {key.removeprefix(f"{name}_"): value for key, value in fixed.items()}
 

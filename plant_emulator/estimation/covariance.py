@@ -57,7 +57,7 @@ def sandwich(
     for residual, jacobian in zip(residuals, jacobians, strict=True):
         for channel in range(len(residual)):
             slopes = jacobian[channel]
-            middle += freedom * slopes.T @ coloured(slopes, autocovariance(residual[channel]))
+            middle += freedom * slopes.T @ colour(slopes, autocovariance(residual[channel]))
     hessian = information + precision
     scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
     values, vectors = np.linalg.eigh(hessian / np.outer(scale, scale))
@@ -105,7 +105,7 @@ def _with_spectrum(covariance: Array) -> Array:
     return np.asarray(np.fft.irfft(spectrum, len(both))[: len(covariance)])
 
 
-def coloured(slopes: Array, covariance: Array) -> Array:
+def colour(slopes: Array, covariance: Array) -> Array:
     """G J: each column of the Jacobian multiplied by the residual's covariance matrix."""
     if len(covariance) == 1:
         return np.asarray(slopes * covariance[0])

@@ -45,7 +45,7 @@ def to_json(
             for p in found.parameters
         ],
         "condition_number": finite(found.estimate.condition_number),
-        "correlated": [list(pair) for pair in correlated(found)],
+        "correlated": [list(pair) for pair in correlated_pairs(found)],
         "chi_squared": found.chi_squared,
         "start_in_gap": list(found.gap_positions),
         "experiments": [
@@ -91,7 +91,7 @@ def distinct(names: Sequence[str]) -> list[str]:
     return found
 
 
-def correlated(found: Identification) -> list[tuple[str, str, float]]:
+def correlated_pairs(found: Identification) -> list[tuple[str, str, float]]:
     """Pairs of parameters with a correlation beyond CORRELATED, and the correlation."""
     names, matrix = [p.name for p in found.parameters], found.estimate.correlation
     return [
@@ -113,7 +113,7 @@ def lines(
     rows += [_row(p) for p in found.parameters]
     rows += [
         f"  {a} and {b} can hardly be told apart (correlation {r:.2f})"
-        for a, b, r in correlated(found)
+        for a, b, r in correlated_pairs(found)
     ]
     rows += [_advice(e) for e in experiments]
     rows += [f"residual: {found.chi_squared**0.5:.2f} times the noise of the logs"]

@@ -207,15 +207,16 @@ def _counting_samples(measured: Log, name: str) -> tuple[Use, list[str]]:
     """Samples of a channel that carry information, and notes on the samples that are left out."""
     channel = measured[name]
     nothing = np.zeros(len(channel), bool)
-    repeated = _repeated(channel)
+    repeated = _find_repeated(channel)
     others = (
-        np.sum([_repeated(measured[o]) for o in compared_channels(measured)], axis=0) - repeated
+        np.sum([_find_repeated(measured[o]) for o in compared_channels(measured)], axis=0)
+        - repeated
     )
     alive = ~_runs(repeated, others, CERTAINLY_FROZEN)
     noisy = noise(channel, alive) > NOISY * np.ptp(channel)
-    held = repeated if _held(channel, repeated) else nothing
-    frozen = _frozen(repeated, others, float(np.mean(repeated[alive]))) if noisy else nothing
-    clipped = _clipped(channel, repeated, others) if noisy else nothing
+    held = repeated if _is_held(channel, repeated) else nothing
+    frozen = _find_frozen(repeated, others, float(np.mean(repeated[alive]))) if noisy else nothing
+    clipped = _find_clipped(channel, repeated, others) if noisy else nothing
     causes = {
         "is slower than the log and held between its samples": held,
         "is at the end of its range": clipped,
@@ -233,11 +234,11 @@ def _counting_samples(measured: Log, name: str) -> tuple[Use, list[str]]:
     return ~(held | frozen | clipped), notes
 
 
-def _repeated(channel: Array) -> Use:
+def _find_repeated(channel: Array) -> Use:
     return np.concatenate([[False], np.diff(channel) == 0.0])
 
 
-def _held(channel: Array, repeated: Use) -> bool:
+def _is_held(channel: Array, repeated: Use) -> bool:
     """Whether most samples repeat the one before while the channel moves."""
     reach = 5
     moving = np.zeros(len(channel), bool)
@@ -246,7 +247,7 @@ def _held(channel: Array, repeated: Use) -> bool:
     return bool(moving.sum() > 20 and np.mean(repeated[moving]) > HELD_SHARE)
 
 
-def _frozen(repeated: Use, others: Array, share: float) -> Use:
+def _find_frozen(repeated: Use, others: Array, share: float) -> Use:
     """Samples in runs of equal ones that are too long for chance.
 
     others : how many other channels repeat each sample; share : of repeated samples by chance
@@ -258,7 +259,7 @@ def _frozen(repeated: Use, others: Array, share: float) -> Use:
     )
 
 
-def _clipped(channel: Array, repeated: Use, others: Array) -> Use:
+def _find_clipped(channel: Array, repeated: Use, others: Array) -> Use:
     """Samples in runs of the channel's largest or smallest value, which noise would not repeat."""
     found = np.zeros(len(channel), bool)
     for end in (np.max(channel), np.min(channel)):

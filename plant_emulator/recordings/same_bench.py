@@ -55,7 +55,7 @@ PRIOR_STD = np.array([0.05, 0.05, 0.01, 0.3])
 # Error of s that the equation of the contact makes, a standard deviation.
 EQUATION_ERROR = 1e-3
 # Standard errors from which on two logs are not of one bench.
-DIFFERENT_ERRORS = 6.0
+BENCH_DIFFERENCE = 6.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,7 +73,7 @@ def check_same_bench(logs: Sequence[Log], values: Mapping[str, float]) -> None:
     for first, second in combinations(found, 2):
         error = float(np.sqrt(first.error**2 + second.error**2 + EQUATION_ERROR**2))
         apart = abs(first.share - second.share) / error
-        if apart > DIFFERENT_ERRORS:
+        if apart > BENCH_DIFFERENCE:
             raise LogError(
                 f"{second.source}: drum speed over motor speed is {_percent(second)} what the gear "
                 f"ratio says while the gear drives, and {_percent(first)} in {first.source}: "

@@ -155,21 +155,21 @@ def estimates_of(fit: RoadFit, errors: dict[str, Any]) -> dict[str, Estimate]:
     """
     truck, values = fit.run.truck, fit.values
 
-    def scaled(name: str, factor: float = 1.0) -> Estimate:
+    def estimate(name: str, factor: float = 1.0) -> Estimate:
         return Estimate(
             value=factor * float(getattr(values, name)), standard_error=factor * float(errors[name])
         )
 
     return {
-        "crr": scaled("crr"),
-        "crr_v": scaled("crr_v"),
-        "efficiency": scaled("efficiency"),
-        "f0_newton": scaled("crr", truck.weight),
-        "f1_newton_per_m_s": scaled("crr_v", truck.weight / truck.drum_radius),
-        "velocity_clock_ahead_s": scaled("clock_ahead"),
-        "clock_ppm": scaled("clock_skew", 1e6),
-        "torque_offset_Nm": scaled("torque_offset"),
-        "torque_gain": scaled("torque_gain"),
+        "crr": estimate("crr"),
+        "crr_v": estimate("crr_v"),
+        "efficiency": estimate("efficiency"),
+        "f0_newton": estimate("crr", truck.weight),
+        "f1_newton_per_m_s": estimate("crr_v", truck.weight / truck.drum_radius),
+        "velocity_clock_ahead_s": estimate("clock_ahead"),
+        "clock_ppm": estimate("clock_skew", 1e6),
+        "torque_offset_Nm": estimate("torque_offset"),
+        "torque_gain": estimate("torque_gain"),
     }
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @cache
-def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+def compile_loop(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compiled form of a loop; numba compiles it at its first call."""
     compiler.use_cache([__file__, str(compiler.__file__)], ["road"])
     return compiler.compile_function(function, on_disk=True)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.road_load.kernel import compiled, predict_walk
+from plant_emulator.road_load.kernel import compile_loop, predict_walk
 
 if TYPE_CHECKING:
     from plant_emulator.road_load.signal import Mask
@@ -45,7 +45,7 @@ class Whitener:
 
         residuals : [m/s], shape (m, columns)
         """
-        innovation = residuals - compiled(predict_walk)(residuals, self.gain, self.rests)
+        innovation = residuals - compile_loop(predict_walk)(residuals, self.gain, self.rests)
         found: Array = (innovation / self.deviation[:, None])[self.valid]
         return found
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from plant_emulator.model.dimensions import DRUM_RADIUS, TRUCK_RATIO, WHEEL_RADIUS
-from plant_emulator.road_load.kernel import compiled, travel
+from plant_emulator.road_load.kernel import compile_loop, travel
 from plant_emulator.simulation.truck import GRAVITY
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def velocity(
     p = parameters
     torque = (shown - p.torque_offset) / p.torque_gain
     per_torque = truck.ratio / (truck.wheel_radius * truck.mass)
-    found: Array = compiled(travel)(
+    found: Array = compile_loop(travel)(
         torque,
         held,
         period,

@@ -48,7 +48,7 @@ def use_cache(sources: Sequence[str], names: Sequence[str]) -> None:
 
 
 def compile_function(function: Callable[..., Any], *, on_disk: bool = False) -> Callable[..., Any]:
-    """A function that is compiled at its first call; without compiler the function itself."""
+    """Compile a function at its first call; without a compiler return the function itself."""
     if not ENABLED:
         return function
     import numba
@@ -61,10 +61,11 @@ def compile_function(function: Callable[..., Any], *, on_disk: bool = False) -> 
 
 
 def one_at_a_time(action: Callable[..., Any], folder: str) -> Callable[..., Any]:
-    """The action, done by one process at a time of all that use this folder.
+    """Let one process at a time do an action, of all processes that use this folder.
 
-    A kernel takes ten to twenty seconds to compile. Processes that need the same one wait for the
-    first, and load what it left. Two at once could also mix up the entries of numba's index.
+    A kernel takes ten to twenty seconds to compile. Processes that need the same kernel wait
+    for the first of them, and load what it left. Two at once could mix up the entries of numba's
+    index.
     """
     import fcntl
 

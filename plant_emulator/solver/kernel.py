@@ -195,7 +195,7 @@ def build(library: Mapping[str, Effect]) -> Kernel:
     check_effects(library)
     files = [*(str(module.__file__) for module in SOURCES), __file__]
     compiler.use_cache([*files, *(effect.file for effect in library.values())], list(library))
-    compiled = _glued(library)
+    compiled = _compile_glue(library)
     if compiler.ENABLED:
         compiled[stepper.private_copy] = compiler.make_private_copy()
         compiled[stepper.write_back] = compiler.make_write_back()
@@ -212,7 +212,7 @@ def build(library: Mapping[str, Effect]) -> Kernel:
     )
 
 
-def _glued(library: Mapping[str, Effect]) -> dict[Function, Function]:
+def _compile_glue(library: Mapping[str, Effect]) -> dict[Function, Function]:
     """The compiled functions of the glue, by the functions of the model that they replace."""
     names: dict[str, Function] = {}
     for law in laws.LAWS:

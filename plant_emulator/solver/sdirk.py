@@ -102,7 +102,7 @@ def accept(h: float, x: State, w: State) -> None:
 
 
 def interpolate(since: float, h: float, x: State, w: State) -> State:
-    """State at the time `since` after the begin of a step [s], by cubic Hermite interpolation.
+    """State at the time `since` after the start of a step [s], by cubic Hermite interpolation.
 
     The result overwrites the first stage in w, which is not needed any more.
     """

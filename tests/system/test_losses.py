@@ -56,7 +56,7 @@ def sweep(folder: Path, parameters: Path, period_ms: int) -> Path:
 
 
 def cruise_error(folder: Path, parameters: Path, *options: object) -> float:
-    """Of the force in cruise, relative to the road load, truck of 3640 kg with a driver."""
+    """Error of the force in cruise over the road load; truck of 3640 kg with a driver."""
     out = folder / "demo"
     fixed = ("--fast", "--driver", "pi", "--load", 0, "--bench-parameters", parameters)
     shown = gateway("demo", "--out", out, *fixed, *options)

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from tools.practice import Case, cases_of, placed, right
+from tools.practice import Case, cases_of, is_located, right
 
 TWO = Case(
     name="two",
@@ -59,6 +59,6 @@ def test_withheld_effect_is_unknown_or_another_that_leaves_noise() -> None:
 
 
 def test_place_is_one_of_the_labels_or_none_is_asked_for() -> None:
-    assert placed(TWO, answer("effect", place="torque_sensor"))
-    assert not placed(TWO, answer("effect", place="drum"))
-    assert placed(NONE, answer("none"))
+    assert is_located(TWO, answer("effect", place="torque_sensor"))
+    assert not is_located(TWO, answer("effect", place="drum"))
+    assert is_located(NONE, answer("none"))

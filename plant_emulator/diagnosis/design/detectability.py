@@ -113,7 +113,10 @@ def detection_limits(model: Model, where: FitValues, runs: Sequence[int]) -> lis
             orthogonal_norm=s.orthogonal_norm,
             total_norm=s.total_norm,
             smallest_size=smallest(
-                [(reached(model.candidates[name], f), norm) for f, norm in s.orthogonal_norms]
+                [
+                    (allowed_factor(model.candidates[name], f), norm)
+                    for f, norm in s.orthogonal_norms
+                ]
             ),
             confounded_with=s.confounded_with,
             indistinguishable=alike(name, seen),
@@ -136,8 +139,8 @@ def smallest(norms: Sequence[tuple[float, float]]) -> float:
     return inf
 
 
-def reached(candidate: Candidate, factor: float) -> float:
-    """What of so many plausible sizes the bounds of an effect leave, in plausible sizes."""
+def allowed_factor(candidate: Candidate, factor: float) -> float:
+    """Largest size up to `factor` that the bounds of an effect allow [plausible sizes]."""
     return max(
         (bounded_size(u, neutral, factor) - neutral) / (u.start - neutral)
         for u in candidate.sizes

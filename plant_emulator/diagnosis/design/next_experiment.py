@@ -105,7 +105,7 @@ class Advice:
         ]
         fits = list(self.runner.map(fit_alternative, alternatives))
         tried: list[tuple[str, list[float]]] = []
-        for source, planned, recipe in self._planned(explained.final):
+        for source, planned, recipe in self._planned_runs(explained.final):
             asked = [PlannedRun(fitted=found, runs=runs, planned=planned) for found in fits]
             norms = list(self.runner.pool.map(discriminability, recipe, asked))
             tried.append((source, norms))
@@ -157,14 +157,14 @@ class Advice:
     def _steady(self, null: FitResult) -> str:
         """Advise the run that determines the nuisance parameters best."""
         gains: dict[str, float] = {}
-        for source, planned, recipe in self._planned(null):
+        for source, planned, recipe in self._planned_runs(null):
             asked = PlannedRun(fitted=null, runs=self.runner.runs, planned=planned)
             (gains[source],) = self.runner.pool.map(information_gain, recipe, [asked])
         best = max(gains, key=gains.__getitem__, default="")
         what = f"drive {best}" if best else "add another run, with other speeds and rates"
         return f"To steady the fit: {what}."
 
-    def _planned(self, found: FitResult) -> list[tuple[str, int, Recipe]]:
+    def _planned_runs(self, found: FitResult) -> list[tuple[str, int, Recipe]]:
         """Planned runs at a fit: what to do, the run's number, and the recipe that has it."""
         recipe = PlannedRecipe(self.runner.recipe, found, self.runner.runs)
         runs = build_model(recipe).runs
@@ -175,7 +175,7 @@ class Advice:
         self, null: FitResult, names: Sequence[str]
     ) -> list[tuple[str, dict[str, float]]]:
         """Visibility of these effects in each planned run, by what to do."""
-        planned = self._planned(null)
+        planned = self._planned_runs(null)
         if not planned or not names:
             return []
         asked = [

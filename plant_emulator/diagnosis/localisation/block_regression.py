@@ -94,7 +94,7 @@ class BlockRegression:
         self.drum_fit = self.drum.fit_null(null.values, [s[GAP_POSITION] for s in null.states])
         self.products = Products()
         self.relations = [
-            whitened_relations(m, p, self._simulated(k)) for k, m in enumerate(self.signals)
+            whitened_relations(m, p, self._simulate_drive(k)) for k, m in enumerate(self.signals)
         ]
         self.blocks = tuple(
             name
@@ -102,7 +102,7 @@ class BlockRegression:
             if name != "wheel_contact" or any(m.truck for m in self.signals)
         )
 
-    def _simulated(self, run: int) -> tuple[Array, NDArray[np.bool_]] | None:
+    def _simulate_drive(self, run: int) -> tuple[Array, NDArray[np.bool_]] | None:
         """The relations' own error between samples, and whether the simulated drive is limited.
 
         None: the run cannot be simulated at the fit

@@ -123,7 +123,7 @@ class BenchModel:
             for r in recordings
         ]
 
-    def _fixed(self, run: int, effects: Sequence[str]) -> dict[str, float]:
+    def _fixed_values(self, run: int, effects: Sequence[str]) -> dict[str, float]:
         """Values that no fit of these effects changes: of set, effects and log."""
         fixed = {k: v for name in effects for k, v in self.candidates[name].fixed.items()}
         logged = self._recordings[run].logged_values
@@ -134,13 +134,13 @@ class BenchModel:
         """See `Model`."""
         recording = self._recordings[run]
         tolerance = TRUCK_TOLERANCE if recording.inputs.truck else TOLERANCE
-        return residual_function(recording, self._fixed(run, effects), tolerance)
+        return residual_function(recording, self._fixed_values(run, effects), tolerance)
 
     def input_noise(
         self, run: int, where: FitResult, state: Mapping[str, float]
     ) -> NoiseDirections | None:
         """See `Model`."""
-        values = {**self._fixed(run, where.effects), **where.values, **state}
+        values = {**self._fixed_values(run, where.effects), **where.values, **state}
         return noise_directions(self._recordings[run], *split_gap_position(values))
 
     def nominal(self, runs: Sequence[int]) -> dict[str, float]:  # noqa: ARG002 - `Model`'s signature
@@ -167,7 +167,7 @@ class BenchModel:
         residual = self.residual(run, effects)
         return scan_states(
             self._recordings[run],
-            {**self._fixed(run, effects), **values},
+            {**self._fixed_values(run, effects), **values},
             groups,
             lambda states: residual({**values, **states}),
         )
@@ -180,7 +180,7 @@ class BenchModel:
 
     def with_planned_runs(self, where: FitResult, runs: Sequence[int]) -> BenchModel:
         """See `Model`: drive programs that no log shows; they start as the last run did."""
-        warm = {**self._fixed(runs[-1], where.effects), **where.values, **where.states[-1]}
+        warm = {**self._fixed_values(runs[-1], where.effects), **where.values, **where.states[-1]}
         fitted = self._set.with_values({name: where.values[name] for name in self._free})
         more = planned_runs(self._recordings, fitted, warm, {**warm, **self._cold(where.effects)})
         return BenchModel([*self._recordings, *more], self._set, self._effects, self._free)

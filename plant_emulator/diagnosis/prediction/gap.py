@@ -109,14 +109,14 @@ def _predict_run(
     effects = found.effects
     residual = model.residual(run, effects)
 
-    def predicted(states: Mapping[str, float]) -> Array:
+    def residual_at(states: Mapping[str, float]) -> Array:
         return residual({**found.values, **states})
 
     own = (*model.states, *(u for name in effects for u in model.candidates[name].states))
     if known is not None or not own:
-        return predicted(known or {}), True
+        return residual_at(known or {}), True
     start = model.initial_states(run, effects, found.values)
-    estimated = fit_from(start, own, predicted)
+    estimated = fit_from(start, own, residual_at)
     return estimated.residuals[0], estimated.converged
 
 
@@ -200,11 +200,11 @@ def closed_fraction(reference: Gap, explained: Gap) -> float | None:
 
     over the channels whose reference is OPEN_GAP or more; both gaps in the noise.
     """
-    (found,) = _closed(reference, reference.mean_squares, explained.mean_squares)
+    (found,) = _closed_fractions(reference, reference.mean_squares, explained.mean_squares)
     return float(found) if np.isfinite(found) else None
 
 
-def _closed(reference: Gap, before: Array, after: Array) -> Array:
+def _closed_fractions(reference: Gap, before: Array, after: Array) -> Array:
     """Closed fraction for mean squares of shape (channels, draws); NaN where there is no gap."""
     counting = reference.by_channel >= OPEN_GAP
     gap_before = np.sum(before[counting] - 1.0, axis=0)
@@ -219,7 +219,7 @@ def closed_fraction_interval(reference: Gap, explained: Gap) -> tuple[float, flo
         return None
     with np.errstate(invalid="ignore"):
         before, after = (np.divide(*found.resampled) for found in (reference, explained))
-    drawn = _closed(reference, before, after)
+    drawn = _closed_fractions(reference, before, after)
     drawn = drawn[np.isfinite(drawn)]
     if not len(drawn):
         return None

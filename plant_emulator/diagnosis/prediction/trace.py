@@ -56,8 +56,8 @@ def traces(
             unit=run.units[k],
             time=run.time,
             measured=run.measured[k],
-            recalibrated=_simulated(run, k, first),
-            explained=_simulated(run, k, second),
+            recalibrated=_prediction(run, k, first),
+            explained=_prediction(run, k, second),
             noise=float(run.noise[k]),
         )
         for run, first, second in pairs
@@ -66,7 +66,7 @@ def traces(
     )
 
 
-def _simulated(run: MeasuredRun, channel: int, residual: Array) -> Array:
+def _prediction(run: MeasuredRun, channel: int, residual: Array) -> Array:
     """Prediction behind a whitened residual [unit]; NaN where a sample does not count.
 
     The prediction of a voltage contains the error of its sensor.

@@ -45,7 +45,7 @@ def from_json(document: Mapping[str, Any]) -> Answer:
         verdict=_verdict(document["verdict"]),
         location=_location(document["location"]),
         gap=_gap(document["gap"]),
-        ranking=tuple(_ranked(entry) for entry in document["ranking"]),
+        ranking=tuple(_ranked_effect(entry) for entry in document["ranking"]),
         undetectable=tuple(Undetectable(**entry) for entry in document["undetectable"]),
     )
 
@@ -123,7 +123,7 @@ def _gap(part: Mapping[str, Any]) -> HeldOutGap:
     )
 
 
-def _ranked(entry: Mapping[str, Any]) -> RankedEffect:
+def _ranked_effect(entry: Mapping[str, Any]) -> RankedEffect:
     sizes = [Quantity(**_numbers(p, "value", "standard_error")) for p in entry["parameters"]]
     return RankedEffect(**{**_numbers(entry, "evidence"), "parameters": tuple(sizes)})
 

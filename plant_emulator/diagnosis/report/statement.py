@@ -83,7 +83,9 @@ def _effects(
     terms: Terms,
     remainder: Remainder | None,
 ) -> str:
-    named = [_named(name, candidates[name], terms.get(name, ())) for name in decision.effects]
+    named = [
+        _describe_effect(name, candidates[name], terms.get(name, ())) for name in decision.effects
+    ]
     share = "" if closed is None else f"the held-out gap closes by {percent(closed)}"
     if remainder is not None:
         share = f"{describe_fall(remainder)}; {describe_band(remainder)}"
@@ -92,7 +94,7 @@ def _effects(
     return f"The machine has what the model lacks: {' and '.join(named)}{more}."
 
 
-def _named(name: str, candidate: Candidate, terms: Sequence[Quantity]) -> str:
+def _describe_effect(name: str, candidate: Candidate, terms: Sequence[Quantity]) -> str:
     """An effect, what it is, and its terms."""
     title = f"{candidate.title[:1].lower()}{candidate.title[1:]}"
     values = ", ".join(f"{number(t.value, 4)} {t.unit} {t.name}" for t in terms)

@@ -86,7 +86,7 @@ def _paragraph(text: str, width: int, most: int, label: str = "") -> list[str]:
     return [row.replace(UNBROKEN, " ") for row in rows]
 
 
-def _listed(
+def _list_items(
     items: Sequence[str], width: int, most: int, label: str, names: Sequence[str] = ()
 ) -> list[str]:
     """List as many items as fit into `most` lines, and the number of the others.
@@ -99,7 +99,7 @@ def _listed(
         if len(rows) <= most:
             return rows
     if names:
-        return _listed(names, width, most, label)
+        return _list_items(names, width, most, label)
     return _paragraph("; ".join(items), width, most, label) if items else []
 
 
@@ -154,7 +154,7 @@ def _beside(entry: RankedEffect, others: Sequence[str], width: int) -> list[str]
     """Other parameters of an accepted effect, and effects that are not separable from it."""
     more = [f"{own_name(p.name, entry.effect)} {size(p)}" for p in entry.parameters[1:]]
     alike = [f"not separable from {others[0]}", *others[1:]] if others else []
-    return _listed(more, width, 1, "  with") + _listed(alike, width, 1, "  class")
+    return _list_items(more, width, 1, "  with") + _list_items(alike, width, 1, "  class")
 
 
 def _shrinkage(gap: HeldOutGap, width: int) -> list[str]:
@@ -199,7 +199,9 @@ def _rest(answer: Answer, width: int) -> list[str]:
     verdict = answer.verdict
     deviations = [describe_deviation(p) for p in verdict.parameters]
     names = [p.name for p in verdict.parameters]
-    rows = _listed(deviations, width, 2 if verdict.kind == "parameter" else 1, "deviates", names)
+    rows = _list_items(
+        deviations, width, 2 if verdict.kind == "parameter" else 1, "deviates", names
+    )
     rows += _unseen(answer.undetectable, width, 1 if len(verdict.effects) > 1 else 2)
     return rows + _paragraph(verdict.next_experiment or "", width, 3, "next")
 
@@ -210,4 +212,4 @@ def _unseen(hidden: Sequence[Undetectable], width: int, most: int) -> list[str]:
     rows = _paragraph(reasons, width, most + 1, "unseen") if hidden else []
     if len(rows) <= most:
         return rows
-    return _listed([u.effect for u in hidden], width, most, "unseen")
+    return _list_items([u.effect for u in hidden], width, most, "unseen")

@@ -54,7 +54,7 @@ def parameter_set(
 def _of_runs(
     effect: Effect, states: Sequence[Mapping[str, float]], recordings: Sequence[Recording]
 ) -> dict[str, float]:
-    """Means over the runs of what every run has of its own of an effect, fitted or measured."""
+    """Means over the runs of an effect's values per run, fitted or measured."""
     own = {effect.name: effect.plausible()}
     told = [*states, *(with_logged_values(r, own).logged_values for r in recordings)]
     values = {

@@ -26,7 +26,7 @@ def test_columns_come_out_by_signal_in_si(tmp_path: Path) -> None:
 
 
 def test_what_is_not_there_is_named(tmp_path: Path) -> None:
-    assert read(log(tmp_path, f"{HEADER}\n{ROWS}")).missing() == [
+    assert read(log(tmp_path, f"{HEADER}\n{ROWS}")).missing_columns() == [
         "armature_current_A",
         "wheel_torque_Nm",
         "armature_voltage_V",

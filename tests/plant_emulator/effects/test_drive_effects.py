@@ -74,7 +74,7 @@ def test_filter_and_ramp_limit_act_one_after_the_other(nominal: ParameterSet) ->
 
 
 def test_jitter_is_spread_evenly_around_the_dead_time_and_stays_within_a_scan() -> None:
-    """Of an even spread over +-A the standard deviation is A / sqrt(3)."""
+    """The standard deviation of an even spread over +-A is A / sqrt(3)."""
     dead_time = effects.load("delay_jitter").laws["dead_time"]
     p = SimpleNamespace(
         delay_jitter_amplitude=0.004, delay_jitter_scan_period=0.01, delay_jitter_sequence=3.0

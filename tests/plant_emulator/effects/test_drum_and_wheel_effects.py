@@ -74,7 +74,7 @@ def test_imbalance_shows_in_the_torque_once_a_turn_of_the_drum(nominal: Paramete
 
 
 def test_slipping_wheel_passes_its_torque_on_later(nominal: ParameterSet) -> None:
-    """Of a step of the torque T the drum misses the momentum T tau, tau = c J_w r_d omega / r_w^2.
+    """After a step T of the torque the drum lacks momentum T tau, tau = c J_w r_d omega / r_w^2.
 
     At 4 rad/s, c = 2e-5 per newton and J_w = 4 kg m^2: tau = 7.0 ms.
     """

@@ -58,7 +58,7 @@ def test_friction_builds_up_exponentially_with_the_displacement(
 
 
 def test_small_displacement_meets_a_spring(nominal: ParameterSet) -> None:
-    """Of stiffness f_gc / z_s, within the curvature up to a tenth of z_s."""
+    """The spring has the stiffness f_gc / z_s, within the curvature up to a tenth of z_s."""
     pairs = [pair for pair in pushed(nominal, 1.0) if 0.02 * Z_S < pair[0] < 0.1 * Z_S]
     assert len(pairs) > 5
     for displacement, friction in pairs:

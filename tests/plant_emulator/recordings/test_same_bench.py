@@ -12,7 +12,7 @@ from plant_emulator.cli import main
 from plant_emulator.errors import LogError
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.same_bench import (
-    DIFFERENT_ERRORS,
+    BENCH_DIFFERENCE,
     EQUATION_ERROR,
     check_same_bench,
     scale_of,
@@ -82,7 +82,7 @@ def test_difference_of_a_sensors_scale_is_told_from_six_errors_on(
     bench_log: BenchLog, values: Mapping[str, float]
 ) -> None:
     log = bench_log("bench_practice/practice_002/program2")
-    limit = DIFFERENT_ERRORS * EQUATION_ERROR
+    limit = BENCH_DIFFERENCE * EQUATION_ERROR
     for scale, refused in ((0.9 * limit, False), (1.2 * limit, True)):
         signals = {**log.signals, "drum_speed": (1.0 + scale) * log["drum_speed"]}
         pair = [log, replace(log, signals=signals)]

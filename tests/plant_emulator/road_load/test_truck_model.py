@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant_emulator.road_load.kernel import compiled, predict_walk
+from plant_emulator.road_load.kernel import compile_loop, predict_walk
 from plant_emulator.road_load.random_walk_filter import whitener
 from plant_emulator.road_load.truck_model import RoadParameters, Truck, velocity
 
@@ -93,7 +93,7 @@ def test_predicted_walk_by_hand() -> None:
     """Gain 1/2: first 0, then half of 4, then 2 + half of (8 - 2), then 0 by standstill."""
     residual = np.array([[4.0], [8.0], [0.0], [0.0]])
     rests = np.array([False, False, False, True])
-    found = compiled(predict_walk)(residual, np.full(4, 0.5), rests)
+    found = compile_loop(predict_walk)(residual, np.full(4, 0.5), rests)
     assert found[:, 0].tolist() == [0.0, 2.0, 5.0, 0.0]
 
 

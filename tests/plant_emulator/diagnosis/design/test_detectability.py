@@ -12,8 +12,8 @@ from plant_emulator.cli import main
 from plant_emulator.diagnosis.design.detectability import (
     DetectionLimit,
     EffectDetectability,
+    allowed_factor,
     effect_detectability,
-    reached,
     smallest,
 )
 from plant_emulator.diagnosis.machines.bench_candidates import candidate
@@ -43,7 +43,7 @@ def test_effect_that_never_reaches_it_has_no_smallest_size() -> None:
     ],
 )
 def test_size_beyond_its_bound_was_not_tried(name: str, factor: float, left: float) -> None:
-    assert reached(candidate(effects.load(name)), factor) == pytest.approx(left)
+    assert allowed_factor(candidate(effects.load(name)), factor) == pytest.approx(left)
 
 
 def answer_of(name: str, smallest_: float, raw: float = 5.0) -> EffectDetectability:
