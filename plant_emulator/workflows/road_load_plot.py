@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from plant_emulator.errors import report_unwritable
 from plant_emulator.workflows.validation_plot import MEASURED, RESIDUAL, SIMULATED
 
 if TYPE_CHECKING:
@@ -33,4 +34,5 @@ def plot(fit: RoadFit, path: str | Path) -> None:
     lower.axhline(values.torque_offset, color="#999999", linewidth=0.5)
     lower.set_ylabel("motor torque [N m]")
     lower.set_xlabel("time of the velocity log [s]")
-    figure.savefig(path, dpi=120, format=Path(path).suffix.removeprefix(".") or "png")
+    with report_unwritable(path):
+        figure.savefig(path, dpi=120, format=Path(path).suffix.removeprefix(".") or "png")

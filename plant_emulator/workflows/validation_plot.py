@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from plant_emulator.errors import report_unwritable
 from plant_emulator.signals.log import COMPARED, VOLTAGE, Log, compared_channels
 
 if TYPE_CHECKING:
@@ -52,7 +53,8 @@ def draw_validation(pairs: Sequence[tuple[Log, Log]], path: str | Path) -> None:
         last.set_xlabel("time [s]")
         last.tick_params(labelbottom=True)
     axes[0][0].legend(loc="upper right")
-    figure.savefig(path, dpi=120, format=Path(path).suffix.removeprefix(".") or "png")
+    with report_unwritable(path):
+        figure.savefig(path, dpi=120, format=Path(path).suffix.removeprefix(".") or "png")
 
 
 def _draw(upper: Axes, lower: Axes, log: Log, simulation: Log, name: str) -> None:

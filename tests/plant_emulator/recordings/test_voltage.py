@@ -29,7 +29,7 @@ from plant_emulator.signals.log import COMPARED, VOLTAGE, Log, compared_channels
 from plant_emulator.simulation.sensor_noise import SENSORS, add_noise
 from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
 from plant_emulator.solver.kernel import kernel
-from plant_emulator.workflows.loading import with_common_voltage
+from plant_emulator.workflows.loading import load_recordings, with_common_voltage
 
 Reader = Callable[[str], Log]
 HEATING = "armature_resistance_heating"
@@ -134,6 +134,22 @@ def test_runs_have_their_voltage_all_or_none(bench_log: Reader, nominal: Paramet
     kept, notes = with_common_voltage(recordings[1:])
     assert all(VOLTAGE in r.channels for r in kept)
     assert notes == []
+
+
+def test_a_voltage_of_one_log_is_fitted_and_left_out_of_a_diagnosis(
+    bench_log: Reader, nominal: ParameterSet
+) -> None:
+    """A pooled fit uses it; a held-out run without it could not test what it shows."""
+    with_it = replace(driven(bench_log("bench_nominal/program1"), nominal), source="one.csv")
+    logs = [
+        with_it,
+        replace(without_voltage(bench_log("bench_nominal/program2")), source="two.csv"),
+    ]
+    pooled, _ = load_recordings(logs, nominal)
+    assert [r.channels for r in pooled] == [(*COMPARED, VOLTAGE), COMPARED]
+    common, notes = load_recordings(logs, nominal, common_channels=True)
+    assert [r.channels for r in common] == [COMPARED, COMPARED]
+    assert notes[-1].startswith("two.csv: no armature_voltage_V that can be used; it is left out")
 
 
 def test_what_the_sensor_may_be_off_by_weighs_no_more_than_its_prior(

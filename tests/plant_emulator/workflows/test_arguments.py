@@ -61,6 +61,7 @@ def test_a_missing_folder_is_an_input_error_with_the_file(tmp_path: Path) -> Non
     log, absent = pe.read_log(LOG), tmp_path / "absent"
     for write in (
         lambda: pe.write_log(log, absent / "run.csv"),
+        lambda: pe.validate(log).plot(absent / "fit.png"),
         lambda: pe.save_parameters(pe.load_parameters(), absent / "mine.toml"),
     ):
         with pytest.raises(pe.InputError, match=r"absent.*No such file or directory; a file that"):
