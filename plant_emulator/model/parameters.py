@@ -126,6 +126,10 @@ class ParameterSet:
     sensors: Mapping[str, Sensor] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Parameter:
+        """The parameter of that name; KeyError names those of the set."""
+        if name not in self.parameters:
+            known = ", ".join(self.parameters)
+            raise KeyError(f"{self.name}: no parameter {name!r}; known: {known}")
         return self.parameters[name]
 
     def __iter__(self) -> Iterator[Parameter]:
@@ -136,8 +140,8 @@ class ParameterSet:
         return f"<ParameterSet {self.name}: {len(self.parameters)} parameters{effects}>"
 
     def value(self, name: str) -> float:
-        """Value of one parameter [its unit]."""
-        return self.parameters[name].value
+        """Value of one parameter [its unit]; KeyError as for the parameter itself."""
+        return self[name].value
 
     def values(self) -> dict[str, float]:
         """All values by name [SI]."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar, cast
 
-from plant_emulator.errors import InputError
+from plant_emulator.errors import InputError, LogError
 from plant_emulator.signals.axis_log import AxisLog
 from plant_emulator.signals.log import Log
 
@@ -56,3 +56,10 @@ def check_count(name: str, value: object, least: int) -> None:
     """Raise InputError if the argument `name` is no whole number of at least `least`."""
     if not isinstance(value, int) or value < least:
         raise InputError(f"{name}={value!r}; a whole number of at least {least} is expected")
+
+
+def check_signals(log: Log, needed: Sequence[str]) -> None:
+    """Raise LogError if a log lacks one of these signals; a log file has been checked before."""
+    if missing := [name for name in needed if name not in log]:
+        known = ", ".join(log.signals)
+        raise LogError(f"{log.source}: no {', '.join(missing)}, which is needed; it has {known}")

@@ -18,6 +18,7 @@ from plant_emulator.recordings.preflight import NAMES, preflight
 from plant_emulator.recordings.recording import recording
 from plant_emulator.recordings.same_bench import check_same_bench
 from plant_emulator.signals.log import VOLTAGE, Log
+from plant_emulator.workflows.arguments import check_signals
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -67,6 +68,7 @@ def load_recordings(
     for source in sources:
         log = source if isinstance(source, Log) else logs.read(source)
         check_unlabelled(log)
+        check_signals(log, NEEDED)
         checked = preflight(log, parameters.value("gear_ratio"))
         taken.append(log)
         uses.append(checked.use)

@@ -21,7 +21,12 @@ from plant_emulator.simulation.sensor_noise import add_noise
 from plant_emulator.simulation.simulate import Hold, fit_start, inputs_of, values_of
 from plant_emulator.simulation.travel_program import simulate_travel
 from plant_emulator.solver.kernel import kernel
-from plant_emulator.workflows.arguments import check_count, check_reference, check_start
+from plant_emulator.workflows.arguments import (
+    check_count,
+    check_reference,
+    check_signals,
+    check_start,
+)
 
 if TYPE_CHECKING:
     from plant_emulator.simulation.programs import Program
@@ -117,7 +122,9 @@ def simulate_log(
     effect in `effects` keeps every value that is given.
 
     reference, start : see `simulate`
+    Raises LogError for a log without a speed reference.
     """
+    check_signals(log, ("speed_reference",))
     values = values_of(parameters, effects)
     own = {name: table for name, table in parameters.effects.items() if name not in effects}
     library = kernel().effects if own else {}

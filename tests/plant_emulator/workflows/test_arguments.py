@@ -4,11 +4,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import plant_emulator as pe
 
 LOG = Path(__file__).parents[2] / "data" / "bench_nominal" / "program1.csv.gz"
+LAME = pe.Log(np.arange(3.0), {"motor_speed": np.zeros(3)})
 LAG, SIZE = "torque_sensor_lag", "time_constant"
 
 
@@ -31,6 +33,8 @@ LAG, SIZE = "torque_sensor_lag", "time_constant"
         (lambda: pe.simulate("program1", effects={LAG: {SIZE: None}}), f"{SIZE}=None"),  # type: ignore[dict-item]
         (lambda: pe.simulate("program1", effects={LAG: {SIZE: "x"}}), f"{SIZE}='x'"),  # type: ignore[dict-item]
         (lambda: pe.simulate("program1", effects=f"{LAG}:{SIZE}=x"), f"{SIZE}='x'"),
+        (lambda: pe.simulate(LAME), "log: no speed_reference"),
+        (lambda: pe.identify(LAME), "log: no speed_reference, drum_speed, shaft_torque"),
         (lambda: pe.identify_truck("a.csv", "b.csv", mass=3640.0), "a.csv: no such file"),
     ],
 )
@@ -71,3 +75,8 @@ def test_a_missing_folder_is_an_input_error_with_the_file(tmp_path: Path) -> Non
 def test_an_unknown_signal_is_told_with_those_of_the_log() -> None:
     with pytest.raises(KeyError, match=r"no signal 'torque'; known: .*shaft_torque"):
         pe.read_log(LOG)["torque"]
+
+
+def test_an_unknown_parameter_is_told_with_those_of_the_set() -> None:
+    with pytest.raises(KeyError, match=r"no parameter 'drum'; known: .*drum_inertia"):
+        pe.load_parameters().value("drum")
