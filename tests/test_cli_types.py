@@ -14,7 +14,18 @@ from register_maps.command_line import parameters
 
 DATA = Path(__file__).parent / "data" / "bench_nominal"
 FOLDERS = {"gateway": gateway.cli.main, "plant_emulator": plant_emulator.cli.main}
-OUTPUTS = {"--csv", "--json", "--log", "--out", "--plot", "--report", "--save", "--table", "--to"}
+OUTPUTS = {
+    "--csv",
+    "--json",
+    "--log",
+    "--out",
+    "--plot",
+    "--report",
+    "--next-program",
+    "--save",
+    "--table",
+    "--to",
+}
 
 
 def leaves(group: click.Group, path: tuple[str, ...]) -> Iterator[tuple[str, click.Command]]:

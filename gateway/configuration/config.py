@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any, get_type_hints
 
 from gateway.configuration.keys import keys, read_value
+from gateway.configuration.program import Program, document_of, read_program
 from gateway.configuration.sections import (
     SECTIONS,
     BenchConfig,
@@ -23,7 +24,7 @@ from gateway.configuration.sections import (
     RegulatorConfig,
     TruckConfig,
 )
-from gateway.configuration.sweep_speeds import Sweep, read_sweep
+from gateway.configuration.sweep_speeds import read_sweep
 from gateway.errors import ConfigError
 from gateway.friction import THESIS, read_friction
 
@@ -31,7 +32,8 @@ __all__ = ["BenchConfig", "Config", "config_hash", "from_document", "merge"]
 
 Document = dict[str, dict[str, Any]]
 Place = Callable[[str, str], str]
-SWEEP = "sweep"
+PROGRAMS = {"sweep": read_sweep, "program": read_program}
+"""Tables that ask for a program, and what reads them."""
 
 
 def _defaults() -> Document:
@@ -47,7 +49,7 @@ def _defaults() -> Document:
 class Config:
     """Configuration of the gateway in SI. Change it by `with_values`, which keeps `document` true.
 
-    sweep : steady speeds to hold instead of a road load; None: road load
+    program : steps to go through instead of a road load; None: road load
     document : sections, keys and values as in a file, with every default; can be written as JSON
     """
 
@@ -58,12 +60,16 @@ class Config:
     regulator: RegulatorConfig = field(default_factory=RegulatorConfig)
     limits: LimitsConfig = field(default_factory=LimitsConfig)
     recording: RecordingConfig = field(default_factory=RecordingConfig)
-    sweep: Sweep | None = None
+    program: Program | None = None
     document: Document = field(default_factory=_defaults)
 
     def with_values(self, values: Mapping[str, object]) -> "Config":
         """Configuration with some values changed, `{"truck.load_kg": 1600}`; see `merge`."""
         return from_document(merge(self.document, values), place=_set_place)
+
+    def with_program(self, program: Program) -> "Config":
+        """Configuration that goes through a program instead of a road load."""
+        return from_document({**self.document, "program": document_of(program)})
 
 
 def merge(document: Document, values: Mapping[str, object]) -> Document:
@@ -91,8 +97,8 @@ def from_document(document: Mapping[str, Any], *, place: Place = _set_place) -> 
     written = _defaults()
     sections: dict[str, Any] = {}
     for name, entries in document.items():
-        if name == SWEEP:
-            sections[name] = read_sweep(entries, place(name, "").rstrip(" ."))
+        if name in PROGRAMS:
+            sections["program"] = PROGRAMS[name](entries, place(name, "").rstrip(" ."))
             written[name] = dict(entries)
             continue
         if name not in SECTIONS or not isinstance(entries, Mapping):

@@ -1,14 +1,12 @@
-"""The steady speeds of a sweep, and their reading from a document (pure).
+"""The steady speeds of a sweep in a document, as a program (pure).
 
-A configuration with a `sweep` makes the gateway hold these speeds in turn instead of a road load.
-The measurement of losses puts it there, so that the recording shows which speeds were asked for.
+The measurement of losses puts a `sweep` into its configuration: speeds that are held in turn.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any, Final
 
+from gateway.configuration.program import Program, Ramp
 from gateway.errors import ConfigError
 from register_maps.units import RPM
 
@@ -20,29 +18,8 @@ HOLD_S: Final = 8.0
 RATE_RPM_S: Final = 300.0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Sweep:
-    """A sweep of steady motor speeds.
-
-    speeds : in their order [rad/s]
-    hold : time for which each speed is held [s]
-    rate : slope from one speed to the next [rad/s^2]
-    """
-
-    speeds: tuple[float, ...]
-    hold: float
-    rate: float
-
-    @property
-    def duration(self) -> float:
-        """Duration of the sweep from standstill to standstill [s]."""
-        stops = (0.0, *self.speeds, 0.0)
-        ways = sum(abs(to - since) for since, to in pairwise(stops))
-        return ways / self.rate + self.hold * len(self.speeds)
-
-
-def read_sweep(table: object, place: str) -> Sweep:
-    """Sweep in a table with speeds_rpm, hold_s, rate_rpm_s. Raises ConfigError."""
+def read_sweep(table: object, place: str) -> Program:
+    """Program of a table with speeds_rpm, hold_s, rate_rpm_s. Raises ConfigError."""
     if not isinstance(table, Mapping) or set(table) != {"speeds_rpm", *RANGES}:
         wanted = ", ".join(("speeds_rpm", *RANGES))
         raise ConfigError("no sweep", place=place, value=table, expected=f"a table with {wanted}")
@@ -50,13 +27,11 @@ def read_sweep(table: object, place: str) -> Sweep:
     if not isinstance(speeds, list) or not speeds:
         where = f"{place}.speeds_rpm"
         raise ConfigError("no speeds", place=where, value=speeds, expected="a list of rpm")
-    return Sweep(
-        speeds=tuple(
-            RPM * _number(f"{place}.speeds_rpm", one, SLOWEST_RPM, FASTEST_RPM) for one in speeds
-        ),
-        hold=_number(f"{place}.hold_s", table["hold_s"], *RANGES["hold_s"]),
-        rate=RPM * _number(f"{place}.rate_rpm_s", table["rate_rpm_s"], *RANGES["rate_rpm_s"]),
-    )
+    found = [_number(f"{place}.speeds_rpm", one, SLOWEST_RPM, FASTEST_RPM) for one in speeds]
+    hold = _number(f"{place}.hold_s", table["hold_s"], *RANGES["hold_s"])
+    rate = RPM * _number(f"{place}.rate_rpm_s", table["rate_rpm_s"], *RANGES["rate_rpm_s"])
+    steps = [Ramp(speed=RPM * speed, rate=rate, hold=hold) for speed in found]
+    return Program(name="sweep", steps=(*steps, Ramp(speed=0.0, rate=rate, hold=0.0)))
 
 
 def _number(place: str, value: Any, low: float, high: float) -> float:

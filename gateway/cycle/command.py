@@ -158,8 +158,8 @@ def next_command(
 
 
 def run_mode(config: Config) -> Mode:
-    """Mode of the PLC for a run: road load; for a sweep without a truck: speed."""
-    return Mode.ROAD_LOAD if config.sweep is None else Mode.SPEED
+    """Mode of the PLC for a run: road load; for a program without a truck: speed."""
+    return Mode.ROAD_LOAD if config.program is None else Mode.SPEED
 
 
 def is_confirmed(config: Config, status: Status) -> bool:

@@ -15,7 +15,7 @@ from typing import Any, cast
 
 from gateway import regulators
 from gateway.configuration.config import Config
-from gateway.cycle import command, limits, samples, sweep
+from gateway.cycle import command, limits, program, samples
 from gateway.cycle.checks import check
 from gateway.cycle.command import Command
 from gateway.cycle.limits import Limit, Limited, Limits
@@ -62,6 +62,7 @@ class Output:
     demand : motor speed that the regulator wants, before the limits [rad/s]; None: no sample yet
     state, reason : of the supervisor; why the last run ended or the bench cannot be armed
     age : of the newest sample [s], None: no sample yet
+    finished : the program of the configuration has come to its end
     """
 
     setpoint: Setpoint | None
@@ -69,6 +70,7 @@ class Output:
     state: State
     reason: Reason | None
     age: float | None
+    finished: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,9 +116,9 @@ def initial(config: Config, register_map: RegisterMap) -> CycleState:
 
 
 def _regulator(config: Config) -> Regulator:
-    """The regulator that makes the demand: the configured one, or the sweep of a configuration."""
-    if config.sweep is not None:
-        return cast("Regulator", sweep)
+    """What makes the demand: the configured regulator, or the program of the configuration."""
+    if config.program is not None:
+        return cast("Regulator", program)
     return regulators.load(config.regulator.name)
 
 
@@ -143,7 +145,14 @@ def step(
         state=supervisor.state,
         reason=supervisor.reason,
         age=None if read.newest is None else read.age(now),
+        finished=_is_finished(config, state),
     )
+
+
+def _is_finished(config: Config, state: CycleState) -> bool:
+    if config.program is None or state.regulator is None:
+        return False
+    return state.supervisor.state is State.RUN and program.is_over(state.params, state.regulator)
 
 
 def _facts(config: Config, state: CycleState, observation: Observation) -> Facts:

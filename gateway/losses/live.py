@@ -1,20 +1,13 @@
-"""A sweep of steady speeds as a run of the daemon: its configuration, and its end (pure)."""
+"""The configuration of a sweep of steady speeds (pure)."""
 
 from collections.abc import Sequence
-from typing import Final
 
 from gateway.configuration import sweep_speeds
 from gateway.configuration.config import Config, from_document
-from gateway.configuration.sweep_speeds import HOLD_S, RATE_RPM_S, Sweep
-from gateway.cycle.cycle import Output
-from gateway.cycle.supervisor import State
+from gateway.configuration.sweep_speeds import HOLD_S, RATE_RPM_S
 from gateway.errors import ConfigError
 from gateway.losses.fit import FEWEST, SPREAD, count_speeds
 from register_maps.units import RPM
-
-ENDED: Final = (State.RAMPDOWN, State.SAFE)
-BEGUN: Final = 0.5
-"""Share of the first speed that shows that the sweep has begun; before, the bench only stood."""
 
 
 def sweep_config(config: Config, speeds: Sequence[float] | None, hold: float | None) -> Config:
@@ -52,23 +45,3 @@ def _refuse(speeds: Sequence[float], highest: float) -> None:
             value=ordered[-1],
             expected=f"at most limits.speed_max_rpm = {highest:.0f}",
         )
-
-
-class Progress:
-    """Progress of a sweep; called with the output of every tick.
-
-    done : the sweep was completed
-    """
-
-    def __init__(self, sweep: Sweep) -> None:
-        self._first = BEGUN * sweep.speeds[0]
-        self._begun = self.done = False
-
-    def __call__(self, output: Output) -> bool:
-        """Whether the run is over: the sweep is at standstill again, or the run has ended early."""
-        if output.state in ENDED:
-            return True
-        if output.state is State.RUN and output.demand is not None:
-            self._begun = self._begun or output.demand > self._first
-            self.done = self._begun and output.demand == 0.0
-        return self.done

@@ -30,6 +30,7 @@ def header(
         "map_hash": register_map.source_hash,
         "map_text": map_text(config.plc.map),
         "config": config.document,
+        "program": config.program and [config.program.name, config.program.duration],
         "config_hash": config_hash(config),
         "read_count": register_map.measurement.count,
         "write_count": register_map.command.count,

@@ -12,9 +12,11 @@ from typing import Any, Final, Self
 import numpy as np
 from rich.console import Console
 from rich.live import Live
+from rich.progress_bar import ProgressBar
 from rich.table import Table
 
 from gateway.cycle.record import NOTHING, SHADOW, Layout
+from gateway.cycle.supervisor import State
 from register_maps.units import RPM
 
 
@@ -25,6 +27,7 @@ class View:
         self._header = header
         self._type = np.dtype(layout.formats)
         self._shown: tuple[int, int] | None = None
+        self._began = math.inf
         self._console = Console(highlight=False, soft_wrap=True)
         self._live = Live(console=self._console, auto_refresh=False, transient=True)
 
@@ -34,7 +37,9 @@ class View:
         for record in records:
             self._line(record)
         if self._live.is_started and len(records):
-            self._live.update(status_table(self._header, records[-1]), refresh=True)
+            table = status_table(self._header, records[-1])
+            add_progress(table, self._header, float(records[-1]["now"]) - self._began)
+            self._live.update(table, refresh=True)
 
     def __enter__(self) -> Self:
         if sys.stdout.isatty():
@@ -46,6 +51,8 @@ class View:
 
     def _line(self, record: np.void) -> None:
         current = (int(record["state"]), int(record["reason"]))
+        if record["state"] == State.RUN:
+            self._began = min(self._began, float(record["now"]))
         if current != self._shown:
             self._shown = current
             self._console.print(state_line(self._header, record), markup=False)
@@ -80,6 +87,15 @@ def status_table(header: dict[str, Any], record: np.void) -> Table:
         table.add_row(label, show(value) if math.isfinite(value) else "-")
     table.add_row("missed deadlines", str(record["missed"]))
     return table
+
+
+def add_progress(table: Table, header: dict[str, Any], time: float) -> None:
+    """Add the progress of the run's program; time : since the begin of the run [s]."""
+    if header.get("program"):
+        name, duration = header["program"]
+        done = min(max(time, 0.0), duration)
+        table.add_row(name, ProgressBar(total=duration, completed=done, width=24))
+        table.add_row("", f"{done:.0f} of {duration:.0f} s")
 
 
 ROWS: Final[tuple[tuple[str, str, Callable[[float], str]], ...]] = (

@@ -2,22 +2,15 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Final
 
-import register_maps
 from gateway.configuration.config import Config
-from gateway.errors import ConfigError, GatewayError
+from gateway.errors import GatewayError
 from gateway.losses.fit import Fit, fit
-from gateway.losses.live import Progress, sweep_config
+from gateway.losses.live import sweep_config
 from gateway.losses.result import Losses, Source
 from gateway.losses.sections import LeftOut, LossesError, Section, steady
 from gateway.recordings import steady_runs
-from gateway.review.review import review
-from gateway.runtime import daemon
-from register_maps.register_map import RegisterMap
-
-CONCERNS: Final = ("loop.", "plc.", "limits.watchdog", "regulator.torque")
-"""Places of a configuration whose errors also forbid a run without a truck."""
+from gateway.workflows.live_program import run_program
 
 
 def measure_losses(files: Sequence[Path], config: Config | None = None) -> Losses:
@@ -76,25 +69,13 @@ def run_sweep(
     did not come to its end.
     """
     swept = sweep_config(config, speeds, hold)
-    register_map = register_maps.load(swept.plc.map)
-    _refuse_errors(swept, register_map)
-    assert swept.sweep is not None
+    assert swept.program is not None
     report(
-        f"no truck on the drum; {len(swept.sweep.speeds)} speeds, "
-        f"{swept.sweep.duration:.0f} s from the moment in which the PLC is switched to remote"
+        f"no truck on the drum; {len(swept.program.steps) - 1} speeds, "
+        f"{swept.program.duration:.0f} s from the moment in which the PLC is switched to remote"
     )
-    progress = Progress(swept.sweep)
-    ended = daemon.run(swept, register_map, view=view, over=progress)
+    ended = run_program(swept, view=view)
     report(f"recording: {ended.recording}")
-    if not progress.done:
-        why = ended.reason.text if ended.reason is not None else "stopped by the operator"
-        raise GatewayError(f"the sweep did not come to its end: {why}; see {ended.recording}")
+    if not ended.completed:
+        raise GatewayError(f"the sweep did not come to its end: {ended.why}; see {ended.recording}")
     return ended.recording
-
-
-def _refuse_errors(config: Config, register_map: RegisterMap) -> None:
-    for one in review(config, register_map).errors:
-        if one.where.startswith(CONCERNS):
-            raise ConfigError(
-                one.what, place=one.where, value=str(one.value), expected=str(one.allowed)
-            )

@@ -61,6 +61,11 @@ Examples:
     "--save", type=OutputFile(), help="Write the parameter set with the accepted effects."
 )
 @click.option("--report", type=OutputFile(), help="Write a report as one HTML file.")
+@click.option(
+    "--next-program",
+    type=OutputFile(),
+    help="Write the next experiment as a drive program (CSV) for `gateway drive`.",
+)
 @_options.json_file
 def command(
     logs: tuple[str, ...],
@@ -74,6 +79,7 @@ def command(
     scheduler: str | None,
     save: str | None,
     report: str | None,
+    next_program: str | None,
     json_file: str | None,
 ) -> None:
     """Diagnose the gap that LOGs show against the model.
@@ -107,6 +113,8 @@ def command(
         _save(found, save, effect_files)
     if report:
         found.write_report(report)
+    if next_program:
+        _write_next_program(found, next_program)
     if json_file:
         _options.write_json(found.to_json(), json_file)
     if json_file != "-":
@@ -116,11 +124,24 @@ def command(
 def _refuse_options_of_the_bench() -> None:
     """Refuse options that a single axis would ignore."""
     given = click.get_current_context().get_parameter_source
-    options = {"save": "--save", "effect_files": "--effects"}
+    options = {"save": "--save", "next_program": "--next-program", "effect_files": "--effects"}
     options |= {"parameters": "--parameters", "reference": "--reference"}
     for name, option in options.items():
         if given(name) is not ParameterSource.DEFAULT:
             raise click.UsageError(f"{option} belongs to --model bench")
+
+
+def _write_next_program(found: Diagnosis, path: str) -> None:
+    """Write the next experiment as a drive program, or note why there is none."""
+    from plant_emulator.errors import ParameterError
+    from plant_emulator.workflows.next_program import write_next_program
+
+    try:
+        words = write_next_program(found.answer.verdict.next_experiment, path)
+    except ParameterError as error:
+        click.echo(f"note: {path} not written: {error}", err=True)
+    else:
+        click.echo(f"note: {path}: {words}; gateway drive {path} -c CONFIG", err=True)
 
 
 def _save(found: Diagnosis, path: str, effect_files: tuple[str, ...]) -> None:

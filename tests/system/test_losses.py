@@ -44,13 +44,13 @@ def sweep(folder: Path, parameters: Path, period_ms: int) -> Path:
     with EmulatorProcess(parameters=str(parameters), truck_mass=None, speed=None) as emulator:
         set_up = {"plc.port": str(emulator.port), "loop.period_ms": str(period_ms)}
         config = sweep_config(Config().with_values(set_up), speeds=None, hold=None)
-        assert config.sweep is not None
+        assert config.program is not None
         session = Session(
             config=config,
             file=folder / "sweep.toml",
             emulator=emulator,
             screen=Screen(Console(quiet=True), "", 1.0),
-            duration=config.sweep.duration + 1.0,
+            duration=config.program.duration + 1.0,
         )
         return operate_fast(session).recording
 

@@ -9,8 +9,9 @@ import pytest
 from gateway.configuration.config import Config, from_document
 from gateway.cycle.supervisor import State
 from gateway.errors import ConfigError
-from gateway.losses.live import Progress, sweep_config
+from gateway.losses.live import sweep_config
 from gateway.reasons import Reason
+from gateway.workflows.live_program import Progress
 from register_maps.signals import Mode, PlcState, Status
 from tests.gateway.closed_loop import ClosedLoop
 
@@ -40,12 +41,12 @@ def test_each_speed_is_held_for_its_time_one_after_the_other():
 def test_duration_is_that_of_holds_and_ramps():
     """4 holds of 4 s; 200 + 200 + 100 + 300 + 600 rpm at 300 rpm/s."""
     config = sweep_config(Config(), SPEEDS, hold=4.0)
-    assert config.sweep.duration == pytest.approx(16.0 + 1400.0 / 300.0)
-    loop, progress = started(config), Progress(config.sweep)
+    assert config.program.duration == pytest.approx(16.0 + 1400.0 / 300.0)
+    loop, progress = started(config), Progress()
     before = len(loop.outputs)
     while not progress(loop.last):
         loop.run(0.01)
-    assert (len(loop.outputs) - before) * 0.01 == pytest.approx(config.sweep.duration, abs=0.3)
+    assert (len(loop.outputs) - before) * 0.01 == pytest.approx(config.program.duration, abs=0.3)
     assert progress.done
 
 
@@ -68,7 +69,7 @@ def test_a_plc_that_goes_into_road_load_ends_the_sweep():
 
 def test_the_operator_ends_it_by_a_ramp_down_and_it_is_not_done():
     config = sweep_config(Config(), SPEEDS, hold=4.0)
-    loop, progress = started(config), Progress(config.sweep)
+    loop, progress = started(config), Progress()
     loop.run(3.0)
     assert not progress(loop.last)
     loop.operate(remote=False)
@@ -88,13 +89,16 @@ def test_the_limits_have_the_last_word():
 
 def test_usual_speeds_stay_under_the_limit():
     config = sweep_config(Config().with_values({"limits.speed_max_rpm": "3000"}), None, None)
-    assert [round(one / RPM) for one in config.sweep.speeds] == [200, 400, 800, 1400, 2100, 2900]
+    assert [round(step.speed / RPM) for step in config.program.steps] == [
+        *(200, 400, 800, 1400, 2100, 2900),
+        0,
+    ]
 
 
 def test_a_configuration_with_a_sweep_survives_its_document():
     config = sweep_config(Config(), SPEEDS, hold=4.0)
     assert from_document(config.document) == config
-    assert Config().sweep is None
+    assert Config().program is None
 
 
 @pytest.mark.parametrize(

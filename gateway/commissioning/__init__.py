@@ -1,0 +1,1 @@
+"""From a running bench to one that can be believed: programs, and what their runs show (pure)."""

@@ -1,0 +1,65 @@
+"""Files of drive programs: CSV with a time and a motor speed in each row.
+
+    time_s,speed_rpm,dwell_s
+    0,0,2
+    5,1500,10
+    8,0,0
+
+The speed is linear between the rows. `time_s` begins at 0 and increases. `dwell_s` is optional: for
+so long the speed of the row is held, which delays all later rows. The speed is `speed_rpm`, or
+`speed_reference_rad_s` as in a log, so that the reference of a log can be driven again.
+"""
+
+import csv
+import gzip
+import math
+from pathlib import Path
+from typing import Final
+
+from gateway.commissioning.drive import Point
+from gateway.errors import ConfigError
+from register_maps.units import RPM
+
+TIME, DWELL = "time_s", "dwell_s"
+SPEEDS: Final = {"speed_rpm": RPM, "speed_reference_rad_s": 1.0}
+"""Column of the speed, and its factor to rad/s."""
+
+
+def read(path: Path) -> list[Point]:
+    """Points of the program in a file, time from 0. Raises ConfigError with file and line."""
+    rows = csv.DictReader(_text(path).splitlines())
+    header = rows.fieldnames or []
+    speed = next((name for name in SPEEDS if name in header), None)
+    if TIME not in header or speed is None:
+        expected = f"columns {TIME} and {' or '.join(SPEEDS)}"
+        raise ConfigError("no program", file=path, value=",".join(header), expected=expected)
+    points = [
+        Point(
+            time=_number(path, number, TIME, row[TIME]),
+            speed=SPEEDS[speed] * _number(path, number, speed, row[speed]),
+            dwell=max(0.0, _number(path, number, DWELL, row.get(DWELL) or "0")),
+        )
+        for number, row in enumerate(rows, 2)
+    ]
+    start = points[0].time if points else 0.0
+    return [Point(time=one.time - start, speed=one.speed, dwell=one.dwell) for one in points]
+
+
+def _text(path: Path) -> str:
+    try:
+        content = path.read_bytes()
+        return (gzip.decompress(content) if path.suffix == ".gz" else content).decode()
+    except (OSError, UnicodeDecodeError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        raise ConfigError(why, file=path, expected="a drive program (CSV)") from error
+
+
+def _number(path: Path, line: int, column: str, text: str | None) -> float:
+    try:
+        value = float(text or "")
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        place = f"line {line}: {column}"
+        raise ConfigError("bad value", file=path, place=place, value=text, expected="a number")
+    return value
