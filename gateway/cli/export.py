@@ -8,7 +8,7 @@ import click
 from gateway.errors import ConfigError
 from gateway.recordings import log_writer, recording
 from gateway.recordings.export import Export, Extent
-from register_maps.command_line.parameters import Command, OutputFile
+from register_maps.command_line.parameters import Command, Number, OutputFile
 
 EXAMPLE = """
 \b
@@ -32,8 +32,8 @@ Example:
     is_flag=True,
     help="every tick by the gateway's clock, also those without a valid sample",
 )
-@click.option("--from", "begin", type=float, metavar="S", help="first time_s of the log")
-@click.option("--to-time", "end", type=float, metavar="S", help="last time_s of the log")
+@click.option("--from", "begin", type=Number(), metavar="S", help="first time_s of the log")
+@click.option("--to-time", "end", type=Number(), metavar="S", help="last time_s of the log")
 def command(
     file: Path, target: Path, begin: float | None, end: float | None, *, every: bool
 ) -> None:
