@@ -31,7 +31,21 @@ Examples:
 @click.option(
     "--set", "values", multiple=True, metavar="KEY=VALUE", help="change a value of the file"
 )
-def command(config: Path, *, shadow: bool, duration: float | None, values: tuple[str, ...]) -> int:
+@click.option(
+    "--log-format",
+    type=click.Choice(["text", "json"]),
+    default="text",
+    show_default=True,
+    help="form of the dated lines, one for each change of state or reason",
+)
+def command(
+    config: Path,
+    *,
+    shadow: bool,
+    duration: float | None,
+    values: tuple[str, ...],
+    log_format: str,
+) -> int:
     """Run until Ctrl-C or SIGTERM, then ramp down and close the recording.
 
     Exit code 0: the operator ended the run; 1: a fault of PLC or gateway ended it, or the PLC was
@@ -46,7 +60,9 @@ def command(config: Path, *, shadow: bool, duration: float | None, values: tuple
         click.echo(f"{'warning' if shadow else 'error'}: {config}: {line}; see {check}", err=True)
     if refused and not shadow:
         return 2
-    ended = daemon.run(settings, register_map, shadow=shadow, duration=duration)
+    ended = daemon.run(
+        settings, register_map, shadow=shadow, duration=duration, log_format=log_format
+    )
     click.echo(report(ended))
     return 0 if ended.reason is None else 1
 

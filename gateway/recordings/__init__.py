@@ -1,1 +1,1 @@
-"""Files of runs: recorder process and its screen, recordings, header, export, logs."""
+"""Files of runs: recorder process, recordings, header, export, logs."""

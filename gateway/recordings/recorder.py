@@ -1,4 +1,4 @@
-"""The recorder: a process that takes records from a pipe, appends them to the file and shows them.
+"""The recorder: a process that takes records from a pipe and appends them to the file.
 
 The loop writes each record into the pipe without waiting. A record is smaller than PIPE_BUF, so
 that it enters whole or not at all; a record that does not enter is counted. When the loop ends in
@@ -13,8 +13,8 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from io import FileIO
 from multiprocessing.connection import Connection
@@ -24,7 +24,6 @@ from typing import Any, Final
 from gateway.cycle.record import Layout
 from gateway.errors import GatewayError
 from gateway.recordings.recording import RecordingError, encode_header
-from gateway.recordings.screen import View
 
 BATCH: Final = 0.05
 """[s] Period of writing to the file."""
@@ -36,12 +35,11 @@ PIPE_SIZE: Final = 1 << 20
 
 @dataclass(frozen=True, kw_only=True)
 class Job:
-    """Task of the recorder's process: file, header, layout, and whether to show the run."""
+    """Task of the recorder's process: file, header and layout."""
 
     path: Path
     header: dict[str, Any]
     layout: Layout
-    view: bool = False
 
 
 class Recorder:
@@ -104,21 +102,18 @@ def record(receiver: Connection, job: Job) -> None:
     """Run the recorder's process: append every record until the loop closes its end."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    view = View(job.header, job.layout) if job.view else nullcontext(_show_nothing)
-    with view as show:
-        try:
-            _append(receiver, job, show)
-        except OSError as error:
-            # The broken pipe makes the loop ramp down; `close` turns the number into words.
-            sys.exit(error.errno)
+    try:
+        _append(receiver, job)
+    except OSError as error:
+        # The broken pipe makes the loop ramp down; `close` turns the number into words.
+        sys.exit(error.errno)
 
 
-def _append(receiver: Connection, job: Job, show: Callable[[bytes], None]) -> None:
+def _append(receiver: Connection, job: Job) -> None:
     with job.path.open("ab", buffering=0) as file:
         synced = time.monotonic()
         for batch in _batches(receiver.fileno(), job.layout.size):
             _write(file, batch)
-            show(batch)
             if time.monotonic() - synced > SYNC:
                 os.fdatasync(file.fileno())
                 synced = time.monotonic()
@@ -155,7 +150,3 @@ def _create(job: Job) -> None:
             file=job.path,
             expected="[recording] dir that can be written",
         ) from error
-
-
-def _show_nothing(batch: bytes) -> None:
-    """Show no record."""

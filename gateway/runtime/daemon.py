@@ -1,18 +1,20 @@
-"""The whole gateway: link, loop, recorder, and the signals that stop it.
+"""The whole gateway: link, loop, recorder, what shows the run, and the signals that stop it.
 
 The loop runs in the calling process, for which real time is requested. The recorder has a process
-of its own. The first SIGINT or SIGTERM asks for a ramp-down. A second one ends the process at once,
-and the PLC's watchdog ramps down.
+of its own, and so has the terminal. The terminal reads the status block, which every tick renews.
+The first SIGINT or SIGTERM asks for a ramp-down. A second one ends the process at once, and the
+PLC's watchdog ramps down.
 """
 
+import os
 import signal
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, closing, contextmanager, nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from gateway.configuration.config import Config
 from gateway.cycle.cycle import Output
@@ -20,15 +22,18 @@ from gateway.cycle.record import Layout
 from gateway.cycle.supervisor import State
 from gateway.errors import GatewayError
 from gateway.link.plc import TcpLink
+from gateway.monitoring import terminal
+from gateway.monitoring.block import BY_OPERATOR
+from gateway.monitoring.shared import Publisher
 from gateway.reasons import Reason
 from gateway.recordings.header import header
 from gateway.recordings.recorder import Job, Recorder
 from gateway.recordings.recording import SUFFIX
+from gateway.runtime.companion import Companion
 from gateway.runtime.loop import Loop, MonotonicClock
 from gateway.runtime.realtime import real_time
 from register_maps.register_map import RegisterMap
 
-BY_OPERATOR: Final = frozenset({Reason.STOP_REQUESTED, Reason.REMOTE_OFF})
 AT_FAULT: Final = frozenset({State.CONNECT, State.ARMED, State.RAMPDOWN, State.SAFE})
 """States whose reason is a fault of the PLC; in ARMED it is a command that does not arrive."""
 SECOND_SIGNAL_AFTER: Final = 1.0
@@ -84,11 +89,13 @@ def run(
     shadow: bool = False,
     duration: float | None = None,
     view: bool = True,
+    log_format: str = "text",
     over: Callable[[Output], bool] = _never,
 ) -> RunResult:
     """Run the gateway until a signal, for a duration [s], or until `over` holds after a tick.
 
     shadow : write nothing; view : show the run on standard output
+    log_format : form of its lines, one of gateway.monitoring.lines.LINES
     """
     link = TcpLink(config.plc.host, config.plc.port, config.plc.unit, config.plc.timeout)
     granted = real_time() if config.loop.realtime else nullcontext("not asked for")
@@ -96,23 +103,35 @@ def run(
         started = time.monotonic()
         stop = _Stop(None if duration is None else started + duration)
         head = header(config, register_map, started=started, shadow=shadow, real_time=real)
-        with _signals(stop):
-            recorder = Recorder(
-                Job(path=_new_file(config), header=head, layout=Layout.of(register_map), view=view)
+        job = Job(path=_new_file(config), header=head, layout=Layout.of(register_map))
+        with _signals(stop), closing(Recorder(job)) as recorder, ExitStack() as beside:
+            publisher = beside.enter_context(Publisher(_identity(job)))
+            if view:
+                screen = Companion("screen", terminal.show_run, publisher.path, log_format)
+                beside.enter_context(closing(screen))
+            loop = Loop(
+                config=config,
+                register_map=register_map,
+                link=link,
+                sink=recorder,
+                clock=MonotonicClock(),
+                shadow=shadow,
+                observe=publisher,
             )
-            try:
-                loop = Loop(
-                    config=config,
-                    register_map=register_map,
-                    link=link,
-                    sink=recorder,
-                    clock=MonotonicClock(),
-                    shadow=shadow,
-                )
-                loop.run(lambda: stop() or _is_over(loop, over))
-            finally:
-                recorder.close()
+            loop.run(lambda: stop() or _is_over(loop, over))
     return _result(loop, recorder, real)
+
+
+def _identity(job: Job) -> dict[str, Any]:
+    """What the status tells about this daemon besides the values of its ticks."""
+    return {
+        "pid": os.getpid(),
+        "title": job.header["title"],
+        "date": job.header["date"],
+        "period": job.header["config"]["loop"]["period_ms"] * 1e-3,
+        "version": job.header["versions"]["gateway"],
+        "recording": str(job.path),
+    }
 
 
 def _new_file(config: Config) -> Path:

@@ -87,9 +87,14 @@ class Writing:
     fault: Reason | None = None
 
 
+def _ignore(_: Tick) -> None:
+    """Show no tick."""
+
+
 class Loop:
     """One run of the gateway against one PLC.
 
+    observe : is called with every tick after its write; may not wait
     before_stop : the last output before a stop was requested, None: there was none
     latency, lateness : histograms of all ticks
     cycles, missed : count of ticks and of missed deadlines
@@ -106,9 +111,11 @@ class Loop:
         sink: Sink,
         clock: Clock,
         shadow: bool = False,
+        observe: Callable[[Tick], object] = _ignore,
     ) -> None:
         self._config, self._map, self._link = config, register_map, link
         self._sink, self._clock, self._shadow = sink, clock, shadow
+        self._observe = observe
         self._function = READ_INPUT if register_map.measurement.table == "input" else READ_HOLDING
         self._layout = Layout.of(register_map)
         self._state = initial(config, register_map)
@@ -160,6 +167,7 @@ class Loop:
         self.lateness.add(lateness)
         tick = self._tick(observation, reading, output, latency=latency, lateness=lateness)
         self._sink.push(self._layout.pack(tick))
+        self._observe(tick)
         self._before = observation.now
         self.cycles += 1
         return output

@@ -1,0 +1,60 @@
+"""Lines of the log: one for each change of state or reason, dated, as text or as JSON (pure)."""
+
+import json
+from collections.abc import Callable
+from datetime import datetime
+from typing import Final
+
+from gateway.cycle.record import NOTHING
+from gateway.cycle.supervisor import State
+from gateway.monitoring.block import Change
+from gateway.reasons import Reason
+
+WARNED: Final = frozenset({State.RAMPDOWN, State.SAFE})
+"""States whose line is a warning."""
+REASONS: Final = {int(reason): reason for reason in Reason}
+Line = Callable[[Change, datetime], str]
+
+
+def text_line(change: Change, date: datetime) -> str:
+    """Line with date, state, reason with its text, and fault of this tick."""
+    parts = [f"{_iso(date)}  {State(change.state).name:9s}"]
+    if change.reason != NOTHING:
+        parts.append(reason_text(change.reason))
+    if change.fault not in (NOTHING, change.reason):
+        parts.append(f"fault {reason_text(change.fault)}")
+    return "  ".join(parts).rstrip()
+
+
+def json_line(change: Change, date: datetime) -> str:
+    """Line as a JSON object; a missing reason or fault is null."""
+    state = State(change.state)
+    return json.dumps(
+        {
+            "time": _iso(date),
+            "level": "warning" if state in WARNED else "info",
+            "event": "state",
+            "state": state.name,
+            "reason": _name(change.reason),
+            "fault": _name(change.fault),
+            "tick": change.tick,
+            "message": text_line(change, date).partition("  ")[2],
+        }
+    )
+
+
+LINES: Final[dict[str, Line]] = {"text": text_line, "json": json_line}
+"""Forms of the log by their names."""
+
+
+def reason_text(code: int) -> str:
+    """Name and text of a reason; a dash for none."""
+    return f"{REASONS[code].name}: {REASONS[code].text}" if code != NOTHING else "-"
+
+
+def _name(code: int) -> str | None:
+    return REASONS[code].name if code != NOTHING else None
+
+
+def _iso(date: datetime) -> str:
+    return date.isoformat(timespec="milliseconds")
