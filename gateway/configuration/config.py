@@ -19,6 +19,7 @@ from gateway.configuration.sections import (
     BenchConfig,
     LimitsConfig,
     LoopConfig,
+    PlausibilityConfig,
     PlcConfig,
     RecordingConfig,
     RegulatorConfig,
@@ -59,6 +60,7 @@ class Config:
     truck: TruckConfig = field(default_factory=TruckConfig)
     regulator: RegulatorConfig = field(default_factory=RegulatorConfig)
     limits: LimitsConfig = field(default_factory=LimitsConfig)
+    plausibility: PlausibilityConfig = field(default_factory=PlausibilityConfig)
     recording: RecordingConfig = field(default_factory=RecordingConfig)
     program: Program | None = None
     document: Document = field(default_factory=_defaults)

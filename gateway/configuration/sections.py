@@ -15,13 +15,18 @@ PERCENT = 1e-2
 
 @dataclass(frozen=True, kw_only=True)
 class PlcConfig:
-    """Address of the PLC, its register map, and the time-out of one request [s]."""
+    """Address of the PLC, its register map, and time-outs.
+
+    timeout : of one request [s]
+    settle : of the first request after connecting, for which some PLCs take longer [s]
+    """
 
     host: str = declare("host", "127.0.0.1")
     port: int = declare("port", 5020, lower=1, upper=65535)
     unit: int = declare("unit", 1, lower=0, upper=255)
     map: str = declare("map", "bench_int16")
     timeout: float = declare("timeout_ms", 40.0, scale=MILLI, lower=1.0, upper=1000.0)
+    settle: float = declare("settle_ms", 1000.0, scale=MILLI, lower=1.0, upper=60000.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +53,7 @@ class BenchConfig:
     dead_time : of the drive's reference [s]
     torque_filter, speed_filter : time constants of first-order filters in front of the PLC [s]
     flux_constant, flux_constant_1, flux_constant_2 : K_m, K_1, K_2 of the motor
+    motor_inertia [kg m^2]; backlash_half_gap : at the gear output [rad]
     """
 
     drum_inertia: float = declare("drum_inertia_kg_m2", 312.69, lower=1.0, upper=1e5)
@@ -60,6 +66,8 @@ class BenchConfig:
     flux_constant: float = declare("flux_constant", 1.8506, lower=0.01, upper=100.0)
     flux_constant_1: float = declare("flux_constant_1", 366.83, lower=1.0, upper=1e5)
     flux_constant_2: float = declare("flux_constant_2", 8.0644, lower=0.0, upper=1e3)
+    motor_inertia: float = declare("motor_inertia_kg_m2", 0.128, lower=1e-3, upper=1e3)
+    backlash_half_gap: float = declare("backlash_half_gap_rad", 0.15073, lower=0.0, upper=1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,6 +153,38 @@ class LimitsConfig:
 
 
 @dataclass(frozen=True, kw_only=True)
+class PlausibilityConfig:
+    """What the sensors may show beside the model of the bench (gateway.cycle.plausibility).
+
+    false_alarms : rate that is allowed by noise [1/s, in the file an hour]
+    torque, torque_share : tolerance of the motor's torque balance [N m], and its share of the
+        motor's torque [1]
+    speed, speed_share : tolerance of the difference of motor and drum [rad/s of the drum], and its
+        share of the speed [1]
+    truck_torque : the largest torque of a truck and its brake [N m at the drum]
+    tare : mean torque that the sensor may show at standstill [N m]
+    motor_speed_noise, drum_speed_noise [rad/s], torque_noise [N m], current_noise [A] : standard
+        deviations of the sensors
+    noisy_speeds : the speed sensors always show noise, so that one without any is stuck
+    """
+
+    false_alarms: float = declare(
+        "false_alarms_per_hour", 0.01, scale=1.0 / 3600.0, lower=1e-6, upper=100.0
+    )
+    torque: float = declare("torque_Nm", 1.0, lower=0.1, upper=100.0)
+    torque_share: float = declare("torque_percent", 20.0, scale=PERCENT, lower=0.0, upper=100.0)
+    speed: float = declare("speed_rad_s", 0.01, lower=0.001, upper=1.0)
+    speed_share: float = declare("speed_percent", 2.5, scale=PERCENT, lower=0.0, upper=50.0)
+    truck_torque: float = declare("truck_torque_Nm", 10000.0, lower=100.0, upper=1e6)
+    tare: float = declare("tare_Nm", 1.5, lower=0.05, upper=100.0)
+    motor_speed_noise: float = declare("motor_speed_noise_rad_s", 0.15, lower=0.0, upper=10.0)
+    drum_speed_noise: float = declare("drum_speed_noise_rad_s", 0.01, lower=0.0, upper=1.0)
+    torque_noise: float = declare("torque_noise_Nm", 0.25, lower=0.0, upper=10.0)
+    current_noise: float = declare("current_noise_A", 0.25, lower=0.0, upper=10.0)
+    noisy_speeds: bool = declare("noisy_speeds", False)
+
+
+@dataclass(frozen=True, kw_only=True)
 class RecordingConfig:
     """Folder of the recordings."""
 
@@ -158,5 +198,6 @@ SECTIONS: dict[str, type] = {
     "truck": TruckConfig,
     "regulator": RegulatorConfig,
     "limits": LimitsConfig,
+    "plausibility": PlausibilityConfig,
     "recording": RecordingConfig,
 }

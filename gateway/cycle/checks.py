@@ -26,18 +26,21 @@ def check(
     overruns: int,
     echo_age: float,
     other_age: float,
+    implausible: Reason | None,
 ) -> Reason | None:
     """Reason of the first check that does not hold; None: all checks hold.
 
     overruns : deadlines missed in a row
     echo_age : time since the PLC last accepted a command [s]
     other_age : time since the PLC last accepted a command of another master [s]
+    implausible : why the sensors contradict the model of the bench; None: they do not
     """
     running = state is State.RUN
     problem = (
         _bench(config, measurement)
         or _alarm(measurement, running=running)
         or _speeds_apart(config, measurement, APART_RUNNING if running else APART_AT_REST)
+        or implausible
     )
     if problem is not None:
         return problem

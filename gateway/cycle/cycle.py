@@ -15,10 +15,11 @@ from typing import Any, cast
 
 from gateway import regulators
 from gateway.configuration.config import Config
-from gateway.cycle import command, limits, program, samples
+from gateway.cycle import command, limits, plausibility, program, samples
 from gateway.cycle.checks import check
 from gateway.cycle.command import Command
 from gateway.cycle.limits import Limit, Limited, Limits
+from gateway.cycle.plausibility import Plausibility
 from gateway.cycle.samples import Samples
 from gateway.cycle.supervisor import Facts, Reason, State, Supervisor, advance
 from gateway.errors import ConfigError
@@ -78,11 +79,14 @@ class CycleState:
     """State that one tick hands to the next.
 
     params, regulator : parameters of the regulator, and its state (None: no sample yet)
+    relations, plausible : parameters and state of the plausibility of the sensors
     demand, demanded : last demand, and its time [s]
     """
 
     params: Any
     limits: Limits
+    relations: plausibility.Params
+    plausible: Plausibility = field(default_factory=Plausibility)
     supervisor: Supervisor = field(default_factory=Supervisor)
     samples: Samples = field(default_factory=Samples)
     regulator: Any = None
@@ -112,6 +116,7 @@ def initial(config: Config, register_map: RegisterMap) -> CycleState:
             deviation=config.limits.deviation,
             stale=config.loop.stale,
         ),
+        relations=plausibility.Params.of(config),
     )
 
 
@@ -131,7 +136,7 @@ def step(
     read = samples.with_window(config, register_map, read)
     sent = command.note_reply(state.command, observation.measurement, observation.fault)
     sent = command.note_echo(register_map, sent, read.newest if read.is_new else None, now)
-    state = replace(state, samples=read, command=sent)
+    state = _judge(register_map, replace(state, samples=read, command=sent))
     supervisor = advance(state.supervisor, _facts(config, state, observation))
     if supervisor.state is State.RUN and state.supervisor.state is not State.RUN:
         state = _start_bumpless(state, now)
@@ -155,6 +160,19 @@ def _is_finished(config: Config, state: CycleState) -> bool:
     return state.supervisor.state is State.RUN and program.is_over(state.params, state.regulator)
 
 
+def _judge(register_map: RegisterMap, state: CycleState) -> CycleState:
+    """Judge the sensors by the window of this tick, if there is one."""
+    read = state.samples
+    if read.window is None or read.newest is None or read.before is None:
+        return state
+    before, now, duration = read.before, read.newest, read.window.duration
+    torque = samples.torque_of("integrated", register_map, now, before, duration)
+    judged = plausibility.judge(
+        state.relations, state.plausible, before, now, torque=torque, duration=duration
+    )
+    return replace(state, plausible=judged)
+
+
 def _facts(config: Config, state: CycleState, observation: Observation) -> Facts:
     now, newest, sent = observation.now, state.samples.newest, state.command
     status = Status(0) if newest is None else newest.status
@@ -172,6 +190,9 @@ def _facts(config: Config, state: CycleState, observation: Observation) -> Facts
             overruns=observation.overruns,
             echo_age=_echo_age(config, state),
             other_age=now - sent.other_wrote,
+            implausible=plausibility.reason(
+                state.relations, state.plausible, running=before is State.RUN
+            ),
         ),
         remote=Status.REMOTE in status,
         confirmed=command.is_confirmed(config, status),

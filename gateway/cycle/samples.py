@@ -131,7 +131,7 @@ def with_window(config: Config, register_map: RegisterMap, samples: Samples) -> 
     samples = replace(samples, ahead=samples.ahead * exp(-own / MEMORY) + duration - own)
     if abs(samples.ahead) > OUT_OF_STEP * MEMORY:
         return replace(samples, window_fault=Reason.PLC_CLOCK)
-    torque = _torque(config.regulator.torque, register_map, now, before, duration)
+    torque = torque_of(config.regulator.torque, register_map, now, before, duration)
     if not _is_possible(register_map, torque, now.shaft_torque_mean, duration):
         return replace(samples, window_fault=Reason.TORQUE_IMPLAUSIBLE)
     window = Window(
@@ -180,7 +180,7 @@ NEEDS = {
 """Signal that each choice of `regulator.torque` reads."""
 
 
-def _torque(
+def torque_of(
     kind: str, register_map: RegisterMap, now: Measurement, before: Measurement, duration: float
 ) -> float:
     """Torque of the window [N m]; the torque at its end where a sample lacks the needed signal."""

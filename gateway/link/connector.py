@@ -1,8 +1,8 @@
 """TCP connection without waiting: one attempt at a time, with a bounded back-off.
 
 `poll` is called once a tick and returns at once. The constructor resolves a host name, because a
-name server may take seconds. The delay is 0.1 s after the first failure and doubles up to 2 s;
-`succeeded` resets it.
+name server may take seconds. A name with several addresses is tried at one after the other. The
+delay is 0.1 s after all of them have failed, and doubles up to 2 s; `succeeded` resets it.
 """
 
 import contextlib
@@ -32,7 +32,7 @@ class Connector:
     """
 
     def __init__(self, host: str, port: int, clock: Callable[[], float] = time.monotonic) -> None:
-        self._family, self._address = resolve(host, port)
+        self._addresses, self._turn = resolve(host, port), 0
         self._clock = clock
         self._pending: socket.socket | None = None
         self._started = 0.0
@@ -62,10 +62,11 @@ class Connector:
             self._pending = None
 
     def _start(self) -> None:
-        attempt = socket.socket(self._family, socket.SOCK_STREAM)
+        family, address = self._addresses[self._turn]
+        attempt = socket.socket(family, socket.SOCK_STREAM)
         attempt.setblocking(False)
         self._pending, self._started = attempt, self._clock()
-        error = attempt.connect_ex(self._address)
+        error = attempt.connect_ex(address)
         if error not in (0, errno.EINPROGRESS):
             self._give_up(error)
 
@@ -86,13 +87,21 @@ class Connector:
     def _give_up(self, error: int) -> None:
         self.close()
         self.problem = os.strerror(error)
-        self.note_failure()
+        self._turn = (self._turn + 1) % len(self._addresses)
+        if self._turn == 0:
+            self.note_failure()
 
 
-def resolve(host: str, port: int) -> tuple[socket.AddressFamily, tuple[str, int]]:
-    """Address family and numeric address of a peer. Raises ConfigError for an unknown host."""
+Address = tuple[socket.AddressFamily, tuple[str, int]]
+
+
+def resolve(host: str, port: int) -> list[Address]:
+    """Address families and numeric addresses of a peer, in the order in which to try them.
+
+    Raises ConfigError for an unknown host.
+    """
     try:
-        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
     except (OSError, ValueError) as error:  # a ValueError for a text that cannot be a name
         raise ConfigError(
             getattr(error, "strerror", None) or "cannot be a name",
@@ -100,7 +109,7 @@ def resolve(host: str, port: int) -> tuple[socket.AddressFamily, tuple[str, int]
             value=host,
             expected="an address, or a name that is known here",
         ) from error
-    return family, (str(address[0]), int(address[1]))
+    return [(family, (str(address[0]), int(address[1]))) for family, *_, address in found]
 
 
 def set_options(connection: socket.socket) -> None:

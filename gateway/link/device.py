@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final
@@ -10,12 +10,15 @@ from typing import Final
 from gateway.errors import ConfigError
 from gateway.link.inspection import Reading, Words, mbpoll
 from gateway.link.plc import READ_HOLDING, READ_INPUT, LinkError, TcpLink
+from gateway.reasons import Reason
 from register_maps.codec import CodecError, decode_value, encode_value, scaled
 from register_maps.register_map import Block, Register, RegisterMap
 from register_maps.signals import RESERVED, SIGNALS
 from register_maps.units import UNITS
 
 POLL: Final = 0.002
+REFUSED: Final = frozenset({Reason.EXCEPTION_1, Reason.EXCEPTION_2, Reason.EXCEPTION_3})
+"""Answers to a block with an address that the device does not have."""
 VERIFY_PAUSE: Final = 0.15
 """[s] Time between the two readings of `verify`: many scans of a PLC."""
 
@@ -23,7 +26,7 @@ VERIFY_PAUSE: Final = 0.15
 @contextmanager
 def open_link(host: str, port: int, unit: int, timeout: float) -> Iterator[TcpLink]:
     """Connected link, for a command that may wait. Raises LinkError after `timeout` [s]."""
-    link = TcpLink(host, port, unit, timeout)
+    link = TcpLink(host, port, unit, timeout, inspects=True)
     deadline = time.monotonic() + timeout
     try:
         while not _connects(link, deadline):
@@ -72,20 +75,44 @@ def two_readings(device: Device, register_map: RegisterMap) -> list[Reading]:
 
 
 def read_all(link: TcpLink, register_map: RegisterMap) -> Reading:
-    """Words of each register. Blocks are read whole, and register by register where that fails."""
+    """Words of each register, or why it cannot be read.
+
+    Blocks are read whole. A refused block is halved until the refused registers stand alone.
+    """
     reading: dict[str, Words | str] = {}
     for block in (register_map.measurement, register_map.command):
         inside = [register for register in register_map.registers if block.holds(register)]
-        try:
-            words = _read(link, block)
-        except LinkError:
-            reading.update({register.name: _alone(link, register) for register in inside})
-        else:
-            reading.update({register.name: _part(words, block, register) for register in inside})
+        reading |= _read_together(link, block, inside)
     for register in register_map.registers:
         if register.name not in reading:
             reading[register.name] = _alone(link, register)
     return reading
+
+
+def _read_together(
+    link: TcpLink, block: Block, inside: Sequence[Register]
+) -> dict[str, Words | str]:
+    """Words of the registers of a block by one request, or by halves where that is refused."""
+    try:
+        link.connect()
+        words = _read(link, block)
+    except LinkError as error:
+        if len(inside) == 1 or error.reason not in REFUSED:
+            return {register.name: str(error) for register in inside}
+        middle = len(inside) // 2
+        halves = (inside[:middle], inside[middle:])
+        return {
+            name: found
+            for half in halves
+            for name, found in _read_together(link, _around(half), half).items()
+        }
+    return {register.name: _part(words, block, register) for register in inside}
+
+
+def _around(registers: Sequence[Register]) -> Block:
+    """Smallest block that holds registers of one table, given by rising address."""
+    first, last = registers[0], registers[-1]
+    return Block(table=first.table, start=first.address, count=last.end - first.address)
 
 
 def _read(link: TcpLink, block: Block) -> Words:

@@ -5,8 +5,9 @@ inside a request, which blocks, and measures its time-out by the wall clock. Her
 only if `check_reply` of gateway.link.reply accepts its bytes. Connecting never blocks, and
 time-outs run on the monotonic clock.
 
-A connection is closed after the second failure in a row, and at once when its bytes are out of
-sync. A late reply to an abandoned request is recognised by its transaction id and dropped. The
+A connection counts from its first reply on, which may take longer than any other. It is given up
+after the second failure in a row, and at once when its bytes are out of sync; gateway.link.patience
+says how. A late reply to an abandoned request is recognised by its transaction id and dropped. The
 exceptions 1, 2 and 3 say that map or unit are wrong, which no retry cures: before the first good
 reply, the next attempt waits 2 s.
 """
@@ -24,8 +25,10 @@ from pymodbus.pdu import ModbusPDU
 
 from gateway.errors import PlcError
 from gateway.link.connector import LAST_DELAY, Connector
+from gateway.link.patience import Retired, Settling, first_request
 from gateway.link.reply import Rejection, Request, check_reply
 from gateway.reasons import Reason
+from register_maps.register_map import Block
 
 READ_HOLDING: Final = 3
 READ_INPUT: Final = 4
@@ -64,7 +67,12 @@ class PlcLink(Protocol):
 
 
 class TcpLink:
-    """One Modbus TCP connection to one unit, with one request at a time."""
+    """One Modbus TCP connection to one unit, with one request at a time.
+
+    timeout : of a request [s]; settle : of the first request after connecting [s]
+    probe : block that the first request reads, None: a connection counts at once
+    inspects : the exceptions 1, 2 and 3 are answers, after which it goes on
+    """
 
     def __init__(
         self,
@@ -73,31 +81,66 @@ class TcpLink:
         unit: int,
         timeout: float,
         clock: Callable[[], float] = time.monotonic,
+        *,
+        settle: float = 1.0,
+        probe: Block | None = None,
+        inspects: bool = False,
     ) -> None:
         self._peer = f"{host}:{port}"
+        self._clock, self._settle = clock, settle
+        self._probe = None if probe is None else first_request(unit, probe)
+        self._settling: Settling | None = None
+        self._retired = Retired(clock)
         self._unit = unit
         self._timeout = timeout
         self._connector = Connector(host, port, clock)
         self._client: _Client | None = None
         self._abandoned: set[int] = set()
         self._failures = 0
-        self._proven = False
+        self._proven = inspects
         self._last = Rejection(reason=Reason.NOT_CONNECTED, text="not connected yet")
 
     def connect(self) -> None:
         """Start or continue a connection attempt without waiting; nothing while connected."""
         if self._client is not None:
             return
-        connection = self._connector.poll()
+        connection = self._settled() if self._retired.is_empty() else None
         if connection is None:
-            if self._connector.problem:
-                self._last = Rejection(
-                    reason=Reason.NOT_CONNECTED, text=f"cannot connect: {self._connector.problem}"
-                )
             raise self._error(self._last)
         self._client = _Client(connection, self._timeout)
         self._abandoned.clear()
         self._failures = 0
+
+    def _settled(self) -> socket.socket | None:
+        """Connection that may be used; None: there is none yet, `_last` says why."""
+        if self._settling is None:
+            connection = self._connector.poll()
+            if connection is None:
+                if self._connector.problem:
+                    self._last = _not_connected(f"cannot connect: {self._connector.problem}")
+                return None
+            if self._probe is None:
+                return connection
+            self._last = _not_connected("connected, no reply to the first request yet")
+            self._settling = Settling(connection, self._probe, self._clock() + self._settle)
+        return self._settle_down(self._settling)
+
+    def _settle_down(self, settling: Settling) -> socket.socket | None:
+        """Connection after its first reply; None: the reply is waited for, or was given up."""
+        try:
+            if settling.is_over():
+                self._settling = None
+                return settling.connection
+        except OSError as error:
+            self._last = _not_connected(error.strerror or str(error))
+        else:
+            if self._clock() < settling.deadline:
+                return None
+            self._last = _not_connected(f"no reply to the first request in {self._settle:g} s")
+        self._retired.add(settling.connection)
+        self._settling = None
+        self._connector.note_failure()
+        return None
 
     def read(self, address: int, count: int, function: int = READ_HOLDING) -> tuple[int, ...]:
         """Words of one block, read by one request."""
@@ -141,6 +184,10 @@ class TcpLink:
     def close(self) -> None:
         """End the connection and any attempt."""
         self._connector.close()
+        self._retired.close()
+        if self._settling is not None:
+            self._settling.connection.close()
+            self._settling = None
         if self._client is not None:
             self._client.close()  # type: ignore[no-untyped-call]  # pymodbus declares none here
             self._client = None
@@ -185,7 +232,10 @@ class TcpLink:
         return self._error(rejection)
 
     def _hang_up(self, delay: float | None) -> None:
-        self.close()
+        client, self._client = self._client, None
+        if client is not None and client.socket is not None:
+            self._retired.add(client.socket)
+            client.socket = None
         self._connector.note_failure(delay)
 
     def _error(self, rejection: Rejection) -> LinkError:
@@ -232,6 +282,10 @@ def _attempt(call: Callable[[], ModbusPDU]) -> tuple[ModbusPDU | None, Rejection
         return None, Rejection(reason=Reason.CONNECTION_LOST, text=text, out_of_sync=True)
     except ModbusException:
         return None, None
+
+
+def _not_connected(text: str) -> Rejection:
+    return Rejection(reason=Reason.NOT_CONNECTED, text=text)
 
 
 def _wrong_count(text: str) -> Rejection:

@@ -97,7 +97,15 @@ def run(
     shadow : write nothing; view : show the run on standard output
     log_format : form of its lines, one of gateway.monitoring.lines.LINES
     """
-    link = TcpLink(config.plc.host, config.plc.port, config.plc.unit, config.plc.timeout)
+    plc = config.plc
+    link = TcpLink(
+        plc.host,
+        plc.port,
+        plc.unit,
+        plc.timeout,
+        settle=plc.settle,
+        probe=register_map.measurement,
+    )
     granted = real_time() if config.loop.realtime else nullcontext("not asked for")
     with granted as real:
         started = time.monotonic()

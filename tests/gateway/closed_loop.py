@@ -11,8 +11,9 @@ from gateway.reasons import Reason
 from plant_emulator import parameter_sets
 from plant_emulator.emulator.plc.plc import Plc
 from plant_emulator.emulator.plc.surroundings import Backlash, Switches, Truck
+from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.simulation.running_bench import Bench
-from plant_emulator.simulation.truck import Forklift, ReplayedTorque
+from plant_emulator.simulation.truck import Driver, Forklift, ReplayedTorque
 from register_maps import load
 from register_maps.codec import decode_measurement, encode_measurement, encode_setpoint
 from register_maps.signals import Measurement
@@ -41,15 +42,19 @@ class ClosedLoop:
     drum_speed: list[float] = field(default_factory=list)
     wheel_torque: list[float] = field(default_factory=list)
     write_fault: Reason | None = None
+    parameters: ParameterSet = PARAMETERS
+    effects: dict[str, dict[str, float]] = field(default_factory=dict)
+    driver: Callable[[Forklift], Driver] = ReplayedTorque
 
     def __post_init__(self) -> None:
         self.map = load(self.map_name)
         truck = Forklift(mass=self.config.truck.total_mass)
+        half_gap = self.parameters.value("backlash_half_gap")
         self.plc = Plc(
-            Bench(PARAMETERS, {}),
+            Bench(self.parameters, self.effects),
             self.map,
-            backlash=Backlash(ratio=62.6, half_gap=0.15073),
-            truck=Truck(lambda: ReplayedTorque(truck), 0.645),
+            backlash=Backlash(ratio=62.6, half_gap=half_gap),
+            truck=Truck(lambda: self.driver(truck), 0.645),
         )
         self.switches = Switches()
         self.words: Sequence[int] | None = None

@@ -39,6 +39,9 @@ def measurement(number: int, state: State, echo: int) -> Measurement:
     running = state in (State.RUN, State.RAMPDOWN)
     status = STANDING | (Status.REMOTE if number > 20 else 0)
     speed = max(0, number - 40) * 0.05
+    # 0.128 kg m^2 times 313 rad/s^2 are 40.06 N m
+    flux = min(1.8506, 366.83 / (8.0644 + 62.6 * speed))
+    current = (2.0 + (40.06 if number > 40 else 0.0)) / flux
     return Measurement(
         sequence_start=number,
         sequence_end=number,
@@ -51,10 +54,10 @@ def measurement(number: int, state: State, echo: int) -> Measurement:
         interlock=Interlock(sum(Interlock)),
         motor_speed=62.6 * speed,
         drum_speed=speed,
-        shaft_torque=-2.0,
+        shaft_torque=-2.0 - 0.01 * (number % 2),
         shaft_torque_mean=-2.0,
         shaft_torque_integral=-0.02 * number,
-        armature_current=3.0,
+        armature_current=current,
         armature_voltage=10.0,
         speed_reference=62.6 * speed,
         shell_temperature_1=305.15,

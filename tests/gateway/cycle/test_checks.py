@@ -35,7 +35,15 @@ GOOD = Measurement(
 BEFORE = (State.CONNECT, State.SHADOW, State.ARMED)
 
 
-def found(measurement=GOOD, state=State.RUN, *, overruns=0, echo_age=0.0, other_age=inf):
+def found(
+    measurement=GOOD,
+    state=State.RUN,
+    *,
+    overruns=0,
+    echo_age=0.0,
+    other_age=inf,
+    implausible=None,
+):
     return check(
         CONFIG,
         measurement,
@@ -43,6 +51,7 @@ def found(measurement=GOOD, state=State.RUN, *, overruns=0, echo_age=0.0, other_
         overruns=overruns,
         echo_age=echo_age,
         other_age=other_age,
+        implausible=implausible,
     )
 
 
@@ -173,6 +182,11 @@ def test_another_master_counts_in_every_state_for_a_second(state):
 @pytest.mark.parametrize("state", BEFORE)
 def test_deadlines_and_echo_keep_from_nothing_before_a_run(state):
     assert found(state=state, overruns=1000, echo_age=10.0) is None
+
+
+@pytest.mark.parametrize("state", State)
+def test_implausible_sensors_count_in_every_state(state):
+    assert found(state=state, implausible=Reason.GEAR_MODEL) is Reason.GEAR_MODEL
 
 
 def test_the_bench_is_named_before_its_alarm_and_that_before_the_speeds():

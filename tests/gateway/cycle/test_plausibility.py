@@ -1,0 +1,244 @@
+"""Relations between the sensors: windows by hand, alarm levels against noise, and every fault.
+
+Motor: K_m = 1.8506 N m/A below 190 rad/s, J_m = 0.128 kg m^2. Gear: 62.6. Friction: Table 3.1.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gateway.configuration.config import Config
+from gateway.cycle import plausibility
+from gateway.cycle.plausibility import Params, Plausibility, judge, reason
+from gateway.cycle.supervisor import State
+from gateway.reasons import Reason
+from plant_emulator.simulation.truck import Cycle, driver_of
+from register_maps.signals import Measurement, Status
+from register_maps.timing import SCAN
+from tests.gateway.closed_loop import ClosedLoop
+from tests.gateway.drifted_bench import largest_shares, noisy, sound_drive
+from tests.gateway.sensor_faults import FAULTS
+
+P = Params.of(Config())
+DRIVING = Measurement(
+    sequence_start=7,
+    sequence_end=7,
+    plc_heartbeat=7,
+    plc_time=1.0,
+    status=Status.READY,
+    motor_speed=125.2,
+    drum_speed=2.0,
+    shaft_torque=-18.506,
+    armature_current=10.0,
+)
+"""Steady: 10 A make 18.506 N m, which the shaft takes off."""
+STANDING = replace(DRIVING, motor_speed=0.0, drum_speed=0.0, shaft_torque=0.0, armature_current=0.0)
+
+
+def after(now, *, before=DRIVING, windows=1, state=None, torque=None):
+    """Sums after windows of 10 ms from one sample to the next."""
+    state = Plausibility() if state is None else state
+    shown = now.shaft_torque if torque is None else torque
+    for _ in range(windows):
+        state = judge(P, state, before, now, torque=shown, duration=0.01)
+    return state
+
+
+def test_balanced_torques_leave_no_sum():
+    seen = after(DRIVING, windows=1000)
+    assert (seen.motor_up, seen.motor_down, seen.gear_up, seen.gear_down) == (0.0, 0.0, 0.0, 0.0)
+    assert reason(P, seen, running=True) is None
+
+
+def test_acceleration_of_the_motor_takes_its_part_of_the_torque():
+    """0.5 rad/s in 10 ms take 6.4 N m: 18.506 - 6.4 N m are left for the shaft."""
+    faster = replace(DRIVING, motor_speed=125.7, shaft_torque=-12.106)
+    assert after(faster).motor_up == 0.0
+    assert after(faster).motor_down == 0.0
+
+
+def test_dead_torque_sensor_adds_the_motors_torque_beyond_the_tolerance():
+    """In the first window: 18.506 N m less 1 N m and 20 % of the smoothed 3.355 N m and 0.17 %."""
+    dead = replace(DRIVING, shaft_torque=0.0)
+    mean = 18.506 * (1.0 - np.exp(-0.01 / 0.05))
+    share = 0.2 + 0.25 * mean / (1.8506 * 72.0)
+    assert after(dead).motor_up == pytest.approx(0.01 * (18.506 - 1.0 - share * mean))
+    assert after(dead).motor_down == 0.0
+
+
+@pytest.mark.parametrize(("shown", "sums"), [(0.0, "motor_up"), (-40.0, "motor_down")])
+def test_torque_that_the_current_does_not_make_has_its_reason(shown, sums):
+    seen = after(replace(DRIVING, shaft_torque=shown), windows=20)
+    assert getattr(seen, sums) > P.motor_level
+    assert reason(P, seen, running=True) is Reason.TORQUE_MODEL
+
+
+def test_map_without_a_current_says_nothing_of_the_torque():
+    blind = replace(DRIVING, armature_current=None, shaft_torque=-90.0)
+    seen = after(blind, before=blind, windows=100)
+    assert (seen.motor_up, seen.motor_down) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(("drum", "sums"), [(1.0, "gear_up"), (3.0, "gear_down")])
+def test_motor_and_drum_apart_by_more_than_the_backlash_have_their_reason(drum, sums):
+    """1 rad/s apart less 0.01 rad/s and 2.5 % of 2 or 3 rad/s."""
+    apart = replace(DRIVING, drum_speed=drum)
+    fast = max(drum, 2.0)
+    one = after(apart, before=apart)
+    assert getattr(one, sums) == pytest.approx(0.01 * (1.0 - 0.01 - 0.025 * fast))
+    assert reason(P, after(apart, before=apart, windows=30), running=True) is None
+    last = after(apart, before=apart, windows=45)
+    assert reason(P, last, running=True) is Reason.GEAR_MODEL
+
+
+def test_widest_backlash_is_a_quarter_wider_than_the_configured_one():
+    assert P.gear_level == pytest.approx(2.5 * 0.15073, abs=0.002)
+
+
+def test_drum_that_jumps_needs_a_torque_that_no_truck_has():
+    """1 rad/s in 10 ms are 313 N m s; 100 N m s are the truck's."""
+    jumped = after(replace(DRIVING, drum_speed=3.0))
+    assert jumped.drum_up > P.drum_level
+    assert reason(P, replace(jumped, motor_up=0.0), running=True) is Reason.DRUM_MODEL
+
+
+def test_sums_stay_at_two_levels_and_fall_again():
+    dead = replace(DRIVING, shaft_torque=0.0)
+    high = after(dead, windows=1000)
+    assert high.motor_up == 2.0 * P.motor_level
+    later = after(DRIVING, state=high, windows=100)
+    assert reason(P, later, running=True) is None
+
+
+@pytest.mark.parametrize(("shown", "found"), [(1.4, None), (1.7, Reason.TARE), (-1.7, Reason.TARE)])
+def test_torque_at_standstill_keeps_from_arming_and_ends_no_run(shown, found):
+    shifted = replace(STANDING, shaft_torque=shown)
+    seen = replace(after(shifted, before=shifted, windows=500), motor_up=0.0, motor_down=0.0)
+    assert reason(P, seen, running=False) is found
+    assert reason(P, seen, running=True) is None
+
+
+def test_configured_offset_is_no_torque():
+    p = Params.of(Config().with_values({"regulator.torque_offset_Nm": 6.0}))
+    shifted, state = replace(STANDING, shaft_torque=6.0), Plausibility()
+    for _ in range(500):
+        state = judge(p, state, shifted, shifted, torque=6.0, duration=0.01)
+    assert reason(p, state, running=False) is None
+
+
+NOISY = Params.of(Config().with_values({"plausibility.noisy_speeds": True}))
+
+
+def moved(signal, sizes):
+    """Sums after samples in which one signal takes these values."""
+    state, before = Plausibility(), DRIVING
+    for size in sizes:
+        now = replace(DRIVING, **{signal: size})
+        state = judge(P, state, before, now, torque=now.shaft_torque, duration=0.01)
+        before = now
+    return replace(state, motor_up=0.0, motor_down=0.0, drum_up=0.0, drum_down=0.0)
+
+
+@pytest.mark.parametrize(
+    ("signal", "swing", "found"),
+    [
+        ("armature_current", 1.6, Reason.TORQUE_STUCK),
+        ("armature_current", 1.4, None),
+        ("motor_speed", 0.4, Reason.SPEED_STUCK),
+        ("motor_speed", 0.3, None),
+        ("drum_speed", 0.03, Reason.SPEED_STUCK),
+        ("drum_speed", 0.02, None),
+    ],
+)
+def test_sensor_that_stands_still_while_its_partner_moves_is_stuck(signal, swing, found):
+    middle = getattr(DRIVING, signal)
+    sizes = [middle + swing / 2.0 * (-1) ** number for number in range(21)]
+    assert reason(NOISY, moved(signal, sizes), running=True) is found
+    assert reason(NOISY, moved(signal, sizes[:15]), running=True) is None
+
+
+def test_drum_without_noise_may_float_through_the_backlash():
+    sizes = [125.2 + 3.0 * number / 21 for number in range(21)]
+    assert reason(P, moved("motor_speed", sizes), running=True) is None
+
+
+def test_alarm_level_of_white_noise_is_passed_as_often_as_allowed():
+    """Allowed once in 1000 ticks: 1000 walks of 500 steps may pass it once, four times at most."""
+    config = Config().with_values({"plausibility.false_alarms_per_hour": 100.0})
+    chance = 100.0 / 3600.0 * 0.01
+    assert plausibility._chance(config) == pytest.approx(chance / 6.0)
+    level = plausibility._walk(config, 1.0, 0.5)
+    random = np.random.default_rng(1)
+    walks = np.cumsum(0.01 * (0.5 * random.standard_normal((20000, 500)) - 1.0), axis=1)
+    assert np.mean(walks.max(axis=1) > level) <= 2.0 * chance
+
+
+def test_fewer_false_alarms_take_higher_levels():
+    rare = Params.of(Config().with_values({"plausibility.false_alarms_per_hour": 1e-4}))
+    often = Params.of(Config().with_values({"plausibility.false_alarms_per_hour": 10.0}))
+    for name in ("motor_level", "gear_level", "drum_level"):
+        assert getattr(often, name) < getattr(P, name) < getattr(rare, name)
+
+
+def driving(kmh, driver, *, noise=True):
+    """A loop at this speed; at standstill, 1 s before the truck sets off."""
+    top = (kmh or 14.0) / 3.6
+    up = top / 0.65
+    cycle = Cycle(speed=top, up=up, brake=8.0 + up, down=top / 1.05, duration=60.0)
+    config = Config().with_values({"plausibility.noisy_speeds": noise})
+    loop = ClosedLoop(config, driver=lambda truck: driver_of(driver, truck, cycle))
+    if noise:
+        loop.disturb = noisy(7)
+    loop.start()
+    loop.run(4.0 + up - 0.2 if kmh else 0.8)
+    return loop
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("driver", "noise"),
+    [("none", True), ("pi", True), ("none", False)],
+    ids=["none", "pi", "exact"],
+)
+@pytest.mark.parametrize("kmh", [0, 5, 14])
+@pytest.mark.parametrize("name", FAULTS)
+def test_sensor_fault_trips_before_the_drum_runs_away(name, kmh, driver, noise):
+    """Within 0.2 s once the drum turns at 1 rad/s, or before the drum has gained 0.15 rad/s.
+
+    A torque sensor that shows too much slows its bench, until its error is within the tolerance.
+    A frozen drum speed of a sensor without noise is that of a drum inside the backlash. A drum
+    speed that is wrong from the beginning is seen when the motor has left the backlash: 0.38 rad
+    at half the speed, which the drum reaches at 1.4 rad/s.
+    """
+    loop = driving(kmh, driver, noise=noise)
+    begin, first = len(loop.drum_speed), max(loop.drum_speed[-1], 1.0)
+    fault, sound = FAULTS[name](), loop.disturb
+    loop.disturb = lambda one, reading: fault(sound(one, reading))
+    fast = 0.0
+    while loop.last.state is State.RUN:
+        loop.run(SCAN)
+        assert len(loop.drum_speed) - begin < 1200
+        fast += SCAN * (loop.drum_speed[-1] > 1.0)
+    loop.run(4.0)
+    gained = max(loop.drum_speed[begin:]) - first
+    assert loop.last.state is State.SAFE
+    assert fast <= 0.2 + 0.5 * SCAN or gained <= (0.5 if name == "drum speed x0.5" else 0.15)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [101, 102])
+def test_sound_sensors_of_a_drifted_bench_do_not_trip(seed):
+    assert largest_shares(sound_drive(seed), 60.0).max() < 0.9
+
+
+def test_offset_of_6_newton_metres_is_never_armed():
+    """Nobody on the drum: without the relation it starts by itself."""
+    loop = ClosedLoop(Config())
+    fault = FAULTS["torque +6 N m"]()
+    loop.disturb = lambda one, reading: fault(reading)
+    loop.run(2.0)
+    loop.operate(remote=True)
+    loop.run(1.0)
+    assert State.RUN not in {output.state for output in loop.outputs}
+    assert loop.last.reason is Reason.TORQUE_MODEL
