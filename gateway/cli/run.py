@@ -1,8 +1,10 @@
 """Run the daemon, which makes the bench feel like the road over Modbus TCP."""
 
+import os
 import shlex
+import signal
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import click
 
@@ -16,11 +18,14 @@ if TYPE_CHECKING:
     from gateway.configuration.config import Config
     from register_maps.register_map import RegisterMap
 
+PATIENCE: Final = 3
+"""[s] Time that a terminal may take for the report."""
 EXAMPLE = """
 \b
 Examples:
   gateway run -c bench.toml --shadow
   gateway run -c bench.toml
+  gateway run -c bench.toml --metrics 127.0.0.1:9108
 """
 
 
@@ -38,6 +43,7 @@ Examples:
     show_default=True,
     help="form of the dated lines, one for each change of state or reason",
 )
+@click.option("--metrics", metavar="HOST:PORT", help="serve metrics, health and a page there")
 def command(
     config: Path,
     *,
@@ -45,6 +51,7 @@ def command(
     duration: float | None,
     values: tuple[str, ...],
     log_format: str,
+    metrics: str | None,
 ) -> int:
     """Run until Ctrl-C or SIGTERM, then ramp down and close the recording.
 
@@ -52,7 +59,8 @@ def command(
     not there; 2: bad configuration, also one that `gateway check` refuses. With --shadow a refused
     configuration only gives a warning, because nothing is written.
     """
-    settings = with_values(load(config), assignments(values))
+    changes = assignments(values) | ({} if metrics is None else {"metrics.address": metrics})
+    settings = with_values(load(config), changes)
     register_map = register_maps.load(settings.plc.map)
     refused = refusals(settings, register_map)
     check = shlex.join(["gateway", "check", "-c", str(config), *_repeated("--set", values)])
@@ -63,8 +71,17 @@ def command(
     ended = daemon.run(
         settings, register_map, shadow=shadow, duration=duration, log_format=log_format
     )
-    click.echo(report(ended))
-    return 0 if ended.reason is None else 1
+    code = 0 if ended.reason is None else 1
+    _tell(report(ended), code)
+    return code
+
+
+def _tell(text: str, code: int) -> None:
+    """Write a text; a terminal that takes nothing does not keep this process from its end."""
+    signal.signal(signal.SIGALRM, lambda *_: os._exit(code))
+    signal.alarm(PATIENCE)
+    click.echo(text)
+    signal.alarm(0)
 
 
 def refusals(config: "Config", register_map: "RegisterMap") -> list[str]:

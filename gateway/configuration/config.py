@@ -19,6 +19,7 @@ from gateway.configuration.sections import (
     BenchConfig,
     LimitsConfig,
     LoopConfig,
+    MetricsConfig,
     PlausibilityConfig,
     PlcConfig,
     RecordingConfig,
@@ -62,6 +63,7 @@ class Config:
     limits: LimitsConfig = field(default_factory=LimitsConfig)
     plausibility: PlausibilityConfig = field(default_factory=PlausibilityConfig)
     recording: RecordingConfig = field(default_factory=RecordingConfig)
+    metrics: MetricsConfig = field(default_factory=MetricsConfig)
     program: Program | None = None
     document: Document = field(default_factory=_defaults)
 

@@ -49,7 +49,7 @@ def keys(section: type) -> dict[str, Key]:
 
 def read_value(key: Key, kind: Any, value: Any, where: str) -> Any:
     """Value in SI of a value in the file. Raises ConfigError with place and allowed values."""
-    wanted = next((one for one in (str, bool, int) if kind is one), float)
+    wanted = next((one for one in (str, bool, int) if kind in (one, one | None)), float)
     numeric = wanted is float and isinstance(value, int) and not isinstance(value, bool)
     if type(value) is not wanted and not numeric:
         name = {str: "text", bool: "true or false", int: "a whole number", float: "a number"}

@@ -191,6 +191,13 @@ class RecordingConfig:
     dir: str = declare("dir", "recordings")
 
 
+@dataclass(frozen=True, kw_only=True)
+class MetricsConfig:
+    """Address HOST:PORT at which metrics, health and a page are served; None: nowhere."""
+
+    address: str | None = declare("address", None)
+
+
 SECTIONS: dict[str, type] = {
     "plc": PlcConfig,
     "loop": LoopConfig,
@@ -200,4 +207,5 @@ SECTIONS: dict[str, type] = {
     "limits": LimitsConfig,
     "plausibility": PlausibilityConfig,
     "recording": RecordingConfig,
+    "metrics": MetricsConfig,
 }

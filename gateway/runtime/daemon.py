@@ -8,6 +8,7 @@ PLC's watchdog ramps down.
 
 import os
 import signal
+import socket
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager, nullcontext
@@ -22,7 +23,7 @@ from gateway.cycle.record import Layout
 from gateway.cycle.supervisor import State
 from gateway.errors import GatewayError
 from gateway.link.plc import TcpLink
-from gateway.monitoring import terminal
+from gateway.monitoring import metrics, server, terminal
 from gateway.monitoring.block import BY_OPERATOR
 from gateway.monitoring.shared import Publisher
 from gateway.reasons import Reason
@@ -112,11 +113,16 @@ def run(
         stop = _Stop(None if duration is None else started + duration)
         head = header(config, register_map, started=started, shadow=shadow, real_time=real)
         job = Job(path=_new_file(config), header=head, layout=Layout.of(register_map))
+        listener = _listener(config)
         with _signals(stop), closing(Recorder(job)) as recorder, ExitStack() as beside:
             publisher = beside.enter_context(Publisher(_identity(job)))
             if view:
                 screen = Companion("screen", terminal.show_run, publisher.path, log_format)
                 beside.enter_context(closing(screen))
+            if listener is not None:
+                with listener:
+                    web = Companion("metrics", server.serve, publisher.path, listener)
+                beside.enter_context(closing(web))
             loop = Loop(
                 config=config,
                 register_map=register_map,
@@ -128,6 +134,14 @@ def run(
             )
             loop.run(lambda: stop() or _is_over(loop, over))
     return _result(loop, recorder, real)
+
+
+def _listener(config: Config) -> socket.socket | None:
+    """Socket at which metrics are served, None: they are not. Raises ConfigError."""
+    if config.metrics.address is None:
+        return None
+    metrics.require()
+    return server.listen(config.metrics.address)
 
 
 def _identity(job: Job) -> dict[str, Any]:
