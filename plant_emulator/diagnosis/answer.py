@@ -163,8 +163,49 @@ class Undetectable:
 
 
 @dataclass(frozen=True, kw_only=True)
+class SearchStep:
+    """A step of the search for effects.
+
+    action : what was done with the set of effects: confirmed, converged, or noise estimated there
+    promised : gain that the linear regressions promised for the last effect, by regression
+    gain : of log evidence over the fit without effects
+    mean_square : of the whitened residual that the fit leaves
+    """
+
+    action: str
+    effects: tuple[str, ...]
+    promised: Mapping[str, float]
+    gain: float
+    mean_square: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorNoise:
+    """The noise of a channel as its logs show it [SI].
+
+    deviation : standard deviation, without outliers
+    correlation_time : that an independent sample is worth [s]
+    lines : frequencies of hum [Hz]
+    outliers : share of the samples [1]
+    held_period : time between new values of a channel that is sampled and held [s]; 0: not held
+    white : whether the model leaves white innovations
+    """
+
+    channel: str
+    deviation: float
+    correlation_time: float
+    lines: tuple[float, ...]
+    outliers: float
+    held_period: float
+    white: bool
+
+
+@dataclass(frozen=True, kw_only=True)
 class Answer:
-    """The whole answer: the verdict, and what it rests on; `ranking`: the best effect first."""
+    """The whole answer: the verdict, and what it rests on.
+
+    ranking : the best effect first; trace : the search in its order; noise : by channel
+    """
 
     logs: Logs
     verdict: Verdict
@@ -172,3 +213,5 @@ class Answer:
     gap: HeldOutGap
     ranking: tuple[RankedEffect, ...]
     undetectable: tuple[Undetectable, ...]
+    trace: tuple[SearchStep, ...] = ()
+    noise: tuple[SensorNoise, ...] = ()

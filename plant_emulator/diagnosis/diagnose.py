@@ -17,8 +17,11 @@ from plant_emulator.diagnosis.design.next_experiment import Advice
 from plant_emulator.diagnosis.execution.pool import TaskRunner, build_model
 from plant_emulator.diagnosis.execution.progress import ReportingPool
 from plant_emulator.diagnosis.fitting.derived_quantities import derived_quantities
-from plant_emulator.diagnosis.fitting.evidence import EVIDENCE_THRESHOLD, NOISE_MEAN_SQUARE
+from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.task import Task
+from plant_emulator.diagnosis.parity.sensor_noise import sensor_noise
+from plant_emulator.diagnosis.parity.settings import SETTINGS
+from plant_emulator.diagnosis.prediction.gap import shows_shrinkage
 from plant_emulator.diagnosis.prediction.held_out import HeldOut
 from plant_emulator.diagnosis.prediction.remainder import unmodelled_remainder
 from plant_emulator.diagnosis.report.details import Details
@@ -32,7 +35,6 @@ from plant_emulator.diagnosis.report.shrinkage import held_out_gap, waterfall
 from plant_emulator.diagnosis.report.statement import statement, verdict
 from plant_emulator.diagnosis.selection import subsystem
 from plant_emulator.diagnosis.selection.procedure import Procedure
-from plant_emulator.diagnosis.selection.rules import SECOND
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -58,8 +60,8 @@ if TYPE_CHECKING:
 
 # Thresholds of the hypothesis tests, for the report.
 THRESHOLDS = {
-    "evidence that an effect needs": f"{EVIDENCE_THRESHOLD:g}",
-    "evidence that a second one needs": f"{SECOND:g}",
+    "gain of log evidence that an effect needs": f"{SETTINGS.needed:g}",
+    "gain that one more effect needs": f"{SETTINGS.needed_again:g}",
     "mean square over the noise up to which a fit leaves noise": f"{NOISE_MEAN_SQUARE:g}",
 }
 
@@ -107,6 +109,18 @@ class _Tests:
             return None
         return {"parameter": gaps.nominal, "effect": gaps.null}.get(self.decision.kind)
 
+    def confirmed_by(self, gaps: Gaps) -> _Tests:
+        """The tests; with an unknown cause where the held-out runs do not confirm the effects."""
+        reference = self.reference(gaps)
+        if not self.effects or reference is None:
+            return self
+        if shows_shrinkage(reference, gaps.by_effects[self.effects]):
+            return self
+        reason = f"the held-out runs do not confirm {' and '.join(self.effects)}"
+        return replace(
+            self, decision=replace(self.decision, kind="unknown", effects=(), reason=reason)
+        )
+
 
 class Diagnose:
     """The steps from a plan to the findings of a diagnosis.
@@ -144,7 +158,8 @@ class Diagnose:
     def diagnose(self) -> Findings:
         """Test the hypotheses, predict the held-out runs, locate the gap; give the findings."""
         tests = self._test()
-        gaps = HeldOut(runner=self.runner, plan=self.plan).gaps(tests.explained, tests.effects)
+        gaps = HeldOut(runner=tests.runner, plan=self.plan).gaps(tests.explained, tests.effects)
+        tests = tests.confirmed_by(gaps)
         drawn = gaps.traces(tests.effects)
         remainder = self._remainder(tests, drawn)
         return Findings(
@@ -189,6 +204,8 @@ class Diagnose:
                 for one in hypotheses_to_rank(tests.explained)
             ),
             undetectable=hidden,
+            trace=tests.explained.trace,
+            noise=sensor_noise(self.model.runs, tests.explained.noise),
         )
 
     def _verdict(

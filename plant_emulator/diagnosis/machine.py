@@ -13,10 +13,14 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from plant_emulator.diagnosis.answer import Location
+    from plant_emulator.diagnosis.fidelity import Fidelity
     from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.estimation.noise.channel_noise import Whitener
     from plant_emulator.estimation.unknowns import Residual, Unknown
     from plant_emulator.recordings.input_noise import NoiseDirections
     from plant_emulator.signals.log import Array
+
+    Whiteners = Mapping[int, Sequence[Whitener]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,6 +131,12 @@ class Model(Protocol):
         is exactly 0 where a sample does not count.
         """
 
+    def unwhitened_residual(self, run: int, effects: Sequence[str]) -> Residual:
+        """Give the residual over the deviation of the noise, whose colour is left in it.
+
+        It is the same as `residual` where the noise is white.
+        """
+
     def input_noise(
         self, run: int, where: FitResult, state: Mapping[str, float]
     ) -> NoiseDirections | None:
@@ -146,6 +156,14 @@ class Model(Protocol):
         self, run: int, effects: Sequence[str], values: Mapping[str, float]
     ) -> dict[str, float]:
         """Find states of a run near the best ones, with all other values as given."""
+
+    def relations(
+        self, where: FitResult, runs: Sequence[int], whiteners: Whiteners | None = None
+    ) -> Fidelity | None:
+        """Give the parity relations around a fit; None: the machine has none there.
+
+        whiteners : of the channels by run, which know the samples that do not count
+        """
 
     def locate(self, where: FitResult, runs: Sequence[int]) -> Location | None:
         """Find the subsystem that holds the gap of a fit, without a hypothesis of its cause.

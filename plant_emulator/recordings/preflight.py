@@ -1,7 +1,7 @@
 """What a log must be before anything is fitted to it, and which of its samples count.
 
-Refused, with file, time and value: a run that does not start at rest, holes longer than a few
-samples, a sampling too slow for the bench's spikes, a torque of the wrong sign, speeds of drum and
+Refused, with file, time and value: a run that does not start at rest, a hole that hides too much, a
+sampling too slow for the bench's spikes, a torque of the wrong sign, speeds of drum and
 motor that do not belong to one gear, no motion. Left out with a note: samples that a channel only
 repeats (frozen, slower than the log, at the end of its range).
 
@@ -41,9 +41,9 @@ NOISY = 2.0 * FLOOR
 HELD_SHARE = 0.4
 # More than this share of a channel left out, and the channel cannot be used.
 USELESS_SHARE = 0.5
-# A missing sample or a few are bridged by the reference's straight line; a longer hole hides what
-# the bench was asked to do.
-LONGEST_BRIDGE = 5.5
+# A hole is bridged by the reference from both sides. A longer one hides too much of what the bench
+# was asked to do [s].
+LONGEST_HOLE = 2.0
 # Sampling interval that still shows the backlash's spikes [s]: at 50 Hz fits find what they find at
 # 100 Hz, at 25 Hz they misplace friction and gap by several standard errors.
 SLOWEST = 0.025
@@ -111,10 +111,10 @@ def _interval(measured: Log) -> float:
 
 
 def _holes(measured: Log, interval: float) -> list[str]:
-    """Notes on short holes; LogError for a long one."""
+    """Notes on holes; LogError for a long one."""
     gaps = np.diff(measured.time)
     worst = int(np.argmax(gaps))
-    if gaps[worst] > LONGEST_BRIDGE * interval:
+    if gaps[worst] > LONGEST_HOLE:
         raise LogError(
             f"{measured.source}: no samples from {measured.time[worst]:.3f} s to "
             f"{measured.time[worst + 1]:.3f} s; cut the log there, or export it without a hole"
@@ -123,8 +123,8 @@ def _holes(measured: Log, interval: float) -> list[str]:
     if len(holes) == 0:
         return []
     first = measured.time[holes[0]]
-    note = f"{measured.source}: {len(holes)} short holes, the first at {first:.3f} s; "
-    return [note + "the reference is taken as straight across them"]
+    note = f"{measured.source}: {len(holes)} holes, the first at {first:.3f} s; "
+    return [note + "the reference is continued across them, and no sample counts there"]
 
 
 def _starts_at_rest(measured: Log) -> None:

@@ -63,6 +63,10 @@ class Recording:
     ) -> Array:
         """Residual as in `residual`; raises UnsettledError where the model cannot be simulated."""
         found = simulate(self.inputs, values, gap_position=gap_position, tolerance=tolerance)
+        return self.residual_of(found)
+
+    def residual_of(self, found: Log) -> Array:
+        """Residual as in `residual`, of a simulated log."""
         difference = np.stack([self.log[name] - found[name] for name in self.channels])
         white = np.where(self.use, difference / self.noise[:, None], 0.0)
         if VOLTAGE in self.channels:

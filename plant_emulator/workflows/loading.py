@@ -14,9 +14,11 @@ import numpy as np
 
 from plant_emulator import logs
 from plant_emulator.errors import LogError
+from plant_emulator.recordings.holes import bridge_holes
 from plant_emulator.recordings.preflight import NAMES, preflight
 from plant_emulator.recordings.recording import recording
 from plant_emulator.recordings.same_bench import check_same_bench
+from plant_emulator.recordings.stamps import restamped
 from plant_emulator.signals.log import VOLTAGE, Log
 from plant_emulator.workflows.arguments import check_signals
 
@@ -70,8 +72,15 @@ def load_recordings(
         check_unlabelled(log)
         check_signals(log, NEEDED)
         checked = preflight(log, parameters.value("gear_ratio"))
+        log, jitter = restamped(log)
+        if jitter > 0.0:
+            notes.append(
+                f"{log.source}: rows were taken {1e3 * jitter:.1f} ms (rms) off their stamps, as "
+                "the reference tells; the stamps are corrected"
+            )
+        log, use = bridge_holes(log, checked.use)
         taken.append(log)
-        uses.append(checked.use)
+        uses.append(use)
         notes += checked.notes
     check_distinct([(log.source, samples(log)) for log in taken])
     check_same_bench(taken, parameters.values())

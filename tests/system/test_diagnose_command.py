@@ -47,6 +47,10 @@ FORM: dict[str, Any] = {
                  "parameters": [{"name": NAME, "value": Real, "standard_error": Real,
                                  "unit": NAME}]}],
     "undetectable": [{"effect": NAME, "reason": NAME}],
+    "trace": [{"action": NAME, "effects": NAMES, "promised": dict, "gain": Real,
+               "mean_square": Real}],
+    "noise": [{"channel": NAME, "deviation": Real, "correlation_time": Real, "lines": [Real],
+               "outliers": Real, "held_period": Real, "white": bool}],
 }  # fmt: skip
 
 

@@ -19,12 +19,13 @@ Answer = TypeVar("Answer")
 # What a person reads about a step, by the name of its function.
 LABELS = {
     "start": "fit without effects",
-    "spread": "fit without effects",
     "find_input_noise": "noise of the inputs",
-    "show": "what each effect changes",
-    "contend": "first fits of effects",
-    "follow": "fits of the best effects",
+    "estimate_noise": "noise of the sensors",
+    "screen": "what each effect promises",
+    "confirm": "first fits of effects",
+    "advance": "fits in the new noise",
     "refit": "fits to their end",
+    "visibilities": "what the logs can show",
     "fit_random_effect": "random effects",
     "fit_alone": "each run alone",
     "locate_gap": "where the gap lies",

@@ -8,7 +8,11 @@ from typing import TYPE_CHECKING
 from plant_emulator.diagnosis.fitting.evidence import CLASS_MARGIN, evidence_of
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from plant_emulator.diagnosis.answer import SearchStep
     from plant_emulator.diagnosis.fit_result import FitResult, VarianceComponent
+    from plant_emulator.estimation.noise.channel_noise import ChannelNoise
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,6 +44,8 @@ class Explanation:
     unconverged : reason why the result cannot be trusted; empty where it can
     random_effects : accepted random effects, beside the effects of `final`
     reduced_costs : for each of several accepted effects, the least cost of a fit without it
+    trace : the search in its order
+    noise : of every channel as the logs show it; empty where it is as declared
     """
 
     null: FitResult
@@ -49,6 +55,8 @@ class Explanation:
     unconverged: str
     random_effects: tuple[VarianceComponent, ...] = ()
     reduced_costs: dict[str, float] = field(default_factory=dict)
+    trace: tuple[SearchStep, ...] = ()
+    noise: Mapping[str, ChannelNoise] = field(default_factory=dict)
 
     @property
     def named(self) -> tuple[str, ...]:

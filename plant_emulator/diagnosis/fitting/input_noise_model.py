@@ -11,7 +11,7 @@ import hashlib
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, cast
 
-from plant_emulator.diagnosis.fitting.steps import refit, start
+from plant_emulator.diagnosis.fitting.fit_steps import refit, start
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.estimation.residuals import whitened_function
 

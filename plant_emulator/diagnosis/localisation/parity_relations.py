@@ -20,14 +20,16 @@ gives e in the same way. At a limit the drive's relation says nothing.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from plant_emulator.signals.log import VOLTAGE
+from plant_emulator.solver import compiler
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
@@ -216,23 +218,59 @@ def reconstructed_reference(
         voltage = p["armature_resistance"] * m.current + flux(m.speed, p) * m.motor_speed
         voltage += p["armature_inductance"] * np.gradient(m.current, m.time)
     steps = np.diff(m.time, prepend=2.0 * m.time[0] - m.time[1])
-    reconstructed = np.empty_like(m.time)
-    limited = np.zeros(len(reconstructed), bool)
+    return _compiled()(
+        voltage,
+        np.ascontiguousarray(m.current),
+        np.ascontiguousarray(m.motor_speed),
+        steps,
+        nominal,
+        p["current_gain"],
+        p["current_integral_time"],
+        p["speed_gain"],
+        p["speed_integral_time"],
+        AT_LIMIT * p["armature_current_limit"],
+        AT_LIMIT * p["voltage_limit"],
+    )
+
+
+def _solve_backwards(
+    voltage: Array,
+    current: Array,
+    speed: Array,
+    steps: Array,
+    nominal: Array,
+    current_gain: float,
+    current_time: float,
+    speed_gain: float,
+    speed_time: float,
+    most_current: float,
+    most_voltage: float,
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Solve both controllers backwards; see `reconstructed_reference`."""
+    reconstructed = np.empty_like(voltage)
+    limited = np.zeros(len(voltage), np.bool_)
     held_voltage = held_current = 0.0
-    for n, (u, i, h) in enumerate(zip(voltage, m.current, steps, strict=True)):
-        short = (u - held_voltage) / (1.0 + h / p["current_integral_time"]) / p["current_gain"]
-        wanted = i + short
-        over = abs(wanted) > AT_LIMIT * p["armature_current_limit"]
-        limited[n] = over or abs(u) > AT_LIMIT * p["voltage_limit"]
-        error = (wanted - held_current) / (1.0 + h / p["speed_integral_time"]) / p["speed_gain"]
+    for n in range(len(voltage)):
+        short = (voltage[n] - held_voltage) / (1.0 + steps[n] / current_time) / current_gain
+        wanted = current[n] + short
+        over = abs(wanted) > most_current
+        limited[n] = over or abs(voltage[n]) > most_voltage
+        error = (wanted - held_current) / (1.0 + steps[n] / speed_time) / speed_gain
         if limited[n]:
-            error = nominal[n] - m.motor_speed[n]
+            error = nominal[n] - speed[n]
         else:
-            held_voltage += h / p["current_integral_time"] * p["current_gain"] * short
+            held_voltage += steps[n] / current_time * current_gain * short
         if not over:
-            held_current += h / p["speed_integral_time"] * p["speed_gain"] * error
-        reconstructed[n] = m.motor_speed[n] + error
+            held_current += steps[n] / speed_time * speed_gain * error
+        reconstructed[n] = speed[n] + error
     return reconstructed, limited
+
+
+@cache
+def _compiled() -> Callable[..., tuple[Array, NDArray[np.bool_]]]:
+    """The loop, compiled once in this process."""
+    compiler.use_cache([__file__, str(compiler.__file__)], ["reconstructed reference"])
+    return compiler.compile_function(_solve_backwards, on_disk=True)
 
 
 @dataclass(frozen=True)

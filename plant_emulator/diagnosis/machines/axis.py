@@ -119,6 +119,11 @@ class AxisModel:
 
         return residual
 
+    unwhitened_residual = residual
+
+    def relations(self, where: FitResult, runs: Sequence[int], whiteners: object = None) -> None:
+        """See `Model`: the residual is that of the axis' only relation."""
+
     def input_noise(self, run: int, where: FitResult, state: Mapping[str, float]) -> None:  # noqa: ARG002 - `Model`'s signature
         """See `Model`: the motion is a measured input, but a smoothed one."""
         return

@@ -18,8 +18,10 @@ from plant_emulator.diagnosis.machines.bench_programs import (
     missing_experiments,
     planned_runs,
 )
+from plant_emulator.diagnosis.machines.bench_relations import BenchRelations
 from plant_emulator.diagnosis.wording import UNITS as SIGNAL_UNITS
 from plant_emulator.effects import from_file
+from plant_emulator.errors import UnsettledError
 from plant_emulator.estimation.equation_error import start_values
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
 from plant_emulator.estimation.initial_states import (
@@ -27,13 +29,13 @@ from plant_emulator.estimation.initial_states import (
     states_of,
     with_logged_values,
 )
-from plant_emulator.estimation.residuals import residual_function
 from plant_emulator.estimation.start_search import Search
 from plant_emulator.model.parameters import UNITS
 from plant_emulator.model.stage import GAP_POSITION, split_gap_position
 from plant_emulator.recordings.input_noise import noise_directions
+from plant_emulator.recordings.recording import IMPOSSIBLE
 from plant_emulator.signals.log import VOLTAGE
-from plant_emulator.simulation.simulate import TOLERANCE, values_of
+from plant_emulator.simulation.simulate import TOLERANCE, simulate, values_of
 from plant_emulator.solver.kernel import kernel, use_own_effects
 
 if TYPE_CHECKING:
@@ -42,15 +44,20 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.answer import Location
     from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.machine import Candidate
     from plant_emulator.effects import Effect
+    from plant_emulator.estimation.noise.channel_noise import Whitener
     from plant_emulator.estimation.unknowns import Residual
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.input_noise import NoiseDirections
     from plant_emulator.recordings.recording import Recording
+    from plant_emulator.signals.log import Array, Log
 
 # Tolerance of a run with a truck. It takes half the time of the usual tolerance, because every
 # sample of such a run is a corner; it changes the residual by less than a hundredth of the noise.
 TRUCK_TOLERANCE = 1e-4
+# Simulated logs that are kept: the screening asks two questions about each.
+KEPT_LOGS = 120
 
 # Subsystem of each parameter of the model.
 SUBSYSTEMS = {
@@ -97,14 +104,15 @@ class BenchModel:
         self._free = free_parameters(parameters, free, voltage=any(voltage))
         self._effects = effects
         self._values = values_of(parameters)
-        self._set = parameters
+        self.nominal_set = parameters
+        self._kept: dict[tuple[object, ...], Log] = {}
         known = {**kernel().effects, **effects}
         plausible = {name: effect.plausible() for name, effect in effects.items()}
         everything = {**plausible, **parameters.effects}
         self._recordings = [with_logged_values(r, everything, known) for r in recordings]
         self._given = {f"{e}_{key}" for e, own in parameters.effects.items() for key in own}
         self.states = states_of(parameters.effects, known)
-        self.candidates = {
+        self.candidates: Mapping[str, Candidate] = {
             name: candidate(effect, voltage=all(voltage)) for name, effect in effects.items()
         }
         self.parameters = tuple(unknowns(parameters, self._free, self._values, ()))
@@ -123,7 +131,11 @@ class BenchModel:
             for r in recordings
         ]
 
-    def _fixed_values(self, run: int, effects: Sequence[str]) -> dict[str, float]:
+    def recording(self, run: int) -> Recording:
+        """The recording of a run."""
+        return self._recordings[run]
+
+    def fixed_values(self, run: int, effects: Sequence[str]) -> dict[str, float]:
         """Values that no fit of these effects changes: of set, effects and log."""
         fixed = {k: v for name in effects for k, v in self.candidates[name].fixed.items()}
         logged = self._recordings[run].logged_values
@@ -132,15 +144,47 @@ class BenchModel:
 
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
         """See `Model`."""
-        recording = self._recordings[run]
-        tolerance = TRUCK_TOLERANCE if recording.inputs.truck else TOLERANCE
-        return residual_function(recording, self._fixed_values(run, effects), tolerance)
+        recording, fixed = self._recordings[run], self.fixed_values(run, effects)
+
+        def residual(found: Mapping[str, float]) -> Array:
+            try:
+                return recording.residual_of(self.simulated(run, {**fixed, **found}))
+            except UnsettledError:
+                return np.where(recording.use, IMPOSSIBLE, 0.0)
+
+        return residual
+
+    unwhitened_residual = residual
+
+    def simulated(self, run: int, values: Mapping[str, float]) -> Log:
+        """The log that a run would have given at these values of everything."""
+        key = (run, *sorted(values.items()))
+        if key not in self._kept:
+            if len(self._kept) >= KEPT_LOGS:
+                self._kept.clear()
+            self._kept[key] = self._simulate(run, values)
+        return self._kept[key]
+
+    def _simulate(self, run: int, values: Mapping[str, float]) -> Log:
+        inputs = self._recordings[run].inputs
+        own, gap = split_gap_position(values)
+        tolerance = TRUCK_TOLERANCE if inputs.truck else TOLERANCE
+        return simulate(inputs, own, gap_position=gap, tolerance=tolerance)
+
+    def relations(
+        self,
+        where: FitResult,
+        runs: Sequence[int],
+        whiteners: Mapping[int, Sequence[Whitener]] | None = None,
+    ) -> BenchRelations | None:
+        """See `Model`; None with effects of the set, which the relations do not know."""
+        return None if self._given else BenchRelations(self, where, runs, whiteners)
 
     def input_noise(
         self, run: int, where: FitResult, state: Mapping[str, float]
     ) -> NoiseDirections | None:
         """See `Model`."""
-        values = {**self._fixed_values(run, where.effects), **where.values, **state}
+        values = {**self.fixed_values(run, where.effects), **where.values, **state}
         return noise_directions(self._recordings[run], *split_gap_position(values))
 
     def nominal(self, runs: Sequence[int]) -> dict[str, float]:  # noqa: ARG002 - `Model`'s signature
@@ -167,7 +211,7 @@ class BenchModel:
         residual = self.residual(run, effects)
         return scan_states(
             self._recordings[run],
-            {**self._fixed_values(run, effects), **values},
+            {**self.fixed_values(run, effects), **values},
             groups,
             lambda states: residual({**values, **states}),
         )
@@ -176,14 +220,14 @@ class BenchModel:
         """See `Model`."""
         if self._given:
             return None
-        return locate([self._recordings[k] for k in runs], self._set, where)
+        return locate([self._recordings[k] for k in runs], self.nominal_set, where)
 
     def with_planned_runs(self, where: FitResult, runs: Sequence[int]) -> BenchModel:
         """See `Model`: drive programs that no log shows; they start as the last run did."""
-        warm = {**self._fixed_values(runs[-1], where.effects), **where.values, **where.states[-1]}
-        fitted = self._set.with_values({name: where.values[name] for name in self._free})
+        warm = {**self.fixed_values(runs[-1], where.effects), **where.values, **where.states[-1]}
+        fitted = self.nominal_set.with_values({name: where.values[name] for name in self._free})
         more = planned_runs(self._recordings, fitted, warm, {**warm, **self._cold(where.effects)})
-        return BenchModel([*self._recordings, *more], self._set, self._effects, self._free)
+        return BenchModel([*self._recordings, *more], self.nominal_set, self._effects, self._free)
 
     def missing_experiments(self, runs: Sequence[int]) -> dict[str, tuple[str, ...]]:
         """See `Model`."""

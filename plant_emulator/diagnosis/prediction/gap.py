@@ -50,7 +50,7 @@ class Fold:
 
 @dataclass(frozen=True, kw_only=True)
 class Prediction:
-    """The whitened residuals of predicted runs [1], shape (channels, samples) each.
+    """The residuals of predicted runs over their noise [1], shape (channels, samples) each.
 
     converged : whether the fit of the fold and the fits of the runs' own states converged
     """
@@ -113,11 +113,12 @@ def _predict_run(
         return residual({**found.values, **states})
 
     own = (*model.states, *(u for name in effects for u in model.candidates[name].states))
-    if known is not None or not own:
-        return residual_at(known or {}), True
-    start = model.initial_states(run, effects, found.values)
-    estimated = fit_from(start, own, residual_at)
-    return estimated.residuals[0], estimated.converged
+    states, converged = known or {}, True
+    if known is None and own:
+        start = model.initial_states(run, effects, found.values)
+        estimated = fit_from(start, own, residual_at)
+        states, converged = estimated.states(0), estimated.converged
+    return model.unwhitened_residual(run, effects)({**found.values, **states}), converged
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -225,6 +226,12 @@ def closed_fraction_interval(reference: Gap, explained: Gap) -> tuple[float, flo
         return None
     low, high = np.quantile(drawn, [0.025, 0.975])
     return float(low), float(high)
+
+
+def shows_shrinkage(reference: Gap, explained: Gap) -> bool:
+    """Whether the 95 % interval of the closed fraction excludes 0; True where it is not defined."""
+    interval = closed_fraction_interval(reference, explained)
+    return interval is None or interval[0] > 0.0
 
 
 def combined_gap(found: Gap) -> tuple[float, float, float]:

@@ -16,6 +16,8 @@ from plant_emulator.diagnosis.answer import (
     ParameterDeviation,
     Quantity,
     RankedEffect,
+    SearchStep,
+    SensorNoise,
     Undetectable,
     Verdict,
 )
@@ -47,6 +49,8 @@ def from_json(document: Mapping[str, Any]) -> Answer:
         gap=_gap(document["gap"]),
         ranking=tuple(_ranked_effect(entry) for entry in document["ranking"]),
         undetectable=tuple(Undetectable(**entry) for entry in document["undetectable"]),
+        trace=tuple(_search_step(entry) for entry in document.get("trace", ())),
+        noise=tuple(_sensor_noise(entry) for entry in document.get("noise", ())),
     )
 
 
@@ -126,6 +130,16 @@ def _gap(part: Mapping[str, Any]) -> HeldOutGap:
 def _ranked_effect(entry: Mapping[str, Any]) -> RankedEffect:
     sizes = [Quantity(**_numbers(p, "value", "standard_error")) for p in entry["parameters"]]
     return RankedEffect(**{**_numbers(entry, "evidence"), "parameters": tuple(sizes)})
+
+
+def _search_step(entry: Mapping[str, Any]) -> SearchStep:
+    promised = {name: _number(gain) for name, gain in entry["promised"].items()}
+    own = {"effects": tuple(entry["effects"]), "promised": promised}
+    return SearchStep(**{**_numbers(entry, "gain", "mean_square"), **own})
+
+
+def _sensor_noise(entry: Mapping[str, Any]) -> SensorNoise:
+    return SensorNoise(**{**entry, "lines": tuple(entry["lines"])})
 
 
 def _numbers(entry: Mapping[str, Any], *keys: str) -> dict[str, Any]:

@@ -1,7 +1,8 @@
 """The report of a diagnosis: one HTML file that needs no network, no font and no script.
 
 The verdict comes first. Then follow the held-out gap, the place of the gap, the tested effects, the
-parameter deviations, what the logs cannot show, the held-out runs, and how to repeat the diagnosis.
+parameter deviations, what the logs cannot show, the held-out runs, the search with the noise of the
+channels, and how to repeat the diagnosis.
 """
 
 from __future__ import annotations
@@ -76,6 +77,7 @@ def html(answer: Answer, details: Details) -> str:
         _parameters(verdict.parameters),
         _limits(answer.undetectable),
         _runs(details.traces),
+        _search(answer),
         _repeat(answer.logs, details),
     )
     return f"<!DOCTYPE html>\n{tag('html', head, tag('body', body), lang='en')}\n"
@@ -226,6 +228,14 @@ def _figure(trace: Trace, columns: int) -> Markup:
     drawn = scroll_region(html_traces.draw(trace, columns), name)
     words = tag("figcaption", tag("strong", name), f": {html_traces.summary(trace)}")
     return tag("figure", words, drawn)
+
+
+def _search(answer: Answer) -> Markup:
+    if not answer.trace and not answer.noise:
+        return Markup("")
+    tried = tables.search_steps(answer.trace) if answer.trace else tag("p", "No effect was fitted.")
+    noise = [tables.sensor_noise(answer.noise)] if answer.noise else []
+    return _section("How the answer was found", tried, *noise)
 
 
 def _repeat(logs: Logs, details: Details) -> Markup:

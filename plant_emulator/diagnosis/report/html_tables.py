@@ -42,6 +42,8 @@ if TYPE_CHECKING:
         ParameterDeviation,
         Quantity,
         RankedEffect,
+        SearchStep,
+        SensorNoise,
         Undetectable,
     )
     from plant_emulator.diagnosis.prediction.trace import Trace
@@ -200,6 +202,58 @@ def undetectable(entries: Sequence[Undetectable]) -> Markup:
         "Effects that these logs cannot show at their plausible size. Such an effect may be there "
         "although the verdict does not name it.",
         ["effect", "reason, and what would show it"],
+        rows,
+    )
+
+
+def search_steps(steps: Sequence[SearchStep]) -> Markup:
+    """What the search tried, in its order."""
+    rows = [
+        tag(
+            "tr",
+            tag("td", step.action),
+            row_head(*_effect_names(step.effects)),
+            cell(", ".join(f"{gain:.0f} ({name})" for name, gain in step.promised.items())),
+            cell(number(step.gain)),
+            cell(number(step.mean_square, 4)),
+        )
+        for step in steps
+    ]
+    heads = ["promised gain", "gain", "mean square left"]
+    return table(
+        "The search in its order. Gains are of log evidence: those that the linear regressions "
+        "promise for the last effect, and that of the fit over the fit without effects. A mean "
+        "square of 1 is noise.",
+        ["step", "effects", *map(right, heads)],
+        rows,
+    )
+
+
+def _effect_names(effects: Sequence[str]) -> list[str]:
+    names = [part for name in effects for part in (" + ", code(name))][1:]
+    return names or ["no effect"]
+
+
+def sensor_noise(channels: Sequence[SensorNoise]) -> Markup:
+    """The noise of every channel as the logs show it."""
+    rows = [
+        tag(
+            "tr",
+            row_head(in_words(one.channel)),
+            cell(number(one.deviation)),
+            cell(f"{1e3 * one.correlation_time:.0f} ms"),
+            tag("td", ", ".join(f"{f:.2f} Hz" for f in one.lines) or "none"),
+            cell(f"{100.0 * one.outliers:.2f} %"),
+            cell(f"{1e3 * one.held_period:.0f} ms" if one.held_period else "no"),
+            tag("td", "yes" if one.white else "no"),
+        )
+        for one in channels
+    ]
+    heads = ["standard deviation [SI]", "correlation time"]
+    return table(
+        "Noise of the channels. White: whether the innovations of the noise model are white; where "
+        "they are not, the model does not explain the noise.",
+        ["channel", *map(right, heads), "hum", right("outliers"), right("held"), "white"],
         rows,
     )
 

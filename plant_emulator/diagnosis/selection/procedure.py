@@ -3,15 +3,8 @@
 1. The noise of measured inputs is made part of the noise (`fitting.input_noise_model`).
 2. The fit without effects leaves the gap. Where the gap is random, a random effect may explain it
    (`fitting.random_effects`); it is then made part of the noise.
-3. Hypothesis tests find the effects that the logs ask for (`selection.stepwise`):
-   a. The signature of an effect is the change of the residual when the effect comes in. Its part
-      orthogonal to the nuisance parameters says how much the effect can explain.
-   b. A screening fit starts from the size whose signature explains most. The best effects are
-      fitted further, the best of these to convergence.
-   c. The cost has many local minima, because contact comes and goes. Effects that could close the
-      gap therefore start again from alternative starts.
-   d. The fit without effects starts again from the best joint fits. Where it gets as low, no effect
-      is needed.
+3. The search finds the set of effects that the logs ask for (`parity.search`). An axis is searched
+   by stepwise tests (`selection.stepwise`).
 4. The evidence decides (`selection.verdict`). Where no effect is named, the runs are fitted one by
    one: they may each agree with the equations, but not with each other.
 """
@@ -24,10 +17,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fitting.evidence import EVIDENCE_THRESHOLD, NOISE_MEAN_SQUARE, excess
+from plant_emulator.diagnosis.fitting.fit_steps import refit, start
 from plant_emulator.diagnosis.fitting.input_noise_model import whiten_inputs
 from plant_emulator.diagnosis.fitting.random_effects import WeightedRecipe, fit_random_effect
-from plant_emulator.diagnosis.fitting.steps import refit, start
 from plant_emulator.diagnosis.fitting.task import Task
+from plant_emulator.diagnosis.parity.search import Search
 from plant_emulator.diagnosis.selection import run_consistency
 from plant_emulator.diagnosis.selection.stepwise import Contest
 from plant_emulator.diagnosis.selection.verdict import decide
@@ -64,10 +58,10 @@ class Procedure:
         """Test the hypotheses and decide; give also the runner in whose noise the costs count."""
         model, runner = self.runner.model, self.runner
         if not model.reaches_noise:
-            explained = self._test_effects(runner, self.null)
+            explained, _ = self._test_effects(runner, self.null)
             return explained, self._check_consistency(explained, decide(model, explained)), runner
         (null,) = [self.null] if self.null else runner.map(start, [runner.runs])
-        found = self._test_random_gap(null) or (self._test_effects(runner, null), runner)
+        found = self._test_random_gap(null) or self._test_effects(runner, null)
         if decide(model, found[0]).kind == "unknown" and not found[0].random_effects:
             found = self._test_random_effects(found[0].final, found[0].null) or found
         explained, runner = found
@@ -78,9 +72,15 @@ class Procedure:
 
     def _test_effects(
         self, runner: TaskRunner, null: FitResult | None, random_evidence: float = 0.0
-    ) -> Explanation:
-        """Run the hypothesis tests of the library; random_evidence : see `Contest`."""
+    ) -> tuple[Explanation, TaskRunner]:
+        """Run the hypothesis tests of the library; random_evidence : see `Contest`.
+
+        Give also the runner in whose noise the costs count.
+        """
         library = runner.model.candidates
+        if runner.model.reaches_noise and null is not None:
+            search = Search(runner=runner, null=null, random_evidence=random_evidence)
+            return search.explain(), search.runner
         contest = Contest(
             runner,
             tuple(library),
@@ -90,7 +90,7 @@ class Procedure:
             exact=[name for name, one in library.items() if one.exact_form],
             subsystems={name: one.subsystem for name, one in library.items()},
         )
-        return contest.explain()
+        return contest.explain(), runner
 
     def _test_random_gap(self, null: FitResult) -> tuple[Explanation, TaskRunner] | None:
         """Test the random effects first where the gap is large and random.
@@ -120,7 +120,7 @@ class Procedure:
         every = tuple(weights.get(k, np.ones(1)) for k in range(len(model.runs)))
         runner = replace(self.runner, recipe=WeightedRecipe(self.runner.recipe, every))
         (null,) = runner.map(refit, [Task(base=null, runs=runs)])
-        explained = self._test_effects(runner, null, best.evidence)
+        explained, runner = self._test_effects(runner, null, best.evidence)
         last = self._fit_random_effects(explained.final, [best.effect])
         return (replace(explained, random_effects=tuple(last)), runner) if last else None
 

@@ -18,6 +18,9 @@ DEVIATION_ERRORS = 3.0
 # A deviation of so many standard errors is no chance, among some ten parameters in a hundred
 # diagnoses.
 SIGNIFICANT_DEVIATION_ERRORS = 4.0
+# Share of a residual that its past predicts from which on the residual is no noise [1]. Noise that
+# is correlated over 30 ms at 100 Hz has 0.5; a wave that no effect explains has 0.95.
+MOST_PREDICTABLE = 0.7
 # Mean square up to which a fit without effects leaves nothing but noise.
 NULL_MEAN_SQUARE = 1.1
 
@@ -99,6 +102,9 @@ def _reason_against(model: Model, explained: Explanation) -> str:
     null, final = explained.null, explained.final
     if explained.unconverged:
         return explained.unconverged
+    for channel, noise in explained.noise.items():
+        if noise.colour.predictable > MOST_PREDICTABLE:
+            return f"what is left of {channel} follows its own past as no noise of a sensor does"
     if model.reaches_noise and _is_structured(explained):
         return "what is left is as small as the noise, but not as random"
     if final.insignificant and not (len(final.effects) == 1 and significant(final, null)):

@@ -1,1 +1,1 @@
-"""The noise of a measured channel as its log shows it: colour, mains, outliers, jittered stamps."""
+"""The noise of a measured channel as its log shows it: colour, mains, outliers."""

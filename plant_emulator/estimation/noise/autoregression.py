@@ -54,6 +54,11 @@ class Autoregression:
         return self.deviations[-1]
 
     @property
+    def predictable(self) -> float:
+        """Share of the variance that the past predicts [1]."""
+        return 1.0 - (self.innovation_deviation / self.deviation) ** 2
+
+    @property
     def correlation_time(self) -> float:
         """Number of samples that an independent sample is worth, for the mean of the noise."""
         whole = max(1e-3, 1.0 - float(self.predictors[-1].sum()))

@@ -1,8 +1,8 @@
 """The noise of a channel, and the linear map that makes a residual of the channel white (pure).
 
-    e(t) = lines + u(t) + slope(t) tau(t),   u(t) autoregressive
+    e(t) = lines + u(t),   u(t) autoregressive
 
-The lines are the mains and their double as the sampling folds them. tau is the error of a stamp.
+The lines are the mains and their double as the sampling folds them.
 """
 
 from __future__ import annotations
@@ -36,20 +36,18 @@ class NoiseSeries:
     """The residual of a channel in one run, in units of the channel's declared noise.
 
     time : [s], value : residual, use : samples that count, shape (n,) each
-    slope : of the measured signal [declared noise/s]; 0 where jitter is not looked for
     """
 
     time: Array
     value: Array
     use: NDArray[np.bool_]
-    slope: Array
 
 
 @dataclass(frozen=True, kw_only=True)
 class ChannelNoise:
     """The noise of a channel, in units of its declared noise.
 
-    lines : frequencies [Hz]; jitter : standard deviation of the stamps [s]
+    lines : frequencies [Hz]; disturbance : their mean square
     outliers : share of the samples [1]
     ljung_box_excess : of the innovations beyond white noise [chi squared, 0 +- sqrt(2 LAGS)]
     unsteady : share of the blocks whose innovations are louder than noise of one spectrum makes [1]
@@ -57,15 +55,20 @@ class ChannelNoise:
 
     colour: Autoregression = field(default_factory=Autoregression)
     lines: tuple[float, ...] = ()
-    jitter: float = 0.0
     outliers: float = 0.0
+    disturbance: float = 0.0
     ljung_box_excess: float = 0.0
     unsteady: float = 0.0
 
     @property
     def deviation(self) -> float:
-        """Standard deviation of the noise without lines and jitter."""
+        """Standard deviation of the noise without lines."""
         return self.colour.deviation
+
+    @property
+    def total_deviation(self) -> float:
+        """Standard deviation of the noise with lines, without outliers."""
+        return float(np.hypot(self.deviation, np.sqrt(self.disturbance)))
 
     @property
     def white(self) -> bool:
@@ -77,12 +80,11 @@ class ChannelNoise:
 class Whitener:
     """The linear map that makes a residual of one channel in one run white.
 
-    use : samples that count; weight : makes samples of jittered stamps as loud as the others
+    use : samples that count; time : of all samples [s]
     """
 
     noise: ChannelNoise
     use: NDArray[np.bool_]
-    weight: Array
     time: Array
 
     @cached_property
@@ -101,7 +103,7 @@ class Whitener:
         """Innovations over their deviation, shape (n,); 0 where a sample does not count."""
         index, known = self._places
         found = np.zeros(len(value))
-        found[index] = self.noise.colour.innovations((value * self.weight)[index], known)
+        found[index] = self.noise.colour.innovations(value[index], known)
         return found
 
     def white(self, value: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What sits on the noise of a channel: outliers, lines of the mains, jittered stamps (pure)."""
+"""What sits on the noise of a channel: outliers, and lines of the mains (pure)."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.estimation.noise.channel_noise import Whitener, line_columns
+from plant_emulator.estimation.noise.channel_noise import line_columns
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from plant_emulator.estimation.noise.channel_noise import ChannelNoise, NoiseSeries
+    from plant_emulator.estimation.noise.channel_noise import NoiseSeries
     from plant_emulator.signals.log import Array
 
 # Departure from both neighbours that no signal of a machine makes [of the usual departure], and
@@ -21,10 +21,8 @@ if TYPE_CHECKING:
 OUTLYING, NEIGHBOURS = 7.0, 0.3
 # Mains [Hz], and how far off they may be [Hz].
 MAINS, MAINS_OFF = (50.0, 60.0), 0.2
-# Gain of log evidence that a line or a jitter needs: odds of e^15.
+# Gain of log evidence that a line needs: odds of e^15.
 EVIDENCE = 15.0
-# A row lies between its neighbours: largest deviation of its stamp [intervals].
-LARGEST_JITTER = 0.3
 
 
 def outlying(value: Array, use: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -81,37 +79,3 @@ def periodogram(time: Array, value: Array, frequencies: Array) -> Array:
         found[k] = np.abs(turn.sum()) ** 2
         turn *= step
     return found / max(1, len(value))
-
-
-def likely_jitter(
-    noise: ChannelNoise, series: Sequence[NoiseSeries], uses: Sequence[NDArray[np.bool_]]
-) -> tuple[float, float]:
-    """Jitter of the stamps [s], and the factor on the other noise beside it; (0, 1): not likely.
-
-    The variance 1 + (jitter slope)^2 of the innovations, by maximum likelihood.
-    """
-    from scipy.optimize import minimize_scalar
-
-    interval = float(np.median(np.diff(series[0].time)))
-    pairs = list(zip(series, uses, strict=True))
-    left = [Whitener(noise, use, np.ones(len(s.time)), s.time).white(s.value) for s, use in pairs]
-    square = np.concatenate([v[use] ** 2 for v, use in zip(left, uses, strict=True)])
-    slope = np.concatenate([s.slope[use] for s, use in pairs]) / noise.colour.innovation_deviation
-
-    def loss(jitter: float) -> tuple[float, float]:
-        variance = 1.0 + (jitter * slope) ** 2
-        scale = float(np.mean(square / variance))
-        return 0.5 * float(np.sum(np.log(variance * scale))), scale
-
-    if not slope.any():
-        return 0.0, 1.0
-    found = minimize_scalar(
-        lambda x: loss(float(np.exp(x)))[0],
-        bounds=(-12.0, float(np.log(LARGEST_JITTER * interval))),
-        method="bounded",
-    )
-    if loss(0.0)[0] - float(found.fun) < EVIDENCE:
-        return 0.0, 1.0
-    jitter = float(np.exp(found.x))
-    factor = float(np.sqrt(loss(jitter)[1]))
-    return jitter * factor, factor

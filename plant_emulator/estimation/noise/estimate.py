@@ -22,7 +22,6 @@ from plant_emulator.estimation.noise.channel_noise import (
 )
 from plant_emulator.estimation.noise.disturbances import (
     EVIDENCE,
-    likely_jitter,
     likely_lines,
     outlying,
     without_lines,
@@ -55,7 +54,7 @@ def estimate_channel_noise(
 ) -> tuple[ChannelNoise, list[Whitener]]:
     """Estimate the noise that these residuals of a channel show; give each run's whitener too.
 
-    disturbed : whether outliers, lines and jitter are looked for as well
+    disturbed : whether outliers and lines are looked for as well
     """
     uses: list[NDArray[np.bool_]] = [s.use for s in series]
     noise = ChannelNoise()
@@ -66,7 +65,7 @@ def estimate_channel_noise(
         noise = ChannelNoise(outliers=left_out)
     noise = _coloured(noise, series, uses, ORDER)
     if disturbed:
-        noise = _with_jitter(_with_lines(noise, series, uses), series, uses)
+        noise = _with_lines(noise, series, uses)
     found = _whiteners(noise, series, uses)
     if found[0].noise.ljung_box_excess > COLOURED:
         found = _whiteners(_coloured(noise, series, uses, LONG_ORDER), series, uses)
@@ -75,22 +74,25 @@ def estimate_channel_noise(
 
 def _whiteners(noise: ChannelNoise, series: Sequence[NoiseSeries], uses: Uses) -> list[Whitener]:
     """Whiteners of all runs, their noise with the result of its tests."""
-    weights = _weights(noise, series)
-    found = [Whitener(noise, u, w, s.time) for s, u, w in zip(series, uses, weights, strict=True)]
+    found = [Whitener(noise, u, s.time) for s, u in zip(series, uses, strict=True)]
     left = [w.white(s.value) for w, s in zip(found, series, strict=True)]
     squares, _ = _block_squares(left, uses)
     tested = replace(
         noise,
+        disturbance=_disturbance(noise, series, uses),
         ljung_box_excess=ljung_box_excess([v[u] for v, u in zip(left, uses, strict=True)]),
         unsteady=float(np.mean(np.concatenate(squares) > LOUD)),
     )
     return [replace(w, noise=tested) for w in found]
 
 
-def _weights(noise: ChannelNoise, series: Sequence[NoiseSeries]) -> list[Array]:
-    """Factors that make samples of jittered stamps as loud as the others, by run."""
-    level = noise.deviation
-    return [1.0 / np.sqrt(1.0 + (noise.jitter * s.slope / level) ** 2) for s in series]
+def _disturbance(noise: ChannelNoise, series: Sequence[NoiseSeries], uses: Uses) -> float:
+    """Mean square of the lines over the samples that count."""
+    parts = [
+        (s.value - without_lines(s, use, noise.lines))[use] ** 2
+        for s, use in zip(series, uses, strict=True)
+    ]
+    return float(np.mean(np.concatenate(parts)))
 
 
 def _with_lines(noise: ChannelNoise, series: Sequence[NoiseSeries], uses: Uses) -> ChannelNoise:
@@ -104,24 +106,11 @@ def _with_lines(noise: ChannelNoise, series: Sequence[NoiseSeries], uses: Uses) 
     return found if count * np.log(shrunk) > EVIDENCE + 4.0 * len(series) else noise
 
 
-def _with_jitter(noise: ChannelNoise, series: Sequence[NoiseSeries], uses: Uses) -> ChannelNoise:
-    """The noise with the jitter of its stamps, where it is likely."""
-    jitter, factor = likely_jitter(noise, series, uses)
-    if jitter == 0.0:
-        return noise
-    smaller = tuple(factor * d for d in noise.colour.deviations)
-    noise = replace(noise, jitter=jitter, colour=replace(noise.colour, deviations=smaller))
-    return _coloured(noise, series, uses, ORDER)
-
-
 def _coloured(
     noise: ChannelNoise, series: Sequence[NoiseSeries], uses: Uses, longest: int
 ) -> ChannelNoise:
     """The noise with the autoregression of its quiet blocks; longest : memory [samples]."""
-    values = [
-        without_lines(s, use, noise.lines) * weight
-        for s, use, weight in zip(series, uses, _weights(noise, series), strict=True)
-    ]
+    values = [without_lines(s, use, noise.lines) for s, use in zip(series, uses, strict=True)]
     # From white noise on: an autoregression that was fitted to a cause would predict the cause.
     found = Autoregression()
     for _ in range(PASSES):
@@ -146,7 +135,7 @@ def _quiet(
     """Samples of the blocks whose innovations are as small as those of the quiet blocks."""
     plain = ChannelNoise(colour=colour)
     left = [
-        Whitener(plain, use, np.ones(len(v)), s.time).innovations(v)
+        Whitener(plain, use, s.time).innovations(v)
         for s, v, use in zip(series, values, uses, strict=True)
     ]
     squares, blocks = _block_squares(left, uses)

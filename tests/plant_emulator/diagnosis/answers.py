@@ -25,6 +25,18 @@ FLOOR = {
 PHASES = (
     "standstill", "breakaway", "acceleration", "cruise", "deceleration", "field_weakening"
 )  # fmt: skip
+TRACE = [
+    {"action": "confirmed", "effects": ["gear_oil_temperature"],
+     "promised": {"simulation": 380.2, "relations": 401.7}, "gain": 406.2, "mean_square": 1.01},
+    {"action": "converged", "effects": ["gear_oil_temperature"], "promised": {}, "gain": 406.4,
+     "mean_square": 1.0},
+]  # fmt: skip
+NOISE = [
+    {"channel": "armature_current", "deviation": 0.25, "correlation_time": 0.03,
+     "lines": [50.02, 100.04], "outliers": 0.003, "held_period": 0.0, "white": True},
+    {"channel": "shaft_torque", "deviation": 0.3, "correlation_time": 0.01, "lines": [],
+     "outliers": 0.0, "held_period": 0.02, "white": False},
+]  # fmt: skip
 HIDDEN = [
     {
         "effect": "armature_resistance_heating",
@@ -120,6 +132,8 @@ def effect() -> dict[str, Any]:
         },
         "ranking": [OIL, *RUNNERS_UP],
         "undetectable": HIDDEN,
+        "trace": TRACE,
+        "noise": NOISE,
     }  # fmt: skip
 
 

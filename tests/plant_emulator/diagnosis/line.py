@@ -8,8 +8,9 @@ import numpy as np
 from plant_emulator.diagnosis.execution.pool import InProcess, Pool, TaskRunner
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.explanation import Explanation
+from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.machine import Candidate, MeasuredRun
-from plant_emulator.diagnosis.selection.stepwise import Contest
+from plant_emulator.diagnosis.parity.search import Search
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.recordings.input_noise import NoiseDirections
 from plant_emulator.signals.log import Array
@@ -100,6 +101,15 @@ class Line:
         """See `Model`."""
         return {}
 
+    def unwhitened_residual(
+        self, run: int, effects: Sequence[str]
+    ) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`: the noise is white."""
+        return self.residual(run, effects)
+
+    def relations(self, where: FitResult, runs: Sequence[int], whiteners: object = None) -> None:
+        """See `Model`: there are none."""
+
     def locate(self, where: FitResult, runs: Sequence[int]) -> None:
         """See `Model`."""
 
@@ -135,6 +145,6 @@ def noisy(y: Array, seed: int = 0) -> Array:
 
 
 def explained(model: Line) -> Explanation:
-    """The contest over all runs."""
-    exact = [name for name, one in model.candidates.items() if one.exact_form]
-    return Contest(runner(model), tuple(model.candidates), exact=exact).explain()
+    """The search over all runs."""
+    there = runner(model)
+    return Search(runner=there, null=fit_null(model, there.runs)).explain()

@@ -327,3 +327,11 @@ def test_text_can_be_read_on_every_ground_of_light_and_dark_screens():
         assert contrast(screen["heat4-fore"], screen["heat4"]) >= 4.5
         for curve in ("before", "after"):
             assert contrast(screen[curve], screen["back"]) >= 3.0
+
+
+def test_search_and_noise_stand_in_tables() -> None:
+    found = words(section(page("effect"), "How the answer was found"))
+    assert "confirmed gear_oil_temperature" in found
+    assert "380 (simulation), 402 (relations)" in found
+    assert "50.02 Hz, 100.04 Hz" in found
+    assert "30 ms" in found

@@ -112,9 +112,6 @@ def test_beat_that_noise_alone_shows_is_not_named() -> None:
     """The best of some 20 frequencies takes 2 (1 + 1/2 + ... + 1/20) = 7 from a run's squares."""
     model = Beating([noisy(np.full_like(TIME, 2.0), seed) for seed in range(8)])
     found = explained(model)
-    (beat,) = found.hypotheses
-    assert beat.fit is not None
-    assert found.null.sum_of_squares - beat.fit.sum_of_squares > 30.0
     assert found.final.effects == ()
 
 

@@ -9,8 +9,8 @@ import pytest
 from plant_emulator.diagnosis.execution.pool import InProcess
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
 from plant_emulator.diagnosis.fitting.random_effects import WeightedRecipe, fit_random_effect
-from plant_emulator.diagnosis.fitting.steps import show
 from plant_emulator.diagnosis.fitting.task import Task
+from plant_emulator.diagnosis.parity.screening import screen
 from plant_emulator.diagnosis.selection.procedure import Procedure
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import (
@@ -161,7 +161,7 @@ def test_no_other_effect_is_sought_where_all_is_chance() -> None:
 
     class Watched(InProcess):
         def map(self, function, recipe, tasks):  # type: ignore[no-untyped-def]
-            if function is show and tasks:
+            if function is screen and tasks:
                 looked.append(recipe)
             return super().map(function, recipe, tasks)
 

@@ -12,6 +12,7 @@ from plant_emulator.diagnosis.prediction.gap import (
     closed_fraction_interval,
     combined_gap,
     measure_gap,
+    shows_shrinkage,
 )
 from plant_emulator.signals.log import Array
 
@@ -65,6 +66,17 @@ def test_worse_prediction_closes_less_than_nothing() -> None:
     before = measure_gap(NAMES, [constant(2.0, 2.0)], [10])
     after = measure_gap(NAMES, [constant(3.0, 3.0)], [10])
     assert closed_fraction(before, after) == pytest.approx(1 - 16 / 6)
+
+
+def test_only_a_prediction_that_is_better_for_certain_shows_shrinkage() -> None:
+    before, after, worse = (
+        measure_gap(NAMES, [constant(level, level)], [10]) for level in (2.0, 1.2, 3.0)
+    )
+    assert shows_shrinkage(before, after)
+    assert not shows_shrinkage(before, worse)
+    assert shows_shrinkage(after, after) is False
+    nothing = measure_gap(NAMES, [constant(1.0, 1.0)], [10])
+    assert shows_shrinkage(nothing, nothing)
 
 
 def test_samples_of_all_runs_are_pooled() -> None:

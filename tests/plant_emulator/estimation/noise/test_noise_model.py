@@ -13,15 +13,12 @@ from plant_emulator.estimation.noise.estimate import estimate_channel_noise
 RATE = 100.0
 
 
-def series(
-    value: np.ndarray, use: np.ndarray | None = None, slope: np.ndarray | None = None
-) -> NoiseSeries:
+def series(value: np.ndarray, use: np.ndarray | None = None) -> NoiseSeries:
     n = len(value)
     return NoiseSeries(
         time=np.arange(n) / RATE,
         value=value,
         use=np.ones(n, bool) if use is None else use,
-        slope=np.zeros(n) if slope is None else slope,
     )
 
 
@@ -43,7 +40,6 @@ def test_white_noise_keeps_its_deviation_and_gets_no_colour() -> None:
     noise, (whitener,) = estimate_channel_noise([series(white(5000, 1))])
     assert noise.colour.order == 0
     assert noise.lines == ()
-    assert noise.jitter == 0.0
     assert noise.deviation == pytest.approx(1.0, abs=4.0 / np.sqrt(2 * 5000))
     assert np.mean(whitener.white(white(5000, 2)) ** 2) == pytest.approx(1.0, abs=0.1)
 
@@ -107,17 +103,6 @@ def test_a_burst_of_several_samples_is_no_outlier() -> None:
     value = white(2000, 10)
     value[500:510] += 20.0 * np.sin(np.pi * np.arange(1, 11) / 11)
     assert not outlying(value, np.ones(2000, bool))[500:510].any()
-
-
-def test_jittered_stamps_show_as_variance_along_the_slope() -> None:
-    rng = np.random.default_rng(11)
-    t = np.arange(8000) / RATE
-    slope = 2000.0 * np.cos(2 * np.pi * 0.2 * t)
-    value = rng.standard_normal(8000) + slope * rng.uniform(-2e-3, 2e-3, 8000)
-    noise, (whitener,) = estimate_channel_noise([series(value, slope=slope)])
-    assert noise.jitter == pytest.approx(2e-3 / np.sqrt(3.0), rel=0.1)
-    assert noise.deviation == pytest.approx(1.0, abs=0.06)
-    assert np.mean(whitener.white(value) ** 2) == pytest.approx(1.0, abs=0.06)
 
 
 def test_a_hole_breaks_the_series() -> None:

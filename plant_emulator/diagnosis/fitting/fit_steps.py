@@ -1,0 +1,22 @@
+"""Fits as steps: functions of a model and plain data, for a pool to run."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from plant_emulator.diagnosis.fitting.joint_fit import fit_from, fit_null
+
+if TYPE_CHECKING:
+    from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.fitting.task import Task
+    from plant_emulator.diagnosis.machine import Model
+
+
+def start(model: Model, runs: tuple[int, ...]) -> FitResult:
+    """The fit without effects (a step)."""
+    return fit_null(model, runs)
+
+
+def refit(model: Model, task: Task) -> FitResult:
+    """The fit of `task.base` with the effects named there, from its values (a step)."""
+    return fit_from(model, task.base.effects, task.runs, task.base)

@@ -1,0 +1,1 @@
+"""Which effects explain the logs: screened by parity relations, confirmed by simulation."""

@@ -1,0 +1,143 @@
+"""The columns of an effect at one size, and what they gain.
+
+Each size parameter has a column of its own. Where an angle is unknown, each run has a cosine and a
+sine column.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.diagnosis.fitting.signature import signs, values_at_size
+from plant_emulator.estimation.regression import gain
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from plant_emulator.diagnosis.fidelity import Fidelity
+    from plant_emulator.diagnosis.machine import Candidate
+    from plant_emulator.estimation.unknowns import Unknown
+    from plant_emulator.signals.log import Array
+
+    States = Sequence[Mapping[str, float]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """A column of an effect: change of the data at one size.
+
+    size : the size parameter's name; run : of a column with an angle, else None
+    """
+
+    size: str
+    run: int | None
+    change: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Score:
+    """What an effect gains in one linear regression at its best size.
+
+    gain : of log evidence
+    values, states : of the effect, and of each run, where a fit may start
+    theta : nuisance coefficients there
+    """
+
+    gain: float
+    values: Mapping[str, float]
+    states: tuple[Mapping[str, float], ...]
+    theta: Array
+
+
+def best_score(
+    fidelity: Fidelity, candidate: Candidate, sizes: Sequence[float], states: States
+) -> Score | None:
+    """Score of an effect at the size that gains most; None: it does nothing here.
+
+    states : of the effect in each run, but for an angle
+    """
+    found = []
+    for sign in signs(candidate.sizes):
+        for size in sizes:
+            columns = list(_columns(fidelity, candidate, sign * size, states))
+            if columns:
+                found.append(_score(fidelity, candidate, sign * size, columns, states))
+    return max(filter(None, found), key=lambda one: one.gain, default=None)
+
+
+def _columns(
+    fidelity: Fidelity, candidate: Candidate, size: float, states: States
+) -> Iterator[Column]:
+    """Columns of the size parameters that change anything at this size."""
+    angle = next((u.name for u in candidate.states if u.angle), None)
+    single = len(candidate.sizes) == 1
+    for u in candidate.sizes:
+        values = values_at_size(candidate, size, None if single else u.name)
+        change = fidelity.column(candidate.name, values, states)
+        if change is None or not change.any():
+            continue
+        turned = None
+        if angle is not None:
+            aside = [{**s, angle: pi / 2} for s in states]
+            turned = fidelity.column(candidate.name, values, aside)
+        if turned is None or np.allclose(turned, change):
+            yield Column(size=u.name, run=None, change=change)
+            continue
+        for run in range(len(states)):
+            own = fidelity.owners == run
+            yield Column(size=u.name, run=run, change=np.where(own, change, 0.0))
+            yield Column(size=u.name, run=run, change=np.where(own, turned, 0.0))
+
+
+def _score(
+    fidelity: Fidelity, candidate: Candidate, size: float, columns: Sequence[Column], states: States
+) -> Score | None:
+    """The gain with one-sided sizes kept on their side; None: all are on the other side."""
+    matrix = np.stack([c.change for c in columns], axis=1)
+    along, gram = fidelity.data.along(matrix), fidelity.data.gram(matrix)
+    two_sided = np.array([c.run is not None for c in columns])
+    keep = np.arange(len(columns))
+    while len(keep):
+        value, mean = gain(gram[np.ix_(keep, keep)], along[keep])
+        wrong = (mean < 0.0) & ~two_sided[keep]
+        if not wrong.any():
+            break
+        keep = keep[~wrong]
+    else:
+        return None
+    beta = np.zeros(len(columns))
+    beta[keep] = mean
+    values, own = _estimate(candidate, size, columns, beta, states)
+    theta = fidelity.data.theta(matrix, beta)
+    return Score(gain=value, values=values, states=own, theta=theta)
+
+
+def _estimate(
+    candidate: Candidate, size: float, columns: Sequence[Column], beta: Array, states: States
+) -> tuple[dict[str, float], tuple[dict[str, float], ...]]:
+    """Sizes, shapes and states that these coefficients of the columns stand for."""
+    values = values_at_size(candidate, 0.0)
+    turned = [dict(own) for own in states]
+    angle = next((u.name for u in candidate.states if u.angle), "")
+    for u in candidate.sizes:
+        own = [(c, float(b)) for c, b in zip(columns, beta, strict=True) if c.size == u.name]
+        factor = own[0][1] if own else 0.0
+        if own and own[0][0].run is not None:
+            amplitudes = []
+            for run in range(len(turned)):
+                cosine, sine = (b for c, b in own if c.run == run)
+                amplitudes.append(float(np.hypot(cosine, sine)))
+                turned[run][angle] = float(np.arctan2(sine, cosine))
+            factor = float(np.mean(amplitudes))
+        values[u.name] = _scaled(candidate, u, factor, values_at_size(candidate, size)[u.name])
+    return values, tuple(turned)
+
+
+def _scaled(candidate: Candidate, size: Unknown, factor: float, value: float) -> float:
+    """A size at a factor of its distance from neutral, within its bounds."""
+    neutral = candidate.neutral[size.name]
+    return float(np.clip(neutral + factor * (value - neutral), size.lower, size.upper))

@@ -1,0 +1,48 @@
+"""All constants of the search, each with its reason."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """Sizes are in plausible sizes of an effect, gains in natural logarithms of probability."""
+
+    # A column is local and nearly linear, and a law that bends shows at one of these sizes. All
+    # effects are tried at the first size; the best are tried at the others too, and those that do
+    # nothing at the first, as a limit that is not reached.
+    sizes: tuple[float, ...] = (0.3, 0.1, 1.0, 3.0)
+    # Prior standard deviation of a size in the rich model that noise is estimated beside.
+    largest_size: float = 3.0
+    # So many effects of each score are tried at the other sizes; the true one was among three.
+    tried_further: int = 6
+    # Mean square up to which the linear rich model around a fit is as good as the fit with a cause.
+    linear_mean_square: float = 1.5
+    # Gain that an effect needs: odds of e^15, one of 30 effects by chance in 100 000 logs.
+    needed: float = 15.0
+    # Gain that one more effect needs: by chance such gains came to 20.
+    needed_again: float = 30.0
+    # Most effects of a set: nobody has told more than three causes apart in one set of logs.
+    most_effects: int = 3
+    # Relative error of an approximate law: other laws of the same effect differed by up to this.
+    law_error: float = 0.1
+    # Promising effects of each score that are fitted beside the best one. Contact and limits move
+    # with the fit, so that the order by promise is not yet that by fit. Beside other effects the
+    # fit is near, and the order is nearly right.
+    rivals: int = 2
+    rivals_beside: int = 1
+    # Gain over the best one's that a rival needs where the best one leaves noise, and elsewhere.
+    rival_share: float = 0.5
+    hopeless_share: float = 0.05
+    # Iterations of a first fit, enough to tell a basin from a slope.
+    iterations: int = 5
+    # Cost above the best one's up to which a first fit may still win [chi squared].
+    near: float = 100.0
+    # Positions in the gap that a start is tried from, because contact comes at once or not at all.
+    gap_positions: int = 9
+    # Sizes that the best start is tried at: a limit does not scale as its column does.
+    trial_sizes: tuple[float, ...] = tuple(0.1 * 1.25**k for k in range(17))
+
+
+SETTINGS = Settings()

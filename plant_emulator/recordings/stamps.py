@@ -1,0 +1,89 @@
+"""Rows that were taken a little early or late but stamped regularly, told by the reference (pure).
+
+A drive's reference is smooth between its corners: straight, or bent slowly. A row that was taken
+late shows a reference further along, so on a slope its departure from a local line, over the slope,
+is how late it was. All channels of a row were taken together, so one corrected stamp serves all.
+Where the reference stands still no departure shows, and none is needed of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from plant_emulator.signals.log import Array, Log
+
+# Windows of a local polynomial: first and last sample beside a row, and its degree. Long straight
+# ones tell best, and short or bent ones where the reference is.
+WINDOWS = (
+    (-20, 20, 1),
+    (-40, 0, 1),
+    (0, 40, 1),
+    (-8, 8, 1),
+    (-16, 0, 1),
+    (0, 16, 1),
+    (-10, 10, 2),
+    (-20, 0, 2),
+    (0, 20, 2),
+)
+# A window's departures over those of the best one, up to which it is as good.
+AS_GOOD = 1.3
+# A slope that tells a row's time [rad/s^2], and the least jitter worth correcting [s].
+SLOPE, LEAST = 10.0, 2e-4
+# Rows that tell nothing of a jitter.
+FEW = 60
+# A departure from the usual interval that no jitter makes [intervals].
+MOST = 0.4
+
+
+def restamped(log: Log) -> tuple[Log, float]:
+    """The log with its rows at the times that its reference tells, and the jitter's deviation [s].
+
+    A staircase (a log with a truck) tells nothing and stays as it is.
+    """
+    if "wheel_torque" in log or len(log.time) < FEW:
+        return log, 0.0
+    late, told = lateness(log.time, log["speed_reference"])
+    if told.sum() < FEW:
+        return log, 0.0
+    # The median: at corners that a window does not miss a line departs, jittered or not.
+    deviation = 1.4826 * float(np.median(np.abs(late[told])))
+    if deviation < LEAST:
+        return log, 0.0
+    return replace(log, time=log.time + np.where(told, late, 0.0)), deviation
+
+
+def lateness(time: Array, reference: Array) -> tuple[Array, Array]:
+    """How late every row was taken [s], and whether the reference tells, shape (n,) each.
+
+    By least squares over windows around, before or behind a row: the first of those that fit best.
+    """
+    n, interval = len(time), float(np.median(np.diff(time)))
+    spreads = np.full((len(WINDOWS), n), np.inf)
+    moves = np.zeros((len(WINDOWS), n))
+    for k, (first, last, degree) in enumerate(WINDOWS):
+        if last - first >= n:
+            continue
+        offsets = np.arange(first, last + 1)
+        basis = np.stack([offsets**power for power in range(degree + 1)], axis=1).astype(float)
+        rows = np.arange(-first, n - last)
+        found = reference[rows[:, None] + offsets] @ np.linalg.pinv(basis).T
+        left = reference[rows[:, None] + offsets] - found @ basis.T
+        rate = found[:, 1:2] + sum(
+            power * found[:, power : power + 1] * offsets ** (power - 1)
+            for power in range(2, degree + 1)
+        )
+        steep = np.min(np.abs(rate), axis=1) > SLOPE * interval
+        moved = interval * left / np.where(rate == 0.0, np.inf, rate)
+        regular = steep & (np.max(np.abs(moved), axis=1) < MOST * interval)
+        freedom = len(offsets) - degree - 1
+        spread = np.sqrt(np.sum(moved**2, axis=1) / freedom)
+        spreads[k, rows[regular]] = spread[regular]
+        moves[k, rows] = moved[:, -first]
+    best = spreads.min(axis=0)
+    chosen = np.argmax(spreads <= AS_GOOD * best + 1e-9, axis=0)
+    told = np.isfinite(best)
+    return np.where(told, moves[chosen, np.arange(n)], 0.0), told

@@ -1,0 +1,44 @@
+"""Gain of log evidence against the Gaussian integral done directly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from plant_emulator.estimation.regression import Regression, gain
+
+
+def log_density(y: np.ndarray, covariance: np.ndarray) -> float:
+    """Log of the normal density of y but for the constant."""
+    return float(-0.5 * y @ np.linalg.solve(covariance, y) - 0.5 * np.linalg.slogdet(covariance)[1])
+
+
+@pytest.fixture
+def problem() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    random = np.random.default_rng(1)
+    nuisance, columns = random.standard_normal((60, 4)), random.standard_normal((60, 2))
+    y = nuisance @ random.standard_normal(4) + columns @ [0.7, -0.4] + random.standard_normal(60)
+    return y, nuisance, columns
+
+
+def test_gain_is_the_ratio_of_the_probabilities(
+    problem: tuple[np.ndarray, np.ndarray, np.ndarray],
+) -> None:
+    y, nuisance, columns = problem
+    data = Regression.of(y, nuisance)
+    found, _ = gain(data.gram(columns), data.along(columns))
+    without = np.eye(60) + nuisance @ nuisance.T
+    with_them = without + columns @ columns.T
+    assert found == pytest.approx(log_density(y, with_them) - log_density(y, without))
+
+
+def test_coefficients_are_the_joint_posterior_mean(
+    problem: tuple[np.ndarray, np.ndarray, np.ndarray],
+) -> None:
+    y, nuisance, columns = problem
+    data = Regression.of(y, nuisance)
+    _, beta = gain(data.gram(columns), data.along(columns))
+    both = np.concatenate([nuisance, columns], axis=1)
+    joint = np.linalg.solve(np.eye(6) + both.T @ both, both.T @ y)
+    assert beta == pytest.approx(joint[4:])
+    assert data.theta(columns, beta) == pytest.approx(joint[:4])

@@ -1,0 +1,52 @@
+"""Holes of a log: rows come in that do not count, and the reference keeps its corner."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from plant_emulator.recordings.holes import bridge_holes
+from plant_emulator.signals.log import Log
+
+TIME = np.arange(0.0, 10.0, 0.01)
+
+
+def reference(time: np.ndarray) -> np.ndarray:
+    """Up at 50 rad/s^2 until 4 s, then steady."""
+    return np.minimum(50.0 * time, 200.0)
+
+
+def holed(first: float, last: float) -> Log:
+    kept = (first >= TIME) | (last <= TIME)
+    time = TIME[kept]
+    return Log(time, {"speed_reference": reference(time), "motor_speed": reference(time)})
+
+
+def bridged(first: float, last: float) -> tuple[Log, np.ndarray]:
+    log = holed(first, last)
+    found, use = bridge_holes(log, {"motor_speed": np.ones(len(log.time), bool)})
+    return found, use["motor_speed"]
+
+
+def test_hole_over_a_corner_gets_the_corner_back() -> None:
+    log, use = bridged(3.7, 4.2)
+    assert log.time == pytest.approx(TIME)
+    assert log["speed_reference"] == pytest.approx(reference(TIME), abs=1e-6)
+    assert log.time[~use] == pytest.approx(np.arange(3.71, 4.195, 0.01))
+
+
+def test_hole_in_a_straight_stretch_stays_straight() -> None:
+    log, _ = bridged(6.0, 6.5)
+    assert log["speed_reference"] == pytest.approx(reference(TIME))
+
+
+def test_rows_that_are_there_stay_as_they_are() -> None:
+    log, use = bridged(3.7, 4.2)
+    whole = holed(3.7, 4.2)
+    assert np.array_equal(log.time[use], whole.time)
+    assert np.array_equal(log["motor_speed"][use], whole["motor_speed"])
+
+
+def test_log_without_a_hole_stays() -> None:
+    log = Log(TIME, {"speed_reference": reference(TIME)})
+    assert bridge_holes(log, {})[0] is log
