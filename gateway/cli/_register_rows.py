@@ -16,11 +16,14 @@ from gateway.link.inspection import (
 )
 from register_maps.register_map import Register
 
-PAPER: Final = ("name", "signal", "address", "form", "type", "order", "raw to", "range", "access")
+PAPER: Final = (
+    *("name", "signal", "address", "form", "type", "order", "raw to", "range", "access"),
+    "with mbpoll",
+)
 
 
-def paper_row(register: Register) -> tuple[str, ...]:
-    """Row of a register in the map."""
+def paper_row(register: Register, device: Device) -> tuple[str, ...]:
+    """Row of a register in the map, with the call that reads it from a device."""
     low, high = register.range
     constant = "" if register.constant is None else f" = {register.constant:.10g} {_both(register)}"
     return (
@@ -34,6 +37,7 @@ def paper_row(register: Register) -> tuple[str, ...]:
         + (f" {register.offset:+g}" if register.offset else ""),
         f"{low:.10g} .. {high:.10g}{constant}",
         register.access,
+        device.mbpoll(register),
     )
 
 

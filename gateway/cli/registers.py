@@ -23,6 +23,7 @@ from gateway.link.device import (
     Device,
     encode_scaled,
     is_exact,
+    parse_value,
     read_all,
     two_readings,
     writable,
@@ -74,10 +75,14 @@ def _on_a_device(wrapped: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @command.command("list")
-@click.argument("name", metavar="MAP")
-def list_registers(name: str) -> None:
-    """Print addresses in both notations, types, word orders, units and ranges."""
-    rows = [paper_row(register) for register in register_maps.load(name).registers]
+@_on_a_device
+def list_registers(name: str, **where: Any) -> None:
+    """Print addresses in both notations, types, word orders, units, ranges and calls of mbpoll.
+
+    Nothing is asked of a device; the options only go into the calls.
+    """
+    device = Device(**where)
+    rows = [paper_row(register, device) for register in register_maps.load(name).registers]
     table(PAPER, rows)
 
 
@@ -155,12 +160,17 @@ def verify_device(name: str, json_file: str | None, **where: Any) -> int:
 @command.command(context_settings={"ignore_unknown_options": True})
 @_on_a_device
 @click.argument("register_name", metavar="REGISTER")
-@click.argument("value", type=float)
+@click.argument("text", metavar="VALUE")
 @click.option("--yes", is_flag=True, help="do not ask")
-def write(name: str, register_name: str, value: float, *, yes: bool, **where: Any) -> None:
-    """Write VALUE, in the unit of the map, to a writable REGISTER."""
+def write(name: str, register_name: str, text: str, *, yes: bool, **where: Any) -> None:
+    """Write VALUE, in the unit of the map, to a writable REGISTER.
+
+    VALUE is a number. A register of bits or states also takes names: enable, enable+fault_reset,
+    none, road_load.
+    """
     register_map, device = register_maps.load(name), Device(**where)
     register = writable(register_map, register_name)
+    value = parse_value(register, text)
     words = encode_scaled(register, value)
     what = f"{register.name} = {value_text(register, words)} {register.unit}".rstrip()
     near = "" if is_exact(register, words, value) else f", nearest to {value:.10g}"

@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Final
 
@@ -158,6 +158,28 @@ def writable(register_map: RegisterMap, name: str) -> Register:
             expected=f"one of {', '.join(allowed)}",
         )
     return allowed[name]
+
+
+def parse_value(register: Register, text: str) -> float:
+    """Value in the register's unit: a number, or names of bits or of a state joined by `+`.
+
+    Raises ConfigError for any other text.
+    """
+    with suppress(ValueError):
+        return float(text)
+    members = getattr(SIGNALS[register.signal].type, "__members__", {})
+    names = [name.strip().upper().replace("-", "_") for name in text.split("+")]
+    if members and names == ["NONE"] and register.type == "bits":
+        return 0.0
+    if not members or set(names) - set(members) or (register.type != "bits" and len(names) > 1):
+        expected = ", ".join(name.lower() for name in members)
+        raise ConfigError(
+            "no value of this register",
+            place=register.name,
+            value=text,
+            expected=f"a number, or {expected}" if expected else "a number",
+        )
+    return float(sum(int(members[name]) for name in set(names)))
 
 
 def encode_scaled(register: Register, scaled_value: float) -> Words:

@@ -13,6 +13,11 @@ from gateway.reasons import Reason
 WARNED: Final = frozenset({State.RAMPDOWN, State.SAFE})
 """States whose line is a warning."""
 REASONS: Final = {int(reason): reason for reason in Reason}
+HINTS: Final = {
+    State.ARMED: "to start: turn remote on at the PLC, from off",
+    State.SAFE: "to acknowledge: turn remote off and on at the PLC",
+}
+"""What the operator does next."""
 Line = Callable[[Change, datetime], str]
 
 
@@ -23,6 +28,8 @@ def text_line(change: Change, date: datetime) -> str:
         parts.append(reason_text(change.reason))
     if change.fault not in (NOTHING, change.reason):
         parts.append(f"fault {reason_text(change.fault)}")
+    if State(change.state) in HINTS:
+        parts.append(f"({HINTS[State(change.state)]})")
     return "  ".join(parts).rstrip()
 
 

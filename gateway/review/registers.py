@@ -1,6 +1,7 @@
 """Findings on the register map: does it have what the regulator reads, and hold every command?"""
 
 from collections.abc import Iterator
+from typing import Final
 
 from gateway.configuration.config import Config
 from gateway.cycle.command import run_mode
@@ -36,6 +37,37 @@ def measurements(config: Config, register_map: RegisterMap) -> Iterator[Finding]
             what="friction depends on the shell temperature, which the register map does not have",
             value=config.regulator.friction.temperature_coefficient,
             allowed="0 without a shell temperature",
+        )
+
+
+PROTECTIONS: Final = {
+    "interlock": "an open guard, door or restraint keeps from no run",
+    "alarm": "no alarm of the PLC ends a run",
+    "command_sequence_echo": "a PLC that ignores the commands is not noticed, nor another master",
+    "command_age": "a command of another master is not noticed before a run",
+    "armature_current": "a dead or wrong torque sensor is not noticed",
+    "speed_reference": "a PLC that ignores the setpoint is not noticed",
+}
+"""Measurement that the map may lack, and what is then missing."""
+TEST_WORDS: Final = {
+    "test_uint32": "exchanged words of 32-bit values are not noticed",
+    "test_float32": "exchanged words of 32-bit values are not noticed",
+}
+"""Constants of which one is enough."""
+
+
+def protections(_config: Config, register_map: RegisterMap) -> Iterator[Finding]:
+    """Warnings for each protection that the register map does not have."""
+    missing = {name: why for name, why in PROTECTIONS.items() if not _has(register_map, name)}
+    if not any(_has(register_map, name) for name in TEST_WORDS):
+        missing |= TEST_WORDS
+    for name, why in missing.items():
+        yield Finding(
+            severity="warning",
+            where="plc.map",
+            what=f"the register map {register_map.name} has no {name}: {why}",
+            value="nothing",
+            allowed=f"a register of the signal {name}",
         )
 
 

@@ -11,6 +11,7 @@ def review(config: Config, register_map: RegisterMap) -> Review:
     found = [
         *registers.measurements(config, register_map),
         *registers.commands(config, register_map),
+        *registers.protections(config, register_map),
         *loop.gain(config),
         *loop.stability(config),
         *loop.aliasing(config),

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from plant_emulator import logs
 from plant_emulator.emulator.control_channel import ControlChannel
 from plant_emulator.emulator.emulator import Emulator, Options, build
+from plant_emulator.emulator.operator_socket import operated
 from plant_emulator.emulator.scan_timer import ScanTimer
 from register_maps.timing import SCAN
 
@@ -120,15 +121,16 @@ def _ask_for_real_time(speed: float | None) -> str:
 
 async def _until_stopped(run: _Run, announce: Callable[[str], None], *, control: bool) -> None:
     others = []
+    channel = ControlChannel(run.emulator, run.timer, run.stopping.set)
     if control:
-        channel = ControlChannel(run.emulator, run.timer, run.stopping.set)
         others.append(_answer(channel, run, announce))
     if run.timer is not None:
         run.timer.start()
         if sys.stderr.isatty():
             others.append(_show(run.timer, run.emulator))
     tasks = [asyncio.create_task(other) for other in others]
-    await run.stopping.wait()
+    async with operated(channel, run.emulator.server.port):
+        await run.stopping.wait()
     for task in tasks:
         task.cancel()
     await asyncio.gather(*tasks, return_exceptions=True)

@@ -7,6 +7,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from gateway.cli.registers import command
+from gateway.errors import ConfigError
 from plant_emulator.emulator.process import EmulatorProcess
 
 pytestmark = pytest.mark.slow
@@ -84,3 +85,36 @@ def test_list_needs_no_device() -> None:
     result = CliRunner().invoke(command, ["list", "bench_int16"])
     assert "40030" in result.output
     assert "ABCD 1234 5678, CDAB 5678 1234" in result.output
+    assert "mbpoll -q -1 -0 -a 1 -r 29 -c 1 -t 4:int -B -p 5020 127.0.0.1" in result.output
+
+
+@pytest.mark.parametrize(
+    ("register", "value", "words"),
+    [
+        ("CTRL", "enable", "0001"),
+        ("CTRL", "enable+fault-reset", "0003"),
+        ("CTRL", "none", "0000"),
+        ("MODE", "road_load", "0004"),
+        ("MODE", "3", "0003"),
+    ],
+)
+def test_bits_and_states_are_written_by_their_names(
+    emulator: EmulatorProcess, register: str, value: str, words: str
+) -> None:
+    done = call(emulator, "write", "bench_int16", register, value, "--yes")
+    assert f"reads back {words} = " in done.output
+
+
+@pytest.mark.parametrize(
+    ("register", "value", "expected"),
+    [
+        ("CTRL", "go", "enable, fault_reset"),
+        ("MODE", "speed+ready", "road_load"),
+        ("WD_TIMEOUT", "long", "expected a number$"),
+    ],
+)
+def test_unknown_name_is_refused_with_those_that_are_known(
+    emulator: EmulatorProcess, register: str, value: str, expected: str
+) -> None:
+    with pytest.raises(ConfigError, match=expected):
+        call(emulator, "write", "bench_int16", register, value, "--yes")

@@ -31,3 +31,10 @@ def test_json_is_one_line_whose_time_any_reader_understands() -> None:
     assert datetime.fromisoformat(found["time"]) == DATE.replace(microsecond=123000)
     assert (found["level"], found["event"], found["state"]) == ("warning", "state", "RAMPDOWN")
     assert (found["reason"], found["fault"], found["tick"]) == ("STALE", "TIMEOUT", 250)
+
+
+def test_operator_is_told_what_to_do_next() -> None:
+    armed = Change(tick=0, now=0.0, state=State.ARMED, reason=NOTHING, fault=NOTHING)
+    safe = Change(tick=9, now=0.0, state=State.SAFE, reason=Reason.STALE, fault=NOTHING)
+    assert text_line(armed, DATE).endswith("(to start: turn remote on at the PLC, from off)")
+    assert text_line(safe, DATE).endswith("(to acknowledge: turn remote off and on at the PLC)")

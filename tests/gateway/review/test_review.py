@@ -345,3 +345,24 @@ def other_version(place):
     words = [0] * MAP.command.count
     words[place] = 99
     return words
+
+
+@pytest.mark.parametrize(
+    ("signals", "what"),
+    [
+        (["interlock"], "an open guard"),
+        (["alarm"], "no alarm of the PLC"),
+        (["command_sequence_echo"], "ignores the commands"),
+        (["command_age"], "another master"),
+        (["armature_current"], "torque sensor"),
+        (["speed_reference"], "ignores the setpoint"),
+        (["test_uint32", "test_float32"], "exchanged words"),
+    ],
+)
+def test_protection_that_the_map_lacks_is_a_warning_that_says_what_is_missing(signals, what):
+    kept = tuple(one for one in MAP.registers if one.signal not in signals)
+    found = review(Config(), replace(MAP, registers=kept))
+    warnings = [one for one in found.findings if one.severity == "warning"]
+    assert found.holds
+    assert warnings
+    assert all(what in one.what and signals[0][:4] in one.what for one in warnings)
