@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
+from plant_emulator.blind.dirt import Dirt
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -42,6 +44,7 @@ class Case:
     parameters : true values of the parameters that deviate [SI]
     gaps : backlash gap position at the start of every run, -1 to 1
     noise : seed of the sensor noise
+    dirt : of the logs; None: they are clean
     """
 
     number: int
@@ -51,6 +54,7 @@ class Case:
     parameters: Mapping[str, float]
     gaps: tuple[float, ...]
     noise: int
+    dirt: Dirt | None = None
 
     @property
     def truth(self) -> str:
@@ -69,4 +73,5 @@ def case_of(data: Mapping[str, Any]) -> Case:
     """The case from the data of `Case.to_json`."""
     hidden = tuple(Hidden(**{**h, "states": tuple(h["states"])}) for h in data["hidden"])
     tuples = {"programs": tuple(data["programs"]), "gaps": tuple(data["gaps"])}
-    return Case(**{**data, **tuples, "hidden": hidden})
+    dirt = Dirt(**data["dirt"]) if data.get("dirt") else None
+    return Case(**{**data, **tuples, "hidden": hidden, "dirt": dirt})

@@ -13,6 +13,7 @@ import numpy as np
 
 from plant_emulator.blind.case import Case, Hidden, Kind
 from plant_emulator.blind.catalogue import INSIDE, OUTSIDE, Entry
+from plant_emulator.blind.dirt import draw_dirt
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -77,6 +78,7 @@ def draw(seed: int, number: int, parameters: ParameterSet, effects: Mapping[str,
         parameters={} if kind == "none" else _deviate(parameters, random),
         gaps=tuple(float(gap) for gap in random.uniform(-1.0, 1.0, len(programs))),
         noise=int(random.integers(1 << 31)),
+        dirt=draw_dirt(seed, number),
     )
 
 

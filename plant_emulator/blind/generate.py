@@ -1,10 +1,11 @@
-"""Simulates the logs of a case with small fixed steps, and adds sensor noise and quantisation."""
+"""Simulates the logs of a case with small fixed steps, and adds noise, quantisation and dirt."""
 
 from __future__ import annotations
 
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from plant_emulator.blind.dirt import soil
 from plant_emulator.errors import UnsettledError
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation.programs import SpeedProgram, program
@@ -58,5 +59,6 @@ def _simulate_converged(inputs: RunInputs, values: Mapping[str, float], gap_posi
 
 
 def measure(case: Case, log: Log, run: int) -> Log:
-    """Add the sensor noise and quantisation of one run to its noise-free log."""
-    return add_noise(log, case.noise + run)
+    """Add sensor noise, quantisation and the case's dirt to the noise-free log of one run."""
+    measured = add_noise(log, case.noise + run)
+    return measured if case.dirt is None else soil(measured, case.dirt, case.noise + run)

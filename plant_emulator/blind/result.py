@@ -48,6 +48,7 @@ class CaseResult:
     top1 : whether the named effects are exactly the hidden ones
     closed_fraction : of the answer; closed_fraction_true : against the noise-free logs
     seconds : duration of the case; error : last line of a failed diagnosis
+    dirt : kind of dirt of its logs; empty: they are clean
     """
 
     case: int
@@ -73,6 +74,7 @@ class CaseResult:
     sizes: tuple[Size, ...]
     seconds: float = 0.0
     error: str = ""
+    dirt: str = ""
 
     def to_json(self) -> dict[str, Any]:
         """The result as JSON types; `classes` has the key "class"."""

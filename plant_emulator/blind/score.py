@@ -181,6 +181,7 @@ def score(
         truth=case.truth,
         hidden=tuple(_hidden_effect(h, unsealed.norms[h.effect]) for h in case.hidden),
         programs=case.programs,
+        dirt="" if case.dirt is None else case.dirt.kind,
         detectable=unsealed.detectable,
         verdict=unsealed.kind,
         effects=unsealed.named,

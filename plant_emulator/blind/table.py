@@ -15,6 +15,7 @@ COLUMNS = (
     "case", "kind", "truth", "norm", "detectable", "programs", "verdict", "answered", "class",
     "evidence", "confidence", "right", "first_name", "false_alarm", "true_place", "place",
     "located", "closed_fraction", "closed_fraction_true", "seconds", "error",
+    "dirt",
 )  # fmt: skip
 
 
@@ -42,6 +43,7 @@ def row(one: CaseResult) -> list[Any]:
         one.closed_fraction_true,
         one.seconds,
         one.error,
+        one.dirt,
     ]
 
 

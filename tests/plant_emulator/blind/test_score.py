@@ -198,7 +198,7 @@ def test_detail_of_a_case_has_the_keys_of_its_schema(results: tuple[CaseResult, 
         "case", "kind", "truth", "hidden", "programs", "detectable", "verdict", "effects", "class",
         "answered", "evidence", "confidence", "right", "top1", "false_alarm", "subsystem",
         "located", "closed_fraction", "closed_fraction_ci95", "closed_fraction_true", "sizes",
-        "seconds", "error",
+        "seconds", "error", "dirt",
     ]  # fmt: skip
 
 

@@ -1,0 +1,139 @@
+"""What real controllers do to a log: coloured noise, hum, spikes, held, coarse and lost values.
+
+Half of the cases have one kind of dirt, of a size that is drawn. Kind and size follow from seed and
+number by a stream of their own, so that dirt changes nothing else of a case.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+
+from plant_emulator.signals.log import COMPARED
+from plant_emulator.simulation.sensor_noise import SENSORS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from plant_emulator.signals.log import Array, Log
+
+DirtKind = Literal["colour", "hum", "spikes", "held", "coarse", "jitter", "lost"]
+# Share of the cases with dirt.
+SHARE = 0.5
+# Range that the size of each kind is drawn from: time constant [s], amplitude [noise], share of the
+# samples [1], period [samples], quantum [noise], half width [s], share of the rows [1].
+RANGES: dict[DirtKind, tuple[float, float]] = {
+    "colour": (0.01, 0.03),
+    "hum": (1.0, 4.0),
+    "spikes": (1e-3, 5e-3),
+    "held": (2.0, 4.0),
+    "coarse": (1.0, 3.0),
+    "jitter": (5e-4, 2e-3),
+    "lost": (5e-3, 3e-2),
+}
+# Height of spikes [noise], mains [Hz] and how far off they are, longest hole [s].
+SPIKE, MAINS, MAINS_OFF, HOLE = (15.0, 40.0), 50.0, 0.05, 0.5
+# Channels that hum and are held.
+HUMMING, HELD = ("armature_current", "shaft_torque"), ("drum_speed", "shaft_torque")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dirt:
+    """The dirt of a case; size : in the unit of RANGES."""
+
+    kind: DirtKind
+    size: float
+
+
+def draw_dirt(seed: int, number: int) -> Dirt | None:
+    """Draw the dirt of a case; None: its logs are clean."""
+    random = np.random.default_rng([seed, 4, number])
+    kind: DirtKind = get_args(DirtKind)[int(random.integers(len(RANGES)))]
+    size = float(random.uniform(*RANGES[kind]))
+    return Dirt(kind=kind, size=size) if random.random() < SHARE else None
+
+
+def soil(log: Log, dirt: Dirt, seed: int) -> Log:
+    """Give a measured log with dirt; seed : of what is drawn."""
+    return _SOILS[dirt.kind](log, dirt.size, np.random.default_rng([seed, 5]))
+
+
+def _changed(log: Log, changes: dict[str, Array]) -> Log:
+    return replace(log, signals={**log.signals, **changes})
+
+
+def _colour(log: Log, time_constant: float, random: np.random.Generator) -> Log:
+    """Add noise that is correlated over a time constant, twice as large as the sensor's own."""
+    from scipy.signal import lfilter
+
+    pole = float(np.exp(-np.median(np.diff(log.time)) / time_constant))
+    found = {}
+    for name in COMPARED:
+        draws = random.standard_normal(len(log.time))
+        slow = lfilter([np.sqrt(1.0 - pole**2)], [1.0, -pole], draws)
+        found[name] = log[name] + 2.0 * SENSORS[name][0] * slow
+    return _changed(log, found)
+
+
+def _hum(log: Log, amplitude: float, random: np.random.Generator) -> Log:
+    """Add the mains and half as much of their double."""
+    mains = MAINS + random.uniform(-MAINS_OFF, MAINS_OFF)
+    found = {}
+    for name in HUMMING:
+        first, second = random.uniform(-np.pi, np.pi, 2)
+        turns = 2.0 * np.pi * mains * log.time
+        wave = np.cos(turns + first) + 0.5 * np.cos(2.0 * turns + second)
+        found[name] = log[name] + amplitude * SENSORS[name][0] * wave
+    return _changed(log, found)
+
+
+def _spikes(log: Log, share: float, random: np.random.Generator) -> Log:
+    """Add single values far off to this share of the samples of each channel."""
+    found = {}
+    for name in COMPARED:
+        there = random.random(len(log.time)) < share
+        height = random.uniform(*SPIKE, len(log.time)) * random.choice([-1.0, 1.0], len(log.time))
+        found[name] = log[name] + np.where(there, height, 0.0) * SENSORS[name][0]
+    return _changed(log, found)
+
+
+def _held(log: Log, period: float, _: np.random.Generator) -> Log:
+    """Renew some channels every few samples only."""
+    fresh = np.arange(len(log.time)) // round(period) * round(period)
+    return _changed(log, {name: log[name][fresh] for name in HELD})
+
+
+def _coarse(log: Log, quantum: float, _: np.random.Generator) -> Log:
+    """Round all channels to a multiple of the noise."""
+    steps = {name: quantum * SENSORS[name][0] for name in COMPARED}
+    return _changed(log, {name: np.round(log[name] / q) * q for name, q in steps.items()})
+
+
+def _jitter(log: Log, half_width: float, random: np.random.Generator) -> Log:
+    """Take every row a little early or late, and stamp it as if it were not."""
+    taken = log.time + random.uniform(-half_width, half_width, len(log.time))
+    signals = {name: np.interp(taken, log.time, values) for name, values in log.signals.items()}
+    return replace(log, signals=signals)
+
+
+def _lost(log: Log, share: float, random: np.random.Generator) -> Log:
+    """Leave out this share of the rows, and a hole."""
+    kept = random.random(len(log.time)) >= share
+    start = random.uniform(0.2, 0.8) * log.time[-1]
+    kept &= (log.time < start) | (log.time > start + random.uniform(0.1, HOLE))
+    kept[:10] = kept[-1] = True
+    signals = {name: values[kept] for name, values in log.signals.items()}
+    return replace(log, time=log.time[kept], signals=signals)
+
+
+_SOILS: dict[DirtKind, Callable[[Log, float, np.random.Generator], Log]] = {
+    "colour": _colour,
+    "hum": _hum,
+    "spikes": _spikes,
+    "held": _held,
+    "coarse": _coarse,
+    "jitter": _jitter,
+    "lost": _lost,
+}

@@ -1,0 +1,89 @@
+"""The dirt of a case: what was asked for is what the log shows; nothing else changes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from plant_emulator.blind.dirt import RANGES, Dirt, DirtKind, draw_dirt, soil
+from plant_emulator.blind.sealing import seal, unseal
+from plant_emulator.signals.log import COMPARED, Log
+from plant_emulator.simulation.sensor_noise import SENSORS
+from tests.plant_emulator.blind.conftest import case_with
+
+TIME = np.arange(0.0, 40.0, 0.01)
+
+
+@pytest.fixture
+def clean() -> Log:
+    """A log whose signals rise steadily."""
+    signals = dict.fromkeys(COMPARED, 10.0 * TIME)
+    return Log(TIME, {"speed_reference": 10.0 * TIME, **signals})
+
+
+def change(clean: Log, kind: DirtKind, size: float, name: str = "shaft_torque") -> np.ndarray:
+    """Change of a channel over its noise."""
+    soiled = soil(clean, Dirt(kind=kind, size=size), 1)
+    return (soiled[name] - clean[name]) / SENSORS[name][0]
+
+
+def test_half_of_the_cases_are_clean_and_all_kinds_come_up() -> None:
+    drawn = [draw_dirt(1, number) for number in range(400)]
+    assert 160 < sum(one is None for one in drawn) < 240
+    assert set(Counter(one.kind for one in drawn if one)) == set(get_args(DirtKind))
+    assert all(RANGES[d.kind][0] <= d.size <= RANGES[d.kind][1] for d in drawn if d)
+
+
+def test_coloured_noise_has_its_time_constant(clean: Log) -> None:
+    noise = change(clean, "colour", 0.03)
+    assert np.std(noise) == pytest.approx(2.0, rel=0.15)
+    assert np.corrcoef(noise[3:], noise[:-3])[0, 1] == pytest.approx(np.exp(-1.0), abs=0.1)
+
+
+def test_hum_has_its_amplitude_where_it_is_expected(clean: Log) -> None:
+    # Cosines of 2 and 1 have a mean square of 2.5 together.
+    assert np.std(change(clean, "hum", 2.0)) == pytest.approx(np.sqrt(2.5), rel=0.3)
+    assert not change(clean, "hum", 2.0, "motor_speed").any()
+
+
+def test_spikes_are_as_rare_as_asked_for(clean: Log) -> None:
+    spikes = change(clean, "spikes", 5e-3)
+    assert np.count_nonzero(spikes) == pytest.approx(20, abs=14)
+    assert np.min(np.abs(spikes[spikes != 0.0])) >= 15.0
+
+
+def test_held_channel_is_new_at_its_period(clean: Log) -> None:
+    held = soil(clean, Dirt(kind="held", size=3.0), 1)["drum_speed"]
+    assert np.flatnonzero(np.diff(held) != 0.0)[:3].tolist() == [2, 5, 8]
+
+
+def test_coarse_values_are_multiples_of_the_quantum(clean: Log) -> None:
+    soiled = soil(clean, Dirt(kind="coarse", size=2.0), 1)["shaft_torque"]
+    counts = soiled / (2.0 * SENSORS["shaft_torque"][0])
+    assert counts == pytest.approx(np.round(counts), abs=1e-9)
+
+
+def test_rows_off_their_stamps_are_off_in_all_channels_alike(clean: Log) -> None:
+    soiled = soil(clean, Dirt(kind="jitter", size=2e-3), 1)
+    off = (soiled["speed_reference"] - clean["speed_reference"]) / 10.0
+    assert np.max(np.abs(off)) <= 2e-3
+    assert np.std(off[1:-1]) == pytest.approx(2e-3 / np.sqrt(3.0), rel=0.1)
+    assert soiled["shaft_torque"] == pytest.approx(soiled["speed_reference"])
+
+
+def test_lost_rows_and_a_hole_are_gone_and_the_others_stay(clean: Log) -> None:
+    soiled = soil(clean, Dirt(kind="lost", size=0.02), 1)
+    steps = np.diff(soiled.time)
+    assert 0.1 <= np.max(steps) <= 0.55
+    assert len(soiled.time) < 0.99 * len(TIME)
+    assert soiled["drum_speed"] == pytest.approx(10.0 * soiled.time)
+
+
+def test_dirt_is_sealed_with_its_case() -> None:
+    case = replace(case_with(kind="none"), dirt=Dirt(kind="hum", size=2.0))
+    text, commitment = seal(case, "nonce")
+    assert unseal(text, commitment, "case").dirt == case.dirt
