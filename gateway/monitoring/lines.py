@@ -23,13 +23,18 @@ Line = Callable[[Change, datetime], str]
 
 def text_line(change: Change, date: datetime) -> str:
     """Line with date, state, reason with its text, and fault of this tick."""
-    parts = [f"{_iso(date)}  {State(change.state).name:9s}"]
-    if change.reason != NOTHING:
-        parts.append(reason_text(change.reason))
-    if change.fault not in (NOTHING, change.reason):
-        parts.append(f"fault {reason_text(change.fault)}")
-    if State(change.state) in HINTS:
-        parts.append(f"({HINTS[State(change.state)]})")
+    return f"{_iso(date)}  {state_text(change.state, change.reason, change.fault)}"
+
+
+def state_text(state: int, reason: int, fault: int) -> str:
+    """State, reason with its text, a fault that is not the reason, and what to do."""
+    parts = [f"{State(state).name:9s}"]
+    if reason != NOTHING:
+        parts.append(reason_text(reason))
+    if fault not in (NOTHING, reason):
+        parts.append(f"fault {reason_text(fault)}")
+    if State(state) in HINTS:
+        parts.append(f"({HINTS[State(state)]})")
     return "  ".join(parts).rstrip()
 
 
@@ -45,7 +50,7 @@ def json_line(change: Change, date: datetime) -> str:
             "reason": _name(change.reason),
             "fault": _name(change.fault),
             "tick": change.tick,
-            "message": text_line(change, date).partition("  ")[2],
+            "message": state_text(change.state, change.reason, change.fault),
         }
     )
 

@@ -19,7 +19,7 @@ from typing import Any, Final
 
 from gateway.configuration.config import Config
 from gateway.cycle.cycle import Output
-from gateway.cycle.record import Layout
+from gateway.cycle.record import Layout, Tick
 from gateway.cycle.supervisor import State
 from gateway.errors import GatewayError
 from gateway.link.plc import TcpLink
@@ -32,6 +32,7 @@ from gateway.recordings.recorder import Job, Recorder
 from gateway.recordings.recording import SUFFIX
 from gateway.runtime.companion import Companion
 from gateway.runtime.loop import Loop, MonotonicClock
+from gateway.runtime.notify import Notifier
 from gateway.runtime.realtime import real_time
 from register_maps.register_map import RegisterMap
 
@@ -130,10 +131,20 @@ def run(
                 sink=recorder,
                 clock=MonotonicClock(),
                 shadow=shadow,
-                observe=publisher,
+                observe=_both(publisher, beside.enter_context(closing(Notifier()))),
             )
             loop.run(lambda: stop() or _is_over(loop, over))
     return _result(loop, recorder, real)
+
+
+def _both(publisher: Publisher, notifier: Notifier) -> Callable[[Tick], None]:
+    """What looks at every tick: the status block, and systemd."""
+
+    def observe(tick: Tick) -> None:
+        publisher(tick)
+        notifier(tick)
+
+    return observe
 
 
 def _listener(config: Config) -> socket.socket | None:
