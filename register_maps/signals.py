@@ -205,6 +205,8 @@ _LOG_COLUMNS: tuple[tuple[str, str, str, bool, str | None, int], ...] = (
     ("wheel_torque_Nm", "wheel_torque", "N m", False, None, 4),
     ("armature_voltage_V", "armature_voltage", "V", False, "armature_voltage", 4),
     ("shell_temperature_degC", "shell_temperature", "degC", False, "shell_temperature_1", 2),
+    ("reference_knee_time_s", "reference_knee_time", "s", False, None, 6),
+    ("reference_knee_rad_s", "reference_knee", "rad/s", False, None, 5),
     ("truck_on_drum", "truck_on_drum", "1", False, None, 4),
 )
 

@@ -4,8 +4,9 @@ A log has one row for each new sample of the PLC, timed by the PLC's clock. Tick
 repeated samples and samples without a needed value have no row, because the time of a log increases
 and its values are finite. With every tick, the time is that of the gateway, and cells may be empty.
 
-The PLC says at a sample which reference it will have reached at the end of the next scan, and moves
-it there in a straight line. The reference at a sample therefore follows from the sample before.
+The PLC says at a sample which reference it will have reached at the end of the next scan. The
+reference of a log is that at the sample. It goes to the line of a new command as fast as the slew
+rate allows; a log tells where it meets the line, between two samples, as the knee.
 
 A recording may be large. It is read twice, piece by piece: first to see what it holds, then to
 write.
@@ -61,7 +62,12 @@ NEEDED: Final = tuple(
     if c.needed and c.measured not in (None, "speed_reference")
 )
 REFERENCE: Final = "measured_speed_reference"
+KNEE: Final = ("reference_knee_time_s", "reference_knee_rad_s")
 TRUCK: Final = "truck_on_drum"
+LIMITED: Final = 0.98
+"""Share of a scan that a limited PLC needs at least; its registers round."""
+CLOCK_DIGITS: Final = 6
+"""Digits of the time in seconds: finer than any PLC's clock, coarser than sums of floats."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,6 +97,15 @@ class Survey:
     quality: PollQuality = field(default_factory=lambda: PollQuality(interval=SCAN))
 
 
+@dataclass(frozen=True, kw_only=True)
+class Piece:
+    """Some rows: records, times [s], and the knees of the reference, if known; see `knees_of`."""
+
+    rows: Any
+    time: Array
+    knees: Array | None = None
+
+
 class Export:
     """A recording as columns, piece by piece."""
 
@@ -98,8 +113,8 @@ class Export:
         self.recording, self.extent = recording, extent
         self._modulus = map_of(recording.header).modulus("plc_time")
         self.survey = Survey()
-        for rows, time in self._rows():
-            self._take(rows, time)
+        for piece in self._pieces():
+            self._take(piece)
 
     @property
     def start_date(self) -> datetime:
@@ -107,15 +122,15 @@ class Export:
         date = datetime.fromisoformat(self.recording.header["date"])
         return date + timedelta(seconds=self.survey.waited)
 
-    def _take(self, rows: Any, time: Array) -> None:
+    def _take(self, piece: Piece) -> None:
         """Add a piece to the survey."""
-        known = self.survey
+        known, rows = self.survey, piece.rows
         if not known.samples and not self.extent.every:
             known.waited = float(rows["now"][0] - self.recording.header["started"])
         status = rows["measured_status"]
         driven = np.nan_to_num(status).astype(int) & int(Status.ROAD_LOAD)
         known.truck = known.truck or bool(np.any(driven))
-        inside = rows[self._inside(time)]
+        inside = rows[self._inside(piece.time)]
         known.samples += len(inside)
         for name in (n for n in rows.dtype.names if rows[n].dtype.kind == "f"):
             found = int(np.isfinite(inside[name]).sum())
@@ -124,49 +139,51 @@ class Export:
     def blocks(self) -> Iterator[Columns]:
         """The columns of the log, some rows at a time; the first block may have no rows."""
         begun = False
-        for rows, time in self._rows():
-            inside = self._inside(time)
+        for piece in self._pieces():
+            inside = self._inside(piece.time)
             if inside.any() or not begun:
                 begun = True
-                yield {k: v[inside] for k, v in self._columns(rows, time).items()}
+                yield {k: v[inside] for k, v in self._columns(piece).items()}
         if not begun:
             empty = np.zeros(0, dtype=np.dtype(self.recording.layout.formats))
-            yield self._columns(empty, np.zeros(0))
+            yield self._columns(Piece(rows=empty, time=np.zeros(0), knees=np.zeros((2, 0))))
 
     def _inside(self, time: Array) -> NDArray[np.bool_]:
         return np.asarray((time >= self.extent.begin) & (time <= self.extent.end))
 
-    def _rows(self) -> Iterator[tuple[Any, Array]]:
-        """Records that become rows, with their times [s] and `speed_reference` at those times."""
-        if self.extent.every:
-            started = self.recording.header["started"]
-            yield from ((rows, rows["now"] - started) for rows in self.recording.chunks())
-        else:
+    def _pieces(self) -> Iterator[Piece]:
+        """Records that become rows, some at a time."""
+        if not self.extent.every:
             yield from self._samples()
+            return
+        started = self.recording.header["started"]
+        for rows in self.recording.chunks():
+            yield Piece(rows=rows, time=rows["now"] - started)
 
-    def _samples(self) -> Iterator[tuple[Any, Array]]:
-        """New samples with their times since the first one, by the PLC's clock [s]."""
+    def _samples(self) -> Iterator[Piece]:
+        """New samples with their times since the first one, by the PLC's clock."""
         self.survey.quality = PollQuality(interval=SCAN)
         last, elapsed, echo = np.nan, 0.0, 0.0
+        before = np.zeros(2)
         for rows in self.recording.chunks():
             new, repeated = new_samples(rows, last)
             self.survey.quality.repeated += repeated
+            asked, before = commands(rows, before)
             if not len(new):
                 continue
             found = rows[new].copy()
             clock = found["measured_plc_time"]
             time = unwrap_time(np.append(last, clock), self._modulus)[1:] + elapsed
+            time = np.round(time, CLOCK_DIGITS)
             steps = np.diff(time, prepend=elapsed)
             self.survey.quality.count(steps[0 if np.isfinite(last) else 1 :].tolist())
             told = self._told(found)
-            before = np.append(echo, told[:-1])
-            share = np.divide(
-                np.maximum(steps - SCAN, 0.0), steps, where=steps > 0.0, out=0 * steps
-            )
-            found[REFERENCE] = before + share * (told - before)
+            begin = reached(np.append(echo, told[:-1]), told, steps)
+            knees = knees_of(begin, told, *asked[:, new])
+            found[REFERENCE] = begin
             last, elapsed, echo = clock[-1], float(time[-1]), float(told[-1])
             whole = np.all([np.isfinite(found[name]) for name in NEEDED], axis=0)
-            yield found[whole], time[whole]
+            yield Piece(rows=found[whole], time=time[whole], knees=knees[:, whole])
 
     def _told(self, rows: Any) -> Array:
         """Reference at the end of the next scan [rad/s]; without its register, the setpoint."""
@@ -174,15 +191,18 @@ class Export:
         asked = np.nan_to_num(rows["setpoint_speed_setpoint"])
         return np.where(np.isfinite(told), told, asked)
 
-    def _columns(self, rows: Any, time: Array) -> Columns:
+    def _columns(self, piece: Piece) -> Columns:
         """Every column that the recording can fill, by its name with unit."""
         found: Columns = {}
+        rows = piece.rows
         for column in LOG_COLUMNS.values():
             if column.measured is not None and self._filled(column.measured, log=True):
                 unit = UNITS[column.unit]
                 values = (rows[f"measured_{column.measured}"] - unit.shift) / unit.factor
                 found[column.column] = values
-        found["time_s"] = time
+        found["time_s"] = piece.time
+        if piece.knees is not None:
+            found |= dict(zip(KNEE, piece.knees, strict=True))
         if self.survey.truck:
             found[TRUCK] = np.ones(len(rows))
         kept = {name: key for name, key in OWN.items() if self.survey.finite.get(key, 1)}
@@ -212,6 +232,43 @@ class Export:
             and signal.name not in taken
             and self._filled(signal.name, log=False)
         }
+
+
+def reached(before: Array, told: Array, steps: Array) -> Array:
+    """Reference at each sample [rad/s]: what the sample before said, or a line across a hole.
+
+    before, told : what the sample before and this one said of the end of the next scan [rad/s]
+    steps : since the sample before [s]
+    """
+    share = np.maximum(steps - SCAN, 0.0) / np.maximum(steps, SCAN)
+    return before + share * (told - before)
+
+
+def knees_of(begin: Array, told: Array, rate: Array, slew: Array) -> Array:
+    """Knee of the reference in the scan after each sample: seconds after it, and value [rad/s].
+
+    From where it is, the PLC goes to the line of the command at its slew rate, and then along the
+    line. Where it does not reach the line, the knee is the end of the scan. Shape (2, n).
+
+    begin, told : where the scan begins and ends [rad/s]
+    rate, slew : slope of the command's line, and largest slope [rad/s^2]; slew 0: not known
+    """
+    jump = told - begin - rate * SCAN
+    needed = np.abs(jump) / np.maximum(slew - np.sign(jump) * rate, 1e-9)
+    limited = needed >= LIMITED * SCAN
+    after = np.where(limited, SCAN, needed)
+    return np.stack([after, told - rate * (SCAN - after)])
+
+
+def commands(records: Any, before: Array) -> tuple[Array, Array]:
+    """Slope and slew rate that the PLC follows at each tick [rad/s^2], and those of the last tick.
+
+    A tick reads what the PLC made of the command of the tick before. Shape (2, ticks).
+    """
+    asked = np.nan_to_num(
+        np.stack([records["setpoint_speed_rate"], records["setpoint_ramp_limit"]])
+    )
+    return np.concatenate([before[:, None], asked[:, :-1]], axis=1), asked[:, -1]
 
 
 def new_samples(records: Any, last: float = np.nan) -> tuple[NDArray[np.intp], int]:

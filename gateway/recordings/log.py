@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from gateway.errors import ConfigError
 from register_maps import csv_log, mdf4_log, parquet_log
 from register_maps.log_table import LogTableError, check_sampling
 from register_maps.signals import LOG_COLUMNS
+
+NO_SENSORS: Final = ("time", "reference_knee_time", "reference_knee", "truck_on_drum")
 
 
 class LogError(ConfigError):
@@ -25,11 +28,11 @@ class Log:
     columns: dict[str, Array]
 
     def missing_columns(self) -> list[str]:
-        """Names of the optional columns that the log lacks; a mark such as a truck is no sensor."""
+        """Names of the optional columns of sensors that the log lacks."""
         return [
             column.column
             for column in LOG_COLUMNS.values()
-            if column.signal not in self.columns and column.signal != "time" and column.unit != "1"
+            if column.signal not in self.columns and column.signal not in NO_SENSORS
         ]
 
 

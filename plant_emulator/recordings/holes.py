@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.signals.log import KNEE_TIME
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -44,6 +46,8 @@ def bridge_holes(log: Log, use: Use) -> tuple[Log, Use]:
             within = (whole > time[k]) & (whole < time[k + 1])
             reference = log["speed_reference"]
             signals["speed_reference"][within] = _continued(time, reference, int(k), whole[within])
+    if KNEE_TIME in log:  # a knee of 0 s is none: the reference is straight in the hole
+        signals[KNEE_TIME][~logged] = 0.0
     counted = {}
     for name, own in use.items():
         counted[name] = np.zeros(len(whole), bool)

@@ -17,6 +17,9 @@ a tenth of its true standard error. Generalised least squares (Aitken, Proc. R. 
 
 for the directions U in which S is above the noise of the sensors. Fainter ones are spread over the
 whole run, and the covariance of an estimate takes them from the residual itself.
+
+A wheel torque that nobody measured is estimated (`wheel_torque`). The error of the estimate is such
+an input noise, with a large standard deviation. What it could explain tells nothing of the machine.
 """
 
 from __future__ import annotations
@@ -28,6 +31,8 @@ import numpy as np
 from scipy.sparse import block_diag, csr_array
 
 from plant_emulator.errors import UnsettledError
+from plant_emulator.recordings.wheel_torque import ERROR, ERROR_WINDOW
+from plant_emulator.signals.log import WHEEL_TORQUE
 from plant_emulator.signals.noise import noise
 
 if TYPE_CHECKING:
@@ -41,6 +46,8 @@ WINDOW = 0.25
 # A log is taken in stretches. Their noise comes from the input within them and shortly before, so
 # that a log twice as long takes twice as long, not four times [s].
 STRETCH, MEMORY = 10.0, 5.0
+# Change of an unknown torque to which the simulation responds linearly [N m at the wheel].
+ERROR_STEP = 10.0
 # Standard deviation along a direction from which on it counts, in the noise of the sensors.
 COUNTED_DEVIATION = 1.0
 # Of the simulations: a direction need not be known better.
@@ -88,11 +95,12 @@ def noise_directions(
         base = recording.strict_residual(values, gap_position, TOLERANCE)
     except UnsettledError:
         return None
-    length = max(1, round(WINDOW / recording.inputs.interval))
-    stretch, memory = (length * round(span / WINDOW) for span in (STRETCH, MEMORY))
+    length, step, deviation = _window(recording)
+    window = length * recording.inputs.interval
+    stretch, memory = (length * round(span / window) for span in (STRETCH, MEMORY))
     answers = [
-        _answer(recording.with_wheel_torque(torque), values, gap_position, base)
-        for torque in _disturbed_torques(recording, length, stretch + memory)
+        deviation / step * _answer(recording.with_wheel_torque(torque), values, gap_position, base)
+        for torque in _disturbed_torques(recording, length, step, stretch + memory)
     ]
     if not answers:
         return None
@@ -108,6 +116,20 @@ def noise_directions(
     )
 
 
+def _window(recording: Recording) -> tuple[int, float, float]:
+    """Samples of a window, change of its mean to simulate, and its standard deviation [N m].
+
+    An unknown torque may be off by far more than what the response is linear in.
+    """
+    measured = not recording.estimated_torque
+    span = WINDOW if measured else ERROR_WINDOW
+    length = max(1, round(span / recording.inputs.interval))
+    if measured:
+        deviation = noise(recording.log[WHEEL_TORQUE]) / np.sqrt(length)
+        return length, deviation, deviation
+    return length, ERROR_STEP, ERROR
+
+
 def _answer(
     recording: Recording, values: Mapping[str, float], gap_position: float, base: Array
 ) -> Array:
@@ -121,15 +143,14 @@ def _answer(
         return np.zeros_like(base)
 
 
-def _disturbed_torques(recording: Recording, length: int, every: int) -> list[Array]:
-    """Wheel torques in which one window of every so many samples is off by a standard deviation.
+def _disturbed_torques(recording: Recording, length: int, step: float, every: int) -> list[Array]:
+    """Wheel torques in which one window of every so many samples is off by a step [N m].
 
     The first torque changes every first window, the next one every second window, and so on. Only
     samples change at which the truck is not parked and that a counting sample follows.
     length : of a window [samples]; every : distance of the changed windows [samples]
     """
     run = recording.inputs
-    step = noise(recording.log["wheel_torque"]) / np.sqrt(length)
     places = np.arange(len(run.time))
     last = np.flatnonzero(recording.use.any(axis=0)).max(initial=-1)
     acts = np.logical_not(run.parked) & (places <= last)

@@ -21,7 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant_emulator.errors import LogError
-from plant_emulator.signals.log import VOLTAGE, Array, Log, compared_channels, without_voltage
+from plant_emulator.signals.log import (
+    VOLTAGE,
+    Array,
+    Log,
+    compared_channels,
+    has_truck,
+    without_voltage,
+)
 from plant_emulator.signals.noise import FLOOR, noise
 from register_maps.signals import LOG_COLUMNS
 
@@ -158,7 +165,7 @@ def _one_gear(measured: Log, gear_ratio: float) -> None:
 
 def _signs(measured: Log, interval: float) -> None:
     """The commissioning check: without a truck the motor drives at steady forward speed."""
-    if "wheel_torque" in measured:
+    if has_truck(measured):
         return
     half = max(1, round(0.5 * STEADY_TIME / interval))
     speed = measured["motor_speed"]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.errors import IdentificationError, UnsettledError
+from plant_emulator.recordings.wheel_torque import is_estimated
 from plant_emulator.signals.log import VOLTAGE, Array, Log, compared_channels, without_voltage
 from plant_emulator.signals.noise import noise
 from plant_emulator.simulation.simulate import TOLERANCE, Hold, RunInputs, inputs_of, simulate
@@ -40,6 +41,11 @@ class Recording:
     noise: Array
     use: NDArray[np.bool_]
     logged_values: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def estimated_torque(self) -> bool:
+        """Whether a truck's wheel torque is unknown, and its input an estimate."""
+        return is_estimated(self.log)
 
     def residual(
         self, values: Mapping[str, float], gap_position: float, tolerance: float = TOLERANCE

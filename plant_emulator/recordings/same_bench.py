@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.errors import LogError
+from plant_emulator.signals.log import has_truck
 from plant_emulator.signals.noise import noise
 from plant_emulator.signals.smoothing import smooth
 
@@ -87,7 +88,7 @@ def _percent(scale: Scale) -> str:
 
 def scale_of(log: Log, values: Mapping[str, float]) -> Scale | None:
     """Share s by which the drum shows less than the gear ratio says; None where no s is found."""
-    if "wheel_torque" in log:
+    if has_truck(log):
         return None
     gear_speed, drum_speed = log["motor_speed"] / values["gear_ratio"], log["drum_speed"]
     period = float(np.median(np.diff(log.time)))

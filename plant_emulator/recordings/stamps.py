@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.signals.log import KNEE_TIME
+
 if TYPE_CHECKING:
     from plant_emulator.signals.log import Array, Log
 
@@ -42,9 +44,10 @@ MOST = 0.4
 def restamped(log: Log) -> tuple[Log, float]:
     """The log with its rows at the times that its reference tells, and the jitter's deviation [s].
 
-    A staircase (a log with a truck) tells nothing and stays as it is.
+    A staircase (a log with a truck) tells nothing and stays as it is. So does one with knees
+    between its samples, which bears the stamps of the PLC itself.
     """
-    if "wheel_torque" in log or len(log.time) < FEW:
+    if "wheel_torque" in log or KNEE_TIME in log or len(log.time) < FEW:
         return log, 0.0
     late, told = lateness(log.time, log["speed_reference"])
     if told.sum() < FEW:

@@ -21,6 +21,10 @@ Array = NDArray[np.float64]
 # Channels on which a simulation is compared with a log, and a further one that a log may have.
 COMPARED = ("motor_speed", "drum_speed", "armature_current", "shaft_torque")
 VOLTAGE = "armature_voltage"
+# Torque of a truck on the drum, and the mark of a truck whose torque nobody measured.
+WHEEL_TORQUE, TRUCK = "wheel_torque", "truck_on_drum"
+# Knee of the speed reference after each sample: seconds after it, and value.
+KNEE_TIME, KNEE = "reference_knee_time", "reference_knee"
 # A channel that moves by less than this share of its largest value shows rounding only [1].
 STILL = 1e-9
 
@@ -64,6 +68,11 @@ def compared_channels(log: Log) -> tuple[str, ...]:
         return given
     moves = np.ptp(log[VOLTAGE]) > STILL * np.max(np.abs(log[VOLTAGE]))
     return (*given, VOLTAGE) if moves else given
+
+
+def has_truck(log: Log) -> bool:
+    """Whether a truck stood on the drum, its wheel torque measured or not."""
+    return WHEEL_TORQUE in log or (TRUCK in log and bool(np.any(log[TRUCK] > 0.5)))
 
 
 def without_voltage(log: Log) -> Log:

@@ -39,6 +39,7 @@ class BenchSamples:
     """Sensor values of some steps [SI]: arrays have one value a step, shape (steps,).
 
     wheel_torque : mean torque of the truck at its wheel, reaction of the brake included [N m]
+    felt_drum_speed : drum speed after the last step that a truck feels, without declared sensors
     shell_temperature : after the last step [K]
     motor_angle, drum_angle : since the start of the bench, after the last step [rad]
     """
@@ -49,6 +50,7 @@ class BenchSamples:
     armature_voltage: Array
     shaft_torque: Array
     wheel_torque: float
+    felt_drum_speed: float
     shell_temperature: float
     motor_angle: float
     drum_angle: float
@@ -141,6 +143,7 @@ class Bench:
             raise UnsettledError(f"bench at {self.time:g} s: its state is not finite any more")
         self._motor_angle += sums[MOTOR_SPEED] * self._step
         self._drum_angle += sums[DRUM_SPEED] * self._step
+        felt = float(out[-1, DRUM_SPEED])
         self._sense(out)
         return BenchSamples(
             motor_speed=out[:, MOTOR_SPEED],
@@ -149,6 +152,7 @@ class Bench:
             armature_voltage=out[:, ARMATURE_VOLTAGE],
             shaft_torque=out[:, SHAFT_TORQUE],
             wheel_torque=sums[WHEEL_TORQUE] / len(out),
+            felt_drum_speed=felt,
             shell_temperature=float(out[-1, SHELL_TEMPERATURE]),
             motor_angle=self._motor_angle,
             drum_angle=self._drum_angle,

@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.signals.log import KNEE, KNEE_TIME
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
 # Longest distance of the samples that a lag follows [s], the step of the running bench.
 STEP = 1e-3
 # A sample this share of a period before a reading counts as the reading itself: times are rounded.
+# The same is the shortest time between two samples [s].
 ROUNDING = 1e-6
 # Phases of a task that are tried, at most.
 PHASES = 64
@@ -98,7 +101,7 @@ def follow(
 
 @dataclass(frozen=True, kw_only=True)
 class Sensing:
-    """The declared sensors of a run.
+    """The declared sensors of a run, and its finer samples.
 
     sensors : by channel; phases : of their tasks [s]
     time : finer samples at which the run is simulated [s], shape (m,)
@@ -129,22 +132,38 @@ class Sensing:
 
 
 def sensing_of(log: Log, sensors: Mapping[str, Sensor]) -> Sensing | None:
-    """The sensors of a log's channels; None: every value shows its quantity at once."""
+    """The sensors of a log's channels, and its finer samples.
+
+    None: every value shows its quantity at once, and the reference is straight between samples.
+    """
     slow = {name: sensor for name, sensor in sensors.items() if not sensor.immediate}
-    if not slow:
+    if not slow and KNEE not in log:
         return None
-    time, rows = finer(log.time)
+    time = np.union1d(finer(log.time) if slow else log.time, reference_nodes(log)[0])
     phases = {name: phase_of(log, name, sensor.period) for name, sensor in slow.items()}
-    return Sensing(sensors=slow, phases=phases, time=time, rows=rows)
+    return Sensing(sensors=slow, phases=phases, time=time, rows=np.searchsorted(time, log.time))
 
 
-def finer(time: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Samples at most STEP apart, those of `time` among them, and the places of these."""
+def reference_nodes(log: Log) -> tuple[Array, Array]:
+    """Times [s] and values [rad/s] between which the speed reference of a log is straight."""
+    time, reference = log.time, log["speed_reference"]
+    if KNEE not in log or KNEE_TIME not in log:
+        return time, reference
+    after, value = log[KNEE_TIME][:-1], log[KNEE][:-1]
+    # A knee in the rounding of a sample is the sample.
+    inside = (after > ROUNDING) & (after < np.diff(time) - ROUNDING)
+    times = np.concatenate([time, (time[:-1] + after)[inside]])
+    order = np.argsort(times, kind="stable")
+    return times[order], np.concatenate([reference, value[inside]])[order]
+
+
+def finer(time: Array) -> Array:
+    """Samples at most STEP apart, those of `time` among them."""
     pieces = np.maximum(1, np.ceil(np.diff(time) / STEP - ROUNDING)).astype(int)
     rows = np.concatenate([[0], np.cumsum(pieces)])
     found = np.interp(np.arange(rows[-1] + 1), rows, time)
     found[rows] = time
-    return found, rows
+    return np.asarray(found)
 
 
 def phase_of(log: Log, name: str, period: float) -> float:

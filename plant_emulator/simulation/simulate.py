@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from plant_emulator.errors import UnsettledError
-from plant_emulator.signals.log import COMPARED, Array, Log
-from plant_emulator.simulation.sensing import Sensing, sensing_of
+from plant_emulator.signals.log import COMPARED, KNEE, WHEEL_TORQUE, Array, Log
+from plant_emulator.simulation.sensing import Sensing, reference_nodes, sensing_of
 from plant_emulator.simulation.sensor_noise import SENSORS
 from plant_emulator.solver.kernel import kernel_for
 from plant_emulator.solver.stepper import CHANNELS, Inputs
@@ -51,6 +51,7 @@ class RunInputs:
     truck : whether a truck is on the drum; without a truck the log has no wheel torque
     source : name of the run in messages; interval : median time between samples [s]
     sensing : what the declared sensors show; None: every value shows its quantity at once
+    nodes : times [s] and values [rad/s] of a reference with knees between the samples
     """
 
     time: Array
@@ -63,6 +64,7 @@ class RunInputs:
     source: str
     interval: float
     sensing: Sensing | None = None
+    nodes: tuple[Array, Array] | None = None
 
 
 def inputs_of(
@@ -74,15 +76,17 @@ def inputs_of(
     sensors : declared sensors by channel
     """
     time, reference = log.time, log["speed_reference"]
-    truck = "wheel_torque" in log
-    staircase = (hold or ("staircase" if truck else "linear")) == "staircase"
+    truck = WHEEL_TORQUE in log
+    staircase = (hold or ("staircase" if truck else "linear")) == "staircase" and KNEE not in log
     slope = np.zeros_like(reference)
+    nodes = reference_nodes(log)
     if staircase:
         corners = time[1:][np.diff(reference) != 0.0]
     else:
         slope[:-1] = np.diff(reference) / np.diff(time)
-        corners = time[1:-1][np.abs(np.diff(slope[:-1])) > CORNER]
-    wheel_torque = log["wheel_torque"] if truck else np.zeros_like(reference)
+        bends = np.abs(np.diff(np.diff(nodes[1]) / np.diff(nodes[0])))
+        corners = nodes[0][1:-1][bends > CORNER]
+    wheel_torque = log[WHEEL_TORQUE] if truck else np.zeros_like(reference)
     return RunInputs(
         time=np.ascontiguousarray(time),
         reference=np.ascontiguousarray(reference),
@@ -94,22 +98,29 @@ def inputs_of(
         source=log.source,
         interval=float(np.median(np.diff(time))),
         sensing=sensing_of(log, sensors or {}),
+        nodes=nodes if KNEE in log else None,
     )
 
 
 def refined(run: RunInputs) -> RunInputs:
-    """The inputs at the finer samples that the lags of the sensors need."""
+    """The inputs at the finer samples that knees of the reference and lags of sensors need."""
     if run.sensing is None:
         return run
     fine, rows = run.sensing.time, run.sensing.rows
     places = np.arange(len(fine))
     before = np.searchsorted(rows, places, side="right") - 1
     ending = np.searchsorted(rows, places)
+    if run.nodes is None:
+        slope = run.slope[before]
+        reference = run.reference[before] + slope * (fine - run.time[before])
+    else:
+        reference = np.interp(fine, *run.nodes)
+        slope = np.append(np.diff(reference) / np.diff(fine), 0.0)
     return replace(
         run,
         time=fine,
-        reference=run.reference[before] + run.slope[before] * (fine - run.time[before]),
-        slope=run.slope[before],
+        reference=reference,
+        slope=slope,
         wheel_torque=run.wheel_torque[ending],
         parked=run.parked[ending],
     )

@@ -19,6 +19,7 @@ from plant_emulator.recordings.preflight import NAMES, preflight
 from plant_emulator.recordings.recording import recording
 from plant_emulator.recordings.same_bench import check_same_bench
 from plant_emulator.recordings.stamps import restamped
+from plant_emulator.recordings.wheel_torque import telling, with_estimated_torque
 from plant_emulator.signals.log import VOLTAGE, Log
 from plant_emulator.workflows.arguments import check_signals
 
@@ -43,6 +44,12 @@ TELLING = re.compile(
 )
 # Words of a name: separated by what is no letter, or by a capital.
 WORD = re.compile("[A-Z]?[a-z]+|[A-Z]+")
+# What a user should know of a truck without a logged torque.
+UNKNOWN_TORQUE = (
+    "a truck stands on the drum whose wheel torque nobody measured; it is estimated from the "
+    "gear's relation, what its error could explain is left open, and flights through the gap do "
+    "not count"
+)
 # Rounding of a sample by a file format, at most [SI].
 ROUNDED = 1e-4
 # Signals that every log of the bench has.
@@ -79,7 +86,13 @@ def load_recordings(
                 "the reference tells; the stamps are corrected"
             )
         log, use = bridge_holes(log, checked.use)
-        taken.append(log)
+        known = with_estimated_torque(log, parameters.values())
+        if known is not log:
+            told = telling(known, parameters.values())
+            use = {name: counted & told for name, counted in use.items()}
+            left = 100.0 * (1.0 - np.mean(told))
+            notes.append(f"{log.source}: {UNKNOWN_TORQUE}; {left:.0f} % of the run is left out")
+        taken.append(known)
         uses.append(use)
         notes += checked.notes
     check_distinct([(log.source, samples(log)) for log in taken])

@@ -14,6 +14,7 @@ from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.model.stage import split_gap_position
 from plant_emulator.parameter_sets import DEFAULT, with_effects
 from plant_emulator.recordings.recording import recording
+from plant_emulator.recordings.wheel_torque import with_estimated_torque
 from plant_emulator.signals.log import Log, without_voltage
 from plant_emulator.simulation import simulate as kernel_level
 from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram, TravelProgram, program
@@ -125,6 +126,7 @@ def simulate_log(
     Raises LogError for a log without a speed reference.
     """
     check_signals(log, ("speed_reference",))
+    log = with_estimated_torque(log, parameters.values())
     values = values_of(parameters, effects)
     own = {name: table for name, table in parameters.effects.items() if name not in effects}
     library = kernel().effects if own else {}

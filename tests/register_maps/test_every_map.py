@@ -229,6 +229,8 @@ def test_log_columns_are_those_of_the_log_file():
         "wheel_torque_Nm": ("N m", False),
         "armature_voltage_V": ("V", False),
         "shell_temperature_degC": ("degC", False),
+        "reference_knee_time_s": ("s", False),
+        "reference_knee_rad_s": ("rad/s", False),
         "truck_on_drum": ("1", False),
     }
     for column in LOG_COLUMNS.values():

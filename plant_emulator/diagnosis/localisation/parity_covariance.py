@@ -59,6 +59,8 @@ def whitened_relations(
         limited = limited | (also & near_limit(limited, m))
         value = value - left
         variance = extra_variance(m, p, limited) + (0.5 * left) ** 2
+    if m.unknown_torque:
+        variance[GEAR] += VOID_VARIANCE
     if m.missing_current:
         variance[[MOTOR, *range(DRIVE, m.rows)]] += VOID_VARIANCE
     return WhitenedRelations(value, covariance_factor(m, p, variance))

@@ -93,7 +93,7 @@ class MeasuredSignals:
     noise : standard deviations in the order of NOISES
     speed : motor speed, smoothed
     drum_torque : of the truck over each interval, shape (n - 1,)
-    truck : whether a truck stood on the drum
+    truck : whether a truck stood on the drum; unknown_torque : whether its torque is an estimate
     missing_current : whether the current is not logged; its relations then say nothing
     """
 
@@ -109,6 +109,7 @@ class MeasuredSignals:
     speed: Array
     drum_torque: Array
     truck: bool
+    unknown_torque: bool
     missing_current: bool
 
     @property
@@ -145,6 +146,7 @@ def measured_signals(recording: Recording, p: Mapping[str, float]) -> MeasuredSi
         speed=smoothed_speed(log.time, *signals, noise, p, use_current=not missing),
         drum_torque=p["drum_radius"] / p["wheel_radius"] * wheel[1:],
         truck=truck,
+        unknown_torque=recording.estimated_torque,
         missing_current=missing,
     )
 

@@ -113,7 +113,7 @@ class Plc:
     def _advance(self) -> None:
         wheel, brake = 0.0, 0.0
         if self.truck is not None and self.scans:
-            wheel, brake = self.truck.torques(self.time, float(self.samples.drum_speed[-1]))
+            wheel, brake = self.truck.torques(self.time, self.samples.felt_drum_speed)
         self.samples = self.bench.advance(self.path, wheel_torque=wheel, brake_torque=brake)
         self.fast_task.take(self.samples.shaft_torque)
 

@@ -2,6 +2,7 @@
 
 import csv
 import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from gateway.cycle.record import NOTHING, Layout, Tick
 from gateway.cycle.supervisor import State
 from gateway.reasons import Reason
 from gateway.recordings import log, recording
+from gateway.recordings.export import knees_of
 from gateway.recordings.header import header
 from gateway.recordings.recording import encode_header
 from register_maps.signals import Measurement, Status
@@ -113,6 +115,19 @@ def test_times_in_the_wrong_order_are_refused_in_one_line(tmp_path: Path) -> Non
     assert result.stderr.count("\n") == 1
 
 
+def test_knee_is_where_the_reference_meets_the_line_of_the_command() -> None:
+    """From 5 rad/s at 300 rad/s^2.
+
+    To a constant 6 within 1 / 300 s. To the line 6 + 100 t, which is at 7 after the scan, within
+    5 ms. To 8, the whole scan.
+    """
+    begin, told = np.array([5.0, 5.0, 5.0]), np.array([6.0, 7.0, 8.0])
+    rate, slew = np.array([0.0, 100.0, 0.0]), np.full(3, 300.0)
+    after, value = knees_of(begin, told, rate, slew)
+    assert after == pytest.approx([1.0 / 300.0, 0.005, 0.01])
+    assert value == pytest.approx([6.0, 6.5, 8.0])
+
+
 @pytest.mark.parametrize(("status", "marked"), [(Status.ROAD_LOAD, True), (STANDING, False)])
 def test_a_truck_on_the_drum_is_marked(tmp_path: Path, status: Status, marked: bool) -> None:
     path = recorded(tmp_path / "a.rlrec", [0, 1, 2], status)
@@ -129,16 +144,22 @@ def test_poll_quality_stands_in_the_metadata_of_parquet(tmp_path: Path) -> None:
 def test_a_recording_is_exported_piece_by_piece(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The pieces give the file of a whole reading, and a part of its memory."""
-    path = recorded(tmp_path / "a.rlrec", list(range(4000)))
-    export(path, "--to", tmp_path / "whole.csv")
-    monkeypatch.setattr(recording, "PIECE", 200)
+    """The pieces give the file of a whole reading, and take a third of its memory at most."""
+    path = recorded(tmp_path / "a.rlrec", list(range(1500)))
+    whole = peak_memory(lambda: export(path, "--to", tmp_path / "whole.csv"))
+    monkeypatch.setattr(recording, "PIECE", 50)
+    pieces = peak_memory(lambda: export(path, "--to", tmp_path / "pieces.csv"))
+    assert (tmp_path / "pieces.csv").read_bytes() == (tmp_path / "whole.csv").read_bytes()
+    assert pieces < whole / 3.0
+
+
+def peak_memory(call: Callable[[], object]) -> int:
+    """Largest memory that a call allocates [bytes]."""
     tracemalloc.start()
-    export(path, "--to", tmp_path / "pieces.csv")
+    call()
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert (tmp_path / "pieces.csv").read_bytes() == (tmp_path / "whole.csv").read_bytes()
-    assert peak < 0.5 * path.stat().st_size
+    return peak
 
 
 def test_a_cut_recording_is_streamed_as_it_is_read(tmp_path: Path) -> None:

@@ -25,6 +25,8 @@ KNOWN = [
     ("wheel_torque_Nm", "wheel_torque", False),
     ("armature_voltage_V", "armature_voltage", False),
     ("shell_temperature_degC", "shell_temperature", False),
+    ("reference_knee_time_s", "reference_knee_time", False),
+    ("reference_knee_rad_s", "reference_knee", False),
     ("truck_on_drum", "truck_on_drum", False),
 ]
 HEADER = "time_s,speed_reference_rad_s,motor_speed_rad_s,drum_speed_rad_s,shaft_torque_Nm"

@@ -44,6 +44,7 @@ class LinearBench:
             armature_voltage=np.full(len(speed), 50.0),
             shaft_torque=np.arange(first, first + len(speed), dtype=float),
             wheel_torque=wheel_torque,
+            felt_drum_speed=float(speed[-1]) / RATIO,
             shell_temperature=305.15,
             motor_angle=self.angle,
             drum_angle=self.angle / RATIO,
