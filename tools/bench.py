@@ -10,6 +10,8 @@ solution. An independent solver has to agree with that one. We run at the looses
 which on our error stays below a bound. The peer runs at its fastest tolerance, among those at which
 its error is at most a quarter larger than ours.
 
+The ticks of the gateway are wall time, in real time beside the emulator: quantiles of 15 s each.
+
 The diagnosis is the whole command on all cores, run once, against a budget of wall time. Its growth
 with logs and effects is the processor time of all its processes.
 """
