@@ -25,6 +25,7 @@ from gateway.configuration.sections import (
     RecordingConfig,
     RegulatorConfig,
     TruckConfig,
+    VerificationConfig,
 )
 from gateway.configuration.sweep_speeds import read_sweep
 from gateway.errors import ConfigError
@@ -64,6 +65,7 @@ class Config:
     plausibility: PlausibilityConfig = field(default_factory=PlausibilityConfig)
     recording: RecordingConfig = field(default_factory=RecordingConfig)
     metrics: MetricsConfig = field(default_factory=MetricsConfig)
+    verification: VerificationConfig = field(default_factory=VerificationConfig)
     program: Program | None = None
     document: Document = field(default_factory=_defaults)
 

@@ -6,9 +6,9 @@ asked for, and a replay does it again.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import inf, isfinite
+from math import isfinite
 from typing import Any, Final
 
 from gateway.errors import ConfigError
@@ -19,10 +19,12 @@ class Profile:
     """A motor speed over time, linear between its points.
 
     times : since the begin of the step, increasing, from 0 [s]; speeds [rad/s]
+    label : what the step is for, in every kind of step
     """
 
     times: tuple[float, ...]
     speeds: tuple[float, ...]
+    label: str = ""
 
     @property
     def duration(self) -> float:
@@ -40,6 +42,7 @@ class Ramp:
     speed: float
     rate: float
     hold: float
+    label: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +62,7 @@ class Emulation:
     slowest: float
     fastest: float
     longest: float
+    label: str = ""
 
 
 Step = Profile | Ramp | Emulation
@@ -127,15 +131,16 @@ def _step(table: object, place: str) -> Step:
     if not isinstance(table, Mapping) or kind is None:
         expected = f"a table with kind = {', '.join(KINDS)}"
         raise ConfigError("no step", place=place, value=table, expected=expected)
-    values = {name: value for name, value in table.items() if name != "kind"}
-    wanted = set(kind.__dataclass_fields__)
+    values = {name: value for name, value in table.items() if name not in ("kind", "label")}
+    wanted = set(kind.__dataclass_fields__) - {"label"}
     if set(values) != wanted:
         expected = ", ".join(sorted(wanted))
         raise ConfigError("wrong keys", place=place, value=list(values), expected=expected)
+    label = str(table.get("label", ""))
     if kind is Profile:
-        return _profile(values, place)
+        return replace(_profile(values, place), label=label)
     numbers = {name: _number(value, f"{place}.{name}") for name, value in values.items()}
-    return Ramp(**numbers) if kind is Ramp else Emulation(**numbers)
+    return Ramp(**numbers, label=label) if kind is Ramp else Emulation(**numbers, label=label)
 
 
 def _profile(values: Mapping[str, Any], place: str) -> Profile:
@@ -162,5 +167,5 @@ def _list(value: object, place: str) -> Sequence[Any]:
 def _number(value: object, place: str) -> float:
     usable = isinstance(value, int | float) and not isinstance(value, bool)
     if not isinstance(value, int | float) or not usable or not isfinite(value):
-        raise ConfigError("bad value", place=place, value=value, expected=f"below {inf}")
+        raise ConfigError("bad value", place=place, value=value, expected="a finite number")
     return float(value)

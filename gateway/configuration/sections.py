@@ -198,6 +198,33 @@ class MetricsConfig:
     address: str | None = declare("address", None)
 
 
+@dataclass(frozen=True, kw_only=True)
+class VerificationConfig:
+    """The verification of the emulated road: its trucks, and the limits of its checks.
+
+    smallest, largest : masses of the emulated trucks [kg]
+    losses, compensation, coast_down : errors of a force at the rim [N]
+    torque, inertia, inertia_mean, acceleration : relative errors [1]
+    response, settling : times to 90 %, and to 10 % for good, after a step in force [s]
+    """
+
+    smallest: float = declare("smallest_kg", 1500.0, lower=100.0, upper=1e5)
+    largest: float = declare("largest_kg", 5240.0, lower=100.0, upper=1e5)
+    losses: float = declare("losses_N", 9.0, lower=0.0, upper=1e4)
+    torque: float = declare("torque_percent", 2.0, scale=PERCENT, lower=0.0, upper=100.0)
+    inertia: float = declare("inertia_percent", 1.0, scale=PERCENT, lower=0.0, upper=100.0)
+    inertia_mean: float = declare(
+        "inertia_mean_percent", 0.2, scale=PERCENT, lower=0.0, upper=100.0
+    )
+    acceleration: float = declare(
+        "acceleration_percent", 1.0, scale=PERCENT, lower=0.0, upper=100.0
+    )
+    compensation: float = declare("compensation_N", 5.0, lower=0.0, upper=1e4)
+    coast_down: float = declare("coast_down_N", 9.8, lower=0.0, upper=1e4)
+    response: float = declare("response_ms", 110.0, scale=MILLI, lower=0.0, upper=1e4)
+    settling: float = declare("settling_ms", 1500.0, scale=MILLI, lower=0.0, upper=1e4)
+
+
 SECTIONS: dict[str, type] = {
     "plc": PlcConfig,
     "loop": LoopConfig,
@@ -208,4 +235,5 @@ SECTIONS: dict[str, type] = {
     "plausibility": PlausibilityConfig,
     "recording": RecordingConfig,
     "metrics": MetricsConfig,
+    "verification": VerificationConfig,
 }

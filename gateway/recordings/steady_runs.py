@@ -53,7 +53,7 @@ def read(path: Path) -> SteadyRun:
         path=path,
         date=datetime.fromisoformat(found.header["date"]),
         sha256=digest,
-        trace=_of_recording(found, map_of(found.header)),
+        trace=trace_of(found, map_of(found.header)),
         config=config_of(found.header),
     )
 
@@ -79,7 +79,8 @@ def _of_log(found: log.Log) -> Trace:
     )
 
 
-def _of_recording(found: recording.Recording, register_map: RegisterMap) -> Trace:
+def trace_of(found: recording.Recording, register_map: RegisterMap) -> Trace:
+    """Signals of a recording at its samples. Raises LossesError where a truck was driven."""
     rows = found.records[of_recording(found)]
     if len(rows) < 2:
         raise LossesError(f"{found.path}: holds no samples of the PLC; expected a run")

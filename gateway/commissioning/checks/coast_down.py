@@ -1,0 +1,96 @@
+"""Virtual coast-downs of the smallest and the largest truck (40 CFR 1066.270).
+
+No truck stands on the drum. The regulator emulates one that rolls out under its road load. The mean
+force of an interval of speeds is m dv / dt. It has to be the road load.
+"""
+
+import numpy as np
+
+from gateway.arrays import Array
+from gateway.commissioning.check import Check, missing
+from gateway.commissioning.step_run import StepRun
+from gateway.configuration.config import Config
+from gateway.configuration.program import Emulation, Ramp, Step
+from gateway.configuration.sweep_speeds import RATE_RPM_S
+from gateway.road_load import GRAVITY
+from register_maps.units import RPM
+
+NAME = LABEL = "coast-down"
+SOURCE = "for comparison: 40 CFR 1066.270, from memory"
+KMH = 1.0 / 3.6
+BOUNDS: Array = np.arange(16.0, 3.0, -2.0) * KMH
+"""[m/s] Speeds between which a mean force is taken."""
+MARGIN = 1.0 * KMH
+LONGEST = 180.0
+
+
+def start(config: Config) -> Step:
+    """Ramp to the speed from which a truck rolls out."""
+    bench = config.bench
+    speed = (float(BOUNDS[0]) + MARGIN) / bench.drum_radius * bench.gear_ratio
+    return Ramp(speed=speed, rate=RPM * RATE_RPM_S, hold=3.0)
+
+
+def steps(config: Config, repeats: int) -> list[Step]:  # noqa: ARG001 - all checks have these arguments
+    """Let the smallest and the largest truck roll out."""
+    masses = (config.verification.smallest, config.verification.largest)
+    return [one for mass in masses for one in (start(config), roll_out(config, mass))]
+
+
+def roll_out(config: Config, mass: float) -> Emulation:
+    """Let a truck of this mass roll out; its road load grows with the mass."""
+    own, weight = config.truck, mass * GRAVITY
+    share = mass / own.total_mass
+    rolls = own.f0 is None
+    return Emulation(
+        mass=mass,
+        f0=own.crr * weight if own.f0 is None else share * own.f0,
+        f1=own.crr_v * weight / config.bench.drum_radius if rolls else share * (own.f1 or 0.0),
+        f2=0.0 if rolls else share * (own.f2 or 0.0),
+        force=0.0,
+        slowest=float(BOUNDS[-1]) - 0.5 * MARGIN,
+        fastest=2.0 * float(BOUNDS[0]),
+        longest=LONGEST,
+        label=LABEL,
+    )
+
+
+def mean_forces(time: Array, speed: Array, mass: float, bounds: Array) -> Array:
+    """Mean force of each interval of speeds [N], shape (n - 1,); NaN where it was not passed.
+
+    time [s], speed [m/s] of a truck that slows down; bounds : falling speeds [m/s], shape (n,)
+    """
+    falling = np.minimum.accumulate(speed)
+    passed = np.interp(-bounds, -falling, time, left=np.nan, right=np.nan)
+    return mass * -np.diff(bounds) / np.diff(passed)
+
+
+def targets(step: Emulation, bounds: Array) -> Array:
+    """Mean road load of each interval of speeds [N], shape (n - 1,)."""
+    high, low = bounds[:-1], bounds[1:]
+    squares = (high**2 + high * low + low**2) / 3.0
+    return step.f0 + step.f1 * 0.5 * (high + low) + step.f2 * squares
+
+
+def evaluate(run: StepRun) -> list[Check]:
+    """Worst error of the mean force of each truck."""
+    return [
+        _judge(run, step, part) for step, part in run.parts(LABEL) if isinstance(step, Emulation)
+    ] or [missing(NAME, "no coast-down", "N", run.config.verification.coast_down, SOURCE)]
+
+
+def _judge(run: StepRun, step: Emulation, part: slice) -> Check:
+    limit = run.config.verification.coast_down
+    found = mean_forces(run.trace.time[part], run.rim_speed[part], step.mass, BOUNDS)
+    errors = found - targets(step, BOUNDS)
+    if not np.isfinite(errors).all():
+        what = f"{step.mass:.0f} kg: did not roll from 16 to 4 km/h"
+        return missing(NAME, what, "N", limit, SOURCE)
+    worst = int(np.argmax(np.abs(errors)))
+    target = float(targets(step, BOUNDS)[worst])
+    what = (
+        f"{step.mass:.0f} kg, {100.0 * errors[worst] / target:+.1f} % of {target:.0f} N at "
+        f"{3.6 * BOUNDS[worst]:.0f} .. {3.6 * BOUNDS[worst + 1]:.0f} km/h"
+    )
+    value = float(errors[worst])
+    return Check(name=NAME, what=what, value=value, unit="N", limit=limit, source=SOURCE)

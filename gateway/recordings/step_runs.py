@@ -1,0 +1,37 @@
+"""Runs of a program in recordings: what the checks of the commissioning look at."""
+
+from pathlib import Path
+
+import numpy as np
+
+from gateway.commissioning.step_run import StepRun, step_numbers
+from gateway.errors import ConfigError
+from gateway.offline.recording_replay import observations
+from gateway.recordings import recording, steady_runs
+from gateway.recordings.export import of_recording, unwrap_time
+from gateway.recordings.header import config_of, map_of
+
+
+def read(path: Path) -> StepRun:
+    """Run of a program in a recording.
+
+    Raises ConfigError for a recording without a program, LossesError for one without samples.
+    """
+    found = recording.read(path)
+    config, register_map = config_of(found.header), map_of(found.header)
+    if config.program is None:
+        raise ConfigError(
+            "not the run of a program", file=path, expected="a recording of drive, ready or verify"
+        )
+    numbers = step_numbers(config, register_map, observations(found.rows(), register_map))
+    samples = of_recording(found)
+    rows = found.records[samples]
+    beats = unwrap_time(rows["measured_plc_heartbeat"], register_map.modulus("plc_heartbeat"))
+    return StepRun(
+        config=config,
+        trace=steady_runs.trace_of(found, register_map),
+        current=rows["measured_armature_current"],
+        own_time=rows["now"],
+        heartbeat=beats,
+        steps=np.array(numbers)[samples],
+    )

@@ -1,0 +1,101 @@
+"""`gateway ready` on the emulated bench over the socket, and `gateway verify` of a recording."""
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from rich.console import Console
+
+from gateway.cli import main
+from gateway.commissioning.verification import CHECKS, verification_program
+from gateway.configuration.config import Config
+from gateway.demo.operator import Session, operate_fast
+from gateway.demo.view import Screen
+from plant_emulator.emulator.process import EmulatorProcess
+from tests.system.gateway_process import until_armed
+
+
+def test_the_command_offers_every_check():
+    from gateway.cli.verify import NAMES
+
+    assert list(CHECKS) == NAMES
+
+
+@pytest.mark.slow
+@pytest.mark.realtime
+def test_a_day_begins_with_one_page_and_a_line_in_the_history(tmp_path):
+    with EmulatorProcess(truck_mass=None) as emulator:
+        (tmp_path / "bench.toml").write_text(
+            f'[plc]\nport = {emulator.port}\n[recording]\ndir = "runs"\n'
+        )
+        command = ["ready", "-c", "bench.toml", "--warm-up", "5", "--json", "ready.json"]
+        process = subprocess.Popen(
+            [sys.executable, "-m", "gateway", *command],
+            cwd=tmp_path,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        until_armed(emulator)
+        emulator.set_remote(on=True)
+        output, errors = process.communicate(timeout=90)
+    assert "no truck on the drum" in errors
+    told = json.loads((tmp_path / "ready.json").read_text())
+    assert told["schema"] == "readiness/1"
+    held = {one["name"] for one in told["checks"] if one["holds"]}
+    assert {"map", "disk", "tare", "zero", "sign", "ratio", "warm-up"} <= held, output
+    assert process.returncode == int(not told["holds"])
+    with (tmp_path / "runs" / "readiness.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["name"] for row in rows] == [one["name"] for one in told["checks"]]
+
+
+def recorded(folder: Path, names: list[str]) -> Path:
+    """The recording of a verification up to 1500 rpm, without waiting for the clock."""
+    with EmulatorProcess(truck_mass=None, speed=None) as emulator:
+        values = {"plc.port": str(emulator.port), "limits.speed_max_rpm": "1500"}
+        config = Config().with_values(values)
+        program = verification_program(config, names)
+        session = Session(
+            config=config.with_program(program),
+            file=folder / "verify.toml",
+            emulator=emulator,
+            screen=Screen(Console(quiet=True), "", 1.0),
+            duration=program.duration + 1.0,
+        )
+        return operate_fast(session).recording
+
+
+@pytest.mark.slow
+def test_a_recording_is_verified_again_from_its_file_alone(tmp_path):
+    path = recorded(tmp_path, ["losses", "torque"])
+    result = CliRunner().invoke(main, ["verify", str(path), "--json", "-"])
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)
+    assert [one["name"] for one in told["checks"]] == ["losses", "torque"]
+    assert told["holds"]
+    assert len(told["sha256"]) == 64
+    losses, torque = (one["value"] for one in told["checks"])
+    assert abs(losses) < 1.0
+    assert abs(torque) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ([], "expected -c CONFIG for a run on the live bench, or a RECORDING"),
+        (["none.rlrec"], "none.rlrec: No such file"),
+        (["-c", "none.toml"], "none.toml: No such file"),
+        (["-c", "x.toml", "--only", "nothing"], "'nothing' is not one of"),
+    ],
+)
+def test_wrong_use_is_one_line_and_exit_code_2(tmp_path, monkeypatch, arguments, says):
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(main, ["verify", *arguments])
+    assert result.exit_code == 2
+    assert says in result.stderr
+    assert result.stderr.count("\n") == 1
