@@ -25,14 +25,14 @@ So is a speed sensor while the other speed moves, if the sensors are known to be
 backlash one side moves alone.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import exp, inf, log, sqrt
 from statistics import NormalDist
 
 from gateway.configuration.config import Config
 from gateway.friction import Friction, friction_torque
 from gateway.reasons import Reason
-from register_maps.signals import Measurement
+from register_maps.signals import Measurement, Status
 from register_maps.timing import SCAN
 
 SMOOTH, ENVELOPE, RISE = 0.05, 0.3, 0.1
@@ -63,6 +63,9 @@ TARE_TIME, AT_REST = 0.5, 0.8
 """[s], [rad/s] Time constant of the tare, and motor speed up to which the motor stands."""
 STUCK = 20
 """Samples in a row without a change. The noise of a sound sensor shows in every sample."""
+SETTLED, LATE = 3, 3
+"""Samples by which the partner may move after the sensor has settled, and before it follows. At
+steady speed a sensor without noise shows one value for seconds."""
 VISIBLE, VISIBLE_TORQUE = 2.5, 6.0
 """Deviations of the noise that the partner of a stuck sensor shows, a speed or the current."""
 NO_TORQUE, NO_SPEED = 1.0, 0.3
@@ -178,12 +181,16 @@ def _walk(config: Config, tolerance: float, *deviations: float) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Streak:
-    """Readings of one sensor in a row that are equal, and the range of what belongs to it."""
+    """Readings of one sensor in a row that are equal, and the range of what belongs to it.
+
+    late : count of the readings since its partner has visibly moved
+    """
 
     value: float
     count: int
-    lowest: float
-    highest: float
+    lowest: float = inf
+    highest: float = -inf
+    late: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -224,7 +231,8 @@ def judge(
     """Return the sums after one more window; `torque` is its mean of T_meas [N m]."""
     shown = torque - p.torque_offset
     first, last = motor_torque(p, before), motor_torque(p, now)
-    middle = (before.motor_speed + now.motor_speed) / (2.0 * p.gear_ratio)
+    gear_speed = now.motor_speed / p.gear_ratio
+    middle = (before.motor_speed / p.gear_ratio + gear_speed) / 2.0
     mean = last + (state.mean - last) * exp(-duration / SMOOTH)
     envelope = max(state.envelope * exp(-duration / ENVELOPE), abs(mean))
     rise = (now.motor_speed - before.motor_speed) / duration
@@ -250,22 +258,25 @@ def judge(
         acceleration=acceleration,
         tare=tare,
         stands=stands,
-        torque=_streak(state.torque, now.shaft_torque, last),
-        motor=_streak(state.motor, now.motor_speed / p.gear_ratio, now.drum_speed),
-        drum=_streak(state.drum, now.drum_speed, now.motor_speed / p.gear_ratio),
+        # Inside the backlash the current moves the motor alone, and the torque is the friction.
+        torque=None
+        if Status.GAP in now.status
+        else _streak(state.torque, now.shaft_torque, last, p.stuck_torque),
+        motor=_streak(state.motor, gear_speed, now.drum_speed, p.stuck_motor),
+        drum=_streak(state.drum, now.drum_speed, gear_speed, p.stuck_drum),
     )
 
 
 def reason(p: Params, state: Plausibility, *, running: bool) -> Reason | None:
     """Reason of the first relation that does not hold; None: all sensors are plausible."""
-    motor = _is_stuck(state.motor, p.stuck_motor, NO_SPEED)
-    drum = _is_stuck(state.drum, p.stuck_drum, NO_SPEED)
+    motor = _is_stuck(state.motor, NO_SPEED)
+    drum = _is_stuck(state.drum, NO_SPEED)
     shifted = state.stands > TARE_TIME and abs(state.tare) > p.tare
     found = (
         (max(state.motor_up, state.motor_down) > p.motor_level, Reason.TORQUE_MODEL),
         (max(state.drum_up, state.drum_down) > p.drum_level, Reason.DRUM_MODEL),
         (max(state.gear_up, state.gear_down) > p.gear_level, Reason.GEAR_MODEL),
-        (_is_stuck(state.torque, p.stuck_torque, NO_TORQUE), Reason.TORQUE_STUCK),
+        (_is_stuck(state.torque, NO_TORQUE), Reason.TORQUE_STUCK),
         (motor or drum, Reason.SPEED_STUCK),
         (shifted and not running, Reason.TARE),
     )
@@ -303,19 +314,22 @@ def _tare(
     return state.tare + share * (torque - state.tare), state.stands + duration
 
 
-def _streak(before: Streak | None, value: float, partner: float) -> Streak:
+def _streak(before: Streak | None, value: float, partner: float, visible: float) -> Streak:
+    """Streak after one more sample; a sound sensor shows a move of `visible` in its partner.
+
+    The first samples do not count, because the partner still moves when the sensor has settled.
+    """
     if before is None or value != before.value:
-        return Streak(value=value, count=1, lowest=partner, highest=partner)
-    return Streak(
-        value=value,
-        count=before.count + 1,
-        lowest=min(before.lowest, partner),
-        highest=max(before.highest, partner),
-    )
+        return Streak(value=value, count=1)
+    if before.count < SETTLED:
+        return replace(before, count=before.count + 1)
+    lowest, highest = min(before.lowest, partner), max(before.highest, partner)
+    late = before.late + (highest - lowest > visible)
+    return replace(before, count=before.count + 1, lowest=lowest, highest=highest, late=late)
 
 
-def _is_stuck(streak: Streak | None, moved: float, nothing: float) -> bool:
-    """Whether a sensor stands still at more than `nothing` while its partner has moved."""
+def _is_stuck(streak: Streak | None, nothing: float) -> bool:
+    """Whether a sensor stands still at more than `nothing` long after its partner has moved."""
     if streak is None or streak.count < STUCK or abs(streak.value) <= nothing:
         return False
-    return streak.highest - streak.lowest > moved
+    return streak.late > LATE

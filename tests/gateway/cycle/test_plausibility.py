@@ -130,12 +130,12 @@ def test_configured_offset_is_no_torque():
 NOISY = Params.of(Config().with_values({"plausibility.noisy_speeds": True}))
 
 
-def moved(signal, sizes):
+def moved(signal, sizes, p=NOISY):
     """Sums after samples in which one signal takes these values."""
     state, before = Plausibility(), DRIVING
     for size in sizes:
         now = replace(DRIVING, **{signal: size})
-        state = judge(P, state, before, now, torque=now.shaft_torque, duration=0.01)
+        state = judge(p, state, before, now, torque=now.shaft_torque, duration=0.01)
         before = now
     return replace(state, motor_up=0.0, motor_down=0.0, drum_up=0.0, drum_down=0.0)
 
@@ -158,9 +158,18 @@ def test_sensor_that_stands_still_while_its_partner_moves_is_stuck(signal, swing
     assert reason(NOISY, moved(signal, sizes[:15]), running=True) is None
 
 
+def test_torque_without_noise_may_stand_still_until_the_current_moves():
+    """At steady speed nothing moves for seconds; the torque follows the current scans later."""
+    sizes = [20.0] * 200 + [12.0] * 3
+    assert reason(NOISY, moved("armature_current", sizes), running=True) is None
+    assert reason(NOISY, moved("armature_current", [*sizes, 12.0]), running=True) is (
+        Reason.TORQUE_STUCK
+    )
+
+
 def test_drum_without_noise_may_float_through_the_backlash():
     sizes = [125.2 + 3.0 * number / 21 for number in range(21)]
-    assert reason(P, moved("motor_speed", sizes), running=True) is None
+    assert reason(P, moved("motor_speed", sizes, P), running=True) is None
 
 
 def test_alarm_level_of_white_noise_is_passed_as_often_as_allowed():
