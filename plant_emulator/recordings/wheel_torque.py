@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.signals.log import Array
 
 # Random walk of the torque at the drum [N m / sqrt(s)]. Its changes have Cauchy's distribution: the
@@ -41,6 +42,14 @@ STILL = 0.02
 # At the drum it is 560 N m, half of the gear's friction at full speed. The window [s] is shorter
 # than the estimate is smooth, so that its errors lie in the windows.
 ERROR, ERROR_WINDOW = 150.0, 0.05
+# Parameters of the estimate, and the gain error that a torque sensor may have [1].
+TAKEN = (
+    "gear_coulomb_friction",
+    "gear_viscous_friction",
+    "gear_friction_exponent",
+    "drum_inertia",
+)
+GAIN_ERROR = 0.01
 # Samples to either side over which the torque of the gear is averaged.
 REACH = 5
 # Torque that keeps gear and drum in contact for certain [N m at the drum]: a sixth of the gear's
@@ -66,6 +75,24 @@ def with_estimated_torque(log: Log, p: Mapping[str, float]) -> Log:
 def is_estimated(log: Log) -> bool:
     """Whether the wheel torque of a log is an estimate of an unknown torque."""
     return WHEEL_TORQUE in log and TRUCK in log and bool(np.any(log[TRUCK] > 0.5))
+
+
+def deviation(log: Log, parameters: ParameterSet) -> Array:
+    """Standard deviation of the estimated wheel torque [N m], shape (n,).
+
+    The priors of the parameters that the estimate takes, and the gain of the torque sensor.
+    """
+    p = parameters.values()
+    share = p["wheel_radius"] / p["drum_radius"]
+    base = drum_torque(log, p)
+    changed = [
+        drum_torque(log, {**p, name: p[name] + std})
+        for name in TAKEN
+        if (std := parameters[name].std) is not None
+    ]
+    signals = {**log.signals, "shaft_torque": (1.0 + GAIN_ERROR) * log["shaft_torque"]}
+    changed.append(drum_torque(replace(log, signals=signals), p))
+    return np.asarray(share * np.sqrt(sum((other - base) ** 2 for other in changed)))
 
 
 def telling(log: Log, p: Mapping[str, float]) -> NDArray[np.bool_]:

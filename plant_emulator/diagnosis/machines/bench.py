@@ -113,7 +113,12 @@ class BenchModel:
         self._given = {f"{e}_{key}" for e, own in parameters.effects.items() for key in own}
         self.states = states_of(parameters.effects, known)
         self.candidates: Mapping[str, Candidate] = {
-            name: candidate(effect, voltage=all(voltage)) for name, effect in effects.items()
+            name: candidate(
+                effect,
+                voltage=all(voltage),
+                unknown_torque=all(r.estimated_torque for r in recordings),
+            )
+            for name, effect in effects.items()
         }
         self.parameters = tuple(unknowns(parameters, self._free, self._values, ()))
         self.units = {name: UNITS[name] for name in self._free}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 from plant_emulator.diagnosis.machine import Candidate
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.recordings.preflight import NAMES
-from plant_emulator.signals.log import VOLTAGE
+from plant_emulator.signals.log import VOLTAGE, WHEEL_TORQUE
 
 if TYPE_CHECKING:
     from plant_emulator.effects import Effect, EffectParameter
@@ -16,10 +16,17 @@ if TYPE_CHECKING:
 
 # What an effect needs begins so, where the logged voltage shows it.
 LOG_VOLTAGE = f"log {NAMES[VOLTAGE]}"
+# Subsystems whose torques an unknown torque of a truck hides, and what would show them.
+BEHIND_THE_GEAR = frozenset({"gear", "drum", "wheel_contact"})
+LOG_WHEEL_TORQUE = f"log {NAMES[WHEEL_TORQUE]}, or give a run without a truck"
 
 
-def candidate(effect: Effect, *, voltage: bool = False) -> Candidate:
-    """Turn the declaration of an effect into unknowns; voltage : whether all logs have it."""
+def candidate(effect: Effect, *, voltage: bool = False, unknown_torque: bool = False) -> Candidate:
+    """Turn the declaration of an effect into unknowns.
+
+    voltage : whether all logs have it
+    unknown_torque : whether a truck's torque that nobody measured acted in every run
+    """
     name, parameters = effect.name, effect.parameters
     unknowns: dict[str, list[Unknown]] = {r: [] for r in ("size", "shape", "state", "stochastic")}
     fixed: dict[str, float] = {}
@@ -40,10 +47,17 @@ def candidate(effect: Effect, *, voltage: bool = False) -> Candidate:
         fixed=fixed,
         units={f"{name}_{key}": declared.unit for key, declared in parameters.items()},
         title=effect.description.partition("\n")[0].rstrip("."),
-        needs="" if voltage and effect.needs.startswith(LOG_VOLTAGE) else effect.needs,
+        needs=_needs(effect, voltage=voltage, unknown_torque=unknown_torque),
         stochastic=tuple(unknowns["stochastic"]),
         exact_form=effect.exact,
     )
+
+
+def _needs(effect: Effect, *, voltage: bool, unknown_torque: bool) -> str:
+    """What a log must have to show the effect and these logs lack."""
+    if unknown_torque and effect.subsystem in BEHIND_THE_GEAR:
+        return LOG_WHEEL_TORQUE
+    return "" if voltage and effect.needs.startswith(LOG_VOLTAGE) else effect.needs
 
 
 def _role(declared: EffectParameter) -> Role:

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.prediction.remainder import Remainder
     from plant_emulator.diagnosis.prediction.trace import Trace
+    from plant_emulator.signals.log import Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,12 +28,28 @@ class Step:
 
 
 @dataclass(frozen=True, kw_only=True)
+class EstimatedInput:
+    """An input of a run that nobody measured: estimate and standard deviation [unit], shape (n,).
+
+    time : of the samples [s], shape (n,)
+    """
+
+    source: str
+    name: str
+    unit: str
+    time: Array
+    value: Array
+    deviation: Array
+
+
+@dataclass(frozen=True, kw_only=True)
 class Details:
     """What a report shows beside the answer.
 
     settings : what repeats the diagnosis: command, version, date, hashes of files, thresholds
     notes : what was noticed about the logs, a sentence each
     remainder : the unmodelled remainder; None for a machine that is modelled down to its noise
+    inputs : of the runs that nobody measured
     """
 
     traces: tuple[Trace, ...]
@@ -40,3 +57,4 @@ class Details:
     settings: Mapping[str, str]
     notes: tuple[str, ...]
     remainder: Remainder | None = None
+    inputs: tuple[EstimatedInput, ...] = ()

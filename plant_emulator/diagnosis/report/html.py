@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.report import html_maps, html_traces
 from plant_emulator.diagnosis.report import html_tables as tables
+from plant_emulator.diagnosis.report.html_inputs import estimated_inputs
 from plant_emulator.diagnosis.report.html_parts import PLUS_MINUS, code, scroll_region
 from plant_emulator.diagnosis.report.html_pictures import line, waterfall
 from plant_emulator.diagnosis.report.html_remainder import remainder_by_band
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
     )
     from plant_emulator.diagnosis.prediction.remainder import Remainder
     from plant_emulator.diagnosis.prediction.trace import Trace
-    from plant_emulator.diagnosis.report.details import Details
+    from plant_emulator.diagnosis.report.details import Details, EstimatedInput
 
 HEADING = "Sim-to-real gap"
 # Held-out runs that are drawn: those with the largest gaps. The others are named.
@@ -77,6 +78,7 @@ def html(answer: Answer, details: Details) -> str:
         _parameters(verdict.parameters),
         _limits(answer.undetectable),
         _runs(details.traces),
+        _inputs(details.inputs),
         _search(answer),
         _repeat(answer.logs, details),
     )
@@ -199,6 +201,12 @@ def _runs(traces: Sequence[Trace]) -> Markup:
     if left_out:
         parts.append(tag("p", f"Not drawn, with smaller gaps: {', '.join(left_out)}."))
     return _section("Held-out runs: measured and predicted", *parts)
+
+
+def _inputs(inputs: Sequence[EstimatedInput]) -> Markup:
+    if not inputs:
+        return Markup("")
+    return _section("Inputs that nobody measured", estimated_inputs(inputs))
 
 
 def _worst(run: Sequence[Trace]) -> float:

@@ -76,7 +76,7 @@ def draw(trace: Trace, columns: int) -> Markup:
     found = residuals(trace)
     bottom = TOP + PANEL + len(found) * (GAP + STRIP)
     times = _finite(trace.time)
-    x = _scale(times[0], times[-1], LEFT, RIGHT)
+    x = linear_scale(times[0], times[-1], LEFT, RIGHT)
     limit = _limit(trace, found)
     strips = [
         _strip(
@@ -111,7 +111,7 @@ def _panel(trace: Trace, found: dict[str, Array], x: Axis, columns: int) -> Mark
     values = _finite(np.concatenate(list(curves.values())))
     low, high = float(values.min()), float(values.max())
     margin = 0.04 * (high - low) or 1.0
-    y = _scale(low - margin, high + margin, TOP + PANEL, TOP)
+    y = linear_scale(low - margin, high + margin, TOP + PANEL, TOP)
     marks = ticks(low - margin, high + margin, 5)
     return join(
         *(line(LEFT, _at(y, v), RIGHT, _at(y, v), "grid") for v in marks),
@@ -135,7 +135,7 @@ def _strip(
     columns: int,
 ) -> Markup:
     """A residual over a band of 2 standard deviations; the title tells a value beyond the strip."""
-    y = _scale(-limit, limit, top + STRIP, top)
+    y = linear_scale(-limit, limit, top + STRIP, top)
     edges = [_at(y, sign * 2.0 * trace.noise) for sign in (1.0, -1.0)]
     largest = float(np.abs(_finite(residual)).max())
     title = f"{title} [{trace.unit}], rms {number(rms(residual))}"
@@ -198,7 +198,7 @@ def _polyline(x: Array, y: Array) -> str:
     return start + "l" + (" ".join(f"{dx / 10:g} {dy / 10:g}" for dx, dy in steps) or "0 0")
 
 
-def _scale(low: float, high: float, start: float, end: float) -> Axis:
+def linear_scale(low: float, high: float, start: float, end: float) -> Axis:
     """The map from values between low and high to pixels between start and end."""
     slope = (end - start) / ((high - low) or 1.0)
     return lambda value: start + slope * (value - low)

@@ -108,7 +108,8 @@ def autocovariance(runs: Sequence[Array], known: Sequence[NDArray[np.int_]], lon
     found = np.zeros(longest + 1)
     for lag in range(longest + 1):
         products = [
-            (v[lag:] * v[: len(v) - lag])[k[lag:] >= lag] for v, k in zip(runs, known, strict=True)
+            (v[lag:] * v[: max(0, len(v) - lag)])[k[lag:] >= lag]  # a run may be shorter
+            for v, k in zip(runs, known, strict=True)
         ]
         count = sum(map(len, products))
         found[lag] = sum(float(p.sum()) for p in products) / max(1, count)

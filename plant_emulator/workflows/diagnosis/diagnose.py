@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -162,6 +162,7 @@ def diagnose(
             ).diagnose()
     finally:
         pool.close()
+    findings = replace(findings, details=replace(findings.details, inputs=runs.inputs))
     return Diagnosis(findings=findings, given=given, fitted=runs.fitted)
 
 

@@ -12,9 +12,11 @@ from plant_emulator import effects
 from plant_emulator.diagnosis.machines.axis import AxisRecipe
 from plant_emulator.diagnosis.machines.axis_effects import EFFECTS as AXIS_EFFECTS
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
+from plant_emulator.diagnosis.report.details import EstimatedInput
 from plant_emulator.errors import DiagnosisError
+from plant_emulator.recordings.wheel_torque import deviation
 from plant_emulator.signals.axis_log import AxisLog
-from plant_emulator.signals.log import Log
+from plant_emulator.signals.log import WHEEL_TORQUE, Log
 from plant_emulator.workflows import axis_reader
 from plant_emulator.workflows.diagnosis.plan import plan_of_runs, plan_recordings
 from plant_emulator.workflows.loading import (
@@ -23,6 +25,7 @@ from plant_emulator.workflows.loading import (
     load_recordings,
 )
 from plant_emulator.workflows.provenance import file_hash, program_version, today
+from register_maps.poll_quality import PollQuality
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -31,6 +34,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.prediction.held_out import Plan
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
+    from plant_emulator.signals.log import Array
 
     # A log, or the path of its file.
     Source = str | Path | Log | AxisLog
@@ -43,6 +47,7 @@ class Runs:
     notes : what the preflight noticed about the logs
     settings : what a report shows to repeat the diagnosis, by name
     fitted : recordings of the bench that are not held out; empty for another machine
+    inputs : of the runs that nobody measured
     """
 
     recipe: Recipe
@@ -50,6 +55,7 @@ class Runs:
     notes: tuple[str, ...]
     settings: Mapping[str, str]
     fitted: tuple[Recording, ...] = ()
+    inputs: tuple[EstimatedInput, ...] = ()
 
 
 def bench_runs(
@@ -81,12 +87,14 @@ def bench_runs(
         "parameters": parameters.name,
         "without": ", ".join(without) or "-",
         "own effects": ", ".join(map(str, effect_files)) or "-",
+        **{f"sampling of {r.log.source}": sampling(r.log.time) for r in recordings},
     }
     return Runs(
         recipe=BenchRecipe(tuple(recordings), parameters, tuple(without), files),
         plan=plan,
         notes=tuple(notes),
         settings=_settings(settings, [*logs, *held_out, parameters.name, *effect_files]),
+        inputs=_unmeasured(recordings, parameters),
         fitted=tuple(recordings[k] for k in plan.fitted),
     )
 
@@ -112,6 +120,33 @@ def axis_runs(
         notes=(),
         settings=_settings({"model": "axis", "without": ", ".join(without) or "-"}, given),
     )
+
+
+def _unmeasured(
+    recordings: Sequence[Recording], parameters: ParameterSet
+) -> tuple[EstimatedInput, ...]:
+    """Wheel torques that were estimated, one a log."""
+    logs = {r.log.source: r.log for r in recordings if r.estimated_torque}
+    return tuple(
+        EstimatedInput(
+            source=source,
+            name="wheel torque",
+            unit="N m",
+            time=log.time,
+            value=log[WHEEL_TORQUE],
+            deviation=deviation(log, parameters),
+        )
+        for source, log in logs.items()
+    )
+
+
+def sampling(time: Array) -> str:
+    """How regularly a log was sampled, in words; time : of its rows [s], shape (n,)."""
+    steps = np.diff(time)
+    quality = PollQuality(interval=float(np.median(steps)))
+    quality.count(steps.tolist())
+    found = quality.entries()
+    return f"every {found['periods']}; {found['skipped samples']} samples skipped"
 
 
 def _bench_source(source: Source) -> str | Path | Log:

@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from plant_emulator.estimation.noise.autoregression import levinson, samples_since_break
+from plant_emulator.estimation.noise.autoregression import (
+    autocovariance,
+    levinson,
+    samples_since_break,
+)
 from plant_emulator.estimation.noise.channel_noise import LAGS, NoiseSeries
 from plant_emulator.estimation.noise.disturbances import outlying
 from plant_emulator.estimation.noise.estimate import estimate_channel_noise
@@ -146,3 +150,10 @@ def test_a_cause_that_acts_at_times_does_not_pass_for_noise() -> None:
 def test_steady_noise_has_no_loud_blocks() -> None:
     noise, _ = estimate_channel_noise([series(first_order(6000, 0.7, 17))])
     assert noise.unsteady == 0.0
+
+
+def test_a_run_shorter_than_a_lag_adds_nothing_to_its_autocovariance() -> None:
+    long, short = np.ones(40), np.ones(3)
+    known = [np.arange(40), np.arange(3)]
+    alone = autocovariance([long], known[:1], 10)
+    assert autocovariance([long, short], known, 10) == pytest.approx(alone)
