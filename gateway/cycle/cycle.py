@@ -15,13 +15,13 @@ from typing import Any, cast
 
 from gateway import regulators
 from gateway.configuration.config import Config
-from gateway.cycle import command, limits, plausibility, program, samples
+from gateway.cycle import command, limits, plausibility, program, samples, surveillance
 from gateway.cycle.checks import check
 from gateway.cycle.command import Command
 from gateway.cycle.limits import Limit, Limited, Limits
-from gateway.cycle.plausibility import Plausibility
 from gateway.cycle.samples import Samples
 from gateway.cycle.supervisor import Facts, Reason, State, Supervisor, advance
+from gateway.cycle.surveillance import Surveillance
 from gateway.errors import ConfigError
 from gateway.regulators import Regulator
 from gateway.regulators.window import Demand
@@ -45,6 +45,7 @@ class Observation:
     fault : of this tick's reading, otherwise of the last write before it
     shadow, stop_requested : never write; a signal or the end of the duration asks for a stop
     overruns : deadlines missed in a row up to this tick
+    latency : from wake-up to the end of the write, of the tick before [s]
     """
 
     now: float
@@ -53,6 +54,7 @@ class Observation:
     shadow: bool = False
     stop_requested: bool = False
     overruns: int = 0
+    latency: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,14 +81,13 @@ class CycleState:
     """State that one tick hands to the next.
 
     params, regulator : parameters of the regulator, and its state (None: no sample yet)
-    relations, plausible : parameters and state of the plausibility of the sensors
+    watched : sensors, motion and pace
     demand, demanded : last demand, and its time [s]
     """
 
     params: Any
     limits: Limits
-    relations: plausibility.Params
-    plausible: Plausibility = field(default_factory=Plausibility)
+    watched: Surveillance
     supervisor: Supervisor = field(default_factory=Supervisor)
     samples: Samples = field(default_factory=Samples)
     regulator: Any = None
@@ -116,7 +117,7 @@ def initial(config: Config, register_map: RegisterMap) -> CycleState:
             deviation=config.limits.deviation,
             stale=config.loop.stale,
         ),
-        relations=plausibility.Params.of(config),
+        watched=Surveillance(relations=plausibility.Params.of(config)),
     )
 
 
@@ -136,7 +137,12 @@ def step(
     read = samples.with_window(config, register_map, read)
     sent = command.note_reply(state.command, observation.measurement, observation.fault)
     sent = command.note_echo(register_map, sent, read.newest if read.is_new else None, now)
-    state = _judge(register_map, replace(state, samples=read, command=sent))
+    writes = state.supervisor.state in command.WRITING and not observation.shadow
+    watched = surveillance.note_latency(config, state.watched, observation.latency, writes=writes)
+    watched = surveillance.note_samples(
+        config, register_map, watched, read, setpoint=sent.speed, now=now
+    )
+    state = replace(state, samples=read, command=sent, watched=watched)
     supervisor = advance(state.supervisor, _facts(config, state, observation))
     if supervisor.state is State.RUN and state.supervisor.state is not State.RUN:
         state = _start_bumpless(state, now)
@@ -160,19 +166,6 @@ def _is_finished(config: Config, state: CycleState) -> bool:
     return state.supervisor.state is State.RUN and program.is_over(state.params, state.regulator)
 
 
-def _judge(register_map: RegisterMap, state: CycleState) -> CycleState:
-    """Judge the sensors by the window of this tick, if there is one."""
-    read = state.samples
-    if read.window is None or read.newest is None or read.before is None:
-        return state
-    before, now, duration = read.before, read.newest, read.window.duration
-    torque = samples.torque_of("integrated", register_map, now, before, duration)
-    judged = plausibility.judge(
-        state.relations, state.plausible, before, now, torque=torque, duration=duration
-    )
-    return replace(state, plausible=judged)
-
-
 def _facts(config: Config, state: CycleState, observation: Observation) -> Facts:
     now, newest, sent = observation.now, state.samples.newest, state.command
     status = Status(0) if newest is None else newest.status
@@ -190,8 +183,11 @@ def _facts(config: Config, state: CycleState, observation: Observation) -> Facts
             overruns=observation.overruns,
             echo_age=_echo_age(config, state),
             other_age=now - sent.other_wrote,
-            implausible=plausibility.reason(
-                state.relations, state.plausible, running=before is State.RUN
+            implausible=surveillance.reason(
+                state.watched,
+                now,
+                running=before is State.RUN,
+                confirmed=state.supervisor.confirmed,
             ),
         ),
         remote=Status.REMOTE in status,
@@ -217,7 +213,7 @@ def _start_bumpless(state: CycleState, now: float) -> CycleState:
     measured = 0.0 if newest is None else newest.motor_speed
     speed = min(max(measured, 0.0), state.limits.speed_max)
     started = replace(state.command, speed=speed, written=now, echo_moved=now)
-    return replace(state, command=started)
+    return replace(state, command=started, watched=surveillance.begin(state.watched, now))
 
 
 def _regulate(config: Config, state: CycleState, now: float) -> CycleState:

@@ -45,6 +45,7 @@ class Difference:
 
 def observations(rows: Iterable[Row], register_map: RegisterMap) -> Iterator[Observation]:
     """Observation of each tick of a recording."""
+    latency = 0.0
     for row in rows:
         yield Observation(
             now=row["now"],
@@ -53,7 +54,9 @@ def observations(rows: Iterable[Row], register_map: RegisterMap) -> Iterator[Obs
             shadow=bool(row["flags"] & SHADOW),
             stop_requested=bool(row["flags"] & STOP_REQUESTED),
             overruns=row["overruns"],
+            latency=latency,
         )
+        latency = row["latency"]
 
 
 def _measurement(row: Row, register_map: RegisterMap) -> Measurement | None:

@@ -7,6 +7,7 @@ gateway loses no tick. Ctrl-C reaches both processes; the recorder ignores it, b
 record the ramp-down.
 """
 
+import errno
 import fcntl
 import multiprocessing
 import os
@@ -81,17 +82,32 @@ class Recorder:
         self._process.join()
         code = self._process.exitcode
         if code:
-            # 1 is a mistake in this software, a negative code a signal, any other a failed write.
-            why = os.strerror(code) if code > 1 else f"exit code {code}"
-            raise GatewayError(
-                f"{self.path}: the recorder ended early: {why}; expected room on the disk"
-            )
+            raise GatewayError(f"{self.path}: the recorder ended early: {reason_of_end(code)}")
+
+
+def reason_of_end(code: int) -> str:
+    """Why the recorder's process ended with this exit code.
+
+    A negative code is a signal, 1 is a mistake in this software, any other code a failed write.
+    """
+    if code < 0:
+        return f"killed by {signal.Signals(-code).name}"
+    if code == 1:
+        return "exit code 1, a mistake in this software"
+    right = (
+        "room on the disk"
+        if code in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+        else "a file to write to"
+    )
+    return f"{os.strerror(code)}; expected {right}"
 
 
 @contextmanager
 def _block_signals() -> Iterator[None]:
     """Block signals while a process starts, so that a Ctrl-C does not end it at once."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    before = signal.pthread_sigmask(
+        signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
+    )
     try:
         yield
     finally:
@@ -100,8 +116,8 @@ def _block_signals() -> Iterator[None]:
 
 def record(receiver: Connection, job: Job) -> None:
     """Run the recorder's process: append every record until the loop closes its end."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
     try:
         _append(receiver, job)
     except OSError as error:

@@ -39,7 +39,9 @@ class Companion:
 @contextmanager
 def blocked_signals() -> Iterator[None]:
     """Block signals while a process starts, so that a Ctrl-C does not end it at once."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    before = signal.pthread_sigmask(
+        signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
+    )
     try:
         yield
     finally:

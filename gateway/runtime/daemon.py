@@ -2,8 +2,8 @@
 
 The loop runs in the calling process, for which real time is requested. The recorder has a process
 of its own, and so has the terminal. The terminal reads the status block, which every tick renews.
-The first SIGINT or SIGTERM asks for a ramp-down. A second one ends the process at once, and the
-PLC's watchdog ramps down.
+The first SIGINT, SIGTERM or SIGHUP asks for a ramp-down. A second one ends the process at once,
+and the PLC's watchdog ramps down.
 """
 
 import os
@@ -176,7 +176,7 @@ def _new_file(config: Config) -> Path:
 def _signals(stop: _Stop) -> Iterator[None]:
     before = {
         number: signal.signal(number, stop.handle_signal)
-        for number in (signal.SIGINT, signal.SIGTERM)
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     }
     try:
         yield

@@ -120,7 +120,7 @@ class Loop:
         self._layout = Layout.of(register_map)
         self._state = initial(config, register_map)
         self._writing = Writing()
-        self._before = clock.now()
+        self._before, self._latency = clock.now(), 0.0
         self.latency, self.lateness = Histogram(), Histogram()
         self.cycles = self.missed = self._overruns = 0
 
@@ -158,11 +158,13 @@ class Loop:
             shadow=self._shadow,
             stop_requested=stop_requested,
             overruns=self._overruns,
+            latency=self._latency,
         )
         self._state, output = step(self._config, self._map, self._state, observation)
         unseen = self._writing.fault if reading.measurement is None else None
         self._writing = self._write(output, unseen)
         latency, lateness = self._clock.now() - woken, woken - deadline
+        self._latency = latency
         self.latency.add(latency)
         self.lateness.add(lateness)
         tick = self._tick(observation, reading, output, latency=latency, lateness=lateness)

@@ -37,6 +37,7 @@ class ClosedLoop:
     refused: Reason | None = None
     stop_requested: bool = False
     overruns: int = 0
+    latency: float = 0.0
     observations: list[Observation] = field(default_factory=list)
     outputs: list[Output] = field(default_factory=list)
     drum_speed: list[float] = field(default_factory=list)
@@ -91,6 +92,7 @@ class ClosedLoop:
             shadow=self.shadow,
             stop_requested=self.stop_requested,
             overruns=self.overruns,
+            latency=self.latency,
         )
         self.state, output = cycle.step(self.config, self.map, self.state, seen)
         self.observations.append(seen)

@@ -139,7 +139,9 @@ def largest_shares(loop: ClosedLoop, duration: float) -> np.ndarray:
     for _ in range(round(duration / SCAN)):
         loop.run(SCAN)
         assert loop.last.state is State.RUN, (loop.last.reason, loop.plc.time)
-        largest = np.maximum(largest, shares(loop.state.relations, loop.state.plausible))
+        largest = np.maximum(
+            largest, shares(loop.state.watched.relations, loop.state.watched.sensors)
+        )
         loop.observations.clear()
         loop.outputs[:-1] = []
     return largest

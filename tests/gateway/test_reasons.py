@@ -41,8 +41,11 @@ CODES = {
     "DRUM_MODEL": 44,
     "TORQUE_STUCK": 45,
     "SPEED_STUCK": 46,
+    "NOT_FOLLOWED": 47,
+    "MOTOR_ASTRAY": 48,
     "OVERRUN": 50,
     "NOT_ENCODABLE": 51,
+    "TOO_SLOW": 52,
 } | {f"EXCEPTION_{code}": 100 + code for code in range(1, 12)}
 
 

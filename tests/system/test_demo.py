@@ -105,16 +105,16 @@ def test_friction_that_is_ten_percent_off_is_felt_in_force_and_not_in_speed(tmp_
     ("mode", "code"), [(["--fast"], 0), pytest.param([], 1, marks=pytest.mark.realtime)]
 )
 def test_run_that_the_gateway_trips_fails_and_leaves_its_figures(tmp_path, mode, code):
-    """A gear of 40 instead of 62.6: motor and drum speed do not belong together."""
+    """A gear of 40 instead of 62.6: motor and drum move apart."""
     (tmp_path / "geared.toml").write_text(TABLE.read_text().replace("value = 62.6", "value = 40.0"))
     command = ["demo", "--out", str(tmp_path), *mode, "--load", "0", "--duration", "10"]
     command += ["--bench-parameters", str(tmp_path / "geared.toml")]
     result = CliRunner().invoke(main, command)
     assert result.exit_code == 1
     error = result.stderr.splitlines()[-1]
-    assert f"3640 kg: stopped by IMPLAUSIBLE, exit code {code} of the gateway" in error
+    assert f"3640 kg: stopped by GEAR_MODEL, exit code {code} of the gateway" in error
     [run] = json.loads((tmp_path / "summary.json").read_text())["runs"]
-    assert run["stop_reason"] == "IMPLAUSIBLE"
+    assert run["stop_reason"] == "GEAR_MODEL"
     assert list(tmp_path.glob("*.rlrec"))
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from gateway.cycle.record import COMMANDED, MEASURED, NOTHING, Layout, Tick
 from gateway.errors import GatewayError
-from gateway.recordings.recorder import Job, Recorder
+from gateway.recordings.recorder import Job, Recorder, reason_of_end
 from gateway.recordings.recording import RecordingError, encode_header, is_recording, read
 from register_maps.signals import Control, Measurement, Mode, Setpoint, Status
 
@@ -218,7 +218,7 @@ def test_a_full_disk_is_told_in_one_line_and_keeps_every_whole_record(
 GATEWAY_THAT_IS_KILLED = """
 import os, signal, sys
 from pathlib import Path
-from gateway.recordings.recorder import Job, Recorder
+from gateway.recordings.recorder import Job, Recorder, reason_of_end
 from tests.gateway.recordings.test_recorder import HEADER, LAYOUT, tick
 if __name__ == "__main__":
     recorder = Recorder(Job(path=Path(sys.argv[1]), header=HEADER, layout=LAYOUT))
@@ -242,3 +242,17 @@ def test_a_gateway_that_is_killed_loses_no_tick(tmp_path: Path) -> None:
     while len(read(path)) < 100:
         assert time.monotonic() < deadline
     assert read(path).records["tick"].tolist() == list(range(100))
+
+
+@pytest.mark.parametrize(
+    ("code", "why"),
+    [
+        (-9, "killed by SIGKILL"),
+        (1, "a mistake in this software"),
+        (28, "No space left on device; expected room on the disk"),
+        (5, "Input/output error; expected a file to write to"),
+    ],
+)
+def test_true_reason_is_told_why_the_recorder_ended(code: int, why: str) -> None:
+    """28 is ENOSPC, 5 is EIO."""
+    assert why in reason_of_end(code)
