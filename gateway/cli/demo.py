@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
+    from gateway.offline.drive_quality import DriveQuality
     from gateway.offline.figures import CruiseForce, Latency, RunFigures
 
 EXAMPLE = """
@@ -151,6 +152,7 @@ def _show(console: "Console", runs: "Sequence[RunFigures]", out: Path) -> None:
         ("speed, Val2", lambda run: _percent(run.velocity.val2 if run.velocity else None)),
         ("force in cruise, error", lambda run: _force(run.force)),
         ("traction energy, error", lambda run: _percent(_energy_error(run), sign="+")),
+        ("J2951 inertia work, speed error", lambda run: _quality(run.quality)),
         ("latency p50 / p99 / max", lambda run: _latency(run.latency)),
         ("missed deadlines", lambda run: f"{run.missed_deadlines} of {run.cycles}"),
         ("stopped by", lambda run: run.stop_reason),
@@ -171,6 +173,12 @@ def _energy_error(run: "RunFigures") -> float | None:
 
 def _force(force: "CruiseForce | None") -> str:
     return "no cruise" if force is None else f"{force.mean_error:+.1f} N of {force.target:.0f} N"
+
+
+def _quality(quality: "DriveQuality | None") -> str:
+    if quality is None:
+        return "-"
+    return f"{100.0 * quality.inertia_work:+.2f} %, {3.6 * quality.speed_error:.3f} km/h"
 
 
 def _latency(latency: "Latency | None") -> str:

@@ -8,6 +8,7 @@ from gateway.arrays import Array
 from gateway.cycle.supervisor import State
 from gateway.demo.options import Options
 from gateway.demo.plot import Curves
+from gateway.offline.drive_quality import drive_quality
 from gateway.offline.evaluation import agreement, traction_energy
 from gateway.offline.figures import Latency, RunFigures, TractionEnergy, cruise_force
 from gateway.recordings.recording import Recording
@@ -69,6 +70,9 @@ def figures_of(options: Options, run: BenchRun) -> RunFigures:
         energy=TractionEnergy(
             road=traction_energy(run.log.time, run.road_force, run.road_speed),
             bench=traction_energy(run.log.time, run.force, run.speed),
+        ),
+        quality=drive_quality(
+            run.log.time, run.road_speed, run.speed, run.truck.mass, run.truck.road_load
         ),
         cycles=len(ticks),
         missed_deadlines=int(ticks["missed"][-1] - ticks["missed"][0]) if len(ticks) else 0,

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gateway.arrays import Array
+from gateway.offline.drive_quality import DriveQuality
 from gateway.offline.evaluation import Agreement, cruise
 
 
@@ -71,6 +72,7 @@ class RunFigures:
     driver : who drove the truck; `recorded` or `logged` for a replay
     velocity : agreement of the two speeds, or of the two setpoints in a replay
     cycles : ticks of the run
+    quality : indices of SAE J2951, of the bench over the road
     latency : of the ticks; None where no clock ran
     stop_reason : name of the reason for which the run ended; empty: it did not end
     """
@@ -81,6 +83,7 @@ class RunFigures:
     velocity: Agreement | None
     force: CruiseForce | None = None
     energy: TractionEnergy | None = None
+    quality: DriveQuality | None = None
     cycles: int
     missed_deadlines: int = 0
     latency: Latency | None = None
@@ -104,6 +107,7 @@ class RunFigures:
                 "bench_joule": energy and energy.bench,
                 "error_percent": energy and energy.error_percent,
             },
+            "j2951": self.quality and self.quality.to_json(),
             "cycles": self.cycles,
             "missed_deadlines": self.missed_deadlines,
             "latency_ms": {

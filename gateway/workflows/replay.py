@@ -14,9 +14,11 @@ import numpy as np
 import register_maps
 from gateway import config_file
 from gateway.configuration.config import Config
+from gateway.cycle.supervisor import State
 from gateway.losses import sections
 from gateway.offline import log_replay, recording_replay
 from gateway.offline.comparison import Comparison, compare
+from gateway.offline.drive_quality import DriveQuality, drive_quality
 from gateway.offline.evaluation import road_speed, traction_energy
 from gateway.offline.figures import Latency, RunFigures, TractionEnergy, cruise_force
 from gateway.offline.recording_replay import Difference
@@ -64,6 +66,8 @@ class Replay:
         if self.differences is not None:
             ticks = len(self.comparison.time)
             lines.append(describe_differences(self.path, self.differences, ticks))
+        if self.figures.quality is not None:
+            lines.append(f"SAE J2951, drum over road: {self.figures.quality}")
         if self.differences != ():
             lines.append(describe_comparison(self.comparison))
         return "\n".join(lines)
@@ -120,6 +124,7 @@ def _replay_recording(found: Recording, config: Config, *, is_exact: bool) -> Re
             _figures(config, comparison, "recorded"),
             missed_deadlines=int(found.records["missed"][-1]) if len(found) else 0,
             latency=Latency.of(found.records["latency"]),
+            quality=_quality_of_run(found, config),
         ),
         differences=tuple(
             replace(one, time=one.time - started)
@@ -174,7 +179,23 @@ def _with_truck(figures: RunFigures, found: log.Log, config: Config) -> RunFigur
     energy = TractionEnergy(
         road=traction_energy(time, force, speed_on_road), bench=traction_energy(time, force, speed)
     )
-    return replace(figures, energy=energy, force=cruise_force(time, speed, force, road.force))
+    quality = drive_quality(time, speed_on_road, speed, config.truck.total_mass, road.force)
+    return replace(
+        figures,
+        energy=energy,
+        force=cruise_force(time, speed, force, road.force),
+        quality=quality,
+    )
+
+
+def _quality_of_run(found: Recording, config: Config) -> DriveQuality | None:
+    """Indices of the drum over the speed that the regulator wanted; None without a run."""
+    bench, rows = config.bench, found.records[found.records["state"] == State.RUN]
+    rows = rows[np.isfinite(rows["demand"]) & np.isfinite(rows["measured_drum_speed"])]
+    wanted = rows["demand"] / bench.gear_ratio * bench.drum_radius
+    speed = rows["measured_drum_speed"] * bench.drum_radius
+    road = road_load(config.truck, bench)
+    return drive_quality(rows["now"], wanted, speed, config.truck.total_mass, road.force)
 
 
 def _wrong_sign(found: log.Log, config: Config) -> str:
