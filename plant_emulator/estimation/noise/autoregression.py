@@ -83,9 +83,10 @@ class Autoregression:
 
             whole = lfilter(np.concatenate([[1.0], -self.predictors[-1]]), [1.0], series)
             left = np.where(known >= order, whole, left)
-        for k in np.flatnonzero((known > 0) & (known < order)):
-            m = int(known[k])
-            left[k] -= self.predictors[m] @ series[k - m : k][::-1]
+        for m in range(1, order):
+            behind_break = np.flatnonzero(known == m)
+            past = series[behind_break[:, None] - np.arange(1, m + 1)]
+            left[behind_break] -= past @ self.predictors[m]
         return np.asarray(left / np.asarray(self.deviations)[np.minimum(known, order)])
 
 
