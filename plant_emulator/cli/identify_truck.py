@@ -12,15 +12,22 @@ from register_maps.command_line.parameters import Command, Number, OutputFile
 
 EXAMPLE = """
 \b
-Example:
+Examples:
   plant-emulator identify-truck torque.csv.gz velocity.csv.gz --mass 3640 \\
       --save truck.toml --plot truck.png
+  plant-emulator identify-truck --coast-down out.csv back.csv --mass 3640
 """
 
 
 @click.command(cls=Command, epilog=EXAMPLE)
 @click.argument("torque")
 @click.argument("velocity")
+@click.argument("more", nargs=-1, metavar="[VELOCITY]...")
+@click.option(
+    "--coast-down",
+    is_flag=True,
+    help="All logs are VELOCITY: the truck rolls out by itself, in both directions.",
+)
 @click.option("--mass", type=Number(50, 1e5), required=True, metavar="KG", help="Mass with load.")
 @click.option(
     "--ratio",
@@ -61,6 +68,9 @@ Example:
 def command(
     torque: str,
     velocity: str,
+    more: tuple[str, ...],
+    *,
+    coast_down: bool,
     mass: float,
     ratio: float,
     wheel_radius: float,
@@ -76,7 +86,17 @@ def command(
     Each log may have its own clock and sample rate. The road must be level. The run needs driving
     and braking by the motor, in both directions if possible. Exit code 1: the estimates must not be
     used.
+
+    With --coast-down no load cell is needed: two VELOCITY logs or more, one roll-out each, the
+    velocity negative in the other direction.
     """
+    if coast_down:
+        if plot:
+            raise click.UsageError("--plot does not draw coast-downs")
+        _coast_down((torque, velocity, *more), mass, drum_radius, save, json_file)
+        return
+    if more:
+        raise click.UsageError(f"{more[0]}: only --coast-down takes more than two logs")
     from plant_emulator.errors import EmulatorError
     from plant_emulator.workflows.truck_identification import identify_truck
 
@@ -102,3 +122,22 @@ def command(
         )
     if save:
         Path(save).write_text(found.truck_table(), encoding="utf-8")
+
+
+def _coast_down(
+    logs: tuple[str, ...],
+    mass: float,
+    drum_radius: float,
+    save: str | None,
+    json_file: str | None,
+) -> None:
+    """Identify the road load from coast-downs."""
+    from plant_emulator.workflows.truck_identification import identify_coast_down
+
+    found, origin = identify_coast_down(logs, mass=mass)
+    if json_file:
+        _options.write_json(found.to_json(drum_radius), json_file)
+    if json_file != "-":
+        click.echo(str(found))
+    if save:
+        Path(save).write_text(found.table(origin), encoding="utf-8")

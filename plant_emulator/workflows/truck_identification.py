@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from plant_emulator.model.dimensions import DRUM_RADIUS, TRUCK_RATIO, WHEEL_RADIUS
+from plant_emulator.road_load import coast_down
 from plant_emulator.road_load.answer import answer_of
 from plant_emulator.road_load.fit import fit
 from plant_emulator.road_load.run import prepare
@@ -15,10 +16,11 @@ from plant_emulator.road_load.truck_table import table
 from plant_emulator.workflows import road_log
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from plant_emulator.road_load.answer import Estimate, RoadAnswer
+    from plant_emulator.road_load.coast_down import CoastDown
     from plant_emulator.road_load.fit import RoadFit
 
 
@@ -100,3 +102,19 @@ def identify_truck(
     return TruckIdentification(
         answer=answer_of(found), fit=found, origin=tuple(road_log.origin(*files))
     )
+
+
+def identify_coast_down(
+    velocity_logs: Sequence[str | Path], *, mass: float
+) -> tuple[CoastDown, tuple[str, ...]]:
+    """Identify a truck's road load from coast-downs; return it and lines about its origin.
+
+    velocity_logs : CSV files with `time_s` and `velocity_m_s`, one roll-out each, negative in the
+        other direction
+    mass : of the truck with its load [kg]
+
+    Raises LogError for a log that cannot be used, or where all runs go in one direction.
+    """
+    files = [str(one) for one in velocity_logs]
+    runs = [coast_down.roll_out(file, *road_log.read(file, road_log.VELOCITY)) for file in files]
+    return coast_down.fit(runs, mass), tuple(road_log.origin(*files))
