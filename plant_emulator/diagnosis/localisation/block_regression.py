@@ -117,7 +117,7 @@ class BlockRegression:
         residuals[DRIVE, limited] = 0.0
         return residuals, limited
 
-    def _drum_values(self, run: int) -> dict[str, float]:
+    def drum_values(self, run: int) -> dict[str, float]:
         """Values and states of the drum subsystem in a run, at its fit."""
         return {**self.drum_fit.parameters(), **self.drum_fit.states(run)}
 
@@ -125,16 +125,14 @@ class BlockRegression:
     def quantities(self) -> list[block_basis.BlockQuantities]:
         """Quantities inside the blocks, one record a run."""
         return [
-            block_basis.block_quantities(
-                m, self.drum.simulate(k, self._drum_values(k)), self.values
-            )
+            block_basis.block_quantities(m, self.drum.simulate(k, self.drum_values(k)), self.values)
             for k, m in enumerate(self.signals)
         ]
 
     @cached_property
     def speed_noise(self) -> list[Array]:
         """Noise of the smoothed motor speed in the drum speed; see `DrumSubsystem.speed_noise`."""
-        return [self.drum.speed_noise(k, self._drum_values(k)) for k in range(len(self.signals))]
+        return [self.drum.speed_noise(k, self.drum_values(k)) for k in range(len(self.signals))]
 
     @cached_property
     def weights(self) -> list[Array]:
@@ -254,7 +252,12 @@ class BlockRegression:
 
     @cached_property
     def with_torque(self) -> list[tuple[LinearModel, list[Array]]]:
-        """Linear models and columns of an unknown torque on the drum.
+        """Linear models and columns of an unknown torque on the drum, at each of its fits."""
+        return [(self.linear_model(f), self._drum_torque(f)) for f in self.torque_fits]
+
+    @cached_property
+    def torque_fits(self) -> list[Estimate]:
+        """Fits of the drum subsystem with an unknown torque on the drum.
 
         The drum subsystem is linearised without the torque and, where it leaves more than chance
         does, also at its best fit with the torque.
@@ -267,7 +270,7 @@ class BlockRegression:
         if self.model.left(slice(-count, None)) > chance:
             sizes = self._torque_sizes_by_gear()
             fits.append(self.drum.fit_torque(self.drum_fit.parameters(), gaps, sizes))
-        return [(self.linear_model(f), self._drum_torque(f)) for f in fits]
+        return fits
 
     def _torque_on_gear(self) -> list[Array]:
         """Columns of the unknown torque on the drum in the gear's relation."""

@@ -1,0 +1,119 @@
+"""The contest of drafted laws by simulation: joint fits, and predictions of held-out runs.
+
+Every draft is an effect of the model by now. A fit starts where the regression with the law lies,
+and from the nominal parameters: the fit without effects has bent the parameters to the gap.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from plant_emulator.diagnosis.fitting.joint_fit import TRIAL_ITERATIONS, fit, fit_from
+from plant_emulator.diagnosis.prediction.gap import (
+    Fold,
+    block_lengths,
+    closed_fraction,
+    closed_fraction_interval,
+    measure_gap,
+    predict,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.diagnosis.execution.pool import TaskRunner
+    from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.machine import Model
+    from plant_emulator.diagnosis.prediction.gap import Gap, Prediction
+    from plant_emulator.diagnosis.prediction.held_out import Plan
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entry:
+    """A draft that enters the contest.
+
+    effect : name of the effect; values : parameters that the regression with the law tells [SI]
+    null : fit without effects; runs : that it was fitted to
+    """
+
+    effect: str
+    values: Mapping[str, float]
+    null: FitResult
+    runs: tuple[int, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Result:
+    """What the contest found of a draft.
+
+    fit : joint fit; gain : share of the held-out gap that the draft closes [1], None: there is none
+    interval : 95 % interval of the gain
+    """
+
+    effect: str
+    fit: FitResult
+    gain: float | None
+    interval: tuple[float, float] | None
+
+
+def enter(model: Model, entry: Entry) -> FitResult:
+    """Fit a draft to all runs from its starts (a step)."""
+    nominal = model.nominal(entry.runs)
+    starts = [{**entry.null.values, **entry.values}, {**entry.null.values, **nominal}]
+    trials = [_trial(model, entry, start) for start in starts]
+    best = min(trials, key=lambda found: found.cost)
+    return best if best.converged else fit_from(model, (entry.effect,), entry.runs, best)
+
+
+def _trial(model: Model, entry: Entry, start: Mapping[str, float]) -> FitResult:
+    candidate = model.candidates[entry.effect]
+    own = {u.name: u.start for u in (*candidate.sizes, *candidate.shapes)}
+    known = {name: value for name, value in start.items() if name in entry.null.values}
+    values = {**known, **own}
+    effects = (entry.effect,)
+    states = [model.initial_states(run, effects, values) for run in entry.runs]
+    return fit(model, effects, entry.runs, values, states, TRIAL_ITERATIONS)
+
+
+def hold(runner: TaskRunner, plan: Plan, entries: Sequence[Entry]) -> list[Result]:
+    """Hold the contest: fit every draft, and predict the held-out runs with and without it."""
+    fits = list(runner.map(enter, entries))
+    null = entries[0].null
+    folds = [
+        _fold(plan, start, fitted, predicted)
+        for start in (null, *fits)
+        for fitted, predicted in plan.folds
+    ]
+    found = list(runner.map(predict, folds))
+    count = len(plan.folds)
+    parts = [found[k : k + count] for k in range(0, len(found), count)]
+    gaps = _gaps(runner, plan, parts)
+    return [
+        Result(
+            effect=entry.effect,
+            fit=one,
+            gain=closed_fraction(gaps[0], gap),
+            interval=closed_fraction_interval(gaps[0], gap),
+        )
+        for entry, one, gap in zip(entries, fits, gaps[1:], strict=True)
+    ]
+
+
+def _fold(
+    plan: Plan, start: FitResult, fitted: tuple[int, ...], predicted: tuple[int, ...]
+) -> Fold:
+    states = tuple(start.states[plan.fitted.index(run)] for run in fitted)
+    return Fold(
+        fitted=fitted,
+        predicted=predicted,
+        start=replace(start, states=states),
+        as_fitted=plan.as_fitted,
+    )
+
+
+def _gaps(runner: TaskRunner, plan: Plan, parts: Sequence[Sequence[Prediction]]) -> list[Gap]:
+    """The held-out gaps of these predictions, each of one hypothesis."""
+    runs = [runner.model.runs[run] for _, predicted in plan.folds for run in predicted]
+    lengths = block_lengths(parts[0])
+    return [measure_gap(runs, part, lengths) for part in parts]

@@ -1,0 +1,94 @@
+"""The missing law as a curve over one state, without a formula, and how much any curve could close.
+
+A curve is a sum of linear splines over one state; the regression gives its coefficients and their
+covariance. The additive curves over all states of a quantity together hold every sum of functions
+of one state. What they leave in the runs that they are fitted to, no such law can close.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.diagnosis.localisation.linear_splines import linear_splines
+from plant_emulator.diagnosis.missing_law.reduced import columns_of, products, run_rows
+
+if TYPE_CHECKING:
+    from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
+    from plant_emulator.diagnosis.missing_law.quantity import Quantity
+    from plant_emulator.diagnosis.missing_law.states import State
+    from plant_emulator.signals.log import Array
+
+# Knots of a curve, at quantiles of its state; between the first and the last one all runs lie.
+KNOTS = 9
+# Half of the 95 % interval of a normal distribution [standard deviations].
+HALF_INTERVAL = 1.96
+
+
+@dataclass(frozen=True, kw_only=True)
+class Curve:
+    """A curve over a state, within the range that the runs show.
+
+    quantity, unit : of the law; over, over_unit : the state
+    knots : values of the state; values, band : of the law there, and half of its 95 % interval
+    """
+
+    quantity: str
+    unit: str
+    over: str
+    over_unit: str
+    knots: tuple[float, ...]
+    values: tuple[float, ...]
+    band: tuple[float, ...]
+
+    @property
+    def text(self) -> str:
+        """The curve in one line: its value at some knots."""
+        some = [0, len(self.knots) // 4, len(self.knots) // 2, -1]
+        parts = [f"{self.values[k]:.3g} +- {self.band[k]:.2g} at {self.knots[k]:.3g}" for k in some]
+        return f"{self.quantity} [{self.unit}] over {self.over} [{self.over_unit or '1'}]: " + (
+            ", ".join(parts)
+        )
+
+
+def curve(regression: BlockRegression, quantity: Quantity, state: State) -> Curve:
+    """The curve of a quantity over a state, fitted to all runs."""
+    knots = _knots(state)
+    columns = [
+        columns_of(regression, quantity, k, linear_splines(own, knots))
+        for k, own in enumerate(state.values)
+    ]
+    p = products(run_rows(regression, quantity.model), columns)
+    every, chosen = range(len(columns)), range(len(knots))
+    found = p.coefficients(chosen, every)
+    left = 2.0 * sum(p.run_loss(chosen, found, k) for k in every)
+    excess = max(1.0, left / len(quantity.model.y))
+    errors = np.sqrt(excess * np.diag(p.covariance(chosen, every)))
+    return Curve(
+        quantity=quantity.name,
+        unit=quantity.unit,
+        over=state.name,
+        over_unit=state.unit,
+        knots=tuple(knots.tolist()),
+        values=tuple((found[p.shared :] / p.scale).tolist()),
+        band=tuple((HALF_INTERVAL * errors / p.scale).tolist()),
+    )
+
+
+def additive_loss(regression: BlockRegression, quantity: Quantity) -> float:
+    """Loss that additive curves over all states of a quantity leave in the runs of their fit."""
+    states = [s for s in quantity.states if s.kind not in {"angle", "followed", "direction"}]
+    columns = []
+    for run in range(len(regression.signals)):
+        splines = [linear_splines(s.values[run], _knots(s)) for s in states]
+        columns.append(columns_of(regression, quantity, run, np.concatenate(splines, axis=1)))
+    p = products(run_rows(regression, quantity.model), columns)
+    return p.fitted_loss(range(columns[0].shape[1]))
+
+
+def _knots(state: State) -> Array:
+    """Knots at quantiles of the state's values, the ends included, each one once."""
+    values = np.concatenate(list(state.values))
+    return np.unique(np.quantile(values, np.linspace(0.0, 1.0, KNOTS)))

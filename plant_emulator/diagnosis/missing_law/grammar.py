@@ -1,0 +1,163 @@
+"""The grammar of laws: short formulas of the states, as values, as text, and as code.
+
+A term is a coefficient times one or two factors. A factor is a function of one state:
+
+    1   x   |x|   x|x|   sqrt|x|   sign x   exp(-(x/s)^2)   lag of x   cos(k x + phase)
+
+s, and the time constant of a lag, come from a grid. The fit by simulation moves them afterwards.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from plant_emulator.diagnosis.missing_law.states import lagged
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from plant_emulator.diagnosis.missing_law.states import State
+    from plant_emulator.signals.log import Array
+
+    Function = Literal["linear", "size", "square", "root", "sign", "bell", "delay", "lag", "turn"]
+
+# Functions without a scale.
+PLAIN: dict[str, Callable[[Array], Array]] = {
+    "linear": lambda x: x,
+    "size": np.abs,
+    "square": lambda x: x * np.abs(x),
+    "root": lambda x: np.sign(x) * np.sqrt(np.abs(x)),
+    "sign": np.sign,
+}
+# Widths of a bell [largest value of the state].
+WIDTHS = (0.02, 0.05, 0.1, 0.2, 0.5)
+# Harmonics of an angle.
+HARMONICS = (1.0, 2.0, 3.0, 4.0)
+
+# Functions of each kind of state that make a factor; those with a scale come from its grid.
+FUNCTIONS: dict[str, tuple[Function, ...]] = {
+    "signed": ("linear", "size", "square", "root", "sign", "bell"),
+    "smooth": ("linear", "size", "square", "bell"),
+    "level": ("linear", "square", "root", "bell"),
+    "direction": ("linear",),
+    "time": ("linear", "bell"),
+    "angle": ("turn",),
+    "followed": (),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Factor:
+    """A function of one state; scale : width [unit], time constant [s] or harmonic, else 0.
+
+    delay : lag of the state minus the state; lag : the lag itself
+    """
+
+    function: Function
+    state: State
+    scale: float = 0.0
+
+    def values(self, run: int) -> Array:
+        """Values over the intervals of a run, shape (n - 1, 1), or (n - 1, 2) for a turn."""
+        x = self.state.values[run]
+        if self.function == "turn":
+            return np.stack([np.cos(self.scale * x), np.sin(self.scale * x)], axis=-1)
+        return np.asarray(self._plain(x, self.state.time[run]))[:, None]
+
+    def _plain(self, x: Array, time: Array) -> Array:
+        if self.function == "delay":
+            return lagged(time, x, self.scale, float(x[0])) - x
+        if self.function == "lag":
+            return lagged(time, x, self.scale, 0.0)
+        if self.function == "bell":
+            return np.asarray(np.exp(-((x / self.scale) ** 2)))
+        return np.asarray(PLAIN[self.function](x))
+
+    @property
+    def text(self) -> str:
+        """The factor as text, with its scale to two digits."""
+        x, s = self.state.symbol, f"{self.scale:.2g}"
+        level = self.state.kind in {"level", "time"}
+        return {
+            "linear": x,
+            "size": f"|{x}|",
+            "square": f"{x}^2" if level else f"{x} |{x}|",
+            "root": f"sqrt({x})" if level else f"sign({x}) sqrt(|{x}|)",
+            "sign": f"sign({x})",
+            "bell": f"exp(-({x}/{s})^2)",
+            "delay": f"(lag({x}, {s} s) - {x})",
+            "lag": f"lag({x}, {s} s)",
+            "turn": f"cos({'' if self.scale == 1.0 else f'{s} '}{x} + phase)",
+        }[self.function]
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the factor does not vanish where its state does."""
+        return self.function in {"bell", "sign", "turn"} or self.state.kind == "direction"
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """A product of factors; none of them: a constant."""
+
+    factors: tuple[Factor, ...]
+
+    def values(self, run: int, count: int) -> Array:
+        """Values over the `count` intervals of a run, shape (count, 1 or 2)."""
+        found = np.ones((count, 1))
+        for factor in self.factors:
+            found = found * factor.values(run)
+        return found
+
+    @property
+    def own(self) -> bool:
+        """Whether each run has coefficients of its own: where an angle starts is not known."""
+        return any(factor.function == "turn" for factor in self.factors)
+
+    @property
+    def text(self) -> str:
+        """The term as text without its coefficient; empty for a constant."""
+        return " ".join(factor.text for factor in self.factors)
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """The states of the term."""
+        return tuple(factor.state for factor in self.factors)
+
+
+def terms(states: Sequence[State]) -> list[Term]:
+    """All terms of these states: a constant, single factors, and products of two of them."""
+    single = [Term((factor,)) for state in states for factor in factors(state)]
+    products = [
+        Term((one, other))
+        for first, second in combinations(states, 2)
+        for one in _simple(first)
+        for other in _simple(second)
+    ]
+    return [Term(()), *single, *products]
+
+
+def factors(state: State) -> Iterator[Factor]:
+    """All factors of a state."""
+    for function in FUNCTIONS[state.kind]:
+        if function == "bell":
+            yield from (Factor("bell", state, w * state.largest) for w in WIDTHS)
+        elif function == "turn":
+            yield from (Factor("turn", state, k) for k in HARMONICS)
+        else:
+            yield Factor(function, state)
+    follows = state.kind in {"followed", "signed"}
+    yield from (Factor("delay" if follows else "lag", state, tau) for tau in state.lags)
+
+
+def _simple(state: State) -> Iterator[Factor]:
+    """Factors that a product may have: of first order, a root, a wide bell, a lag, a slow turn."""
+    for factor in factors(state):
+        wide = factor.function == "bell" and factor.scale >= WIDTHS[2] * state.largest
+        slow = factor.function == "turn" and factor.scale <= HARMONICS[1]
+        if factor.function in {"linear", "size", "root", "lag"} or wide or slow:
+            yield factor

@@ -1,0 +1,187 @@
+"""The search for the laws that close most of the gap in runs that they were not fitted to.
+
+A law is a sum of one to three terms of one quantity. The first term is the one with the largest
+held-out gain; each next one must close a worthwhile share more. Rivals are laws over other states,
+or of other quantities, that come near.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.diagnosis.missing_law.grammar import Term, terms
+from plant_emulator.diagnosis.missing_law.reduced import columns_of, products, run_rows
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
+    from plant_emulator.diagnosis.missing_law.quantity import Quantity
+    from plant_emulator.diagnosis.missing_law.reduced import Products
+    from plant_emulator.signals.log import Array
+
+# Most terms of a law.
+MOST_TERMS = 3
+# Laws of one term that further terms are tried with.
+STARTS = 6
+# Another term must raise the held-out gain by this [twice the log of the odds].
+WORTHWHILE_GAIN = 25.0
+# A law is drafted from this held-out gain on [twice the log of the odds]. Runs without any gap gave
+# up to 60, because the drum's flight through the gap is linearised.
+DRAFTED_GAIN = 100.0
+# A factor more costs this [as above]: of two terms that say the same, the shorter one counts.
+PRICE_OF_FACTOR = 5.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Law:
+    """A law of a quantity: the sum of coefficients times terms.
+
+    coefficients, errors : of each term [unit of the quantity over that of the term]
+    gain : fall of twice the loss of every run, with the law fitted to the other runs
+    parameters : what the regression with the law says of the free parameters [SI]
+    """
+
+    quantity: Quantity
+    terms: tuple[Term, ...]
+    coefficients: tuple[float, ...]
+    errors: tuple[float, ...]
+    gain: float
+    parameters: dict[str, float]
+
+    @property
+    def text(self) -> str:
+        """The law as text, with unit."""
+        parts = [
+            f"{c:+.3g} {t.text}".strip() for c, t in zip(self.coefficients, self.terms, strict=True)
+        ]
+        return f"{' '.join(parts).removeprefix('+')} {self.quantity.unit}"
+
+    @property
+    def over(self) -> tuple[str, ...]:
+        """Names of the states that the law depends on."""
+        return tuple(dict.fromkeys(state.name for term in self.terms for state in term.states))
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """The search in one quantity; null : sum of the held-out losses of all runs without a law."""
+
+    regression: BlockRegression
+    quantity: Quantity
+    terms: Sequence[Term]
+    products: Products
+    null: float
+
+    def score(self, chosen: Sequence[int]) -> float:
+        """Held-out gain of these terms, less the price of their factors."""
+        factors = sum(len(self.terms[j].factors) for j in chosen)
+        return self.gain(chosen) - PRICE_OF_FACTOR * factors
+
+    def gain(self, chosen: Sequence[int]) -> float:
+        """Held-out gain of these terms."""
+        return float(2.0 * (self.null - self.products.held_out_losses(self._columns(chosen)).sum()))
+
+    def fitted_loss(self, chosen: Sequence[int]) -> float:
+        """Loss of all runs that these terms leave where they are fitted to all of them."""
+        return self.products.fitted_loss(self._columns(chosen))
+
+    def _columns(self, chosen: Sequence[int]) -> list[int]:
+        """Numbers of the columns of these terms: a turn has two."""
+        widths = [2 if term.own else 1 for term in self.terms]
+        ends = np.cumsum(widths)
+        return [int(c) for j in chosen for c in range(ends[j] - widths[j], ends[j])]
+
+    def singles(self) -> list[tuple[int, ...]]:
+        """All laws of one term, the best one first."""
+        return sorted(((j,) for j in range(len(self.terms))), key=self.score, reverse=True)
+
+    def nested(self) -> list[tuple[int, ...]]:
+        """The best law of one term, and longer ones as long as another term counts."""
+        starts = self.singles()[:STARTS]
+        found = [starts[0]]
+        while len(found) < MOST_TERMS:
+            longer = [
+                (*start, j) for start in starts for j in range(len(self.terms)) if j not in start
+            ]
+            best = max(longer, key=self.score)
+            if self.score(best) <= self.score(found[-1]) + WORTHWHILE_GAIN:
+                break
+            found.append(best)
+            starts = [best]
+        return found
+
+    def law(self, chosen: Sequence[int]) -> Law:
+        """The law with these terms, fitted to all runs."""
+        p, every = self.products, range(len(self.products.grams))
+        columns = self._columns(chosen)
+        found = p.coefficients(columns, every)
+        errors = np.sqrt(np.diag(p.covariance(columns, every)))
+        shared = iter(zip(found[p.shared :], errors, strict=True))
+        turns = [p.own_coefficients(columns, found, k) for k in every]
+        sizes, deviations, at = [], [], 0
+        for j in chosen:
+            first = self._columns([j])[0]
+            if self.terms[j].own:
+                amplitudes = [np.hypot(*one[at : at + 2]) for one in turns]
+                sizes.append(float(np.mean(amplitudes)) / p.scale[first])
+                deviations.append(float(np.std(amplitudes)) / p.scale[first])
+                at += 2
+                continue
+            size, error = next(shared)
+            sizes.append(float(size / p.scale[first]))
+            deviations.append(float(error / p.scale[first]))
+        return Law(
+            quantity=self.quantity,
+            terms=tuple(self.terms[j] for j in chosen),
+            coefficients=tuple(sizes),
+            errors=tuple(deviations),
+            gain=self.gain(chosen),
+            parameters=self._parameters(found),
+        )
+
+    def _parameters(self, found: Array) -> dict[str, float]:
+        """Values of the free parameters that the relations contain."""
+        r = self.regression
+        return {
+            name: r.values[name] + (away + offset) * std
+            for (name, std), away, offset in zip(
+                r.stds.items(), found, r.prior_offsets, strict=False
+            )
+        }
+
+
+def search(regression: BlockRegression, quantity: Quantity, null: float) -> Search:
+    """Prepare the search in a quantity; null : see `Search`."""
+    every = terms(quantity.states)
+    counts = [len(q.time) for q in regression.quantities]
+    columns = [
+        columns_of(
+            regression,
+            quantity,
+            k,
+            np.concatenate([term.values(k, count) for term in every], axis=1),
+        )
+        for k, count in enumerate(counts)
+    ]
+    return Search(
+        regression,
+        quantity,
+        every,
+        products(
+            run_rows(regression, quantity.model),
+            columns,
+            [term.own for term in every for _ in range(2 if term.own else 1)],
+        ),
+        null,
+    )
+
+
+def null_loss(regression: BlockRegression) -> float:
+    """Sum of the held-out losses of all runs without a law."""
+    rows = run_rows(regression, regression.model)
+    nothing = [np.zeros((len(own.y), 0)) for own in rows]
+    return float(products(rows, nothing).held_out_losses(()).sum())

@@ -1,0 +1,59 @@
+"""The states that a missing law may depend on, and first-order lags of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from plant_emulator.signals.log import Array
+
+    Kind = Literal["signed", "smooth", "level", "direction", "time", "angle", "followed"]
+
+# Time constants of a lag that a law may have [s]: of a filter, and of something that warms up.
+QUICK = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+SLOW = (10.0, 30.0, 100.0, 300.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class State:
+    """A state that a missing law may depend on.
+
+    symbol : letter in a formula; unit : of the state, empty for a pure number
+    code : expression in an effect's law
+    values : over the intervals of each run [SI], shape (n - 1,) each; time : likewise [s]
+    kind : which functions make sense; `followed` is a state that has a lag only
+    lags : time constants that a lag of the state may have [s]; empty: none
+    start : expression of a lag's value at the start of a run
+    """
+
+    name: str
+    symbol: str
+    unit: str
+    code: str
+    kind: Kind
+    values: Sequence[Array]
+    time: Sequence[Array]
+    lags: tuple[float, ...] = ()
+    start: str = "0.0"
+
+    @property
+    def largest(self) -> float:
+        """Largest absolute value in all runs [SI]."""
+        return max(float(np.max(np.abs(own))) for own in self.values)
+
+
+def lagged(time: Array, value: Array, tau: float, start: float) -> Array:
+    """First-order lag of a state, tau dx/dt = value - x, from `start` on, shape (n,).
+
+    Exact for a value that holds over each interval.
+    """
+    from scipy.signal import lfilter
+
+    share = float(-np.expm1(-np.median(np.diff(time)) / tau))
+    found, _ = lfilter([share], [1.0, share - 1.0], value, zi=[(1.0 - share) * start])
+    return np.asarray(found)
