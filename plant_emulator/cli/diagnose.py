@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
@@ -60,6 +59,11 @@ Examples:
 @click.option(
     "--save", type=OutputFile(), help="Write the parameter set with the accepted effects."
 )
+@click.option(
+    "--draft",
+    is_flag=True,
+    help="Draft a missing law whatever the verdict; it is drafted where the cause is unknown.",
+)
 @click.option("--report", type=OutputFile(), help="Write a report as one HTML file.")
 @click.option(
     "--next-program",
@@ -78,6 +82,7 @@ def command(
     workers: int,
     scheduler: str | None,
     save: str | None,
+    draft: bool,
     report: str | None,
     next_program: str | None,
     json_file: str | None,
@@ -105,12 +110,13 @@ def command(
             workers=workers,
             scheduler=scheduler,
             progress=tell,
+            draft="always" if draft else "unknown",
             settings={"command": f"plant-emulator {shlex.join(sys.argv[1:])}"},
         )
     for note in found.notes:
         click.echo(f"note: {note}", err=True)
     if save:
-        _save(found, save, effect_files)
+        _save(found, save)
     if report:
         found.write_report(report)
     if next_program:
@@ -144,20 +150,15 @@ def _write_next_program(found: Diagnosis, path: str) -> None:
         click.echo(f"note: {path}: {words}; gateway drive {path} -c CONFIG", err=True)
 
 
-def _save(found: Diagnosis, path: str, effect_files: tuple[str, ...]) -> None:
+def _save(found: Diagnosis, path: str) -> None:
     """Write the parameter set, and note what its user has to know."""
     from plant_emulator import parameter_sets
 
     parameter_sets.save(found.parameter_set, path)
     verdict = found.answer.verdict
-    for file in effect_files:
-        if (name := Path(file).stem) in verdict.effects:
-            click.echo(
-                f"note: {path}: serve, simulate and validate know {name} once {file} lies in "
-                "plant_emulator/effects",
-                err=True,
-            )
-    if verdict.kind == "unknown":
+    if verdict.kind == "unknown" and found.drafted.drafts:
+        click.echo(f"note: {path}: the cause is unknown; the draft is in it", err=True)
+    elif verdict.kind == "unknown":
         click.echo(
             f"note: {path}: the cause is unknown: no effect is in it, and the cause may have "
             "biased its parameters",

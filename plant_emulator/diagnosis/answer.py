@@ -201,10 +201,54 @@ class SensorNoise:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Curve:
+    """A missing law over one state, without a formula, within the range that the runs show.
+
+    quantity, unit : of the law; over, over_unit : the state
+    knots : values of the state; values, band : of the curve there, and half of its 95 % interval
+    law : the drafted law there; None: it depends on more than the state
+    """
+
+    quantity: str
+    unit: str
+    over: str
+    over_unit: str
+    knots: tuple[float, ...]
+    values: tuple[float, ...]
+    band: tuple[float, ...]
+    law: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Draft:
+    """A law that no effect of the library is, drawn from the logs.
+
+    place : subsystem; quantity, over : of the law, and the states that it depends on, in words
+    form : the law as text, with unit; file : the effect file with it
+    held_out_gain : share of the held-out gap that the draft closes [1]; None: there is none
+    bound : largest share that any sum of curves over single states could close [1]
+    rivals : other laws that come near
+    """
+
+    place: str
+    quantity: str
+    over: str
+    form: str
+    file: str
+    held_out_gain: float | None
+    held_out_gain_ci95: tuple[float, float] | None
+    bound: float | None
+    bound_ci95: tuple[float, float] | None
+    rivals: tuple[str, ...]
+    curve: Curve
+
+
+@dataclass(frozen=True, kw_only=True)
 class Answer:
     """The whole answer: the verdict, and what it rests on.
 
     ranking : the best effect first; trace : the search in its order; noise : by channel
+    drafts : of the missing law, the best one first; None: nobody asked for one
     """
 
     logs: Logs
@@ -215,3 +259,4 @@ class Answer:
     undetectable: tuple[Undetectable, ...]
     trace: tuple[SearchStep, ...] = ()
     noise: tuple[SensorNoise, ...] = ()
+    drafts: tuple[Draft, ...] | None = None

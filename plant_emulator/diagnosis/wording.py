@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.answer import (
+        Draft,
         HeldOutGap,
         Location,
         Logs,
@@ -188,3 +189,14 @@ def describe_deviation(parameter: ParameterDeviation, sign: str = "+-") -> str:
 def indistinguishable(verdict: Verdict) -> dict[str, tuple[str, ...]]:
     """By accepted effect, the other effects that these logs cannot distinguish from it."""
     return {group[0]: group[1:] for group in verdict.classes if group}
+
+
+def describe_draft_gain(draft: Draft) -> str:
+    """How much of the held-out gap a draft closes, and how much any law of its kind could."""
+    if draft.held_out_gain is None or draft.held_out_gain_ci95 is None or draft.bound is None:
+        return "no held-out run can be predicted"
+    low, high = map(percent, draft.held_out_gain_ci95)
+    return (
+        f"closes {percent(draft.held_out_gain)} ({low} to {high}) of the held-out gap; at best "
+        f"{percent(draft.bound)}"
+    )

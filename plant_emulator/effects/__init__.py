@@ -46,11 +46,13 @@ __all__ = [
     "EffectParameter",
     "Memory",
     "complete",
+    "effects_of_sets",
     "from_file",
     "from_files",
     "load",
     "names",
     "parse",
+    "use_effects_of_set",
 ]
 
 
@@ -60,8 +62,24 @@ def names() -> list[str]:
     return sorted(name for name in found if name != "declaration")
 
 
+# Effects of the parameter sets that this process has loaded, beside the shipped ones, by name.
+_of_sets: dict[str, Effect] = {}
+
+
+def use_effects_of_set(own: Sequence[Effect]) -> None:
+    """Let this process know these effects, which a parameter set names the files of."""
+    _of_sets.update({effect.name: effect for effect in own})
+
+
+def effects_of_sets() -> tuple[Effect, ...]:
+    """Effects of the parameter sets that this process has loaded, beside the shipped ones."""
+    return tuple(_of_sets.values())
+
+
 def load(name: str) -> Effect:
-    """The shipped effect of that name; ParameterError where there is none."""
+    """The effect of that name, shipped or of a loaded set; ParameterError where there is none."""
+    if name in _of_sets:
+        return _of_sets[name]
     if name not in names():
         raise ParameterError(f"effect {name}: unknown; known: {', '.join(names())}")
     return read_effect(name, importlib.import_module(f"{__name__}.{name}"))

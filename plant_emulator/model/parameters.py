@@ -96,6 +96,8 @@ UNITS: dict[str, str] = {
 
 # Tables of a parameter file that are not parameters.
 ORIGIN, EFFECTS = "origin", "effects"
+# Key of the file of an effect that is not shipped, in the table of the effect.
+FILE = "file"
 # Parameters that may be zero: their term is then absent from the model.
 MAY_BE_ZERO = frozenset(
     {
@@ -117,6 +119,7 @@ class ParameterSet:
         a publication
     effects : effects of this bench beyond the nominal model: effect -> parameter -> value [SI]
     sensors : declared sensors by channel
+    effect_files : files of effects that are not shipped, by effect
     """
 
     name: str
@@ -124,6 +127,7 @@ class ParameterSet:
     origin: Mapping[str, Any] | None = None
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     sensors: Mapping[str, Sensor] = field(default_factory=dict)
+    effect_files: Mapping[str, str] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Parameter:
         """The parameter of that name; KeyError names those of the set."""
@@ -190,7 +194,8 @@ def parameter_set(name: str, table: Mapping[str, Any]) -> ParameterSet:
         raise ParameterError(f"{name}: {ORIGIN}: a table that says where the values come from")
     effects = _effects(name, table.get(EFFECTS, {}))
     sensors = sensors_of(name, table.get(SENSORS, {}))
-    return ParameterSet(name, given, origin, effects, sensors).with_values({})
+    files = {key: str(own[FILE]) for key, own in table.get(EFFECTS, {}).items() if FILE in own}
+    return ParameterSet(name, given, origin, effects, sensors, files).with_values({})
 
 
 def _effects(place: str, table: object) -> dict[str, dict[str, float]]:
@@ -198,7 +203,11 @@ def _effects(place: str, table: object) -> dict[str, dict[str, float]]:
     if not isinstance(table, Mapping) or not all(isinstance(t, Mapping) for t in table.values()):
         raise ParameterError(f"{place}: {EFFECTS}: one table an effect, [{EFFECTS}.NAME]")
     return {
-        name: {k: _number(place, f"{EFFECTS}.{name}.{k}", value) for k, value in values.items()}
+        name: {
+            k: _number(place, f"{EFFECTS}.{name}.{k}", value)
+            for k, value in values.items()
+            if k != FILE
+        }
         for name, values in table.items()
     }
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
 import tomllib
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from plant_emulator.errors import ParameterError, report_unwritable
-from plant_emulator.model.parameters import EFFECTS, ORIGIN, ParameterSet, parameter_set
+from plant_emulator.model.parameters import EFFECTS, FILE, ORIGIN, ParameterSet, parameter_set
 from plant_emulator.model.sensors import SENSORS
 
 if TYPE_CHECKING:
@@ -39,13 +41,22 @@ def load(name: str | Path = DEFAULT) -> ParameterSet:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:  # no TOML or UTF-8, or a number too long
         raise ParameterError(f"{path}: {error}") from error
-    return parameter_set(str(name), table)
+    found = parameter_set(str(name), table)
+    # A set names the files of its effects from its own folder on.
+    files = {key: str(path.parent / file) for key, file in found.effect_files.items()}
+    return replace(found, effect_files=files)
 
 
 def save(parameters: ParameterSet, path: str | Path) -> None:
     """Write a set as a TOML file that `load` reads; InputError where it cannot be written."""
     with report_unwritable(path):
-        Path(path).write_text(text(parameters), encoding="utf-8")
+        folder = Path(path).absolute().parent
+        files = {
+            key: os.path.relpath(Path(file).absolute(), folder)
+            for key, file in parameters.effect_files.items()
+        }
+        written = text(replace(parameters, effect_files=files))
+        Path(path).write_text(written, encoding="utf-8")
 
 
 def text(parameters: ParameterSet) -> str:
@@ -53,7 +64,11 @@ def text(parameters: ParameterSet) -> str:
     tables = [_table(p.name, _entries(p)) for p in parameters]
     if parameters.origin is not None:
         tables.insert(0, _table(ORIGIN, dict(parameters.origin)))
-    tables += [_table(f"{EFFECTS}.{name}", dict(v)) for name, v in parameters.effects.items()]
+    files = {name: {FILE: file} for name, file in parameters.effect_files.items()}
+    tables += [
+        _table(f"{EFFECTS}.{name}", {**files.get(name, {}), **v})
+        for name, v in parameters.effects.items()
+    ]
     tables += [
         _table(f"{SENSORS}.{name}", dict(s.entries())) for name, s in parameters.sensors.items()
     ]

@@ -18,15 +18,17 @@ if TYPE_CHECKING:
 def load(
     name: str | Path = parameter_sets.DEFAULT, effect_files: Sequence[str | Path] = ()
 ) -> ParameterSet:
-    """Load the set of that name or path and check its effects.
+    """Load the set of that name or path and check its effects; the process knows them from then on.
 
-    effect_files : files of a user's own effects, which the set may have
+    effect_files : files of a user's own effects, which the set may have beside those it names
     Raises ParameterError with file and key, also for an unknown effect or effect parameter.
     """
     found = parameter_sets.load(name)
     if found.effects:
-        files = [Path(file) for file in effect_files]
-        mine = {effect.name: effect for effect in effects.from_files(files)}
+        own = effects.from_files([Path(file) for file in found.effect_files.values()])
+        effects.use_effects_of_set(own)
+        others = effects.from_files([Path(file) for file in effect_files])
+        mine = {effect.name: effect for effect in (*own, *others)}
         for key, values in found.effects.items():
             _check(found.name, key, values, mine)
     return found

@@ -126,9 +126,15 @@ def use_own_effects(*own: Effect) -> None:
     _user_effects[:] = own
 
 
+def _own_effects() -> tuple[Effect, ...]:
+    """Effects beside the shipped ones: those of loaded parameter sets, and the user's own."""
+    found = {effect.name: effect for effect in (*effects.effects_of_sets(), *_user_effects)}
+    return tuple(found.values())
+
+
 def kernel() -> Kernel:
     """The kernel with all shipped effects and the user's own effects; built once a process."""
-    return _kernel(tuple(_user_effects))
+    return _kernel(_own_effects())
 
 
 @cache
@@ -177,7 +183,7 @@ def kernel_for(values: Mapping[str, float]) -> tuple[Kernel, Mapping[str, float]
     others = [name for name in values if name not in UNITS]
     if not others:
         return plain_kernel(), values
-    table = _neutral(tuple(_user_effects))
+    table = _neutral(_own_effects())
     neutral = {name: table.get(name, (nan, None)) for name in others}
     kinds = {kind for name, (value, kind) in neutral.items() if values[name] != value}
     if None in kinds or len(kinds) > 1:

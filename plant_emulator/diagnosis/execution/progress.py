@@ -31,6 +31,7 @@ LABELS = {
     "locate_gap": "where the gap lies",
     "signature_norms": "what held-out runs need",
     "predict": "held-out runs",
+    "enter": "fits of drafted laws",
     "discriminability": "what to drive next",
     "fit_alternative": "what to drive next",
     "information_gain": "what to drive next",

@@ -7,11 +7,11 @@ of one state. What they leave in the runs that they are fitted to, no such law c
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.diagnosis.answer import Curve
 from plant_emulator.diagnosis.localisation.linear_splines import linear_splines
 from plant_emulator.diagnosis.missing_law.reduced import columns_of, products, run_rows
 
@@ -25,32 +25,6 @@ if TYPE_CHECKING:
 KNOTS = 9
 # Half of the 95 % interval of a normal distribution [standard deviations].
 HALF_INTERVAL = 1.96
-
-
-@dataclass(frozen=True, kw_only=True)
-class Curve:
-    """A curve over a state, within the range that the runs show.
-
-    quantity, unit : of the law; over, over_unit : the state
-    knots : values of the state; values, band : of the law there, and half of its 95 % interval
-    """
-
-    quantity: str
-    unit: str
-    over: str
-    over_unit: str
-    knots: tuple[float, ...]
-    values: tuple[float, ...]
-    band: tuple[float, ...]
-
-    @property
-    def text(self) -> str:
-        """The curve in one line: its value at some knots."""
-        some = [0, len(self.knots) // 4, len(self.knots) // 2, -1]
-        parts = [f"{self.values[k]:.3g} +- {self.band[k]:.2g} at {self.knots[k]:.3g}" for k in some]
-        return f"{self.quantity} [{self.unit}] over {self.over} [{self.over_unit or '1'}]: " + (
-            ", ".join(parts)
-        )
 
 
 def curve(regression: BlockRegression, quantity: Quantity, state: State) -> Curve:

@@ -19,8 +19,8 @@ from plant_emulator.diagnosis.missing_law.quantities import quantities
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from plant_emulator.diagnosis.answer import Curve
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.missing_law.curve import Curve
     from plant_emulator.diagnosis.missing_law.law_search import Law, Search
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording

@@ -7,7 +7,7 @@ or of other quantities, that come near.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +16,7 @@ from plant_emulator.diagnosis.missing_law.grammar import Term, terms
 from plant_emulator.diagnosis.missing_law.reduced import columns_of, products, run_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
     from plant_emulator.diagnosis.missing_law.quantity import Quantity
@@ -52,6 +52,23 @@ class Law:
     gain: float
     parameters: dict[str, float]
 
+    def over_state(self, name: str, knots: Array) -> Array | None:
+        """Values of the law at values of this state; None: it depends on more than the state."""
+        if any(
+            factor.state.name != name or factor.function in {"delay", "lag", "turn"}
+            for term in self.terms
+            for factor in term.factors
+        ):
+            return None
+        found = np.zeros(len(knots))
+        for size, term in zip(self.coefficients, self.terms, strict=True):
+            at = [
+                replace(f, state=replace(f.state, values=[knots], time=[knots]))
+                for f in term.factors
+            ]
+            found = found + size * Term(tuple(at)).values(0, len(knots))[:, 0]
+        return found
+
     @property
     def text(self) -> str:
         """The law as text, with unit."""
@@ -59,6 +76,23 @@ class Law:
             f"{c:+.3g} {t.text}".strip() for c, t in zip(self.coefficients, self.terms, strict=True)
         ]
         return f"{' '.join(parts).removeprefix('+')} {self.quantity.unit}"
+
+    def fitted(self, values: Mapping[str, float]) -> Law:
+        """The law with the sizes, widths and time constants of a fit, as `effect_text` names them.
+
+        values : by name, as `a1` and `b12`
+        """
+        changed = tuple(
+            Term(
+                tuple(
+                    replace(factor, scale=values.get(f"b{k}{j}", factor.scale))
+                    for j, factor in enumerate(term.factors, 1)
+                )
+            )
+            for k, term in enumerate(self.terms, 1)
+        )
+        sizes = tuple(values.get(f"a{k}", a) for k, a in enumerate(self.coefficients, 1))
+        return replace(self, terms=changed, coefficients=sizes)
 
     @property
     def over(self) -> tuple[str, ...]:

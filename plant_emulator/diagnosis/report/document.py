@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 from plant_emulator.diagnosis.answer import (
     Answer,
     Cell,
+    Curve,
+    Draft,
     HeldOutGap,
     Location,
     Logs,
@@ -51,6 +53,7 @@ def from_json(document: Mapping[str, Any]) -> Answer:
         undetectable=tuple(Undetectable(**entry) for entry in document["undetectable"]),
         trace=tuple(_search_step(entry) for entry in document.get("trace", ())),
         noise=tuple(_sensor_noise(entry) for entry in document.get("noise", ())),
+        drafts=tuple(map(_draft, document["drafts"])) if "drafts" in document else None,
     )
 
 
@@ -70,6 +73,8 @@ def _document(record: DataclassInstance) -> dict[str, Any]:
                 "map": _plain(record.maps.get(PHASE, ())),
             }
     names = [field.name for field in fields(record)]
+    if isinstance(record, Answer) and record.drafts is None:
+        names.remove("drafts")
     return {KEYS.get(name, name): _plain(getattr(record, name)) for name in names}
 
 
@@ -140,6 +145,18 @@ def _search_step(entry: Mapping[str, Any]) -> SearchStep:
 
 def _sensor_noise(entry: Mapping[str, Any]) -> SensorNoise:
     return SensorNoise(**{**entry, "lines": tuple(entry["lines"])})
+
+
+def _draft(entry: Mapping[str, Any]) -> Draft:
+    intervals = {
+        key: entry[key] and tuple(entry[key]) for key in ("held_out_gain_ci95", "bound_ci95")
+    }
+    drawn: dict[str, Any] = {
+        key: tuple(map(_number, value)) if isinstance(value, list) else value
+        for key, value in entry["curve"].items()
+    }
+    rivals = tuple(entry["rivals"])
+    return Draft(**{**entry, **intervals, "rivals": rivals, "curve": Curve(**drawn)})
 
 
 def _numbers(entry: Mapping[str, Any], *keys: str) -> dict[str, Any]:

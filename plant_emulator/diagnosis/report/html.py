@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.report import html_maps, html_traces
 from plant_emulator.diagnosis.report import html_tables as tables
+from plant_emulator.diagnosis.report.html_drafts import drafts
 from plant_emulator.diagnosis.report.html_inputs import estimated_inputs
 from plant_emulator.diagnosis.report.html_parts import PLUS_MINUS, code, scroll_region
 from plant_emulator.diagnosis.report.html_pictures import line, waterfall
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.answer import (
         Answer,
+        Draft,
         HeldOutGap,
         Location,
         Logs,
@@ -75,6 +77,7 @@ def html(answer: Answer, details: Details) -> str:
         _location(answer.location, units),
         _remainder(details.remainder),
         _effects(answer),
+        _drafts(answer.drafts),
         _parameters(verdict.parameters),
         _limits(answer.undetectable),
         _runs(details.traces),
@@ -173,6 +176,12 @@ def _class(name: str, others: Sequence[str]) -> list[str]:
         return [code(name), ": these logs distinguish it from every other effect of the library."]
     listed = [part for other in others for part in (", ", code(other))][1:]
     return [code(name), ": these logs cannot distinguish it from ", *listed, "."]
+
+
+def _drafts(found: Sequence[Draft] | None) -> Markup:
+    if found is None:
+        return Markup("")
+    return _section("The missing law, drafted", drafts(found))
 
 
 def _parameters(deviations: Sequence[ParameterDeviation]) -> Markup:

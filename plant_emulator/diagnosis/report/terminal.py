@@ -18,6 +18,7 @@ from plant_emulator.diagnosis.wording import (
     UNITS,
     closed_share,
     describe_deviation,
+    describe_draft_gain,
     describe_location,
     gap_rows,
     indistinguishable,
@@ -33,7 +34,13 @@ from plant_emulator.diagnosis.wording import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from plant_emulator.diagnosis.answer import Answer, HeldOutGap, RankedEffect, Undetectable
+    from plant_emulator.diagnosis.answer import (
+        Answer,
+        Draft,
+        HeldOutGap,
+        RankedEffect,
+        Undetectable,
+    )
 
 # Lines of a screen of 24 lines whose last line holds the prompt.
 HEIGHT = 23
@@ -203,7 +210,22 @@ def _rest(answer: Answer, width: int) -> list[str]:
         deviations, width, 2 if verdict.kind == "parameter" else 1, "deviates", names
     )
     rows += _unseen(answer.undetectable, width, 1 if len(verdict.effects) > 1 else 2)
+    rows += _drafted(answer.drafts, width)
     return rows + _paragraph(verdict.next_experiment or "", width, 3, "next")
+
+
+def _drafted(found: Sequence[Draft] | None, width: int) -> list[str]:
+    """The best draft of a missing law, in three lines."""
+    if found is None:
+        return []
+    if not found:
+        return _paragraph("no law over the measured states closes the gap", width, 1, "draft")
+    best, *others = found
+    told = [f"{best.quantity}: {best.form}", describe_draft_gain(best), f"file {best.file}"]
+    if others:
+        told[-1] = f"rivals {'; '.join(one.form for one in others)}; {told[-1]}"
+    first, *rest = [row for words in told for row in _paragraph(words, width - 9, 1)]
+    return [f"{'draft':9}{first}", *(f"{'':9}{row}" for row in rest)]
 
 
 def _unseen(hidden: Sequence[Undetectable], width: int, most: int) -> list[str]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from threadpoolctl import threadpool_limits
 
 from plant_emulator.diagnosis.diagnose import Diagnose
+from plant_emulator.diagnosis.execution.progress import ReportingPool
 from plant_emulator.diagnosis.report.document import to_json
 from plant_emulator.diagnosis.report.html import html
 from plant_emulator.diagnosis.report.terminal import lines
@@ -25,6 +26,8 @@ from plant_emulator.workflows.arguments import (
     list_sources,
 )
 from plant_emulator.workflows.diagnosis.calibration import load_model_form_errors, trial_cases
+from plant_emulator.workflows.diagnosis.drafting import NOTHING, Drafted
+from plant_emulator.workflows.diagnosis.drafting import draft as draft_law
 from plant_emulator.workflows.diagnosis.runs import axis_runs, bench_runs
 from plant_emulator.workflows.diagnosis.saved_set import parameter_set
 from plant_emulator.workflows.workers import make_pool
@@ -34,9 +37,13 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.answer import Answer
     from plant_emulator.diagnosis.diagnose import Findings
+    from plant_emulator.diagnosis.execution.pool import Pool
     from plant_emulator.diagnosis.execution.progress import Progress
     from plant_emulator.recordings.recording import Recording
-    from plant_emulator.workflows.diagnosis.runs import Source
+    from plant_emulator.workflows.diagnosis.runs import Runs, Source
+
+# Folder of the effect files of drafts, in the current one.
+DRAFTS = "drafts"
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -45,11 +52,15 @@ class Diagnosis:
 
     given : the parameter set that was diagnosed; None: the machine is a single axis
     fitted : the runs of the bench that were not held out
+    effect_files : of the user's own effects, absolute
+    drafted : drafts of a missing law, with their fits
     """
 
     findings: Findings
     given: ParameterSet | None
     fitted: tuple[Recording, ...]
+    effect_files: tuple[str, ...] = ()
+    drafted: Drafted = NOTHING
 
     @property
     def answer(self) -> Answer:
@@ -63,13 +74,18 @@ class Diagnosis:
 
     @property
     def parameter_set(self) -> ParameterSet:
-        """The given set with the fitted values and the accepted effects.
+        """The given set with the fitted values and the accepted effects, or else the best draft.
 
         Raises DiagnosisError for a single axis, which has no parameter set.
         """
         if self.given is None:
             raise DiagnosisError("a single axis has no parameter set")
-        return parameter_set(self.findings, self.given, self.fitted)
+        findings, files = self.findings, {Path(file).stem: file for file in self.effect_files}
+        if self.drafted.fits and not self.answer.verdict.effects:
+            file, fit = self.drafted.drafts[0].file, self.drafted.fits[0]
+            files[Path(file).stem] = file
+            findings = replace(findings, final=fit, fixed={Path(file).stem: {}})
+        return parameter_set(findings, self.given, self.fitted, files)
 
     def to_json(self) -> dict[str, Any]:
         """The answer as the document `gap-diagnosis/1`."""
@@ -111,6 +127,8 @@ def diagnose(
     scheduler: str | None = None,
     progress: Progress | None = None,
     settings: Mapping[str, str] | None = None,
+    draft: Literal["never", "unknown", "always"] = "never",
+    draft_folder: str | Path = DRAFTS,
 ) -> Diagnosis:
     """Diagnose the gap between the model and the machine that the logs were recorded on.
 
@@ -126,6 +144,8 @@ def diagnose(
     scheduler : address of a Dask scheduler to use in their place, tcp://host:port
     progress : function that is called with a step's name and its done share, 0 to 1
     settings : lines for the report, by name, on how to repeat the diagnosis
+    draft : whether a missing law is drafted: where the cause is unknown, or always
+    draft_folder : folder of the effect files of the drafts
     Raises InputError for a log, a set or an option that cannot be used, and EmulatorError where
     a worker is lost.
     """
@@ -160,10 +180,30 @@ def diagnose(
                 notes=runs.notes,
                 progress=progress,
             ).diagnose()
+            shown = pool if progress is None else ReportingPool(pool, progress)
+            findings, drafted = _with_drafts(findings, runs, shown, draft, Path(draft_folder))
     finally:
         pool.close()
     findings = replace(findings, details=replace(findings.details, inputs=runs.inputs))
-    return Diagnosis(findings=findings, given=given, fitted=runs.fitted)
+    return Diagnosis(
+        findings=findings,
+        given=given,
+        fitted=runs.fitted,
+        effect_files=tuple(str(Path(file).absolute()) for file in effect_files),
+        drafted=drafted,
+    )
+
+
+def _with_drafts(
+    findings: Findings, runs: Runs, pool: Pool, wanted: str, folder: Path
+) -> tuple[Findings, Drafted]:
+    """The findings with the drafts of a missing law, if these are wanted."""
+    verdict = findings.answer.verdict
+    if wanted == "never" or (wanted == "unknown" and verdict.kind != "unknown"):
+        return findings, NOTHING
+    null = None if findings.final.effects else findings.final
+    drafted = draft_law(runs, null, pool, folder)
+    return replace(findings, answer=replace(findings.answer, drafts=drafted.drafts)), drafted
 
 
 def _set(parameters: ParameterSet | str | Path, effect_files: Sequence[str | Path]) -> ParameterSet:

@@ -73,7 +73,10 @@ def bench_runs(
     reference : what holds between samples of the reference; None: as the log says
     Raises InputError for a log that cannot be used.
     """
-    files = tuple(Path(file).absolute() for file in effect_files)
+    given = [Path(file).absolute() for file in effect_files]
+    stems = {file.stem for file in given}
+    of_set = [Path(file).absolute() for file in parameters.effect_files.values()]
+    files = (*given, *(file for file in of_set if file.stem not in stems))
     named = [effect.name for effect in effects.from_files(files)]
     _check_names(without, [*effects.names(), *named])
     recordings, notes = load_recordings(

@@ -21,14 +21,18 @@ if TYPE_CHECKING:
 
 
 def parameter_set(
-    findings: Findings, parameters: ParameterSet, recordings: Sequence[Recording]
+    findings: Findings,
+    parameters: ParameterSet,
+    recordings: Sequence[Recording],
+    files: Mapping[str, str],
 ) -> ParameterSet:
-    """The given set with the fitted values and the accepted effects.
+    """The given set with the fitted values and the effects of the final fit.
 
     A value that every run has of its own becomes the mean of the runs.
     parameters : the set as given; recordings : the runs that were fitted
+    files : of the effects that are not shipped, by effect
     """
-    final, named = findings.final, findings.answer.verdict.effects
+    final, named = findings.final, tuple(findings.fixed)
     own = {name: dict(findings.fixed[name]) for name in named}
     for name in named:
         effect = kernel().effects[name]
@@ -48,7 +52,14 @@ def parameter_set(
         "logs": list(findings.answer.logs.estimation),
         "verdict": findings.answer.verdict.statement,
     }
-    return replace(new, parameters=kept, origin=origin, effects={**parameters.effects, **own})
+    used = {name: file for name, file in files.items() if name in own}
+    return replace(
+        new,
+        parameters=kept,
+        origin=origin,
+        effects={**parameters.effects, **own},
+        effect_files={**parameters.effect_files, **used},
+    )
 
 
 def _of_runs(

@@ -219,12 +219,42 @@ def unknown() -> dict[str, Any]:
     return answer
 
 
+def drafted() -> dict[str, Any]:
+    """An unknown cause, with two drafts of the missing law."""
+    curve = {
+        "quantity": "friction of the gear at its output",
+        "unit": "N m",
+        "over": "gear speed",
+        "over_unit": "rad/s",
+        "knots": [0.0, 0.5, 1.0, 6.0],
+        "values": [-31.0, -11.0, -4.0, 0.2],
+        "band": [2.0, 1.0, 1.0, 0.5],
+        "law": [-31.4, -11.5, -4.2, 0.0],
+    }
+    best = {
+        "place": "gear",
+        "quantity": "friction of the gear at its output",
+        "over": "gear speed",
+        "form": "-31.4 exp(-(w/0.5)^2) N m",
+        "file": "drafts/draft_gear_1.py",
+        "held_out_gain": 0.81,
+        "held_out_gain_ci95": [0.77, 0.84],
+        "bound": 0.9,
+        "bound_ci95": [0.87, 0.93],
+        "rivals": ["-8.2 sqrt(w) N m"],
+        "curve": curve,
+    }
+    other = {**best, "form": "-8.2 sqrt(w) N m", "held_out_gain": 0.7, "rivals": [best["form"]]}
+    return {**unknown(), "drafts": [best, {**other, "curve": {**curve, "law": None}}]}
+
+
 KINDS = {
     "effect": effect,
     "two_effects": two_effects,
     "parameter": other_values,
     "none": none,
     "unknown": unknown,
+    "drafted": drafted,
 }
 
 

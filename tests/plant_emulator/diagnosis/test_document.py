@@ -30,3 +30,8 @@ def test_map_of_the_document_holds_the_phases_only() -> None:
     location = replace(answer.location, cells=(*answer.location.cells, other))
     written = to_json(replace(answer, location=location))
     assert written["location"]["map"] == answers.place()["map"]
+
+
+def test_drafts_that_were_read_are_written_as_they_were() -> None:
+    document = {**answers.effect(), "drafts": answers.drafted()["drafts"]}
+    assert json.dumps(to_json(from_json(document))) == json.dumps(document)

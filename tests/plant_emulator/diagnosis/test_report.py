@@ -66,7 +66,8 @@ def test_each_picture_and_each_table_stands_once(kind):
     root = page(kind)
     told = [s.get("aria-label") for s in root.iter("svg") if s.get("role") == "img"]
     captions = [words(c) for c in root.iter("caption")]
-    assert len(told) == len(set(told)) == 1 + len(answers.CHANNELS)
+    curves = len(answers.KINDS[kind]().get("drafts", ()))
+    assert len(told) == len(set(told)) == 1 + len(answers.CHANNELS) + curves
     assert len(captions) == len(set(captions))
 
 
@@ -335,3 +336,12 @@ def test_search_and_noise_stand_in_tables() -> None:
     assert "380 (simulation), 402 (relations)" in found
     assert "50.02 Hz, 100.04 Hz" in found
     assert "30 ms" in found
+
+
+def test_draft_is_drawn_with_its_curve_band_law_and_rivals():
+    found = section(page("drafted"), "The missing law, drafted")
+    best, other = found.findall("figure")
+    assert [p.get("class") for p in best.iter("path")] == ["after", "edge", "edge", "before"]
+    assert [p.get("class") for p in other.iter("path")] == ["after", "edge", "edge"]
+    assert "rivals: -8.2 sqrt(w) N m" in words(found)
+    assert "drafts/draft_gear_1.py" in words(found)

@@ -217,3 +217,18 @@ def test_advice_for_two_rivals_is_told_whole():
     )
     told = " ".join(" ".join(lines(answer)).split())
     assert answer["verdict"]["next_experiment"] in told
+
+
+def test_draft_says_its_law_what_it_closes_and_the_rival():
+    rows = lines(answers.drafted())
+    k = next(k for k, row in enumerate(rows) if row.startswith("draft "))
+    told = " ".join(" ".join(rows[k : k + 3]).split())
+    assert "friction of the gear at its output: -31.4 exp(-(w/0.5)^2) N m" in told
+    assert "closes 81 % (77 % to 84 %) of the held-out gap; at best 90 %" in told
+    assert "rivals -8.2 sqrt(w) N m; file drafts/draft_gear_1.py" in told
+
+
+def test_no_draft_is_told_only_where_one_was_asked_for():
+    asked = {**answers.unknown(), "drafts": []}
+    assert any(row.startswith("draft ") for row in lines(asked))
+    assert not any(row.startswith("draft ") for row in lines(answers.unknown()))

@@ -50,7 +50,7 @@ def diagnosis(name: str, **states: tuple[float, ...]) -> Findings:
 def test_mean_of_angles_is_on_the_circle(
     nominal: ParameterSet, phases: tuple[float, ...], mean: float
 ) -> None:
-    saved = parameter_set(diagnosis("gear_eccentricity", phase=phases), nominal, [])
+    saved = parameter_set(diagnosis("gear_eccentricity", phase=phases), nominal, [], {})
     apart = saved.effects["gear_eccentricity"]["phase"] - mean
     assert np.cos(apart) == pytest.approx(1.0)
 
@@ -60,7 +60,7 @@ def test_shell_is_saved_as_warm_as_it_was_measured(
 ) -> None:
     log = bench_log("bench_practice/practice_004/program2")
     found = diagnosis("gear_oil_temperature", start_temperature=(300.0, 310.0))
-    own = parameter_set(found, nominal, [recording(log)]).effects["gear_oil_temperature"]
+    own = parameter_set(found, nominal, [recording(log)], {}).effects["gear_oil_temperature"]
     assert own["start_temperature"] == 305.0
     # 32.06 degC in the log's first row, and it warms by less than 2 K
     assert own["shell_temperature"] == pytest.approx(273.15 + 33.0, abs=1.5)
