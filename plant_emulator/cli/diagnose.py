@@ -143,7 +143,8 @@ def _write_next_program(found: Diagnosis, path: str) -> None:
     from plant_emulator.workflows.next_program import write_next_program
 
     try:
-        words = write_next_program(found.answer.verdict.next_experiment, path)
+        own = found.drafted.next_program if found.drafted else None
+        words = write_next_program(found.answer.verdict.next_experiment, path, own)
     except ParameterError as error:
         click.echo(f"note: {path} not written: {error}", err=True)
     else:
@@ -156,7 +157,7 @@ def _save(found: Diagnosis, path: str) -> None:
 
     parameter_sets.save(found.parameter_set, path)
     verdict = found.answer.verdict
-    if verdict.kind == "unknown" and found.drafted.drafts:
+    if verdict.kind == "unknown" and found.answer.drafts:
         click.echo(f"note: {path}: the cause is unknown; the draft is in it", err=True)
     elif verdict.kind == "unknown":
         click.echo(

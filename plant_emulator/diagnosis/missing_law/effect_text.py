@@ -87,8 +87,15 @@ def _parameters(law: Law) -> list[str]:
 
 
 def _unit(law: Law, term: Term) -> str:
-    below = " ".join(f.state.unit for f in term.factors if f.function in {"linear", "size", "lag"})
-    return f"{law.quantity.unit}/({below})" if below.strip() else law.quantity.unit
+    """Unit of a term's coefficient: that of the quantity over those of the factors."""
+    powers = {"linear": "{}", "size": "{}", "delay": "{}", "lag": "{}", "square": "({})^2"}
+    powers["root"] = "({})^0.5"
+    below = [
+        powers[factor.function].format(factor.state.unit)
+        for factor in term.factors
+        if factor.state.unit and factor.function in powers
+    ]
+    return f"{law.quantity.unit}/({' '.join(below)})" if below else law.quantity.unit
 
 
 def _shape(k: int, j: int, factor: Factor) -> str:
@@ -177,6 +184,8 @@ def _product(name: str, k: int, term: Term) -> str:
 
 def _code(name: str, here: str, factor: Factor) -> str:
     x, b = f"({factor.state.code})", f"p.{name}_b{here}"
+    if factor.state.kind == "level" and factor.function in {"square", "root"}:
+        return f"{x} * {x}" if factor.function == "square" else f"sqrt{x}"
     return {
         "linear": x,
         "size": f"abs{x}",

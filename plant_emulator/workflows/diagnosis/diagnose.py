@@ -17,6 +17,7 @@ from plant_emulator.diagnosis.wording import KINDS, percent
 from plant_emulator.errors import DiagnosisError, report_unwritable
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.parameter_sets import DEFAULT, with_effects
+from plant_emulator.simulation.programs import describe
 from plant_emulator.workflows.arguments import (
     check_choice,
     check_count,
@@ -26,7 +27,7 @@ from plant_emulator.workflows.arguments import (
     list_sources,
 )
 from plant_emulator.workflows.diagnosis.calibration import load_model_form_errors, trial_cases
-from plant_emulator.workflows.diagnosis.drafting import NOTHING, Drafted
+from plant_emulator.workflows.diagnosis.drafting import Drafted
 from plant_emulator.workflows.diagnosis.drafting import draft as draft_law
 from plant_emulator.workflows.diagnosis.runs import axis_runs, bench_runs
 from plant_emulator.workflows.diagnosis.saved_set import parameter_set
@@ -53,14 +54,14 @@ class Diagnosis:
     given : the parameter set that was diagnosed; None: the machine is a single axis
     fitted : the runs of the bench that were not held out
     effect_files : of the user's own effects, absolute
-    drafted : drafts of a missing law, with their fits
+    drafted : drafts of a missing law, with their fits; None: nobody asked, or it cannot be done
     """
 
     findings: Findings
     given: ParameterSet | None
     fitted: tuple[Recording, ...]
     effect_files: tuple[str, ...] = ()
-    drafted: Drafted = NOTHING
+    drafted: Drafted | None = None
 
     @property
     def answer(self) -> Answer:
@@ -81,7 +82,7 @@ class Diagnosis:
         if self.given is None:
             raise DiagnosisError("a single axis has no parameter set")
         findings, files = self.findings, {Path(file).stem: file for file in self.effect_files}
-        if self.drafted.fits and not self.answer.verdict.effects:
+        if self.drafted and self.drafted.fits and not self.answer.verdict.effects:
             file, fit = self.drafted.drafts[0].file, self.drafted.fits[0]
             files[Path(file).stem] = file
             findings = replace(findings, final=fit, fixed={Path(file).stem: {}})
@@ -196,14 +197,21 @@ def diagnose(
 
 def _with_drafts(
     findings: Findings, runs: Runs, pool: Pool, wanted: str, folder: Path
-) -> tuple[Findings, Drafted]:
+) -> tuple[Findings, Drafted | None]:
     """The findings with the drafts of a missing law, if these are wanted."""
     verdict = findings.answer.verdict
     if wanted == "never" or (wanted == "unknown" and verdict.kind != "unknown"):
-        return findings, NOTHING
+        return findings, None
     null = None if findings.final.effects else findings.final
     drafted = draft_law(runs, null, pool, folder)
-    return replace(findings, answer=replace(findings.answer, drafts=drafted.drafts)), drafted
+    if drafted is None:
+        return findings, None
+    if drafted.next_program is not None:
+        names = " from ".join(Path(one.file).stem for one in drafted.drafts[:2])
+        advised = f"drive {describe(drafted.next_program)}: it separates {names}"
+        verdict = replace(verdict, next_experiment=advised)
+    answer = replace(findings.answer, verdict=verdict, drafts=drafted.drafts)
+    return replace(findings, answer=answer), drafted
 
 
 def _set(parameters: ParameterSet | str | Path, effect_files: Sequence[str | Path]) -> ParameterSet:

@@ -15,7 +15,9 @@ from plant_emulator.diagnosis.machines.bench import BenchModel, BenchRecipe
 from plant_emulator.diagnosis.missing_law.contest import Entry, hold
 from plant_emulator.diagnosis.missing_law.draft import sketches
 from plant_emulator.diagnosis.missing_law.effect_text import effect_text
+from plant_emulator.diagnosis.missing_law.next_run import best_separation
 from plant_emulator.errors import report_unwritable
+from plant_emulator.simulation.simulate import values_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.missing_law.contest import Result
     from plant_emulator.diagnosis.missing_law.draft import Sketch
     from plant_emulator.diagnosis.missing_law.law_search import Law
+    from plant_emulator.recordings.recording import Recording
+    from plant_emulator.simulation.programs import SpeedProgram
     from plant_emulator.workflows.diagnosis.runs import Runs
 
 # Share of the gap that a longer law has to close more than a shorter one.
@@ -34,32 +38,33 @@ WORTH_A_TERM = 0.02
 
 @dataclass(frozen=True, kw_only=True)
 class Drafted:
-    """The drafts, the best one first, and the joint fit of each; see `answer.Draft`."""
+    """The drafts, the best one first, and the joint fit of each; see `answer.Draft`.
+
+    next_program : the drive program that separates the two best drafts; None: there is one draft
+    """
 
     drafts: tuple[Draft, ...] = ()
     fits: tuple[FitResult, ...] = ()
+    next_program: SpeedProgram | None = None
 
 
-NOTHING = Drafted()
-
-
-def draft(runs: Runs, null: FitResult | None, pool: Pool, folder: Path) -> Drafted:
-    """Draft the missing law of these runs of the bench; nothing where no law closes a gap.
+def draft(runs: Runs, null: FitResult | None, pool: Pool, folder: Path) -> Drafted | None:
+    """Draft the missing law of these runs of the bench; no drafts where no law closes a gap.
 
     null : converged fit without effects; None: it is made here
     folder : of the effect files, one a draft
-    A bench whose set has effects gets no draft, because the relations know the nominal equations
-    only. Nor does a single run, because other runs judge a law.
+    None: it cannot be done. The relations know the nominal equations of the bench only, without
+    effects of a set; and other runs judge a law, so that a single run is not enough.
     Raises InputError where a file cannot be written.
     """
     recipe = runs.recipe
     if not isinstance(recipe, BenchRecipe) or recipe.parameters.effects or len(runs.fitted) < 2:
-        return NOTHING
+        return None
     if null is None:
         null = fit_null(BenchModel(runs.fitted, recipe.parameters, {}), range(len(runs.fitted)))
     found = sketches(runs.fitted, recipe.parameters, null)
     if not found:
-        return NOTHING
+        return Drafted()
     files = _write(found, folder)
     own = replace(recipe, without=_library(recipe), own=(*recipe.own, *files))
     runner = TaskRunner(pool=pool, recipe=own, model=build_model(own), runs=runs.plan.fitted)
@@ -67,7 +72,20 @@ def draft(runs: Runs, null: FitResult | None, pool: Pool, folder: Path) -> Draft
         Entry(effect=file.stem, values=one.law.parameters, null=null, runs=runs.plan.fitted)
         for one, file in zip(found, files, strict=True)
     ]
-    return _ranked(found, files, hold(runner, runs.plan, entries))
+    drafted = _ranked(found, files, hold(runner, runs.plan, entries))
+    return replace(drafted, next_program=_next_program(runs.fitted, recipe, drafted.fits))
+
+
+def _next_program(
+    recordings: Sequence[Recording], recipe: BenchRecipe, fits: Sequence[FitResult]
+) -> SpeedProgram | None:
+    """The drive program in which the two best drafts differ most."""
+    if len(fits) < 2:
+        return None
+    known = values_of(recipe.parameters)
+    one, other = ({**known, **fit.values, **fit.states[-1]} for fit in fits[:2])
+    found = best_separation(recordings, one, other)
+    return None if found is None else found.program
 
 
 def _library(recipe: BenchRecipe) -> tuple[str, ...]:

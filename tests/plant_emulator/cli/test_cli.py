@@ -205,6 +205,7 @@ def test_effects_as_json_hold_every_parameter_with_its_unit(command: Command) ->
         (("validate",), "LOG"),
         (("validate", PROGRAM1, "--start", "left"), "left"),
         (("effects", "gear_ghost"), "effect gear_ghost: unknown; known: armature_reaction"),
+        (("draft-check", "ghost.py", NOISY), "ghost.py: no Python file with an effect"),
         (("simulate", "--program", "program1", "--json", "-"), "--json"),
     ],
 )  # fmt: skip

@@ -1,0 +1,96 @@
+"""The contest for an effect file that a person wrote: what it closes of the gap of some logs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from threadpoolctl import threadpool_limits
+
+from plant_emulator import effects
+from plant_emulator.diagnosis.answer import Quantity
+from plant_emulator.diagnosis.execution.pool import InProcess, TaskRunner, build_model
+from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.missing_law.contest import Entry, hold
+from plant_emulator.diagnosis.wording import percent, size
+from plant_emulator.parameter_sets import DEFAULT, with_effects
+from plant_emulator.workflows.diagnosis.runs import bench_runs
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+SCHEMA = "draft-check/1"
+
+
+@dataclass(frozen=True, kw_only=True)
+class DraftCheck:
+    """What an effect file closes of the held-out gap; each log is held out in turn.
+
+    mean_square : of the residual that the joint fit leaves, over the noise [1]
+    """
+
+    effect: str
+    parameters: tuple[Quantity, ...]
+    mean_square: float
+    held_out_gain: float | None
+    held_out_gain_ci95: tuple[float, float] | None
+
+    def to_json(self) -> dict[str, Any]:
+        """The document `draft-check/1`."""
+        return {
+            "schema": SCHEMA,
+            "effect": self.effect,
+            "parameters": [vars(one) for one in self.parameters],
+            "mean_square": self.mean_square,
+            "held_out_gain": self.held_out_gain,
+            "held_out_gain_ci95": self.held_out_gain_ci95,
+        }
+
+    def to_text(self) -> str:
+        """A line for the share of the gap, and one for every size."""
+        closed = "no gap that it could close"
+        if self.held_out_gain is not None and self.held_out_gain_ci95 is not None:
+            low, high = map(percent, self.held_out_gain_ci95)
+            closed = f"closes {percent(self.held_out_gain)} ({low} to {high}) of the held-out gap"
+        left = f"leaves {self.mean_square:.3g} times the noise's squares"
+        rows = [f"  {one.name} {size(one)}" for one in self.parameters]
+        return "\n".join([f"{self.effect}: {closed}, {left}", *rows])
+
+    def __str__(self) -> str:
+        return self.to_text()
+
+
+def draft_check(
+    file: str | Path, logs: Sequence[str | Path], *, parameters: str | Path = DEFAULT
+) -> DraftCheck:
+    """Fit the effect of a file to logs, and predict each log from the others with it.
+
+    Raises InputError for a file, a log or a set that cannot be used.
+    """
+    (own,) = effects.from_files([Path(file)])
+    runs = bench_runs(
+        logs, (), with_effects.load(parameters), without=effects.names(), effect_files=[file]
+    )
+    model = build_model(runs.recipe)
+    runner = TaskRunner(pool=InProcess(), recipe=runs.recipe, model=model, runs=runs.plan.fitted)
+    with threadpool_limits(1):
+        null = fit_null(model, runs.plan.fitted)
+        entry = Entry(effect=own.name, values={}, null=null, runs=runs.plan.fitted)
+        (found,) = hold(runner, runs.plan, [entry])
+    candidate = model.candidates[own.name]
+    return DraftCheck(
+        effect=own.name,
+        parameters=tuple(
+            Quantity(
+                name=u.name.removeprefix(f"{own.name}_"),
+                value=found.fit.values[u.name],
+                standard_error=found.fit.standard_errors[u.name],
+                unit=candidate.units[u.name],
+            )
+            for u in (*candidate.sizes, *candidate.shapes)
+        ),
+        mean_square=found.fit.mean_square,
+        held_out_gain=found.gain,
+        held_out_gain_ci95=found.interval,
+    )

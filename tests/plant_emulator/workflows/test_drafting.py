@@ -1,0 +1,55 @@
+"""A missing law from the logs to a saved set: drafted, tried on held-out runs, saved, simulated."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from plant_emulator import effects, parameter_sets
+from plant_emulator.diagnosis.diagnose import Findings
+from plant_emulator.diagnosis.execution.pool import InProcess
+from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.machines.bench import BenchModel
+from plant_emulator.diagnosis.report.document import from_json
+from plant_emulator.model.parameters import ParameterSet
+from plant_emulator.parameter_sets import with_effects
+from plant_emulator.workflows.diagnosis.diagnose import Diagnosis
+from plant_emulator.workflows.diagnosis.drafting import draft
+from plant_emulator.workflows.diagnosis.runs import bench_runs
+from plant_emulator.workflows.validation import validate
+from tests.plant_emulator.diagnosis import answers
+
+FOLDER = Path(__file__).parents[2] / "data" / "bench_practice"
+
+
+@pytest.mark.slow
+def test_lag_of_the_torque_sensor_is_drafted_saved_and_simulated(
+    nominal: ParameterSet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(effects, "_of_sets", {})
+    logs = [FOLDER / "practice_003" / f"program{k}.csv.gz" for k in (1, 2, 3)]
+    runs = bench_runs(logs[:2], (), nominal)
+    null = fit_null(BenchModel(runs.fitted, nominal, {}), range(2))
+    found = draft(runs, null, InProcess(), tmp_path / "drafts")
+    assert found is not None
+    best = found.drafts[0]
+    assert best.place == "torque_sensor"
+    assert best.over == "shaft torque"
+    assert best.held_out_gain == pytest.approx(1.0, abs=0.05)
+    assert best.bound is not None
+    assert best.bound >= best.held_out_gain
+
+    answer = replace(from_json(answers.unknown()), drafts=found.drafts)
+    findings = Findings(answer=answer, details=None, final=null, fixed={})  # type: ignore[arg-type]
+    whole = Diagnosis(findings=findings, given=nominal, fitted=runs.fitted, drafted=found)
+    parameter_sets.save(whole.parameter_set, tmp_path / "bench.toml")
+    assert 'file = "drafts/' in (tmp_path / "bench.toml").read_text()
+
+    # the third run, which nothing was fitted to: the sensor's noise is 0.25 N m
+    errors = [
+        validate([logs[2]], parameters=one).to_json()["logs"][str(logs[2])]["shaft_torque"]["nrmsd"]
+        for one in (nominal.with_values(null.values), with_effects.load(tmp_path / "bench.toml"))
+    ]
+    assert errors[1] < 0.5 * errors[0]
+    assert np.isfinite(errors).all()
