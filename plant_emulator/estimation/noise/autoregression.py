@@ -131,17 +131,20 @@ def levinson(covariance: Array) -> tuple[list[Array], list[float]]:
 
 
 def fit_autoregression(
-    runs: Sequence[Array], times: Sequence[Array], longest: int, price: float
+    runs: Sequence[Array], times: Sequence[Array], longest: int, price: float, least: float = 0.0
 ) -> Autoregression:
     """Fit the autoregression of the least criterion n log(variance) + order * price.
 
     runs, times : residual and time [s] of the samples that count, by run
     longest : highest order; price : of an order, 2 after Akaike and log n after Schwarz
+    least : deviation of white noise that is there in any case
     """
     count = sum(map(len, runs))
     known = [samples_since_break(t) for t in times]
     longest = min(longest, max(0, count // 4))
-    predictors, variances = levinson(autocovariance(runs, known, longest))
+    covariance = autocovariance(runs, known, longest)
+    covariance[0] += least**2
+    predictors, variances = levinson(covariance)
     criteria = [count * np.log(max(v, 1e-300)) + m * price for m, v in enumerate(variances)]
     order = int(np.argmin(criteria))
     return Autoregression(

@@ -26,7 +26,10 @@ EVIDENCE = 15.0
 
 
 def outlying(value: Array, use: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Mark single samples far from both neighbours, which lie near each other; shape (n,)."""
+    """Mark single samples far from both neighbours, which lie near each other; shape (n,).
+
+    value : in the declared noise
+    """
     index = np.flatnonzero(use)
     found = np.zeros(len(value), bool)
     if len(index) < 5:
@@ -34,7 +37,8 @@ def outlying(value: Array, use: NDArray[np.bool_]) -> NDArray[np.bool_]:
     v = value[index]
     off = np.abs(v[1:-1] - 0.5 * (v[2:] + v[:-2]))
     apart = np.abs(v[2:] - v[:-2])
-    usual = 1.4826 * float(np.median(off))
+    # A coarse channel that stands still has no departure at all.
+    usual = max(1.0, 1.4826 * float(np.median(off)))
     found[index[1:-1]] = (off > OUTLYING * usual) & (apart < NEIGHBOURS * off)
     return found
 

@@ -45,6 +45,9 @@ ORDER, LONG_ORDER = 12, 60
 BLOCK, LOUD = 50, 2.0
 # The quiet blocks: this quantile of the blocks' mean squares, and its value for white noise.
 QUIET, QUIET_SQUARE = 0.25, 0.86
+# Deviation of the white noise that there is in any case, in the declared noise: a coarse channel
+# that stands still shows none. A block that shows less says nothing of the noise.
+LEAST = 0.1
 # Times that the quiet blocks are looked for; the last time changed them little.
 PASSES = 4
 
@@ -126,7 +129,7 @@ def _autoregression(
     runs = [v[use] for v, use in zip(values, uses, strict=True)]
     times = [s.time[use] for s, use in zip(series, uses, strict=True)]
     price = float(np.log(max(3, sum(map(len, runs))))) if longest == ORDER else 2.0
-    return fit_autoregression(runs, times, longest, price)
+    return fit_autoregression(runs, times, longest, price, LEAST)
 
 
 def _quiet(
@@ -139,9 +142,14 @@ def _quiet(
         for s, v, use in zip(series, values, uses, strict=True)
     ]
     squares, blocks = _block_squares(left, uses)
-    level = float(np.quantile(np.concatenate(squares), QUIET)) / QUIET_SQUARE
+    least = (LEAST / colour.innovation_deviation) ** 2
+    alive = np.concatenate(squares)
+    alive = alive[alive > least]
+    if len(alive) == 0:
+        return list(uses)
+    level = float(np.quantile(alive, QUIET)) / QUIET_SQUARE
     return [
-        use & (square <= LOUD * level)[block]
+        use & ((square > least) & (square <= LOUD * level))[block]
         for use, square, block in zip(uses, squares, blocks, strict=True)
     ]
 

@@ -157,3 +157,17 @@ def test_a_run_shorter_than_a_lag_adds_nothing_to_its_autocovariance() -> None:
     known = [np.arange(40), np.arange(3)]
     alone = autocovariance([long], known[:1], 10)
     assert autocovariance([long, short], known, 10) == pytest.approx(alone)
+
+
+def test_coarse_channel_that_stands_still_keeps_the_noise_of_its_motion() -> None:
+    value = white(6000, 18)
+    value[:3600] = 0.0
+    noise, (whitener,) = estimate_channel_noise([series(value)])
+    assert noise.deviation == pytest.approx(1.0, abs=0.06)
+    assert np.mean(whitener.white(value)[3600:] ** 2) == pytest.approx(1.0, abs=0.1)
+
+
+def test_channel_without_noise_is_whitened_by_the_least_that_there_is() -> None:
+    noise, (whitener,) = estimate_channel_noise([series(np.zeros(2000))])
+    assert noise.deviation == pytest.approx(0.1)
+    assert np.isfinite(whitener.white(np.ones(2000))).all()
