@@ -72,3 +72,7 @@ class Reason(IntEnum):
     EXCEPTION_9 = 109, "exception 9"
     EXCEPTION_10 = 110, "exception 10, gateway path unavailable"
     EXCEPTION_11 = 111, "exception 11, gateway target device failed to respond"
+
+
+BY_OPERATOR = frozenset({Reason.STOP_REQUESTED, Reason.REMOTE_OFF})
+"""Reasons for which an operator ends a run; any other is a trip."""

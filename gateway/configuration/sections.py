@@ -186,9 +186,17 @@ class PlausibilityConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class RecordingConfig:
-    """Folder of the recordings."""
+    """Folder of the recordings.
+
+    rotate_size, rotate_time : at which a part of a recording ends [bytes, s]
+    keep_age, keep_size : above which old recordings are removed [s, bytes]; None: never
+    """
 
     dir: str = declare("dir", "recordings")
+    rotate_size: float = declare("rotate_MB", 256.0, scale=1e6, lower=0.1, upper=2000.0)
+    rotate_time: float = declare("rotate_h", 1.0, scale=3600.0, lower=0.001, upper=1000.0)
+    keep_age: float | None = declare("keep_days", None, scale=86400.0, lower=0.01, upper=1e4)
+    keep_size: float | None = declare("keep_GB", None, scale=1e9, lower=0.001, upper=1e6)
 
 
 @dataclass(frozen=True, kw_only=True)

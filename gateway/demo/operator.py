@@ -26,7 +26,8 @@ from gateway.errors import GatewayError
 from gateway.link.plc import TcpLink
 from gateway.recordings import recording
 from gateway.recordings.header import header
-from gateway.recordings.recording import SUFFIX, encode_header
+from gateway.recordings.parts import SUFFIX
+from gateway.recordings.recording import encode_header
 from gateway.runtime.loop import Loop
 from register_maps.timing import SCAN
 

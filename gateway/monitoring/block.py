@@ -18,7 +18,7 @@ from typing import Any, Final
 
 from gateway.cycle.record import NOTHING, Tick, number
 from gateway.cycle.supervisor import State
-from gateway.reasons import Reason
+from gateway.reasons import BY_OPERATOR, Reason
 
 BOUNDS: Final = (
     *(1e-4, 2e-4, 3e-4, 5e-4, 7e-4, 1e-3, 1.5e-3, 2e-3, 3e-3, 5e-3, 7e-3),
@@ -34,8 +34,6 @@ COUNTER: Final = 8
 SEQUENCE: Final = struct.Struct("<Q")
 CHANGE: Final = struct.Struct("<QdQQQ")
 PLACE: Final = {code: index for index, code in enumerate(CODES)}
-BY_OPERATOR: Final = frozenset({Reason.STOP_REQUESTED, Reason.REMOTE_OFF})
-"""Reasons that are no trip."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,9 +20,10 @@ from typing import Any, Final
 from gateway.cycle.supervisor import State
 from gateway.errors import ConfigError
 from gateway.monitoring import metrics, page, terminal
-from gateway.monitoring.block import BY_OPERATOR, Snapshot
+from gateway.monitoring.block import Snapshot
 from gateway.monitoring.lines import reason_text
 from gateway.monitoring.shared import Observer
+from gateway.reasons import BY_OPERATOR
 
 PLACE: Final = "[metrics] address"
 ADDRESS: Final = re.compile(r"(?P<host>\[[0-9a-fA-F:]+\]|[\w.-]+):(?P<port>\d{1,5})")

@@ -15,32 +15,34 @@ import signal
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
-from io import FileIO
+from contextlib import closing, contextmanager, suppress
+from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from gateway.cycle.record import Layout
 from gateway.errors import GatewayError
+from gateway.recordings.parts import Keeping, Parts
 from gateway.recordings.recording import RecordingError, encode_header
+from gateway.recordings.triggers import Trips, Wait
 
 BATCH: Final = 0.05
 """[s] Period of writing to the file."""
-SYNC: Final = 1.0
-"""[s] Period of synchronising the file with the disk."""
 PIPE_SIZE: Final = 1 << 20
 """[bytes] About 10 s of records at 100 Hz: the disk may be busy so long before one is dropped."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Job:
-    """Task of the recorder's process: file, header and layout."""
+    """Task of the recorder's process: file, header, layout, and what is kept."""
 
     path: Path
     header: dict[str, Any]
     layout: Layout
+    keeping: Keeping = field(default_factory=Keeping)
 
 
 class Recorder:
@@ -126,21 +128,18 @@ def record(receiver: Connection, job: Job) -> None:
 
 
 def _append(receiver: Connection, job: Job) -> None:
-    with job.path.open("ab", buffering=0) as file:
-        synced = time.monotonic()
+    head, fields = encode_header(job.header), job.layout.formats
+    wait, kind = Wait(fields), np.dtype(fields)
+    with (
+        closing(Parts(job.path, head, job.keeping)) as parts,
+        closing(Trips(job.path, head, fields)) as trips,
+    ):
         for batch in _batches(receiver.fileno(), job.layout.size):
-            _write(file, batch)
-            if time.monotonic() - synced > SYNC:
-                os.fdatasync(file.fileno())
-                synced = time.monotonic()
-        os.fsync(file.fileno())
-
-
-def _write(file: FileIO, batch: bytes) -> None:
-    """Write the whole batch; a disk that fills up takes a part first, without an error."""
-    left = memoryview(batch)
-    while left:
-        left = left[file.write(left) :]
+            if batch:
+                last = float(np.frombuffer(batch, kind)["now"][-1])
+                parts.write(wait.passed(batch), last)
+                trips.take(batch)
+        parts.write(wait.rest(), 0.0)
 
 
 def _batches(source: int, size: int) -> Iterator[bytes]:

@@ -10,9 +10,8 @@ refused.
 """
 
 import json
-import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO, Final
 
@@ -21,8 +20,8 @@ import numpy as np
 from gateway.cycle.record import MAGIC, NOTHING, Layout, is_intact
 from gateway.cycle.supervisor import State
 from gateway.errors import ConfigError
+from gateway.recordings.parts import SUFFIX, following, open_plain_or_compressed, plain_size
 
-SUFFIX: Final = ".rlrec"
 SCHEMA: Final = "recording/1"
 CHUNK: Final = 1000
 PIECE: Final = 5000
@@ -97,10 +96,25 @@ def encode_header(header: dict[str, Any]) -> bytes:
 
 
 def read(path: Path) -> Recording:
-    """Recording in a file. Raises RecordingError, and DamageError for a damaged record."""
+    """Recording in a file; the file of its first part stands for the whole run.
+
+    Raises RecordingError, and DamageError for a damaged record.
+    """
+    first, *others = [_read_part(one) for one in (path, *following(path))]
+    if not others:
+        return first
+    return replace(
+        first,
+        records=np.concatenate([first.records, *(one.records for one in others)]),
+        note="; ".join(one.note for one in (first, *others) if one.note),
+    )
+
+
+def _read_part(path: Path) -> Recording:
     try:
-        content = path.read_bytes()
-    except OSError as error:
+        with open_plain_or_compressed(path) as file:
+            content = file.read()
+    except (OSError, EOFError) as error:
         raise _unreadable(path, error) from error
     header, start = _header(path, content)
     layout = Layout(read_count=header["read_count"], write_count=header["write_count"])
@@ -115,7 +129,10 @@ def read(path: Path) -> Recording:
 
 @dataclass(frozen=True, kw_only=True)
 class Stream:
-    """A recording that is read piece by piece; every reading begins at its first record."""
+    """A recording that is read piece by piece; every reading begins at its first record.
+
+    parts : the streams of the parts that follow in the same run
+    """
 
     path: Path
     header: dict[str, Any]
@@ -123,14 +140,20 @@ class Stream:
     start: int
     note: str
     count: int
+    parts: "tuple[Stream, ...]" = ()
 
     def __len__(self) -> int:
-        return self.count
+        return self.count + sum(map(len, self.parts))
 
     def chunks(self) -> "Iterator[np.ndarray[Any, np.dtype[np.void]]]":
         """The records, some at a time. Raises DamageError for a damaged one."""
+        yield from self._chunks()
+        for part in self.parts:
+            yield from part.chunks()
+
+    def _chunks(self) -> "Iterator[np.ndarray[Any, np.dtype[np.void]]]":
         size, tick = self.layout.size, 0
-        with self.path.open("rb") as file:
+        with open_plain_or_compressed(self.path) as file:
             file.seek(self.start)
             for first in range(0, self.count, PIECE):
                 body = file.read(min(PIECE, self.count - first) * size)
@@ -141,14 +164,23 @@ class Stream:
 
 
 def stream(path: Path) -> Stream:
-    """The recording in a file, without its records. Raises RecordingError."""
+    """The recording in a file, without its records; the first part stands for the whole run.
+
+    Raises RecordingError.
+    """
+    first, *others = [_stream_part(one) for one in (path, *following(path))]
+    note = "; ".join(one.note for one in (first, *others) if one.note)
+    return replace(first, parts=tuple(others), note=note)
+
+
+def _stream_part(path: Path) -> Stream:
     try:
-        with path.open("rb") as file:
+        with open_plain_or_compressed(path) as file:
             head = file.read(HEAD)
             length = int.from_bytes(head[len(MAGIC) : len(MAGIC) + 4], "little")
             header, start = _header(path, head + file.read(length))
             layout = Layout(read_count=header["read_count"], write_count=header["write_count"])
-            end = file.seek(0, os.SEEK_END)
+            end = plain_size(path)
             whole = _whole_records(file, start, end, layout.size)
     except OSError as error:
         raise _unreadable(path, error) from error
@@ -173,9 +205,11 @@ def _whole_records(file: BinaryIO, start: int, end: int, size: int) -> int:
     return max(0, count - 1) + _count_finished(file.read(size), size)
 
 
-def _unreadable(path: Path, error: OSError) -> RecordingError:
+def _unreadable(path: Path, error: OSError | EOFError) -> RecordingError:
     return RecordingError(
-        error.strerror or "cannot be read", file=path, expected=f"a recording ({SUFFIX})"
+        getattr(error, "strerror", None) or "cannot be read",
+        file=path,
+        expected=f"a recording ({SUFFIX})",
     )
 
 
@@ -212,11 +246,13 @@ def _check(
 def is_recording(path: Path) -> bool:
     """Whether the file begins like a recording. Raises RecordingError if it cannot be read."""
     try:
-        with path.open("rb") as file:
-            return file.read(len(MAGIC)) == MAGIC
-    except OSError as error:
+        with open_plain_or_compressed(path) as file:
+            return bool(file.read(len(MAGIC)) == MAGIC)
+    except (OSError, EOFError) as error:
         raise RecordingError(
-            error.strerror or "cannot be read", file=path, expected="a log or a recording"
+            getattr(error, "strerror", None) or "cannot be read",
+            file=path,
+            expected="a log or a recording",
         ) from error
 
 

@@ -18,18 +18,18 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.configuration.config import Config
+from gateway.configuration.sections import RecordingConfig
 from gateway.cycle.cycle import Output
 from gateway.cycle.record import Layout, Tick
 from gateway.cycle.supervisor import State
 from gateway.errors import GatewayError
 from gateway.link.plc import TcpLink
 from gateway.monitoring import metrics, server, terminal
-from gateway.monitoring.block import BY_OPERATOR
 from gateway.monitoring.shared import Publisher
-from gateway.reasons import Reason
+from gateway.reasons import BY_OPERATOR, Reason
 from gateway.recordings.header import header
+from gateway.recordings.parts import SUFFIX, Keeping
 from gateway.recordings.recorder import Job, Recorder
-from gateway.recordings.recording import SUFFIX
 from gateway.runtime.companion import Companion
 from gateway.runtime.loop import Loop, MonotonicClock
 from gateway.runtime.notify import Notifier
@@ -113,7 +113,12 @@ def run(
         started = time.monotonic()
         stop = _Stop(None if duration is None else started + duration)
         head = header(config, register_map, started=started, shadow=shadow, real_time=real)
-        job = Job(path=_new_file(config), header=head, layout=Layout.of(register_map))
+        job = Job(
+            path=_new_file(config),
+            header=head,
+            layout=Layout.of(register_map),
+            keeping=_keeping(config.recording),
+        )
         listener = _listener(config)
         with _signals(stop), closing(Recorder(job)) as recorder, ExitStack() as beside:
             publisher = beside.enter_context(Publisher(_identity(job)))
@@ -153,6 +158,15 @@ def _listener(config: Config) -> socket.socket | None:
         return None
     metrics.require()
     return server.listen(config.metrics.address)
+
+
+def _keeping(recording: RecordingConfig) -> Keeping:
+    return Keeping(
+        size=recording.rotate_size,
+        time=recording.rotate_time,
+        age=recording.keep_age,
+        total=recording.keep_size,
+    )
 
 
 def _identity(job: Job) -> dict[str, Any]:

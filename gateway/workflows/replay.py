@@ -24,7 +24,7 @@ from gateway.offline.figures import Latency, RunFigures, TractionEnergy, cruise_
 from gateway.offline.recording_replay import Difference
 from gateway.recordings import log, recording, steady_runs
 from gateway.recordings.header import config_of, map_of
-from gateway.recordings.recording import Recording
+from gateway.recordings.recording import Recording, RecordingError
 from gateway.reports.replay import describe_comparison, describe_differences
 from gateway.road_load import road_load
 
@@ -98,12 +98,24 @@ def replay(
     """
     path, changes = Path(log_or_recording), dict(values or {})
     if recording.is_recording(path):
-        found = recording.read(path)
+        found = _from_its_start(recording.read(path))
         own = config_of(found.header) if config is None else config_file.as_config(config)
         settings = config_file.with_values(own, changes)
         return _replay_recording(found, settings, is_exact=config is None and not changes)
     settings = config_file.with_values(config_file.as_config(config or Config()), changes)
     return _replay_log(log.read(path), settings)
+
+
+def _from_its_start(found: Recording) -> Recording:
+    """The recording, if it has the first tick of its run. Raises RecordingError."""
+    if len(found) and found.records["tick"][0]:
+        raise RecordingError(
+            "the run began earlier",
+            file=found.path,
+            place=f"tick {found.records['tick'][0]}",
+            expected="the first part of a recording, from which a replay can begin",
+        )
+    return found
 
 
 def _replay_recording(found: Recording, config: Config, *, is_exact: bool) -> Replay:

@@ -71,7 +71,7 @@ class Gateway:
     def rows(self) -> list[dict[str, str]]:
         """The recording as `gateway export` writes it."""
         recordings = self.folder / "recordings"
-        (recording,) = [path for path in recordings.iterdir() if path.suffix != ".csv"]
+        (recording,) = [path for path in recordings.iterdir() if path.suffix == ".rlrec"]
         exported = self.folder / "export.csv"
         subprocess.run(
             [sys.executable, "-m", "gateway", "export", str(recording), "--to", str(exported)],
