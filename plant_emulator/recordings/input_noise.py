@@ -48,6 +48,8 @@ WINDOW = 0.25
 STRETCH, MEMORY = 10.0, 5.0
 # Change of an unknown torque to which the simulation responds linearly [N m at the wheel].
 ERROR_STEP = 10.0
+# Time over which the error of an unknown torque may be the same [s].
+SLOW = 1.0
 # Standard deviation along a direction from which on it counts, in the noise of the sensors.
 COUNTED_DEVIATION = 1.0
 # Of the simulations: a direction need not be known better.
@@ -104,6 +106,8 @@ def noise_directions(
     ]
     if not answers:
         return None
+    if recording.estimated_torque:
+        answers += _slow_answers(answers)
     parts = [
         _strongest([answer[:, first : first + stretch] for answer in answers])
         for first in range(0, base.shape[1], stretch)
@@ -114,6 +118,17 @@ def noise_directions(
         directions=csr_array(block_diag([directions for directions, _ in parts])),
         deviations=np.concatenate([deviations for _, deviations in parts]),
     )
+
+
+def _slow_answers(answers: Sequence[Array]) -> list[Array]:
+    """Responses to errors that all windows of a second have in common, and all of a run.
+
+    A wrong friction makes such an error. Independent windows would hardly have one together.
+    answers : responses to the windows in their order, each of shape (channels, samples)
+    """
+    size = round(SLOW / ERROR_WINDOW)
+    seconds = [np.sum(answers[k : k + size], axis=0) for k in range(0, len(answers), size)]
+    return [*seconds, np.sum(answers, axis=0)]
 
 
 def _window(recording: Recording) -> tuple[int, float, float]:

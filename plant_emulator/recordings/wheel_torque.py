@@ -56,6 +56,8 @@ REACH = 5
 # friction at full speed, which the friction may be off by. After a flight through the gap the drive
 # settles so long, and before it as much of the estimate is uncertain [s].
 LOOSE, BEFORE, AFTER = 150.0, 0.1, 1.0
+# Drum speed below which the gear may stick [rad/s]: a thirtieth of its speed in use.
+CREEPING = 0.2
 # Change of the torque within a window that is a jump [N m at the wheel]: two amperes' worth.
 JUMP = 40.0
 
@@ -100,7 +102,8 @@ def telling(log: Log, p: Mapping[str, float]) -> NDArray[np.bool_]:
 
     Where the gear passes hardly any torque to the drum, the drum may float in the gap or stand with
     its brake on. When it meets the gear again depends on the unknown torque far from linearly.
-    Where the torque jumps within a window, its mean over the window says too little.
+    Where the torque jumps within a window, its mean over the window says too little. Near
+    standstill friction and brake take any torque.
     """
     known, _ = _gear_side(log, p)
     passed = uniform_filter1d(np.append(known, known[-1]), 2 * REACH + 1)
@@ -109,6 +112,7 @@ def telling(log: Log, p: Mapping[str, float]) -> NDArray[np.bool_]:
     window = max(1, round(ERROR_WINDOW / interval))
     jump = np.abs(log[WHEEL_TORQUE][window:] - log[WHEEL_TORQUE][:-window]) > JUMP
     unsure = (np.abs(passed) < LOOSE) | np.append(jump, np.zeros(window, bool))
+    unsure |= np.abs(uniform_filter1d(log["drum_speed"], 2 * REACH + 1)) < CREEPING
     wide = maximum_filter1d(unsure, before + after + 1, origin=(after - before) // 2)
     return np.asarray(~wide)
 
