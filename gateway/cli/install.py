@@ -15,7 +15,13 @@ Examples:
 @click.command(epilog=EXAMPLE)
 @click.option("-c", "--config", type=click.Path(path_type=Path), required=True, help="TOML file")
 @click.option("--print", "printed", is_flag=True, help="print the unit, write nothing")
-@click.option("--to", "folder", type=click.Path(path_type=Path), help="another folder for the unit")
+@click.option(
+    "--to",
+    "folder",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="another folder for the unit",
+)
 def command(config: Path, *, printed: bool, folder: Path | None) -> int:
     """Write gateway.service, which runs this installation with a configuration.
 
