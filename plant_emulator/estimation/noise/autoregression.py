@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 # A step of time over the usual step that breaks a series.
 BREAK = 1.5
-# Largest reflection coefficient: a pole on the unit circle has no variance.
-LARGEST_REFLECTION = 0.9999
+# Least share of the variance that a predictor leaves [1]: no noise is more predictable.
+LEAST_LEFT = 1e-4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,14 +119,21 @@ def autocovariance(runs: Sequence[Array], known: Sequence[NDArray[np.int_]], lon
 
 
 def levinson(covariance: Array) -> tuple[list[Array], list[float]]:
-    """Predictors of all orders, and the variances of their innovations."""
+    """Predictors of the orders 0, 1, ..., and the variances of their innovations.
+
+    An autocovariance of a series with many breaks need not be that of any process. The recursion
+    ends at the order from which on it is not, or predicts nearly all.
+    """
     predictors, variances = [np.zeros(0)], [float(covariance[0])]
     for m in range(1, len(covariance)):
         before = predictors[-1]
         missed = covariance[m] - before @ covariance[m - 1 : 0 : -1]
-        reflection = float(np.clip(missed / variances[-1], -LARGEST_REFLECTION, LARGEST_REFLECTION))
+        reflection = float(missed / variances[-1]) if variances[-1] > 0.0 else 1.0
+        left = variances[-1] * (1.0 - reflection**2)
+        if left < LEAST_LEFT * covariance[0]:
+            break
         predictors.append(np.append(before - reflection * before[::-1], reflection))
-        variances.append(variances[-1] * (1.0 - reflection**2))
+        variances.append(left)
     return predictors, variances
 
 

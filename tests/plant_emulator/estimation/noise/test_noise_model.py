@@ -171,3 +171,10 @@ def test_channel_without_noise_is_whitened_by_the_least_that_there_is() -> None:
     noise, (whitener,) = estimate_channel_noise([series(np.zeros(2000))])
     assert noise.deviation == pytest.approx(0.1)
     assert np.isfinite(whitener.white(np.ones(2000))).all()
+
+
+def test_levinson_ends_where_no_process_has_such_an_autocovariance() -> None:
+    """By hand: 1 and 0.5 leave 0.75; -1 at a lag of 2 would need a reflection of -1.67."""
+    predictors, variances = levinson(np.array([1.0, 0.5, -1.0, 0.3]))
+    assert variances == pytest.approx([1.0, 0.75])
+    assert len(predictors) == 2
