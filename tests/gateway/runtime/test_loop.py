@@ -14,9 +14,10 @@ from gateway.errors import BugError
 from gateway.link.plc import LinkError, TcpLink
 from gateway.offline import recording_replay
 from gateway.reasons import Reason
-from gateway.recordings import export, log
+from gateway.recordings import log, log_writer
+from gateway.recordings.export import Export, Extent
 from gateway.recordings.header import config_of, header, map_of
-from gateway.recordings.recording import Recording, encode_header, read
+from gateway.recordings.recording import Recording, encode_header, read, stream
 from gateway.runtime.loop import Loop
 from plant_emulator.emulator.process import EmulatorProcess
 from register_maps.register_map import RegisterMap
@@ -266,12 +267,10 @@ def test_a_replay_is_equal_bit_for_bit(run: Run) -> None:
 
 def test_an_exported_recording_is_a_log(run: Run, tmp_path: Path) -> None:
     running(run)
-    recorded = run.recording
     path = tmp_path / "run.csv"
-    columns = export.columns(recorded, map_of(recorded.header))
-    export.write(path, columns, export.start_date(recorded))
+    log_writer.write(path, Export(stream(run.sink.path), Extent()))
     exported = log.read(path)
     assert exported.time[0] == 0.0
     assert np.diff(exported.time) == pytest.approx(0.01)
-    measured = recorded.records["measured_motor_speed"]
+    measured = run.recording.records["measured_motor_speed"]
     assert exported.columns["motor_speed"].tolist() == measured[np.isfinite(measured)].tolist()
