@@ -200,12 +200,16 @@ class Search:
             self.sets[key] = found
 
     def _value(self, found: FitResult) -> float:
-        """Negative log evidence of a set, each effect at the price of its place."""
+        """Negative log evidence of a set, each effect at the price of its place.
+
+        Where every set leaves more than the noise, the least of what they leave counts as noise.
+        """
+        left = max(1.0, min(one.mean_square for one in self.sets.values()))
         price = 0.0
         for count, _ in enumerate(found.effects):
             smaller = self.sets.get(frozenset(found.effects[:count]), self.null)
             price += self._needed(smaller)
-        return 0.5 * found.cost + price
+        return 0.5 * found.cost / left + price
 
     def _settled(self) -> FitResult:
         """The best set, its fit and those near it converged."""
