@@ -39,7 +39,7 @@ SMOOTH, ENVELOPE, RISE = 0.05, 0.3, 0.1
 """[s] The tolerance follows the mean torque over the first time, because a wrong gain cancels in a
 ripple. It remembers a large mean for the second time, because shafts ring and fluxes lag. The third
 time smoothes the acceleration."""
-PULSES = 0.05
+PULSES = 0.08
 """[N m s^2/rad] Further tolerance of the motor's torque by its acceleration: a setpoint that rises
 in steps drives pulses of current, of which a poll sees only one moment."""
 REACTION = 0.25

@@ -59,6 +59,7 @@ class Tick:
     missed, overruns : deadlines missed so far, and in a row up to this tick
     dropped : records lost so far
     words_written, written : the encoded setpoint, and whether the PLC confirmed it
+    problem : the link's own words for the fault of this tick; not recorded
     """
 
     tick: int
@@ -81,6 +82,7 @@ class Tick:
     words_written: Sequence[int] | None
     measurement: Measurement | None
     setpoint: Setpoint | None
+    problem: str = ""
 
     @property
     def flags(self) -> int:

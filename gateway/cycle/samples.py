@@ -31,6 +31,8 @@ OUT_OF_STEP, JITTER = 0.5, 0.05
 FASTEST, LEAP = 1e-3, 100
 """[s] Shortest period of a PLC, and samples to spare. A sample number that leads by more than the
 time allows belongs to a counter that started anew behind the middle of its range."""
+FORGOTTEN = 1.0
+"""[s] Age of the newest sample from which its first fault is history."""
 RESTARTING = 1.0
 """[s] Time after a restart during which no sample counts as fresh."""
 MEMORY = 0.5
@@ -46,7 +48,7 @@ class Samples:
 
     newest, before : the last good reading, and the other sample before it
     heartbeat_moved, sequence_moved : times of their last change [s]
-    fault : the first fault since the last good reading
+    fault, last_fault : the first fault since the last good reading, and the last one
     down : the link is known to be gone
     is_new : this tick has brought a new sample
     before_came : time at which the sample before came [s]
@@ -62,6 +64,7 @@ class Samples:
     heartbeat_moved: float = -inf
     sequence_moved: float = -inf
     fault: Reason | None = None
+    last_fault: Reason | None = None
     down: bool = False
     is_new: bool = False
     before_came: float = -inf
@@ -83,7 +86,9 @@ def take(
     samples = replace(samples, is_new=False, window=None)
     if measurement is None:
         first = samples.fault or fault or Reason.STALE
-        return replace(samples, fault=first, down=fault in LINK_IS_DOWN)
+        return replace(
+            samples, fault=first, last_fault=fault or Reason.STALE, down=fault in LINK_IS_DOWN
+        )
     if measurement.sequence_start != measurement.sequence_end:
         return replace(samples, fault=samples.fault or Reason.TORN_IMAGE, down=False)
     last = samples.newest
@@ -97,13 +102,19 @@ def take(
         heartbeat_moved=now if beats else samples.heartbeat_moved,
         sequence_moved=now if moves else samples.sequence_moved,
         fault=None,
+        last_fault=None,
         down=False,
         is_new=moves,
     )
 
 
 def fault(samples: Samples, now: float, stale: float) -> Reason | None:
-    """Reason for which there is no fresh sample; None: there is one."""
+    """Reason for which there is no fresh sample; None: there is one.
+
+    The first fault is the cause. After FORGOTTEN the last one tells what is wrong now.
+    """
+    if samples.last_fault is not None and samples.age(now) > FORGOTTEN:
+        return samples.last_fault
     if samples.down or samples.newest is None:
         return samples.fault or Reason.STALE
     if now - samples.restarted <= RESTARTING:

@@ -74,6 +74,17 @@ def two_readings(device: Device, register_map: RegisterMap) -> list[Reading]:
         return [first, read_all(link, register_map)]
 
 
+def round_trips(device: Device, block: Block, count: int = 100) -> list[float]:
+    """Times of so many readings of a block, sorted [s]. Raises LinkError."""
+    times = []
+    with device.link() as link:
+        for _ in range(count):
+            begun = time.monotonic()
+            _read(link, block)
+            times.append(time.monotonic() - begun)
+    return sorted(times)
+
+
 def read_all(link: TcpLink, register_map: RegisterMap) -> Reading:
     """Words of each register, or why it cannot be read.
 

@@ -49,6 +49,7 @@ class Values:
     age, latency, lateness : of the newest sample, of the tick [s]
     latency_sum, latency_max, lateness_sum, lateness_max : over all ticks [s]
     demand, setpoint, motor_speed, drum_speed [rad/s]; shaft_torque [N m]; armature_current [A]
+    problem : the link's own words for its last fault, without which there is no connection
     """
 
     now: float = 0.0
@@ -79,9 +80,10 @@ class Values:
     drum_speed: float = math.nan
     shaft_torque: float = math.nan
     armature_current: float = math.nan
+    problem: bytes = b""
 
 
-LETTERS: Final[dict[Any, str]] = {float: "d", int: "Q", bool: "?"}
+LETTERS: Final[dict[Any, str]] = {float: "d", int: "Q", bool: "?", bytes: "160s"}
 VALUES: Final = struct.Struct("<" + "".join(LETTERS[one.type] for one in fields(Values)))
 AT_VALUES: Final = SEQUENCE.size
 AT_LATENCY: Final = -(-(AT_VALUES + VALUES.size) // COUNTER) * COUNTER
@@ -193,6 +195,7 @@ class Block:
                     number(measured.armature_current),
                 )
             ),
+            tick.problem.encode(),
         )
 
 

@@ -59,6 +59,23 @@ LINES: Final[dict[str, Line]] = {"text": text_line, "json": json_line}
 """Forms of the log by their names."""
 
 
+def problem_line(problem: str, date: datetime) -> str:
+    """Line with the link's own words for why there is no connection."""
+    return f"{_iso(date)}  link       {problem}"
+
+
+def json_problem_line(problem: str, date: datetime) -> str:
+    """Line of the link's words as a JSON object."""
+    line = {"time": _iso(date), "level": "warning", "event": "link", "message": problem}
+    return json.dumps(line)
+
+
+PROBLEMS: Final[dict[str, Callable[[str, datetime], str]]] = {
+    "text": problem_line,
+    "json": json_problem_line,
+}
+
+
 def reason_text(code: int) -> str:
     """Name and text of a reason; a dash for none."""
     return f"{REASONS[code].name}: {REASONS[code].text}" if code != NOTHING else "-"

@@ -70,9 +70,16 @@ def status_rows(values: Values, age: float) -> list[Row]:
         ("state", f"{State(values.state).name}{shadow} for {values.now - values.since:.0f} s"),
         ("reason", reason_text(values.reason)),
     ]
+    if text := problem_text(values):
+        rows.append(("link", text))
     if age > STALLED:
         rows.append(("STALLED", f"no tick for {age:.1f} s"))
     return rows
+
+
+def problem_text(values: Values) -> str:
+    """What the link says of its last fault; empty where the last reading was good."""
+    return values.problem.rstrip(b"\0").decode(errors="replace")
 
 
 def value_rows(values: Values) -> list[Row]:

@@ -18,9 +18,10 @@ from rich.live import Live
 from rich.panel import Panel
 from rich.table import Table
 
+from gateway.cycle.supervisor import State
 from gateway.monitoring import page
 from gateway.monitoring.block import RING, Change, Snapshot, Values
-from gateway.monitoring.lines import LINES, text_line
+from gateway.monitoring.lines import LINES, PROBLEMS, text_line
 from gateway.monitoring.shared import Observer
 
 PERIOD: Final = 0.1
@@ -30,7 +31,7 @@ PERIOD: Final = 0.1
 def show_run(ended: Connection, path: Path, form: str) -> None:
     """Process: print each change of a run as a line until the daemon's end of the pipe closes."""
     observer, line = Observer(path), LINES[form]
-    told, live = 0, form == "text" and sys.stdout.isatty()
+    told, problem, live = 0, "", form == "text" and sys.stdout.isatty()
     with _screen(observer, live=live) as (console, draw):
         over = False
         while not over:
@@ -39,6 +40,10 @@ def show_run(ended: Connection, path: Path, form: str) -> None:
             for text in new_lines(snapshot, told, line):
                 console.print(text, markup=False)
             told = snapshot.values.changes
+            found = page.problem_text(snapshot.values)
+            if found not in ("", problem) and State(snapshot.values.state) is State.CONNECT:
+                problem = found
+                console.print(PROBLEMS[form](found, date(snapshot.values.now)), markup=False)
             draw(snapshot)
 
 

@@ -71,11 +71,12 @@ class Sink(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """Reading of a tick: words and their measurement, or the fault."""
+    """Reading of a tick: words and their measurement, or the fault and the link's words for it."""
 
     words: tuple[int, ...] | None = None
     measurement: Measurement | None = None
     fault: Reason | None = None
+    problem: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -191,7 +192,7 @@ class Loop:
             if whole is not None and whole.sequence_start != whole.sequence_end:
                 reading = self._read_once()
         except LinkError as error:
-            return Reading(fault=error.reason)
+            return Reading(fault=error.reason, problem=str(error))
         return reading
 
     def _read_once(self) -> Reading:
@@ -250,4 +251,5 @@ class Loop:
             words_written=writing.words,
             measurement=reading.measurement,
             setpoint=output.setpoint,
+            problem=reading.problem,
         )

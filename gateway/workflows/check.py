@@ -30,14 +30,42 @@ def check(
     found = review(settings, register_map)
     if not live:
         return found
-    return Review(findings=(*compare_with_device(settings.plc, register_map), *found.findings))
+    compared = compare_with_device(settings.plc, register_map)
+    if not any(one.where == "plc.host" for one in compared):
+        compared.append(compare_pace(settings, register_map))
+    return Review(findings=(*compared, *found.findings))
+
+
+def compare_pace(config: Config, register_map: RegisterMap) -> Finding:
+    """Finding on the round trips of the live device: a tick takes two of them."""
+    try:
+        times = device.round_trips(_peer(config.plc), register_map.measurement)
+    except LinkError as error:
+        return _error("loop.period_ms", f"round trips: {error}", "no reply", "100 replies")
+    half, late, longest = times[len(times) // 2], times[len(times) * 99 // 100], times[-1]
+    period = config.loop.period
+    severity = "info" if 2.0 * late <= period else "warning"
+    return Finding(
+        severity="error" if 2.0 * half > period else severity,
+        where="loop.period_ms",
+        what=f"round trip in ms: p50 {half * 1e3:.1f}, p99 {late * 1e3:.1f}, max "
+        f"{longest * 1e3:.1f}; a tick takes two of them",
+        value=round(2e3 * half, 1),
+        allowed=f"<= {period * 1e3:g}",
+    )
+
+
+def _peer(plc: PlcConfig) -> device.Device:
+    """Device of the PLC; its first reply may take the settle time."""
+    timeout = max(plc.timeout, plc.settle)
+    return device.Device(host=plc.host, port=plc.port, unit=plc.unit, timeout=timeout)
 
 
 def compare_with_device(plc: PlcConfig, register_map: RegisterMap) -> list[Finding]:
     """Errors that the registers of the live device show in the register map."""
-    peer = device.Device(host=plc.host, port=plc.port, unit=plc.unit, timeout=plc.timeout)
     try:
-        rows = inspection.verify(register_map, device.two_readings(peer, register_map)).rows
+        readings = device.two_readings(_peer(plc), register_map)
+        rows = inspection.verify(register_map, readings).rows
     except LinkError as error:
         return [_error("plc.host", str(error), f"{plc.host}:{plc.port}", "a PLC that answers")]
     findings = [

@@ -280,6 +280,13 @@ def test_each_fault_leaves_run_in_time_with_its_reason(running, disturb, reason)
     assert running.last.reason is reason
     running.run(3.0)
     assert (running.last.state, running.last.reason) == (State.SAFE, reason)
+    running.disturb = lambda _, reading: reading
+    running.run(1.5)
+    assert running.last.state is State.SAFE
+    for remote in (False, True, False, True):  # acknowledge, then start
+        running.operate(remote=remote)
+        running.run(1.2 if remote else 0.3)
+    assert running.last.state is State.RUN
 
 
 @pytest.mark.parametrize("factor", [0.1, 0.4, 2.0, 10.0])

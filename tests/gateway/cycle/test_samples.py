@@ -361,3 +361,15 @@ def test_restart_over_a_lost_link_is_noticed_with_the_first_sample():
     lost = [Reason.CONNECTION_LOST] * 50
     seen = after(FIRST, *lost, changed(plc_time=0.0))
     assert samples.fault(seen, seen.sequence_moved, 0.1) is Reason.PLC_RESTARTED
+
+
+def test_last_fault_is_told_when_the_first_is_history():
+    """The port refuses since a second: the time-out at its begin is no longer what is wrong."""
+    seen = after(FIRST, LATER, Reason.TIMEOUT, Reason.NOT_CONNECTED)
+    assert samples.fault(seen, 101.01, 0.1) is Reason.TIMEOUT
+    assert samples.fault(seen, 101.02, 0.1) is Reason.NOT_CONNECTED
+
+
+def test_before_any_sample_the_last_fault_is_told():
+    seen = after(Reason.TIMEOUT, Reason.NOT_CONNECTED, Reason.EXCEPTION_2)
+    assert samples.fault(seen, 100.02, 0.1) is Reason.EXCEPTION_2
