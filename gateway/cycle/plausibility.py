@@ -57,8 +57,8 @@ SWING, TOP_SPEED, FASTEST_DRUM = 60.0, 8.0, 5.0
 front of the PLC shows them later by its time constant."""
 GAP_SPREAD = 1.25
 """Widest backlash over the configured one."""
-MOST = 2.0
-"""Alarm levels at which a sum stays, so that it falls again when the fault is gone."""
+MOST = 1.02
+"""Alarm levels at which a sum stays, so that it falls soon when the fault is gone."""
 TARE_TIME, AT_REST = 0.5, 0.8
 """[s], [rad/s] Time constant of the tare, and motor speed up to which the motor stands."""
 STUCK = 20
