@@ -14,7 +14,7 @@ from plant_emulator.diagnosis.report.document import to_json
 from plant_emulator.diagnosis.report.html import html
 from plant_emulator.diagnosis.report.terminal import lines
 from plant_emulator.diagnosis.wording import KINDS, percent
-from plant_emulator.errors import DiagnosisError, report_unwritable
+from plant_emulator.errors import DiagnosisError, InputError, report_unwritable
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.parameter_sets import DEFAULT, with_effects
 from plant_emulator.simulation.programs import describe
@@ -203,7 +203,13 @@ def _with_drafts(
     if wanted == "never" or (wanted == "unknown" and verdict.kind != "unknown"):
         return findings, None
     null = None if findings.final.effects else findings.final
-    drafted = draft_law(runs, null, pool, folder)
+    try:
+        drafted = draft_law(runs, null, pool, folder)
+    except InputError as error:
+        if wanted == "always":
+            raise
+        told = (*findings.details.notes, f"no missing law is drafted: {error}")
+        return replace(findings, details=replace(findings.details, notes=told)), None
     if drafted is None:
         return findings, None
     if drafted.next_program is not None:
