@@ -226,7 +226,7 @@ class Draft:
     place : subsystem; quantity, over : of the law, and the states that it depends on, in words
     form : the law as text, with unit; file : the effect file with it
     held_out_gain : share of the held-out gap that the draft closes [1]; None: there is none
-    bound : largest share that any sum of curves over single states could close [1]
+    bound : largest share that any law over single states could close [1]; None: not computed
     rivals : other laws that come near
     """
 

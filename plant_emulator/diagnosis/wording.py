@@ -192,11 +192,8 @@ def indistinguishable(verdict: Verdict) -> dict[str, tuple[str, ...]]:
 
 
 def describe_draft_gain(draft: Draft) -> str:
-    """How much of the held-out gap a draft closes, and how much any law of its kind could."""
-    if draft.held_out_gain is None or draft.held_out_gain_ci95 is None or draft.bound is None:
+    """How much of the held-out gap a draft closes."""
+    if draft.held_out_gain is None or draft.held_out_gain_ci95 is None:
         return "no held-out run can be predicted"
     low, high = map(percent, draft.held_out_gain_ci95)
-    return (
-        f"closes {percent(draft.held_out_gain)} ({low} to {high}) of the held-out gap; at best "
-        f"{percent(draft.bound)}"
-    )
+    return f"closes {percent(draft.held_out_gain)} ({low} to {high}) of the held-out gap"

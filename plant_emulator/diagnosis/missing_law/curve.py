@@ -1,8 +1,7 @@
-"""The missing law as a curve over one state, without a formula, and how much any curve could close.
+"""The missing law as a curve over one state, without a formula.
 
-A curve is a sum of linear splines over one state; the regression gives its coefficients and their
-covariance. The additive curves over all states of a quantity together hold every sum of functions
-of one state. What they leave in the runs that they are fitted to, no such law can close.
+A curve is a sum of linear splines over one state. The regression gives its coefficients and their
+covariance.
 """
 
 from __future__ import annotations
@@ -49,17 +48,6 @@ def curve(regression: BlockRegression, quantity: Quantity, state: State) -> Curv
         values=tuple((found[p.shared :] / p.scale).tolist()),
         band=tuple((HALF_INTERVAL * errors / p.scale).tolist()),
     )
-
-
-def additive_loss(regression: BlockRegression, quantity: Quantity) -> float:
-    """Loss that additive curves over all states of a quantity leave in the runs of their fit."""
-    states = [s for s in quantity.states if s.kind not in {"angle", "followed", "direction"}]
-    columns = []
-    for run in range(len(regression.signals)):
-        splines = [linear_splines(s.values[run], _knots(s)) for s in states]
-        columns.append(columns_of(regression, quantity, run, np.concatenate(splines, axis=1)))
-    p = products(run_rows(regression, quantity.model), columns)
-    return p.fitted_loss(range(columns[0].shape[1]))
 
 
 def _knots(state: State) -> Array:

@@ -9,10 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
-from plant_emulator.diagnosis.missing_law.curve import additive_loss, curve
+from plant_emulator.diagnosis.missing_law.curve import curve
 from plant_emulator.diagnosis.missing_law.law_search import DRAFTED_GAIN, null_loss, search
 from plant_emulator.diagnosis.missing_law.quantities import quantities
 
@@ -29,8 +27,6 @@ if TYPE_CHECKING:
 MOST_LAWS = 3
 # Share of the best law's held-out gain from which on another law is a rival.
 RIVAL_SHARE = 0.8
-# A loss leaves more than chance from so many of its standard deviations on.
-SURPRISING = 3.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,12 +34,10 @@ class Sketch:
     """A law that is worth a contest.
 
     curve : the same quantity over the law's first state, without a formula
-    left : share of what the law leaves of the gap that additive curves leave too [1]
     """
 
     law: Law
     curve: Curve
-    left: float
 
 
 def sketches(
@@ -95,15 +89,4 @@ def _sketch(regression: BlockRegression, one: Search, chosen: tuple[int, ...]) -
     law = one.law(chosen)
     smooth = [state for term in law.terms for state in term.states if state.kind != "angle"]
     state = smooth[0] if smooth else one.quantity.states[0]
-    return Sketch(law=law, curve=curve(regression, one.quantity, state), left=_left(one, chosen))
-
-
-def _left(one: Search, chosen: Sequence[int]) -> float:
-    """See `Sketch`; 1 where the law leaves no more than chance."""
-    rows = len(one.quantity.model.y)
-    chance = SURPRISING * np.sqrt(2.0 * rows)
-    by_law = 2.0 * one.fitted_loss(chosen) - rows
-    if by_law <= chance:
-        return 1.0
-    by_curves = 2.0 * additive_loss(one.regression, one.quantity) - rows
-    return float(np.clip(by_curves / by_law, 0.0, 1.0))
+    return Sketch(law=law, curve=curve(regression, one.quantity, state))

@@ -119,10 +119,6 @@ class Search:
         """Held-out gain of these terms."""
         return float(2.0 * (self.null - self.products.held_out_losses(self._columns(chosen)).sum()))
 
-    def fitted_loss(self, chosen: Sequence[int]) -> float:
-        """Loss of all runs that these terms leave where they are fitted to all of them."""
-        return self.products.fitted_loss(self._columns(chosen))
-
     def _columns(self, chosen: Sequence[int]) -> list[int]:
         """Numbers of the columns of these terms: a turn has two."""
         widths = [2 if term.own else 1 for term in self.terms]

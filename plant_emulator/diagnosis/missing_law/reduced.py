@@ -148,12 +148,6 @@ class Products:
             ]
         )
 
-    def fitted_loss(self, chosen: Sequence[int]) -> float:
-        """Loss of all runs with their own best coefficients."""
-        runs = range(len(self.grams))
-        found = self.coefficients(chosen, runs)
-        return sum(self.run_loss(chosen, found, k) for k in runs)
-
     def _reduced(self, chosen: Sequence[int], run: int) -> tuple[Array, Array, float]:
         """Products of nuisance and shared columns, and loss, with the run's own ones fitted.
 

@@ -141,13 +141,8 @@ def _draft(one: Sketch, file: Path, result: Result, rivals: tuple[str, ...]) -> 
         file=str(file),
         held_out_gain=gain,
         held_out_gain_ci95=interval,
-        bound=None if gain is None else _bound(gain, one.left),
-        bound_ci95=interval and (_bound(interval[0], one.left), _bound(interval[1], one.left)),
+        bound=None,
+        bound_ci95=None,
         rivals=rivals,
         curve=replace(one.curve, law=None if drawn is None else tuple(drawn.tolist())),
     )
-
-
-def _bound(gain: float, left: float) -> float:
-    """Share that a law closes which leaves this share of what the draft leaves [1]."""
-    return 1.0 - (1.0 - gain) * left

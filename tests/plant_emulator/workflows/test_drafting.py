@@ -38,8 +38,6 @@ def test_lag_of_the_torque_sensor_is_drafted_saved_and_simulated(
     assert "shaft torque" in best.over
     assert best.held_out_gain is not None
     assert best.held_out_gain > 0.9
-    assert best.bound is not None
-    assert best.bound >= best.held_out_gain
 
     answer = replace(from_json(answers.unknown()), drafts=found.drafts)
     findings = Findings(answer=answer, details=None, final=null, fixed={})  # type: ignore[arg-type]
