@@ -13,7 +13,13 @@ from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.answer import SearchStep
 from plant_emulator.diagnosis.execution.pool import build_model
-from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, UNEXPLAINED_SHARE, excess
+from plant_emulator.diagnosis.fitting.evidence import (
+    EVIDENCE_THRESHOLD,
+    NOISE_MEAN_SQUARE,
+    UNEXPLAINED_SHARE,
+    evidence_of,
+    excess,
+)
 from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
 from plant_emulator.diagnosis.fitting.fit_steps import refit
 from plant_emulator.diagnosis.fitting.task import Task
@@ -200,16 +206,12 @@ class Search:
             self.sets[key] = found
 
     def _value(self, found: FitResult) -> float:
-        """Negative log evidence of a set, each effect at the price of its place.
-
-        Where every set leaves more than the noise, the least of what they leave counts as noise.
-        """
-        left = max(1.0, min(one.mean_square for one in self.sets.values()))
+        """Negative log evidence of a set, each effect at the price of its place."""
         price = 0.0
         for count, _ in enumerate(found.effects):
             smaller = self.sets.get(frozenset(found.effects[:count]), self.null)
             price += self._needed(smaller)
-        return 0.5 * found.cost / left + price
+        return 0.5 * found.cost + price
 
     def _settled(self) -> FitResult:
         """The best set, its fit and those near it converged."""
@@ -246,7 +248,12 @@ class Search:
             (self.null,) = self._fits(refit, [other])
 
     def _without_needless(self, best: FitResult) -> FitResult:
-        """The set without what it does not need."""
+        """The set without what it does not need.
+
+        The queue takes the noise for known. Where a set leaves something correlated, an effect that
+        follows a little of it is needless too: its evidence among what is left is that of chance.
+        """
+        self.reduced_costs = {}
         if len(best.effects) < 2:
             return best
         for name in best.effects:
@@ -256,7 +263,16 @@ class Search:
             (found,) = self.runner.map(confirm, [trial])
             self._keep(found)
             self.reduced_costs[name] = self.sets[frozenset(rest)].cost
-        return self._settled()
+        found = self._settled()
+        cheapest = min(self.reduced_costs, key=self.reduced_costs.__getitem__)
+        fall = self.reduced_costs[cheapest] - found.cost
+        if (
+            found.effects != best.effects
+            or evidence_of(fall, found, self.null) >= EVIDENCE_THRESHOLD
+        ):
+            return found
+        (smaller,) = self._fits(refit, [self.sets[frozenset(best.effects) - {cheapest}]])
+        return self._without_needless(smaller)
 
     def _explanation(self, final: FitResult) -> Explanation:
         singles = {next(iter(k)): one for k, one in self.sets.items() if len(k) == 1}
