@@ -2,7 +2,8 @@
  *
  * libmodbus_plc REMOTE_AFTER_SECONDS
  * Prints "listening on 127.0.0.1:PORT", and at SIGTERM what it saw. Once enabled, a truck pushes the
- * drum with a torque of PUSH at the sensor, so that a gateway has something to follow.
+ * drum with a torque of PUSH at the sensor, so that a gateway has something to follow. The sensor has
+ * some noise, and the current balances torque and acceleration of the motor as on the bench.
  */
 #include <arpa/inet.h>
 #include <math.h>
@@ -17,6 +18,7 @@
 
 enum { COMMAND = 64, CMD_SEQ = 64, HB_GW, CTRL, MODE, SPEED_REF, WD_TIMEOUT = 72, REGISTERS = 80 };
 static const double PUSH = 8.0, TIME_CONSTANT = 0.1, SCAN = 0.01, RATIO = 62.6;
+static const double MOTOR_INERTIA = 0.128, FLUX = 1.8506; /* kg m^2, N m/A: Table 3.1 */
 static volatile sig_atomic_t stopped;
 static uint16_t *r;
 static unsigned scans, commands, enabled_scans;
@@ -40,6 +42,9 @@ static void scan(unsigned remote_after) {
     enabled_scans += enabled;
 
     double target = enabled ? (int16_t)r[SPEED_REF] * 0.2 : 0.0, torque = enabled ? PUSH : 0.0;
+    double acceleration = (target - speed_rpm) * M_PI / 30 / TIME_CONSTANT;
+    torque += 0.05 * ((int)(scans % 5) - 2);
+    double current = (MOTOR_INERTIA * acceleration - torque) / FLUX;
     speed_rpm += (target - speed_rpm) * SCAN / TIME_CONSTANT;
     if (speed_rpm > speed_max) speed_max = speed_rpm;
     integral += torque * SCAN;
@@ -51,6 +56,7 @@ static void scan(unsigned remote_after) {
     r[8] = (int16_t)lround(speed_rpm / 0.2);
     r[9] = (int16_t)lround(speed_rpm * M_PI / 30 / RATIO / 0.0005);
     r[10] = r[11] = (int16_t)lround(torque / 0.01);
+    r[12] = (int16_t)lround(current / 0.01);
     r[14] = (int16_t)lround(target / 0.2);
     r[15] = r[16] = 320;
     r[17] = 0x8000;
