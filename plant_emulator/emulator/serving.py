@@ -85,7 +85,6 @@ async def serve(options: Options, announce: Callable[[str], None], *, control: b
     gc.collect()
     gc.freeze()
     policy = _ask_for_real_time(options.speed)
-    announce(f"listening on {options.host}:{emulator.server.port}")
     try:
         await _until_stopped(run, announce, control=control)
     finally:
@@ -129,7 +128,9 @@ async def _until_stopped(run: _Run, announce: Callable[[str], None], *, control:
         if sys.stderr.isatty():
             others.append(_show(run.timer, run.emulator))
     tasks = [asyncio.create_task(other) for other in others]
-    async with operated(channel, run.emulator.server.port):
+    port = run.emulator.server.port
+    async with operated(channel, port):
+        announce(f"listening on {run.options.host}:{port}")
         await run.stopping.wait()
     for task in tasks:
         task.cancel()
