@@ -3,7 +3,7 @@
     import gateway
 
     result = gateway.replay("program6.csv.gz", values={"truck.load_kg": 1600})
-    print(result, result.to_json())
+    print(result.summary(), result.to_json())
 
 A name is imported when it is first used, so that `import gateway` loads nothing heavy.
 """
@@ -14,16 +14,35 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from gateway.config_file import load as load_config
     from gateway.configuration.config import Config
-    from gateway.errors import GatewayError
+    from gateway.errors import ConfigError, GatewayError
+    from gateway.recordings.log import LogError
+    from gateway.recordings.recording import RecordingError
     from gateway.review.finding import Review
     from gateway.workflows.check import check
     from gateway.workflows.replay import Replay, replay
+    from register_maps.register_map import MapError
 
-__all__ = ["Config", "GatewayError", "Replay", "Review", "check", "load_config", "replay"]
+__all__ = [
+    "Config",
+    "ConfigError",
+    "GatewayError",
+    "LogError",
+    "MapError",
+    "RecordingError",
+    "Replay",
+    "Review",
+    "check",
+    "load_config",
+    "replay",
+]
 
 _PLACES = {
     "Config": ("gateway.configuration.config", "Config"),
+    "ConfigError": ("gateway.errors", "ConfigError"),
     "GatewayError": ("gateway.errors", "GatewayError"),
+    "LogError": ("gateway.recordings.log", "LogError"),
+    "MapError": ("register_maps.register_map", "MapError"),
+    "RecordingError": ("gateway.recordings.recording", "RecordingError"),
     "Replay": ("gateway.workflows.replay", "Replay"),
     "Review": ("gateway.review.finding", "Review"),
     "check": ("gateway.workflows.check", "check"),

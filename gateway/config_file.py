@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ from gateway import regulators
 from gateway.configuration.config import Config, Place, from_document, merge
 from gateway.configuration.keys import check_text
 from gateway.errors import ConfigError
-from gateway.friction import friction_table
+from gateway.friction.document import regulator_entries
 
 
 def load(path: str | Path) -> Config:
@@ -24,7 +24,8 @@ def load(path: str | Path) -> Config:
     def place(section: str, key: str) -> str:
         return _place(file, text, section, key)
 
-    document = _with_friction(_toml(file, text), file.parent, place)
+    written = _toml(file, text)
+    document = _with_friction(written, file.parent, place, _keys_of(written.get("regulator")))
     return _refuse_unknown_regulator(from_document(document, place=place), place)
 
 
@@ -36,19 +37,22 @@ def as_config(config: Config | str | Path) -> Config:
 def with_values(config: Config, values: Mapping[str, object]) -> Config:
     """Configuration with some values changed, `{"truck.load_kg": 1600}`; a text is read as TOML.
 
-    `regulator.friction` may also be the path of a friction file. Raises ConfigError.
+    `regulator.friction` may also be the path of a friction file; what that tells of the torque
+    sensor holds unless the values name it. Raises ConfigError.
     """
     try:
         document = merge(config.document, values)
     except (ValueError, RecursionError) as error:
         raise ConfigError(_why(error), place="--set", expected="KEY=VALUE as in TOML") from error
     place = "{}.{}".format
-    return _refuse_unknown_regulator(from_document(_with_friction(document, Path(), place)), place)
+    named = {name.removeprefix("regulator.") for name in values}
+    whole = _with_friction(document, Path(), place, named)
+    return _refuse_unknown_regulator(from_document(whole), place)
 
 
 def load_friction(path: str | Path) -> dict[str, Any]:
-    """Table of the friction in the file of a friction map or of a parameter set."""
-    return friction_table(_toml(Path(path), _text(Path(path))), path)
+    """Entries of [regulator] in the file of a friction map or of a parameter set."""
+    return regulator_entries(_toml(Path(path), _text(Path(path))), path)
 
 
 def _refuse_unknown_regulator(config: Config, place: Place) -> Config:
@@ -59,13 +63,21 @@ def _refuse_unknown_regulator(config: Config, place: Place) -> Config:
     return config
 
 
-def _with_friction(document: dict[str, Any], directory: Path, place: Place) -> dict[str, Any]:
+def _keys_of(table: object) -> Collection[str]:
+    return table.keys() if isinstance(table, Mapping) else ()
+
+
+def _with_friction(
+    document: dict[str, Any], directory: Path, place: Place, named: Collection[str]
+) -> dict[str, Any]:
+    """Document with the content of its friction file, which no `named` key gives way to."""
     regulator = document.get("regulator")
     if not isinstance(regulator, Mapping) or not isinstance(regulator.get("friction"), str):
         return document
     check_text(regulator["friction"], place("regulator", "friction"))
-    table = load_friction(directory / regulator["friction"])
-    return document | {"regulator": {**regulator, "friction": table}}
+    found = load_friction(directory / regulator["friction"])
+    told = {key: one for key, one in found.items() if key == "friction" or key not in named}
+    return document | {"regulator": {**regulator, **told}}
 
 
 def _text(path: Path) -> str:

@@ -5,7 +5,7 @@ The command line shows an error that has an `exit_code` as one line, and exits w
 
 
 class GatewayError(Exception):
-    """What was asked for failed; exit code 1."""
+    """A request failed. Base class of all errors of the gateway; exit code 1."""
 
     exit_code = 1
 

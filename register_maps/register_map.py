@@ -5,6 +5,7 @@
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 from register_maps.units import UNITS, Unit
@@ -143,7 +144,12 @@ class RegisterMap:
 
     def register(self, signal: str) -> Register | None:
         """Register of a signal; None: the map has none."""
-        return next((found for found in self.registers if found.signal == signal), None)
+        return self._by_signal.get(signal)
+
+    @cached_property
+    def _by_signal(self) -> dict[str, Register]:
+        """The first register of each signal; the tick asks for eleven of them."""
+        return {register.signal: register for register in reversed(self.registers)}
 
     def modulus(self, signal: str) -> float | None:
         """Span after which a counter starts again [SI unit of the signal]; None: never."""

@@ -7,6 +7,7 @@ import click
 
 from gateway.cli._options import write_json
 from register_maps.command_line.parameters import Command, Number, OutputFile
+from register_maps.units import KMH
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -178,7 +179,7 @@ def _force(force: "CruiseForce | None") -> str:
 def _quality(quality: "DriveQuality | None") -> str:
     if quality is None:
         return "-"
-    return f"{100.0 * quality.inertia_work:+.2f} %, {3.6 * quality.speed_error:.3f} km/h"
+    return f"{100.0 * quality.inertia_work:+.2f} %, {quality.speed_error / KMH:.3f} km/h"
 
 
 def _latency(latency: "Latency | None") -> str:

@@ -15,8 +15,7 @@ from gateway.runtime import daemon
 from register_maps.command_line.parameters import Command, Number
 
 if TYPE_CHECKING:
-    from gateway.configuration.config import Config
-    from register_maps.register_map import RegisterMap
+    from gateway.review.finding import Finding
 
 PATIENCE: Final = 3
 """[s] Time that a terminal may take for the report."""
@@ -59,10 +58,17 @@ def command(
     not there; 2: bad configuration, also one that `gateway check` refuses. With --shadow a refused
     configuration only gives a warning, because nothing is written.
     """
+    from gateway.review.review import review
+    from gateway.workflows.run_quality import quality_at_the_end
+
     changes = assignments(values) | ({} if metrics is None else {"metrics.address": metrics})
     settings = with_values(load(config), changes)
     register_map = register_maps.load(settings.plc.map)
-    refused = refusals(settings, register_map)
+    found = review(settings, register_map)
+    refused = list(map(_line, found.errors))
+    for one in found.findings:
+        if one.severity == "warning" and one.where.startswith("regulator."):
+            click.echo(f"warning: {config}: {_line(one)}", err=True)
     check = shlex.join(["gateway", "check", "-c", str(config), *_repeated("--set", values)])
     for line in refused:
         click.echo(f"{'warning' if shadow else 'error'}: {config}: {line}; see {check}", err=True)
@@ -73,6 +79,9 @@ def command(
     )
     code = 0 if ended.reason is None else 1
     _tell(report(ended), code)
+    quality = quality_at_the_end(ended.recording)
+    if quality is not None:
+        _tell(f"SAE J2951, drum over demand: {quality}", code)
     return code
 
 
@@ -84,14 +93,9 @@ def _tell(text: str, code: int) -> None:
     signal.alarm(0)
 
 
-def refusals(config: "Config", register_map: "RegisterMap") -> list[str]:
-    """Errors that the review finds, one line each: place, value found, value expected."""
-    from gateway.review.review import review
-
-    return [
-        f"{one.where}: {one.what}: found {one.value}, expected {one.allowed}"
-        for one in review(config, register_map).errors
-    ]
+def _line(one: "Finding") -> str:
+    """A finding of the review: place, value found, value expected."""
+    return f"{one.where}: {one.what}: found {one.value}, expected {one.allowed}"
 
 
 def _repeated(option: str, values: tuple[str, ...]) -> list[str]:

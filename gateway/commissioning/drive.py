@@ -14,7 +14,7 @@ from gateway.configuration.program import Profile, Program, Ramp, Step
 from gateway.configuration.sweep_speeds import RATE_RPM_S
 from gateway.errors import ConfigError
 from gateway.review.limits import delay_of
-from register_maps.drive_programs import interpolate
+from register_maps.logs.drive_programs import interpolate
 from register_maps.units import RPM
 
 SLACK: Final = 1.0 + 1e-9

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ class StepRun:
     config : of the run, with its program
     trace : speeds and shaft torque; current : of the armature [A], NaN: unknown
     own_time : by the gateway's clock [s]; heartbeat : scans of the PLC since the first sample
+    oil_temperature : of the gear as the gateway computes it [K], NaN: unknown
     steps : index of the step whose demand followed from the sample; OUTSIDE: none
     """
 
@@ -33,6 +35,7 @@ class StepRun:
     current: Array
     own_time: Array
     heartbeat: Array
+    oil_temperature: Array
     steps: NDArray[np.int64]
 
     @property
@@ -49,14 +52,15 @@ class StepRun:
                 yield one, slice(int(inside[0]), int(inside[-1]) + 1)
 
 
-def step_numbers(
+def replayed(
     config: Config, register_map: RegisterMap, seen: Iterable[Observation]
-) -> list[int]:
-    """Step at work in each tick of a run, from its replay."""
-    state, numbers = initial(config, register_map), []
+) -> tuple[list[int], list[float]]:
+    """Step at work, and temperature of the oil [K], in each tick of a run, from its replay."""
+    state, numbers, oil = initial(config, register_map), [], []
     for observation in seen:
         before = state.regulator
         state, output = step(config, register_map, state, observation)
         runs = output.state is State.RUN and before is not None
         numbers.append(before.number if runs else OUTSIDE)
-    return numbers
+        oil.append(nan if state.samples.oil is None else state.samples.oil)
+    return numbers, oil

@@ -29,7 +29,8 @@ from gateway.configuration.sections import (
 )
 from gateway.configuration.sweep_speeds import read_sweep
 from gateway.errors import ConfigError
-from gateway.friction import THESIS, read_friction
+from gateway.friction.document import read_friction
+from gateway.friction.law import THESIS
 
 __all__ = ["BenchConfig", "Config", "config_hash", "from_document", "merge"]
 

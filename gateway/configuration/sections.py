@@ -4,9 +4,10 @@ Each field declares its key: name in the file, default, factor to SI, range or c
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 from gateway.configuration.keys import declare
-from gateway.friction import THESIS, Friction
+from gateway.friction.law import THESIS, Friction
 from register_maps.units import KMH, RPM
 
 MILLI = 1e-3
@@ -19,6 +20,7 @@ class PlcConfig:
 
     timeout : of one request [s]
     settle : of the first request after connecting, for which some PLCs take longer [s]
+    tls_authority, tls_certificate, tls_key : files of Modbus/TCP Security; None: a plain connection
     """
 
     host: str = declare("host", "127.0.0.1")
@@ -27,6 +29,9 @@ class PlcConfig:
     map: str = declare("map", "bench_int16")
     timeout: float = declare("timeout_ms", 40.0, scale=MILLI, lower=1.0, upper=1000.0)
     settle: float = declare("settle_ms", 1000.0, scale=MILLI, lower=1.0, upper=60000.0)
+    tls_authority: str | None = declare("tls_authority", None)
+    tls_certificate: str | None = declare("tls_certificate", None)
+    tls_key: str | None = declare("tls_key", None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,7 +116,8 @@ class RegulatorConfig:
     under_compensation : share of the friction that is not compensated
     under_compensation_slow : share at standstill; it falls to the other share at 0.5 rad/s of the
         drum
-    torque_offset : torque that the sensor shows without load [N m]
+    torque_offset, torque_gain, torque_lag : of the torque sensor, which the regulator takes out:
+        torque that it shows without load [N m], error of its gain [1], time constant [s]
     breakaway : torque over the road load at which a standing truck starts [N m at the drum]
     """
 
@@ -128,8 +134,14 @@ class RegulatorConfig:
         "under_compensation_slow_percent", 2.0, scale=PERCENT, lower=0.0, upper=20.0
     )
     torque_offset: float = declare("torque_offset_Nm", 0.0, lower=-20.0, upper=20.0)
+    torque_gain: float = declare("torque_gain_percent", 0.0, scale=PERCENT, lower=-50.0, upper=50.0)
+    torque_lag: float = declare("torque_lag_ms", 0.0, scale=MILLI, lower=0.0, upper=1000.0)
     breakaway: float = declare("breakaway_Nm", 30.0, lower=0.0, upper=2000.0)
     friction: Friction = THESIS
+
+    def shaft_torque(self, shown: Any) -> Any:
+        """Torque of the shaft where the sensor steadily shows this one [N m], a number or array."""
+        return (shown - self.torque_offset) / (1.0 + self.torque_gain)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,13 +15,14 @@ from typing import Any, cast
 
 from gateway import regulators
 from gateway.configuration.config import Config
-from gateway.cycle import command, limits, plausibility, program, samples, surveillance
+from gateway.cycle import command, limits, program, samples, surveillance
 from gateway.cycle.checks import check
 from gateway.cycle.command import Command
 from gateway.cycle.limits import Limit, Limited, Limits
 from gateway.cycle.samples import Samples
 from gateway.cycle.supervisor import Facts, Reason, State, Supervisor, advance
 from gateway.cycle.surveillance import Surveillance
+from gateway.cycle.tolerances import Params
 from gateway.errors import ConfigError
 from gateway.regulators import Regulator
 from gateway.regulators.window import Demand
@@ -117,7 +118,7 @@ def initial(config: Config, register_map: RegisterMap) -> CycleState:
             deviation=config.limits.deviation,
             stale=config.loop.stale,
         ),
-        watched=Surveillance(relations=plausibility.Params.of(config)),
+        watched=Surveillance(relations=Params.of(config)),
     )
 
 

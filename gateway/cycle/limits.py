@@ -1,4 +1,6 @@
-"""The limits that every setpoint passes. They know no regulator and no state.
+"""The limits that every setpoint passes last: after them it is only encoded and sent.
+
+They know no regulator and no state. The PLC limits the setpoint again by itself.
 
 A setpoint is finite, lies inside the range of the bench, and changes no faster than the slopes. It
 rises neither on stale data nor to more than `deviation` over the measured speed. The PLC continues

@@ -17,7 +17,7 @@ from gateway.configuration.config import Config
 from gateway.configuration.program import Emulation, Profile, Ramp, Step
 from gateway.regulators import Regulator
 from gateway.regulators.window import Demand, Window
-from register_maps.drive_programs import interpolate
+from register_maps.logs.drive_programs import interpolate
 
 NOTHING = Demand(speed=0.0)
 

@@ -60,6 +60,8 @@ class Tick:
     dropped : records lost so far
     words_written, written : the encoded setpoint, and whether the PLC confirmed it
     problem : the link's own words for the fault of this tick; not recorded
+    implausible : sums of the relations of motor, gear and drum over their alarm levels [1]; not
+        recorded, because a replay computes them again
     """
 
     tick: int
@@ -83,6 +85,7 @@ class Tick:
     measurement: Measurement | None
     setpoint: Setpoint | None
     problem: str = ""
+    implausible: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
     def flags(self) -> int:

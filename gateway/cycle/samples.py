@@ -17,6 +17,8 @@ from dataclasses import dataclass, replace
 from math import exp, inf
 
 from gateway.configuration.config import Config
+from gateway.configuration.sections import RegulatorConfig
+from gateway.friction.law import oil_temperature
 from gateway.reasons import Reason
 from gateway.regulators.window import Window
 from register_maps.codec import difference
@@ -55,6 +57,7 @@ class Samples:
     window : the window between the two samples, None: no new sample, or an impossible window
     used : time of the last usable window [s]
     window_fault : why a later window is impossible
+    oil : temperature of the gear's oil after the last window [K], None: unknown
     ahead : lead of the PLC's clock over ours within the last MEMORY [s]
     restarted : time at which the PLC was last found to have restarted [s]
     """
@@ -71,6 +74,7 @@ class Samples:
     window: Window | None = None
     used: float = -inf
     window_fault: Reason = Reason.STALE
+    oil: float | None = None
     ahead: float = 0.0
     restarted: float = -inf
 
@@ -145,15 +149,19 @@ def with_window(config: Config, register_map: RegisterMap, samples: Samples) -> 
     torque = torque_of(config.regulator.torque, register_map, now, before, duration)
     if not _is_possible(register_map, torque, now.shaft_torque_mean, duration):
         return replace(samples, window_fault=Reason.TORQUE_IMPLAUSIBLE)
+    shell = _shell_temperature(now)
+    gear_speed = now.motor_speed / config.bench.gear_ratio
+    oil = oil_temperature(samples.oil, gear_speed, shell, duration, config.regulator.friction)
     window = Window(
         duration=duration,
-        shaft_torque=torque - config.regulator.torque_offset,
+        shaft_torque=without_sensor(config.regulator, torque, now, before, duration),
         motor_speed=now.motor_speed,
         drum_speed=now.drum_speed,
         drum_speed_change=now.drum_speed - before.drum_speed,
-        shell_temperature=_shell_temperature(now),
+        shell_temperature=shell,
+        oil_temperature=oil,
     )
-    return replace(samples, window=window, used=samples.sequence_moved)
+    return replace(samples, window=window, used=samples.sequence_moved, oil=oil)
 
 
 def _follows(register_map: RegisterMap, now: Measurement, before: Measurement, own: float) -> bool:
@@ -201,6 +209,22 @@ def torque_of(
     if kind == "integrated" and last is not None and first is not None:
         return difference(last, first, register_map.modulus("shaft_torque_integral")) / duration
     return now.shaft_torque
+
+
+def without_sensor(
+    regulator: RegulatorConfig,
+    torque: float,
+    now: Measurement,
+    before: Measurement,
+    duration: float,
+) -> float:
+    """Torque of the shaft behind the torque that its sensor shows over a window [N m].
+
+    A sensor of first order shows T with tau T_meas' + T_meas = T. Over a window the slope is that
+    between its ends, so that noise does not add up from window to window.
+    """
+    slope = (now.shaft_torque - before.shaft_torque) / duration
+    return float(regulator.shaft_torque(torque + regulator.torque_lag * slope))
 
 
 def _shell_temperature(measurement: Measurement) -> float | None:

@@ -6,7 +6,8 @@ from gateway.configuration.config import Config
 from gateway.cycle import following, pace, plausibility
 from gateway.cycle.following import Following
 from gateway.cycle.plausibility import Plausibility
-from gateway.cycle.samples import Samples, torque_of
+from gateway.cycle.samples import Samples, torque_of, without_sensor
+from gateway.cycle.tolerances import Params
 from gateway.reasons import Reason
 from register_maps.register_map import RegisterMap
 
@@ -20,7 +21,7 @@ class Surveillance:
     slow : share of the last ticks that took too long [1]
     """
 
-    relations: plausibility.Params
+    relations: Params
     sensors: Plausibility = field(default_factory=Plausibility)
     following: Following = field(default_factory=Following)
     slow: float = 0.0
@@ -42,7 +43,8 @@ def note_samples(
     if read.window is None or read.newest is None or read.before is None:
         return state
     before, last, duration = read.before, read.newest, read.window.duration
-    torque = torque_of("integrated", register_map, last, before, duration)
+    shown = torque_of("integrated", register_map, last, before, duration)
+    torque = without_sensor(config.regulator, shown, last, before, duration)
     sensors = plausibility.judge(
         state.relations, state.sensors, before, last, torque=torque, duration=duration
     )

@@ -9,7 +9,7 @@ from gateway.cycle.supervisor import State
 from gateway.demo.options import Options
 from gateway.demo.plot import Curves
 from gateway.offline.drive_quality import drive_quality
-from gateway.offline.evaluation import agreement, traction_energy
+from gateway.offline.evaluation import Agreement, agreement, traction_energy
 from gateway.offline.figures import Latency, RunFigures, TractionEnergy, cruise_force
 from gateway.recordings.recording import Recording
 from plant_emulator.signals.log import Log
@@ -81,11 +81,10 @@ def figures_of(options: Options, run: BenchRun) -> RunFigures:
     )
 
 
-def curves_of(run: BenchRun, figures: RunFigures) -> Curves:
-    """What the picture shows of one run."""
-    close = figures.velocity
+def curves_of(run: BenchRun, title: str, close: Agreement | None) -> Curves:
+    """What the picture shows of one run; close : agreement of the speeds."""
     return Curves(
-        title=f"{run.truck.mass:.0f} kg, regulator {figures.regulator}, driver {figures.driver}",
+        title=title,
         note=f"Val1 {close.val1:.1f} %   Val2 {close.val2:.1f} %" if close else "",
         time=run.log.time,
         road_speed=run.road_speed,

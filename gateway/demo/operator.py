@@ -81,7 +81,7 @@ def operate_in_real_time(session: Session) -> GatewayRun:
         try:
             wait_for("a recording", lambda: bool(set(folder.glob(f"*{SUFFIX}")) - before), daemon)
             (path,) = set(folder.glob(f"*{SUFFIX}")) - before
-            _operate(session, _Follower(path, session), daemon)
+            _operate(session, Follower(path, session), daemon)
         except GatewayError as error:
             raise GatewayError(f"{error}; the daemon's words: {words}") from error
         finally:
@@ -89,7 +89,7 @@ def operate_in_real_time(session: Session) -> GatewayRun:
     return GatewayRun(recording=path, exit_code=daemon.returncode)
 
 
-def _operate(session: Session, look: "_Follower", daemon: "subprocess.Popen[bytes]") -> None:
+def _operate(session: Session, look: "Follower", daemon: "subprocess.Popen[bytes]") -> None:
     wait_for("ARMED", lambda: look.state() is State.ARMED, daemon)
     session.emulator.set_remote(on=True)
     wait_for("RUN", lambda: look.state() is State.RUN, daemon)
@@ -120,7 +120,7 @@ def wait_for(
         time.sleep(LOOK_EVERY)
 
 
-class _Follower:
+class Follower:
     """Reads the growing recording of the daemon, and shows its newest tick.
 
     time : of the cycle [s]; -1 before it

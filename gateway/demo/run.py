@@ -45,13 +45,19 @@ def demo(options: Options, console: Console) -> DemoResult:
     options.out.mkdir(parents=True, exist_ok=True)
     runs = [drive(options, load_mass, console) for load_mass in options.loads]
     figures = tuple(figures_of(options, run) for run in runs)
-    curves = [curves_of(*pair) for pair in zip(runs, figures, strict=True)]
+    curves = [
+        curves_of(run, _title(one), one.velocity) for run, one in zip(runs, figures, strict=True)
+    ]
     plot.draw(curves, options.out / "demo.png")
     failures = tuple(filter(None, map(failure_of, runs)))
     result = DemoResult(figures=figures, failures=failures)
     text = json.dumps(result.to_json(), indent=2)
     (options.out / "summary.json").write_text(text + "\n", "utf-8")
     return result
+
+
+def _title(run: RunFigures) -> str:
+    return f"{run.truck_mass:.0f} kg, regulator {run.regulator}, driver {run.driver}"
 
 
 def failure_of(run: BenchRun) -> str:

@@ -10,11 +10,13 @@ import errno
 import os
 import select
 import socket
+import ssl
 import time
 from collections.abc import Callable
 from typing import Final
 
 from gateway.errors import ConfigError
+from gateway.link.tls import has_shaken_hands, wrap
 
 FIRST_DELAY: Final = 0.1
 LAST_DELAY: Final = 2.0
@@ -31,8 +33,15 @@ class Connector:
     problem : why the last attempt failed; empty: it did not
     """
 
-    def __init__(self, host: str, port: int, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        clock: Callable[[], float] = time.monotonic,
+        tls: ssl.SSLContext | None = None,
+    ) -> None:
         self._addresses, self._turn = resolve(host, port), 0
+        self._host, self._tls = host, tls
         self._clock = clock
         self._pending: socket.socket | None = None
         self._started = 0.0
@@ -68,25 +77,39 @@ class Connector:
         self._pending, self._started = attempt, self._clock()
         error = attempt.connect_ex(address)
         if error not in (0, errno.EINPROGRESS):
-            self._give_up(error)
+            self._give_up(os.strerror(error))
 
     def _finish(self) -> socket.socket | None:
-        attempt = self._pending
-        assert attempt is not None
-        if not select.select([], [attempt], [], 0.0)[1]:
-            if self._clock() - self._started > ATTEMPT_TIMEOUT:
-                self._give_up(errno.ETIMEDOUT)
+        """Connection whose attempt is over; None: it is under way, or has failed."""
+        try:
+            if not self._is_open():
+                if self._clock() - self._started > ATTEMPT_TIMEOUT:
+                    self._give_up(os.strerror(errno.ETIMEDOUT))
+                return None
+        except OSError as error:
+            self._give_up(error.strerror or str(error))
             return None
-        if error := attempt.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR):
-            self._give_up(error)
-            return None
-        self._pending, self.problem = None, ""
-        set_options(attempt)
+        attempt, self._pending, self.problem = self._pending, None, ""
         return attempt
 
-    def _give_up(self, error: int) -> None:
+    def _is_open(self) -> bool:
+        """Whether the attempt is over, its TLS handshake included. Raises OSError."""
+        attempt = self._pending
+        assert attempt is not None
+        if isinstance(attempt, ssl.SSLSocket):
+            return has_shaken_hands(attempt)
+        if not select.select([], [attempt], [], 0.0)[1]:
+            return False
+        if error := attempt.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR):
+            raise OSError(error, os.strerror(error))
+        set_options(attempt)
+        if self._tls is not None:
+            self._pending = wrap(attempt, self._tls, self._host)
+        return self._tls is None
+
+    def _give_up(self, problem: str) -> None:
         self.close()
-        self.problem = os.strerror(error)
+        self.problem = problem
         self._turn = (self._turn + 1) % len(self._addresses)
         if self._turn == 0:
             self.note_failure()

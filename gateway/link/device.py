@@ -1,6 +1,7 @@
 """A live device for the operator's commands: connect, read and write registers, disconnect."""
 
 import math
+import ssl
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -24,9 +25,11 @@ VERIFY_PAUSE: Final = 0.15
 
 
 @contextmanager
-def open_link(host: str, port: int, unit: int, timeout: float) -> Iterator[TcpLink]:
+def open_link(
+    host: str, port: int, unit: int, timeout: float, tls: ssl.SSLContext | None = None
+) -> Iterator[TcpLink]:
     """Connected link, for a command that may wait. Raises LinkError after `timeout` [s]."""
-    link = TcpLink(host, port, unit, timeout, inspects=True)
+    link = TcpLink(host, port, unit, timeout, inspects=True, tls=tls)
     deadline = time.monotonic() + timeout
     try:
         while not _connects(link, deadline):
@@ -48,17 +51,18 @@ def _connects(link: TcpLink, deadline: float) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class Device:
-    """Address of a device; timeout : of a request [s]."""
+    """Address of a device; timeout : of a request [s]; tls : context of gateway.link.tls."""
 
     host: str
     port: int
     unit: int
     timeout: float
+    tls: ssl.SSLContext | None = None
 
     @contextmanager
     def link(self) -> Iterator[TcpLink]:
         """Connected link to the device."""
-        with open_link(self.host, self.port, self.unit, self.timeout) as link:
+        with open_link(self.host, self.port, self.unit, self.timeout, self.tls) as link:
             yield link
 
     def mbpoll(self, register: Register, words: Words | None = None) -> str:

@@ -9,12 +9,12 @@ Nothing here blocks: each object is asked once a tick.
 """
 
 import contextlib
-import select
 import socket
 from collections.abc import Callable
 from typing import Final
 
 from gateway.link.reply import HEADER, split
+from gateway.link.tls import arrived
 from register_maps.register_map import Block
 
 READ: Final = {"holding": 3, "input": 4}
@@ -40,15 +40,20 @@ class Settling:
 
     def __init__(self, connection: socket.socket, request: bytes, deadline: float) -> None:
         self.connection, self.deadline = connection, deadline
-        self._received = b""
+        self._received, self._request = b"", request
         connection.setblocking(False)
-        connection.sendall(request)
 
     def is_over(self) -> bool:
-        """Whether a reply has come, be it good or not. Raises OSError for a closed connection."""
-        if not select.select([self.connection], [], [], 0.0)[0]:
+        """Whether a reply has come, be it good or not. Raises OSError for a closed connection.
+
+        The first call sends the request.
+        """
+        if self._request:
+            request, self._request = self._request, b""
+            self.connection.sendall(request)
+        chunk = arrived(self.connection, 0.0)
+        if chunk is None:
             return False
-        chunk = self.connection.recv(4096)
         if not chunk:
             raise ConnectionResetError(0, "closed by the peer before its first reply")
         self._received += chunk

@@ -13,8 +13,8 @@ reply, the next attempt waits 2 s.
 """
 
 import logging
-import select
 import socket
+import ssl
 import time
 from collections.abc import Callable, Sequence
 from typing import Final, Protocol
@@ -27,6 +27,7 @@ from gateway.errors import PlcError
 from gateway.link.connector import LAST_DELAY, Connector
 from gateway.link.patience import Retired, Settling, first_request
 from gateway.link.reply import Rejection, Request, check_reply
+from gateway.link.tls import arrived
 from gateway.reasons import Reason
 from register_maps.register_map import Block
 
@@ -72,6 +73,7 @@ class TcpLink:
     timeout : of a request [s]; settle : of the first request after connecting [s]
     probe : block that the first request reads, None: a connection counts at once
     inspects : the exceptions 1, 2 and 3 are answers, after which it goes on
+    tls : context of gateway.link.tls; None: a plain connection
     """
 
     def __init__(
@@ -85,6 +87,7 @@ class TcpLink:
         settle: float = 1.0,
         probe: Block | None = None,
         inspects: bool = False,
+        tls: ssl.SSLContext | None = None,
     ) -> None:
         self._peer = f"{host}:{port}"
         self._clock, self._settle = clock, settle
@@ -93,7 +96,7 @@ class TcpLink:
         self._retired = Retired(clock)
         self._unit = unit
         self._timeout = timeout
-        self._connector = Connector(host, port, clock)
+        self._connector = Connector(host, port, clock, tls)
         self._client: _Client | None = None
         self._abandoned: set[int] = set()
         self._failures = 0
@@ -261,16 +264,15 @@ class _Client(ModbusTcpClient):
 
     def recv(self, size: int | None) -> bytes:  # noqa: ARG002 - pymodbus's signature
         connection = self.socket
-        remaining = self._deadline - time.monotonic()
-        if connection is None or remaining <= 0.0:
-            return b""
-        if not select.select([connection], [], [], remaining)[0]:
-            return b""
-        chunk = connection.recv(4096)
-        if not chunk:
-            raise ConnectionException("closed by the peer")
-        self.received += chunk
-        return chunk
+        while connection and (remaining := self._deadline - time.monotonic()) > 0.0:
+            chunk = arrived(connection, remaining)
+            if chunk is None:
+                continue
+            if not chunk:
+                raise ConnectionException("closed by the peer")
+            self.received += chunk
+            return chunk
+        return b""
 
 
 def _attempt(call: Callable[[], ModbusPDU]) -> tuple[ModbusPDU | None, Rejection | None]:

@@ -15,7 +15,8 @@ from typing import Final
 import numpy as np
 
 from gateway.arrays import Array
-from gateway.friction import RANGES, Friction
+from gateway.friction.document import RANGES
+from gateway.friction.law import Friction
 from gateway.losses.sections import LossesError, Section
 
 FEWEST: Final = 4

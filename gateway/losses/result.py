@@ -4,14 +4,14 @@ Units here are the operator's: rpm, N m, N at the drum's rim, degC.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from typing import Any, Final
 
 import numpy as np
 
 from gateway.configuration.config import BenchConfig
-from gateway.friction import Friction
+from gateway.friction.law import Friction
 from gateway.losses.fit import Fit
 from gateway.losses.sections import LeftOut, Section
 from register_maps.units import RPM, ZERO_CELSIUS
@@ -85,7 +85,7 @@ class Losses:
         if shell is None:
             return law
         middle = round(0.5 * (shell[0] + shell[1]), 1)
-        return Friction(**law.document | {"reference_temperature_celsius": middle})
+        return replace(law, reference_temperature_celsius=middle)
 
     @property
     def worst_percent(self) -> float:

@@ -22,10 +22,12 @@ from typing import Final
 import numpy as np
 
 from gateway.arrays import Array
-from gateway.configuration.config import BenchConfig
+from gateway.configuration.sections import BenchConfig, RegulatorConfig
 from gateway.errors import GatewayError
 from register_maps.units import RPM
 
+PLAIN: Final = RegulatorConfig()
+"""A torque sensor without known errors."""
 HALF: Final = 0.5
 """[s] Time before and after a moment over which its slope is taken."""
 LONGEST: Final = 2.4 * HALF
@@ -113,10 +115,10 @@ class Steady:
     left_out: tuple[LeftOut, ...]
 
 
-def steady(trace: Trace, bench: BenchConfig, torque_offset: float = 0.0) -> Steady:
+def steady(trace: Trace, bench: BenchConfig, sensor: RegulatorConfig = PLAIN) -> Steady:
     """Steady stretches of a run with the friction in each.
 
-    torque_offset : torque that the sensor shows without load [N m]
+    sensor : knows the errors of the torque sensor
 
     Raises SignError where the torque is that of a truck that drives, or of a sensor with the wrong
     sign. Raises LossesError where the samples are too far apart.
@@ -133,7 +135,7 @@ def steady(trace: Trace, bench: BenchConfig, torque_offset: float = 0.0) -> Stea
         if why:
             left_out.append(_left_out(trace, part, why))
         else:
-            sections.append(_section(trace, part, bench, torque_offset))
+            sections.append(_section(trace, part, bench, sensor))
     _refuse_sign(sections)
     return Steady(sections=_pool_noise(sections), left_out=tuple(left_out))
 
@@ -202,10 +204,10 @@ def _left_out(trace: Trace, part: slice, why: str) -> LeftOut:
     return LeftOut(run=trace.name, start=start, end=end, motor_speed=speed, why=why)
 
 
-def _section(trace: Trace, part: slice, bench: BenchConfig, torque_offset: float) -> Section:
+def _section(trace: Trace, part: slice, bench: BenchConfig, sensor: RegulatorConfig) -> Section:
     """Friction in one steady stretch, with the standard error of its batches."""
     xi, inertia = bench.gear_ratio, bench.gear_inertia + bench.drum_inertia
-    time, torque = trace.time[part], trace.shaft_torque[part] - torque_offset
+    time, torque = trace.time[part], sensor.shaft_torque(trace.shaft_torque[part])
     acceleration = float(np.polyfit(time - time[0], trace.drum_speed[part], 1)[0])
     motor_speed, mean = float(trace.motor_speed[part].mean()), float(torque.mean())
     scatter = float(_batch_means(torque).std(ddof=1)) / np.sqrt(BATCHES)

@@ -49,6 +49,7 @@ class Values:
     age, latency, lateness : of the newest sample, of the tick [s]
     latency_sum, latency_max, lateness_sum, lateness_max : over all ticks [s]
     demand, setpoint, motor_speed, drum_speed [rad/s]; shaft_torque [N m]; armature_current [A]
+    motor_share, gear_share, drum_share : sums of the plausibility over their alarm levels [1]
     problem : the link's own words for its last fault, without which there is no connection
     """
 
@@ -80,6 +81,9 @@ class Values:
     drum_speed: float = math.nan
     shaft_torque: float = math.nan
     armature_current: float = math.nan
+    motor_share: float = 0.0
+    gear_share: float = 0.0
+    drum_share: float = 0.0
     problem: bytes = b""
 
 
@@ -195,6 +199,7 @@ class Block:
                     number(measured.armature_current),
                 )
             ),
+            *tick.implausible,
             tick.problem.encode(),
         )
 

@@ -59,21 +59,20 @@ LINES: Final[dict[str, Line]] = {"text": text_line, "json": json_line}
 """Forms of the log by their names."""
 
 
-def problem_line(problem: str, date: datetime) -> str:
-    """Line with the link's own words for why there is no connection."""
-    return f"{_iso(date)}  link       {problem}"
+def text_note(event: str, text: str, date: datetime, *, warning: bool = True) -> str:
+    """Line of what is no change of state: the start, the link's words, lines left out."""
+    del warning  # the text says so
+    return f"{_iso(date)}  {event:9s}  {text}"
 
 
-def json_problem_line(problem: str, date: datetime) -> str:
-    """Line of the link's words as a JSON object."""
-    line = {"time": _iso(date), "level": "warning", "event": "link", "message": problem}
-    return json.dumps(line)
+def json_note(event: str, text: str, date: datetime, *, warning: bool = True) -> str:
+    """Line of what is no change of state as a JSON object."""
+    level = "warning" if warning else "info"
+    return json.dumps({"time": _iso(date), "level": level, "event": event, "message": text})
 
 
-PROBLEMS: Final[dict[str, Callable[[str, datetime], str]]] = {
-    "text": problem_line,
-    "json": json_problem_line,
-}
+NOTES: Final[dict[str, Callable[..., str]]] = {"text": text_note, "json": json_note}
+"""Forms of a note by their names."""
 
 
 def reason_text(code: int) -> str:

@@ -77,6 +77,7 @@ def families(identity: Mapping[str, Any], snapshot: Snapshot, age: float) -> "It
         yield GaugeMetricFamily(f"gateway_{name}", text, value=getattr(values, field))
     yield from _counters(snapshot)
     yield _states(snapshot)
+    yield _relations(snapshot)
     yield _histogram(
         "latency", "From wake-up to the end of the write", snapshot.latency, values.latency_sum
     )
@@ -104,6 +105,16 @@ def _states(snapshot: Snapshot) -> "Metric":
     family = GaugeMetricFamily("gateway_state", "1 for the present state", labels=["state"])
     for state in State:
         family.add_metric([state.name], float(snapshot.values.state == state))
+    return family
+
+
+def _relations(snapshot: Snapshot) -> "Metric":
+    from prometheus_client.metrics_core import GaugeMetricFamily
+
+    text = "Sum of a relation between the sensors over its alarm level; a run ends above 1"
+    family = GaugeMetricFamily("gateway_plausibility_ratio", text, labels=["relation"])
+    for relation in ("motor", "gear", "drum"):
+        family.add_metric([relation], getattr(snapshot.values, f"{relation}_share"))
     return family
 
 

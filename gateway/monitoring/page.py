@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from gateway.cycle.supervisor import State
 from gateway.monitoring.block import Snapshot, Values, quantile
-from gateway.monitoring.lines import reason_text
+from gateway.monitoring.lines import WARNED, reason_text
 from register_maps.units import RPM
 
 BARS: Final = "▁▂▃▄▅▆▇█"
@@ -105,7 +105,7 @@ def time_rows(snapshot: Snapshot) -> list[Row]:
 
 def _quantiles(counts: Sequence[int], longest: float) -> str:
     shown = (f"{name} {_bound(quantile(counts, q))}" for name, q in (("p50", 0.5), ("p99", 0.99)))
-    return f"{'  '.join(shown)}  max {longest * 1e3:.2f} ms"
+    return f"{', '.join(shown)}, max {longest * 1e3:.2f} ms"
 
 
 def _bound(duration: float) -> str:
@@ -115,7 +115,7 @@ def _bound(duration: float) -> str:
 def count_rows(snapshot: Snapshot) -> list[Row]:
     """Reasons and faults that have occurred: changes to the reason, ticks with the fault."""
     return [
-        (reason_text(code), f"{count} times, {snapshot.faults[code]} ticks")
+        (reason_text(code), f"as reason {count}, as fault in ticks {snapshot.faults[code]}")
         for code, count in snapshot.reasons.items()
         if code and (count or snapshot.faults[code])
     ]
@@ -126,6 +126,7 @@ def document(snapshot: Snapshot, age: float, lines: Sequence[str]) -> dict[str, 
     values = snapshot.values
     return {
         "status": status_rows(values, age),
+        "warning": State(values.state) in WARNED or age > STALLED,
         "values": value_rows(values),
         "times": time_rows(snapshot),
         "counts": count_rows(snapshot),

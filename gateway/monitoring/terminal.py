@@ -21,7 +21,8 @@ from rich.table import Table
 from gateway.cycle.supervisor import State
 from gateway.monitoring import page
 from gateway.monitoring.block import RING, Change, Snapshot, Values
-from gateway.monitoring.lines import LINES, PROBLEMS, text_line
+from gateway.monitoring.lines import LINES, NOTES, text_line
+from gateway.monitoring.rate import Rate
 from gateway.monitoring.shared import Observer
 
 PERIOD: Final = 0.1
@@ -29,22 +30,48 @@ PERIOD: Final = 0.1
 
 
 def show_run(ended: Connection, path: Path, form: str) -> None:
-    """Process: print each change of a run as a line until the daemon's end of the pipe closes."""
-    observer, line = Observer(path), LINES[form]
-    told, problem, live = 0, "", form == "text" and sys.stdout.isatty()
-    with _screen(observer, live=live) as (console, draw):
+    """Process: print the lines of a run until the daemon's end of the pipe closes."""
+    observer = Observer(path)
+    log = RunLog(observer.identity, form)
+    with _screen(observer, live=form == "text" and sys.stdout.isatty()) as (console, draw):
         over = False
         while not over:
             over = ended.poll(PERIOD)
             snapshot = observer.snapshot()
-            for text in new_lines(snapshot, told, line):
+            for text in log.lines(snapshot, time.monotonic(), over=over):
                 console.print(text, markup=False)
-            told = snapshot.values.changes
-            found = page.problem_text(snapshot.values)
-            if found not in ("", problem) and State(snapshot.values.state) is State.CONNECT:
-                problem = found
-                console.print(PROBLEMS[form](found, date(snapshot.values.now)), markup=False)
             draw(snapshot)
+
+
+class RunLog:
+    """The lines of a run: its start, each change, the link's words, no more than the rate allows.
+
+    identity : of the daemon, as the status block has it; form : one of LINES
+    """
+
+    def __init__(self, identity: dict[str, Any], form: str) -> None:
+        self._line, self._note = LINES[form], NOTES[form]
+        self._start: str | None = f"{identity['recording']}; real time: {identity['real_time']}"
+        self._refused = " no (" in identity["real_time"]
+        self._told, self._problem = 0, ""
+        self._rate = Rate(self._left_out)
+
+    def lines(self, snapshot: Snapshot, now: float, *, over: bool) -> list[str]:
+        """Lines since the last snapshot; now : monotonic time [s]; over : they are the last."""
+        values, found = snapshot.values, page.problem_text(snapshot.values)
+        new = new_lines(snapshot, self._told, self._line)
+        lost, self._told = values.changes - self._told - len(new), values.changes
+        if self._start is not None:
+            start, self._start = self._start, None
+            new = [self._note("start", start, date(now), warning=self._refused), *new]
+        if found not in ("", self._problem) and State(values.state) is State.CONNECT:
+            self._problem = found
+            new.append(self._note("link", found, date(values.now)))
+        passed = self._rate.passed(new, now, lost=lost)
+        return passed + (self._rate.rest() if over else [])
+
+    def _left_out(self, count: int) -> str:
+        return self._note("log", f"{count} lines left out", date(time.monotonic()))
 
 
 def new_lines(

@@ -18,6 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from gateway.arrays import Array
+from register_maps.units import KMH
 
 PERIOD: Final = 0.1
 POINTS: Final = 5
@@ -53,14 +54,14 @@ class DriveQuality:
             "eer_percent": 100.0 * self.economy,
             "ascr_percent": 100.0 * self.speed_change,
             "iwr_percent": 100.0 * self.inertia_work,
-            "rmsse_km_h": 3.6 * self.speed_error,
+            "rmsse_km_h": self.speed_error / KMH,
             "braking_road_joule": self.braking_on_road,
             "braking_bench_joule": self.braking_on_bench,
         }
 
     def __str__(self) -> str:
         return (
-            f"IWR {100.0 * self.inertia_work:+.2f} %  RMSSE {3.6 * self.speed_error:.3f} km/h  "
+            f"IWR {100.0 * self.inertia_work:+.2f} %  RMSSE {self.speed_error / KMH:.3f} km/h  "
             f"ER {100.0 * self.energy:+.2f} %  DR {100.0 * self.distance:+.2f} %"
         )
 

@@ -25,7 +25,7 @@ from gateway.arrays import Array
 from gateway.cycle.record import READ, WRITTEN
 from gateway.recordings.header import map_of
 from gateway.recordings.recording import Recording, Stream, reason_name, state_name
-from register_maps.poll_quality import PollQuality
+from register_maps.logs.poll_quality import PollQuality
 from register_maps.signals import LOG_COLUMNS, SIGNALS, Status
 from register_maps.timing import SCAN
 from register_maps.units import UNITS

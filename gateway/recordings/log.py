@@ -8,8 +8,8 @@ import numpy as np
 
 from gateway.arrays import Array
 from gateway.errors import ConfigError
-from register_maps import csv_log, mdf4_log, parquet_log
-from register_maps.log_table import LogTableError, check_sampling
+from register_maps.logs import csv_log, mdf4_log, parquet_log
+from register_maps.logs.log_table import LogTableError, check_sampling
 from register_maps.signals import LOG_COLUMNS
 
 NO_SENSORS: Final = ("time", "reference_knee_time", "reference_knee", "truck_on_drum")

@@ -10,8 +10,8 @@ import numpy as np
 
 from gateway.errors import ConfigError
 from gateway.recordings.export import SUFFIXES, Columns, Export
-from register_maps import mdf4_log, parquet_log
-from register_maps.log_table import Column, LogTableError
+from register_maps.logs import mdf4_log, parquet_log
+from register_maps.logs.log_table import Column, LogTableError
 from register_maps.signals import LOG_COLUMNS
 
 FORMS: Final = (".csv", ".csv.gz", ".parquet", ".mf4")

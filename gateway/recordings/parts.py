@@ -24,7 +24,7 @@ TRIPS: Final = "trips"
 SYNC: Final = 1.0
 """[s] Period of synchronising the file with the disk."""
 LEVEL: Final = 6
-"""Level of gzip: 175 MB, an hour at 100 Hz, become 45 MB in 6 s; level 9 takes 30 s for 44 MB."""
+"""Level of gzip: 175 MB, an hour at 100 Hz with noisy sensors, become 63 MB in 4 s."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gateway.commissioning.step_run import StepRun, step_numbers
+from gateway.commissioning.step_run import StepRun, replayed
 from gateway.errors import ConfigError
 from gateway.offline.recording_replay import observations
 from gateway.recordings import recording, steady_runs
@@ -23,7 +23,7 @@ def read(path: Path) -> StepRun:
         raise ConfigError(
             "not the run of a program", file=path, expected="a recording of drive, ready or verify"
         )
-    numbers = step_numbers(config, register_map, observations(found.rows(), register_map))
+    numbers, oil = replayed(config, register_map, observations(found.rows(), register_map))
     samples = of_recording(found)
     rows = found.records[samples]
     beats = unwrap_time(rows["measured_plc_heartbeat"], register_map.modulus("plc_heartbeat"))
@@ -33,5 +33,6 @@ def read(path: Path) -> StepRun:
         current=rows["measured_armature_current"],
         own_time=rows["now"],
         heartbeat=beats,
+        oil_temperature=np.array(oil)[samples],
         steps=np.array(numbers)[samples],
     )

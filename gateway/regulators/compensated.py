@@ -18,9 +18,9 @@ It differs from the regulator of the thesis in four points.
 from dataclasses import dataclass, replace
 
 from gateway.configuration.config import Config
-from gateway.friction import Friction, friction_torque
+from gateway.friction.law import Friction, bearing_torque, friction_torque, load_loss
+from gateway.physics.road_load import RoadLoad, road_load
 from gateway.regulators.window import Demand, Window
-from gateway.road_load import RoadLoad, road_load
 
 SLOW = 0.5
 """[rad/s] Drum speed up to which less of the friction may be compensated. In cruise, 1 % of the
@@ -119,6 +119,8 @@ def truck_torque(params: Params, window: Window) -> float:
     """Mean torque of the truck on the drum over the window [N m].
 
     T_w' = (J_g + J_d) theta_d'' + T_f(theta_m' / xi) + xi T_meas           (thesis, eq 4.9)
+
+    T_f : with the losses by load and in the drum's bearings, where the friction has them
     """
     measured = params.gear_ratio * window.shaft_torque
     accelerating = params.drum_inertia * window.drum_speed_change / window.duration
@@ -128,11 +130,14 @@ def truck_torque(params: Params, window: Window) -> float:
 def _friction(params: Params, window: Window, measured: float) -> float:
     gear_speed = window.motor_speed / params.gear_ratio
     if abs(gear_speed) < STICK_SPEED:
-        return _clip(-measured, params.friction.coulomb)
+        return _clip(-measured, params.friction.breakaway)
     least, most = params.under_compensation, params.under_compensation_slow
     slow = max(0.0, 1.0 - abs(gear_speed) / SLOW)
     share = 1.0 - least - max(0.0, most - least) * slow
-    return share * friction_torque(gear_speed, params.friction, window.shell_temperature)
+    law = params.friction
+    gear = friction_torque(gear_speed, law, window.shell_temperature, window.oil_temperature)
+    loaded = load_loss(-measured - gear, gear_speed, law)
+    return share * (gear + loaded + bearing_torque(window.drum_speed, law))
 
 
 def _move(params: Params, state: State, torque: float, duration: float) -> tuple[bool, float]:

@@ -17,9 +17,9 @@ range. The setpoint is a staircase as in the thesis, without a slope between two
 from dataclasses import dataclass, replace
 
 from gateway.configuration.config import Config
-from gateway.friction import Friction, friction_torque
+from gateway.friction.law import Friction, friction_torque
+from gateway.physics.road_load import RoadLoad, road_load
 from gateway.regulators.window import Demand, Window
-from gateway.road_load import RoadLoad, road_load
 
 
 @dataclass(frozen=True, kw_only=True)

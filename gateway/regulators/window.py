@@ -11,7 +11,7 @@ class Window:
     shaft_torque : over the window or at its end, see `regulator.torque` [N m, sign of the sensor]
     motor_speed, drum_speed : at the end of the window [rad/s]
     drum_speed_change : over exactly this window [rad/s]
-    shell_temperature : of the gear [K], None: unknown
+    shell_temperature, oil_temperature : of the gear [K], None: unknown
     """
 
     duration: float
@@ -20,6 +20,7 @@ class Window:
     drum_speed: float
     drum_speed_change: float
     shell_temperature: float | None = None
+    oil_temperature: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,11 +3,12 @@
 from collections.abc import Iterator
 
 from gateway.configuration.config import Config
-from gateway.friction import friction_torque
+from gateway.friction.law import idle_torque
+from gateway.physics.motor import flux
+from gateway.physics.road_load import road_load
 from gateway.review.finding import Finding
 from gateway.review.loop import rho_of
 from gateway.review.stability import DRIVE
-from gateway.road_load import road_load
 from register_maps.timing import SCAN
 from register_maps.units import RPM
 
@@ -95,16 +96,12 @@ def torque(config: Config) -> Iterator[Finding]:
     truck, bench = config.truck, config.bench
     omega, road = truck.top_speed / bench.drum_radius, road_load(truck, bench)
     rolling = bench.drum_radius * road.force(truck.top_speed)
-    friction = friction_torque(omega, config.regulator.friction)
+    friction = idle_torque(omega, config.regulator.friction)
     difference = bench.drum_radius * truck.total_mass * (1.0 - rho_of(config))
     at_constant_speed = friction - rolling
     accelerating = at_constant_speed - difference * truck.acceleration
     braking = at_constant_speed + difference * truck.braking
-    flux = min(
-        bench.flux_constant,
-        bench.flux_constant_1 / (bench.flux_constant_2 + bench.gear_ratio * omega),
-    )
-    limit = bench.gear_ratio * flux * config.limits.current
+    limit = bench.gear_ratio * flux(bench, bench.gear_ratio * omega) * config.limits.current
     for name, torque in (("acceleration", accelerating), ("braking", braking)):
         yield Finding(
             severity="info" if abs(torque) <= limit else "warning",

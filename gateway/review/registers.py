@@ -6,6 +6,7 @@ from typing import Final
 from gateway.configuration.config import Config
 from gateway.cycle.command import run_mode
 from gateway.cycle.samples import NEEDS
+from gateway.friction.document import EFFECTS, SENSOR
 from gateway.review.finding import Finding
 from register_maps.codec import CodecError, Value, encode_value
 from register_maps.register_map import RegisterMap
@@ -28,15 +29,31 @@ def measurements(config: Config, register_map: RegisterMap) -> Iterator[Finding]
                 kind for kind, signal in NEEDS.items() if _has(register_map, signal)
             ),
         )
-    if config.regulator.friction.temperature_coefficient and not any(
-        _has(register_map, f"shell_temperature_{number}") for number in (1, 2)
-    ):
+    law = config.regulator.friction
+    follows = law.temperature_coefficient or law.gear_oil_temperature.viscosity_coefficient
+    if follows and not any(_has(register_map, f"shell_temperature_{n}") for n in (1, 2)):
         yield Finding(
             severity="warning",
             where="regulator.friction",
             what="friction depends on the shell temperature, which the register map does not have",
-            value=config.regulator.friction.temperature_coefficient,
+            value=follows,
             allowed="0 without a shell temperature",
+        )
+    if law.left_out:
+        yield Finding(
+            severity="warning",
+            where="regulator.friction",
+            what="effects of the parameter set that the regulator cannot use",
+            value=", ".join(law.left_out),
+            allowed="; ".join(EFFECTS | SENSOR),
+        )
+    if law.effects and config.regulator.name == "thesis":
+        yield Finding(
+            severity="warning",
+            where="regulator.name",
+            what="the regulator of the thesis leaves out " + ", ".join(law.effects),
+            value="thesis",
+            allowed="compensated",
         )
 
 

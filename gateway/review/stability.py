@@ -6,7 +6,7 @@ torque. D = F cancels for every mass and delay. D and F differ when the torque i
 while the speed difference spans a window, when their filters differ, and by the lead.
 
 The loop is linear and has the period of the poll. Its stability follows from the eigenvalues of the
-map from one poll to the next (Floquet). The map is built by sending each unit state through one
+map from one poll to the next (Floquet). The map is built by sending all unit states through one
 period in steps of 1 ms: speed of the drum in contact, reference in its dead time, filters, and the
 regulator at the end. One eigenvalue is always 1, because driver and road close the loop of the
 truck's speed.
@@ -28,6 +28,7 @@ CONTACT = 385.0
 MARGIN = 1e-7
 """Excess of an eigenvalue over 1 that counts as rounding."""
 LIGHTEST, HEAVIEST = 60.0, 20000.0
+"""[kg] Range of masses that is searched for the smallest stable one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,8 +53,7 @@ class Loop:
 
 def spectral_radius(loop: Loop, rho: float) -> float:
     """Largest modulus of the eigenvalues from poll to poll; above 1 the loop is unstable."""
-    size = _size(loop)
-    period_map = np.column_stack([_one_period(loop, rho, unit) for unit in np.eye(size)])
+    period_map = _one_period(loop, rho, np.eye(_size(loop)))
     return float(np.abs(np.linalg.eigvals(period_map)).max())
 
 
@@ -91,14 +91,14 @@ def _size(loop: Loop) -> int:
     return 7 + round(loop.dead_time / STEP)
 
 
-def _one_period(loop: Loop, rho: float, state: Array) -> Array:
-    """State one poll later. The torque is in units of the drum's inertia: T = -w'.
+def _one_period(loop: Loop, rho: float, states: Array) -> Array:
+    """States one poll later, a column each. The torque is in units of the drum's inertia: T = -w'.
 
     g, w : speed of gear and drum; tau, y : filtered torque and speed; before : y at the last poll
     v : speed of the truck; reference : the newest one; the rest of the state is in the dead time
     """
-    g, w, tau, y, before, v, reference = (float(value) for value in state[:7])
-    delayed = list(state[7:])
+    g, w, tau, y, before, v, reference = states[:7]
+    delayed = list(states[7:])
     steps = round(loop.period / STEP)
     follow, meet, smooth_torque, smooth_speed = (
         1.0 - exp(-DRIVE * STEP),
@@ -106,19 +106,19 @@ def _one_period(loop: Loop, rho: float, state: Array) -> Array:
         _share(loop.torque_filter),
         _share(loop.speed_filter),
     )
-    impulse = 0.0
+    impulse = np.zeros_like(g)
     for _ in range(steps):
         delayed.append(reference)
-        g += follow * (delayed.pop(0) - g)
+        g = g + follow * (delayed.pop(0) - g)
         change = meet * (g - w)
-        w += change
-        tau += smooth_torque * (-change / STEP - tau)
-        y += smooth_speed * (w - y)
-        impulse += tau * STEP
+        w = w + change
+        tau = tau + smooth_torque * (-change / STEP - tau)
+        y = y + smooth_speed * (w - y)
+        impulse = impulse + tau * STEP
     torque = impulse / loop.period if loop.averaged else tau
     gain = rho * (1.0 + loop.inertia_error)
     growth = gain * (y - before) + rho * torque * loop.period
-    v += growth
+    v = v + growth
     reference = v + loop.lead * growth / loop.period + loop.trim * (v - y)
     return np.array([g, w, tau, y, y, v, reference, *delayed])
 

@@ -23,6 +23,7 @@ from gateway.cycle.cycle import Output
 from gateway.cycle.record import Layout, Tick
 from gateway.cycle.supervisor import State
 from gateway.errors import GatewayError
+from gateway.link import tls
 from gateway.link.plc import TcpLink
 from gateway.monitoring import metrics, server, terminal
 from gateway.monitoring.shared import Publisher
@@ -107,6 +108,7 @@ def run(
         plc.timeout,
         settle=plc.settle,
         probe=register_map.measurement,
+        tls=tls.context(plc),
     )
     granted = real_time() if config.loop.realtime else nullcontext("not asked for")
     with granted as real:
@@ -178,6 +180,7 @@ def _identity(job: Job) -> dict[str, Any]:
         "period": job.header["config"]["loop"]["period_ms"] * 1e-3,
         "version": job.header["versions"]["gateway"],
         "recording": str(job.path),
+        "real_time": job.header["real_time"],
     }
 
 

@@ -16,6 +16,7 @@ from typing import Final, Protocol
 
 from gateway.configuration.config import Config
 from gateway.cycle.cycle import Observation, Output, initial, step
+from gateway.cycle.plausibility import shares
 from gateway.cycle.record import NOTHING, Layout, Tick
 from gateway.cycle.supervisor import State
 from gateway.errors import BugError, GatewayError
@@ -252,4 +253,5 @@ class Loop:
             measurement=reading.measurement,
             setpoint=output.setpoint,
             problem=reading.problem,
+            implausible=shares(self._state.watched.relations, self._state.watched.sensors),
         )

@@ -1,4 +1,4 @@
-"""The unit by which systemd runs the gateway."""
+"""What runs and shows the gateway in a plant: the unit of systemd, the board of Grafana."""
 
 import sys
 from importlib import resources
@@ -8,6 +8,7 @@ from typing import Final
 from gateway.errors import GatewayError
 
 NAME: Final = "gateway.service"
+BOARD: Final = "grafana_board.json"
 FOLDER: Final = Path("/etc/systemd/system")
 
 
@@ -17,6 +18,11 @@ def unit(config: Path) -> str:
     words = (sys.executable, "-m", "gateway", "run", "-c", str(config.resolve()))
     command = " ".join((*map(_quoted, words), "--log-format", "json"))
     return template.replace("{command}", command)
+
+
+def board() -> str:
+    """Text of a board for Grafana over the metrics of the gateway."""
+    return resources.files(__package__).joinpath(BOARD).read_text("utf-8")
 
 
 def install(config: Path, folder: Path) -> Path:

@@ -7,7 +7,7 @@ import register_maps
 from gateway import config_file
 from gateway.configuration.config import Config
 from gateway.configuration.sections import PlcConfig
-from gateway.link import device, inspection
+from gateway.link import device, inspection, tls
 from gateway.link.plc import LinkError
 from gateway.review.finding import Finding, Review
 from gateway.review.review import review
@@ -58,7 +58,9 @@ def compare_pace(config: Config, register_map: RegisterMap) -> Finding:
 def _peer(plc: PlcConfig) -> device.Device:
     """Device of the PLC; its first reply may take the settle time."""
     timeout = max(plc.timeout, plc.settle)
-    return device.Device(host=plc.host, port=plc.port, unit=plc.unit, timeout=timeout)
+    return device.Device(
+        host=plc.host, port=plc.port, unit=plc.unit, timeout=timeout, tls=tls.context(plc)
+    )
 
 
 def compare_with_device(plc: PlcConfig, register_map: RegisterMap) -> list[Finding]:

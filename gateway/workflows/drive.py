@@ -16,7 +16,7 @@ from gateway.recordings import log_writer, program_file, recording
 from gateway.recordings.export import Export, Extent, of_recording, unwrap_time
 from gateway.recordings.header import map_of
 from gateway.workflows.live_program import Ended, run_program
-from register_maps.drive_programs import DRIVE_PROGRAMS
+from register_maps.logs.drive_programs import DRIVE_PROGRAMS
 from register_maps.timing import SCAN
 
 REST: Final = 1.0

@@ -27,7 +27,7 @@ def measure_losses(files: Sequence[Path], config: Config | None = None) -> Losse
     for run in map(steady_runs.read, files):
         known = config or run.config or Config()
         try:
-            found = steady(run.trace, known.bench, known.regulator.torque_offset)
+            found = steady(run.trace, known.bench, known.regulator)
         except LossesError as error:
             raise LossesError(f"{run.path}: {error}") from error
         sections += found.sections

@@ -14,19 +14,19 @@ import numpy as np
 import register_maps
 from gateway import config_file
 from gateway.configuration.config import Config
-from gateway.cycle.supervisor import State
 from gateway.losses import sections
 from gateway.offline import log_replay, recording_replay
 from gateway.offline.comparison import Comparison, compare
-from gateway.offline.drive_quality import DriveQuality, drive_quality
+from gateway.offline.drive_quality import drive_quality
 from gateway.offline.evaluation import road_speed, traction_energy
 from gateway.offline.figures import Latency, RunFigures, TractionEnergy, cruise_force
 from gateway.offline.recording_replay import Difference
+from gateway.physics.road_load import road_load
 from gateway.recordings import log, recording, steady_runs
 from gateway.recordings.header import config_of, map_of
 from gateway.recordings.recording import Recording, RecordingError
 from gateway.reports.replay import describe_comparison, describe_differences
-from gateway.road_load import road_load
+from gateway.workflows.run_quality import quality_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +136,7 @@ def _replay_recording(found: Recording, config: Config, *, is_exact: bool) -> Re
             _figures(config, comparison, "recorded"),
             missed_deadlines=int(found.records["missed"][-1]) if len(found) else 0,
             latency=Latency.of(found.records["latency"]),
-            quality=_quality_of_run(found, config),
+            quality=quality_of(found, config),
         ),
         differences=tuple(
             replace(one, time=one.time - started)
@@ -200,16 +200,6 @@ def _with_truck(figures: RunFigures, found: log.Log, config: Config) -> RunFigur
     )
 
 
-def _quality_of_run(found: Recording, config: Config) -> DriveQuality | None:
-    """Indices of the drum over the speed that the regulator wanted; None without a run."""
-    bench, rows = config.bench, found.records[found.records["state"] == State.RUN]
-    rows = rows[np.isfinite(rows["demand"]) & np.isfinite(rows["measured_drum_speed"])]
-    wanted = rows["demand"] / bench.gear_ratio * bench.drum_radius
-    speed = rows["measured_drum_speed"] * bench.drum_radius
-    road = road_load(config.truck, bench)
-    return drive_quality(rows["now"], wanted, speed, config.truck.total_mass, road.force)
-
-
 def _wrong_sign(found: log.Log, config: Config) -> str:
     """Why the logged torque seems to have the wrong sign; empty: it has not, or a truck drives."""
     columns = found.columns
@@ -223,7 +213,7 @@ def _wrong_sign(found: log.Log, config: Config) -> str:
         shaft_torque=columns["shaft_torque"],
     )
     try:
-        sections.steady(trace, config.bench, config.regulator.torque_offset)
+        sections.steady(trace, config.bench, config.regulator)
     except sections.SignError as error:
         return str(error)
     except sections.LossesError:

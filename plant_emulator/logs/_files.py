@@ -8,7 +8,7 @@ import numpy as np
 
 from plant_emulator.errors import LogError
 from plant_emulator.signals.log import Array, Log
-from register_maps.log_table import Column, LogTable, LogTableError, check_sampling
+from register_maps.logs.log_table import Column, LogTable, LogTableError, check_sampling
 from register_maps.signals import LOG_COLUMNS, LogColumn
 from register_maps.units import UNITS
 

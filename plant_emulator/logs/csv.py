@@ -1,4 +1,4 @@
-"""Reads and writes CSV logs; `register_maps.csv_log` defines the format."""
+"""Reads and writes CSV logs; `register_maps.logs.csv_log` defines the format."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import gzip
 from typing import TYPE_CHECKING
 
 from plant_emulator.logs import _files
-from register_maps.csv_log import GZIP, parse
+from register_maps.logs.csv_log import GZIP, parse
 
 if TYPE_CHECKING:
     from pathlib import Path

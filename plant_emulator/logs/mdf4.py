@@ -1,11 +1,11 @@
-"""Reads and writes MDF4 logs; `register_maps.mdf4_log` defines the format."""
+"""Reads and writes MDF4 logs; `register_maps.logs.mdf4_log` defines the format."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from plant_emulator.logs import _files
-from register_maps import mdf4_log
+from register_maps.logs import mdf4_log
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -1,11 +1,11 @@
-"""Reads and writes Parquet logs; `register_maps.parquet_log` defines the format."""
+"""Reads and writes Parquet logs; `register_maps.logs.parquet_log` defines the format."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from plant_emulator.logs import _files
-from register_maps import parquet_log
+from register_maps.logs import parquet_log
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -13,7 +13,7 @@ import numpy as np
 
 from plant_emulator.errors import ParameterError
 from plant_emulator.signals.log import Log
-from register_maps.drive_programs import DRIVE_PROGRAMS, DriveProgram
+from register_maps.logs.drive_programs import DRIVE_PROGRAMS, DriveProgram
 
 if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
@@ -28,7 +28,12 @@ def sample_times(duration: float, period: float = SAMPLE_PERIOD) -> Array:
 
 @dataclass(frozen=True, kw_only=True)
 class SpeedProgram(DriveProgram):
-    """A drive program that can be sampled."""
+    """A drive program that can be sampled.
+
+    name, duration [s] : of the program
+    corners : time [s] and speed reference [rad/s] where the linear pieces meet
+    sweeps : sines of rising frequency on top
+    """
 
     def reference(self, period: float = SAMPLE_PERIOD) -> tuple[Array, Array]:
         """Sample times [s] and references [rad/s], shape (n,) each."""

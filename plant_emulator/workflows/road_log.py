@@ -15,7 +15,7 @@ import numpy as np
 
 from plant_emulator.errors import LogError
 from plant_emulator.workflows.provenance import file_hash, program_version
-from register_maps.csv_log import TIME, CsvLogError, parse
+from register_maps.logs.csv_log import TIME, CsvLogError, parse
 from register_maps.signals import LOG_COLUMNS, LogColumn
 
 if TYPE_CHECKING:

@@ -1,6 +1,7 @@
 """Gateway's tick and emulated PLC in one virtual time: no clock, no socket, everything in words."""
 
 from collections.abc import Callable, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 
 from gateway.configuration.config import Config
@@ -14,6 +15,7 @@ from plant_emulator.emulator.plc.surroundings import Backlash, Switches, Truck
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.simulation.running_bench import Bench
 from plant_emulator.simulation.truck import Driver, Forklift, ReplayedTorque
+from plant_emulator.solver import compiler
 from register_maps import load
 from register_maps.codec import decode_measurement, encode_measurement, encode_setpoint
 from register_maps.signals import Measurement
@@ -109,3 +111,14 @@ class ClosedLoop:
         self.operate(remote=True)
         self.run(0.2)
         assert self.last.state is State.RUN, self.last
+
+    def branch(self) -> "ClosedLoop":
+        """A loop that goes on from here by itself, for one run up to where many tests begin."""
+        bench = self.plc.bench
+        same = (self.config, self.map, self.parameters, self.state.params, bench._kernel)
+        past = (self.observations, self.outputs, self.drum_speed, self.wheel_torque)
+        known = {id(one): one for one in same} | {id(one): list(one) for one in past}
+        if compiler.ENABLED:  # a compiled kernel takes the array that a record stands in
+            records = (bench._p, bench._stage)
+            known |= {id(one): one.base.copy()[0] for one in records}  # type: ignore[attr-defined]
+        return deepcopy(self, known)

@@ -10,13 +10,12 @@ their alarm levels.
 """
 
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from gateway.configuration.config import Config
-from gateway.cycle.plausibility import Params, Plausibility
+from gateway.cycle.plausibility import shares
 from gateway.cycle.supervisor import State
 from plant_emulator import parameter_sets
 from plant_emulator.model.parameters import ParameterSet
@@ -80,19 +79,21 @@ class Travels:
         return Cycle(speed=top, up=up, brake=brake, down=down, duration=brake + down + 4.0)
 
 
-def noisy(seed: int) -> Callable[[object, Measurement], Measurement]:
+@dataclass
+class Noisy:
     """Disturbance that adds the noise of the sensors to every sample, integral and mean included.
 
     The fast task of the PLC takes ten torque samples a scan, so that its mean has less noise.
     """
-    random = np.random.default_rng(seed)
-    integral = 0.0
 
-    def disturbed(_: object, reading: Measurement) -> Measurement:
-        nonlocal integral
-        motor, drum, current, torque = random.standard_normal(4)
-        mean = SENSORS["shaft_torque"][0] * random.standard_normal() / np.sqrt(10.0)
-        integral += mean * SCAN
+    random: np.random.Generator
+    _integral: float = 0.0
+
+    def __call__(self, _: object, reading: Measurement) -> Measurement:
+        """The sample with noise."""
+        motor, drum, current, torque = self.random.standard_normal(4)
+        mean = SENSORS["shaft_torque"][0] * self.random.standard_normal() / np.sqrt(10.0)
+        self._integral += mean * SCAN
         assert reading.shaft_torque_mean is not None
         assert reading.shaft_torque_integral is not None
         assert reading.armature_current is not None
@@ -103,10 +104,8 @@ def noisy(seed: int) -> Callable[[object, Measurement], Measurement]:
             armature_current=reading.armature_current + SENSORS["armature_current"][0] * current,
             shaft_torque=reading.shaft_torque + SENSORS["shaft_torque"][0] * torque,
             shaft_torque_mean=reading.shaft_torque_mean + mean,
-            shaft_torque_integral=reading.shaft_torque_integral + integral,
+            shaft_torque_integral=reading.shaft_torque_integral + self._integral,
         )
-
-    return disturbed
 
 
 def sound_drive(seed: int) -> ClosedLoop:
@@ -118,19 +117,10 @@ def sound_drive(seed: int) -> ClosedLoop:
         parameters=parameters,
         effects=effects,
         driver=lambda truck: Travels(truck, ("none", "pi")[seed % 2], random),
-        disturb=noisy(seed + 2000),
+        disturb=Noisy(np.random.default_rng(seed + 2000)),
     )
     loop.start()
     return loop
-
-
-def shares(p: Params, sums: Plausibility) -> tuple[float, float, float]:
-    """Sums of motor, gear and drum over their alarm levels."""
-    return (
-        max(sums.motor_up, sums.motor_down) / p.motor_level,
-        max(sums.gear_up, sums.gear_down) / p.gear_level,
-        max(sums.drum_up, sums.drum_down) / p.drum_level,
-    )
 
 
 def largest_shares(loop: ClosedLoop, duration: float) -> np.ndarray:

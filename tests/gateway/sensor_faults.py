@@ -2,9 +2,16 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cache
 
+import numpy as np
+
+from gateway.configuration.config import Config
+from plant_emulator.simulation.truck import Cycle, driver_of
 from register_maps.signals import Measurement
 from register_maps.timing import SCAN
+from tests.gateway.closed_loop import ClosedLoop
+from tests.gateway.drifted_bench import Noisy
 
 
 @dataclass
@@ -68,3 +75,22 @@ FAULTS: dict[str, Callable[[], Callable[[Measurement], Measurement]]] = {
     "drum speed x0.5": lambda: SpeedFault("drum_speed", 0.5),
 }
 """A fault by its name; call it to begin the fault with the next sample."""
+
+
+def driving(kmh: float, driver: str, *, noise: bool = True) -> ClosedLoop:
+    """A loop at this speed; at standstill, 1 s before the truck sets off."""
+    return _driven(kmh, driver, noise=noise).branch()
+
+
+@cache
+def _driven(kmh: float, driver: str, *, noise: bool) -> ClosedLoop:
+    top = (kmh or 14.0) / 3.6
+    up = top / 0.65
+    cycle = Cycle(speed=top, up=up, brake=8.0 + up, down=top / 1.05, duration=60.0)
+    config = Config().with_values({"plausibility.noisy_speeds": noise})
+    loop = ClosedLoop(config, driver=lambda truck: driver_of(driver, truck, cycle))
+    if noise:
+        loop.disturb = Noisy(np.random.default_rng(7))
+    loop.start()
+    loop.run(4.0 + up - 0.2 if kmh else 0.8)
+    return loop

@@ -13,13 +13,12 @@ from gateway.commissioning.step_run import StepRun
 from gateway.configuration.config import Config
 from gateway.configuration.program import Emulation, Ramp, Step
 from gateway.configuration.sweep_speeds import RATE_RPM_S
-from register_maps.units import RPM
+from register_maps.units import KMH, RPM
 
 NAME = LABEL = "acceleration"
 SOURCE = "40 CFR 1066.265"
 RATES = (0.25, 0.5, 0.75)
 """[m/s^2] Steps of 0.25: those of a road car are too fast for the bench."""
-KMH = 1.0 / 3.6
 LOWEST, HIGHEST = 3.0 * KMH, 15.0 * KMH
 """[m/s] Speeds between which a run counts."""
 MARGIN = 1.0 * KMH

@@ -12,12 +12,11 @@ from gateway.commissioning.step_run import StepRun
 from gateway.configuration.config import Config
 from gateway.configuration.program import Emulation, Ramp, Step
 from gateway.configuration.sweep_speeds import RATE_RPM_S
-from gateway.road_load import GRAVITY
-from register_maps.units import RPM
+from gateway.physics.road_load import GRAVITY
+from register_maps.units import KMH, RPM
 
 NAME = LABEL = "coast-down"
 SOURCE = "for comparison: 40 CFR 1066.270, from memory"
-KMH = 1.0 / 3.6
 BOUNDS: Array = np.arange(16.0, 3.0, -2.0) * KMH
 """[m/s] Speeds between which a mean force is taken."""
 MARGIN = 1.0 * KMH
@@ -90,7 +89,7 @@ def _judge(run: StepRun, step: Emulation, part: slice) -> Check:
     target = float(targets(step, BOUNDS)[worst])
     what = (
         f"{step.mass:.0f} kg, {100.0 * errors[worst] / target:+.1f} % of {target:.0f} N at "
-        f"{3.6 * BOUNDS[worst]:.0f} .. {3.6 * BOUNDS[worst + 1]:.0f} km/h"
+        f"{BOUNDS[worst] / KMH:.0f} .. {BOUNDS[worst + 1] / KMH:.0f} km/h"
     )
     value = float(errors[worst])
     return Check(name=NAME, what=what, value=value, unit="N", limit=limit, source=SOURCE)

@@ -15,7 +15,7 @@ from gateway.arrays import Array
 from gateway.commissioning.check import Check, missing
 from gateway.commissioning.checks import acceleration
 from gateway.commissioning.step_run import StepRun
-from gateway.friction import friction_torque
+from gateway.friction.law import idle_torque
 
 NAME, LABEL = "inertia", acceleration.LABEL
 SOURCE = "40 CFR 1066.250"
@@ -43,9 +43,9 @@ def _integrals(run: StepRun, part: slice) -> tuple[float, float, float]:
     bench, regulator = run.config.bench, run.config.regulator
     time, drum = run.trace.time[part], run.trace.drum_speed[part]
     duration = np.diff(time)
-    torque = run.trace.shaft_torque[part][1:] - regulator.torque_offset
+    torque = regulator.shaft_torque(run.trace.shaft_torque[part][1:])
     gear = run.trace.motor_speed[part] / bench.gear_ratio
-    friction = np.array([friction_torque(float(one), regulator.friction) for one in gear])
+    friction = np.array([idle_torque(float(one), regulator.friction) for one in gear])
     loss = float(np.sum(0.5 * (friction[1:] + friction[:-1]) * duration))
     return float(drum[-1] - drum[0]), float(-bench.gear_ratio * np.sum(torque * duration)), loss
 

@@ -5,6 +5,7 @@ the friction that the regulator compensates is a force that the truck would feel
 """
 
 from collections.abc import Sequence
+from math import isfinite
 
 import numpy as np
 
@@ -13,9 +14,9 @@ from gateway.commissioning.step_run import StepRun
 from gateway.configuration.config import Config
 from gateway.configuration.program import Ramp, Step
 from gateway.configuration.sweep_speeds import DEFAULT, RATE_RPM_S
-from gateway.friction import friction_torque
+from gateway.friction.law import idle_torque
 from gateway.losses.sections import Section, steady
-from register_maps.units import RPM
+from register_maps.units import KMH, RPM
 
 NAME = LABEL = "losses"
 SOURCE = "for comparison: 40 CFR 1066.255, from memory"
@@ -35,8 +36,15 @@ def stretches(run: StepRun) -> Sequence[Section]:
     if not inside:
         return ()
     first, last = run.trace.time[inside[0].start], run.trace.time[inside[-1].stop - 1]
-    found = steady(run.trace, run.config.bench, run.config.regulator.torque_offset)
+    found = steady(run.trace, run.config.bench, run.config.regulator)
     return [one for one in found.sections if first <= one.start and one.end <= last]
+
+
+def oil(run: StepRun, section: Section) -> float | None:
+    """Temperature of the oil in the middle of a stretch [K]; None: unknown."""
+    middle = 0.5 * (section.start + section.end)
+    found = float(np.interp(middle, run.trace.time, run.oil_temperature))
+    return found if isfinite(found) else None
 
 
 def evaluate(run: StepRun) -> list[Check]:
@@ -45,11 +53,13 @@ def evaluate(run: StepRun) -> list[Check]:
     if not found:
         return [missing(NAME, "no steady speed", "N", limit, SOURCE)]
     law, radius = run.config.regulator.friction, run.config.bench.drum_radius
-    known = np.array([friction_torque(one.gear_speed, law, one.shell_temperature) for one in found])
+    known = np.array(
+        [idle_torque(one.gear_speed, law, one.shell_temperature, oil(run, one)) for one in found]
+    )
     off = np.array([one.friction for one in found]) - known
     worst = int(np.argmax(np.abs(off)))
     ratio = 100.0 * float(np.sum(off * known) / np.sum(known * known))
-    speed = 3.6 * found[worst].gear_speed * radius
+    speed = found[worst].gear_speed * radius / KMH
     return [
         Check(
             name=NAME,

@@ -16,13 +16,13 @@ from gateway.commissioning.step_run import StepRun
 from gateway.configuration.config import Config
 from gateway.configuration.program import Emulation, Ramp, Step
 from gateway.configuration.sweep_speeds import RATE_RPM_S
-from register_maps.units import RPM
+from register_maps.units import KMH, RPM
 
 NAME = LABEL = "response"
 SOURCE = "own limit; 40 CFR 1066.245: settled in 100 ms"
 RATE = 0.5
 """[m/s^2] Acceleration of the step."""
-START = 6.0 / 3.6
+START = 6.0 * KMH
 """[m/s] Speed at which the force begins."""
 REST, PUSH = 2.0, 2.0
 WITHIN = 0.1

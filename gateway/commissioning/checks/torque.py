@@ -6,21 +6,14 @@ only other torque on the bench. It is as good as the known flux, so that the lim
 
 import numpy as np
 
-from gateway.arrays import Array
 from gateway.commissioning.check import Check, missing
 from gateway.commissioning.checks import losses
 from gateway.commissioning.step_run import StepRun
-from gateway.configuration.config import BenchConfig
+from gateway.physics.motor import flux
 
 NAME, LABEL = "torque", losses.LABEL
 SOURCE = "own limit; the motor's flux is the scale"
 steps = losses.steps
-
-
-def flux(bench: BenchConfig, motor_speed: Array) -> Array:
-    """Flux k Phi [N m/A] at speeds of the motor [rad/s] (thesis, eq. 3.16-3.18)."""
-    weakened = bench.flux_constant_1 / (bench.flux_constant_2 + np.abs(motor_speed))
-    return np.minimum(bench.flux_constant, weakened)
 
 
 def evaluate(run: StepRun) -> list[Check]:

@@ -12,7 +12,8 @@ from click.testing import CliRunner, Result
 
 from gateway.cli import main
 from gateway.config_file import load_friction
-from gateway.friction import friction_torque, read_friction
+from gateway.friction.document import read_friction
+from gateway.friction.law import friction_torque
 from plant_emulator.emulator.process import EmulatorProcess
 from tests.system.gateway_process import until, until_armed
 
@@ -33,7 +34,7 @@ def test_map_of_a_log_is_a_friction_file_that_tells_its_origin(tmp_path):
     file = tmp_path / "map.toml"
     result = losses(*NOISY, "--save", file)
     assert result.exit_code == 0, result.output
-    friction = read_friction(load_friction(file), "map")
+    friction = read_friction(load_friction(file)["friction"], "map")
     for omega in (2.0, 4.0, 6.0):
         assert friction_torque(omega, friction) == pytest.approx(table_3_1(omega), rel=3e-3)
     assert friction.reference_temperature_celsius == pytest.approx(32.5, abs=0.6)
@@ -166,7 +167,7 @@ def test_live_sweep_ends_by_itself_and_leaves_the_map(tmp_path):
         until(lambda: emulator.status()["state"] == "READY")
     assert "no truck on the drum; 4 speeds" in errors
     assert "friction known to" in output
-    friction = read_friction(load_friction(file), "map")
+    friction = read_friction(load_friction(file)["friction"], "map")
     for omega in (0.35, 0.6, 0.95):
         assert friction_torque(omega, friction) == pytest.approx(table_3_1(omega), rel=3e-3)
 

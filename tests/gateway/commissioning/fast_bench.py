@@ -75,5 +75,6 @@ def step_run(config: Config, samples: Sequence[Measurement], steps: Sequence[int
         current=columns["armature_current"],
         own_time=time,
         heartbeat=columns["plc_heartbeat"],
+        oil_temperature=np.full(len(time), np.nan),
         steps=np.array(steps),
     )

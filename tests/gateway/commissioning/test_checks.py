@@ -12,7 +12,7 @@ from gateway.commissioning.verification import CHECKS, evaluate, verification_pr
 from gateway.configuration.config import Config, from_document
 from gateway.configuration.program import Emulation, Program, Ramp
 from gateway.errors import ConfigError
-from gateway.friction import friction_torque
+from gateway.friction.law import friction_torque
 from gateway.losses.sections import Trace
 
 RADIUS, RATIO = 0.645, 62.6
@@ -52,6 +52,7 @@ def run_of(parts: list[tuple[Emulation, np.ndarray]], torque=None) -> StepRun:  
         current=np.full(len(time), np.nan),
         own_time=time,
         heartbeat=np.arange(len(time), dtype=float),
+        oil_temperature=np.full(len(time), np.nan),
         steps=steps,
     )
 
@@ -194,6 +195,7 @@ def slow_turn(*, torque: float = -4.0, ratio: float = RATIO, drift: float = 0.0)
         current=motor,
         own_time=time,
         heartbeat=np.arange(len(time), dtype=float),
+        oil_temperature=np.full(len(time), np.nan),
         steps=np.repeat((0, 1, 2), lengths),
     )
 

@@ -12,7 +12,7 @@ from gateway.cycle.supervisor import State
 from gateway.errors import ConfigError
 from gateway.workflows.drive import read_program
 from gateway.workflows.live_program import Progress
-from register_maps.drive_programs import DRIVE_PROGRAMS
+from register_maps.logs.drive_programs import DRIVE_PROGRAMS
 from register_maps.signals import Mode
 from tests.gateway.closed_loop import ClosedLoop
 

@@ -27,13 +27,18 @@ def idle():
     return ClosedLoop(CONFIG)
 
 
-@pytest.fixture
-def running():
+@pytest.fixture(scope="module")
+def driving():
     loop = ClosedLoop(CONFIG)
     loop.start()
     loop.run(4.5)
     assert loop.last.setpoint.speed_setpoint > 50.0
     return loop
+
+
+@pytest.fixture
+def running(driving):
+    return driving.branch()
 
 
 def left_run_after(loop, within=0.4):

@@ -16,13 +16,18 @@ from tests.gateway.closed_loop import ClosedLoop, undisturbed
 CONFIG = Config()
 
 
-@pytest.fixture
-def running():
+@pytest.fixture(scope="module")
+def driving():
     loop = ClosedLoop(CONFIG)
     loop.start()
     loop.run(4.5)
     assert loop.drum_speed[-1] > 1.0
     return loop
+
+
+@pytest.fixture
+def running(driving):
+    return driving.branch()
 
 
 def restart(loop):

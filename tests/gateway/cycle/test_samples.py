@@ -69,6 +69,20 @@ def test_the_offset_of_the_sensor_is_taken_off():
     assert between(FIRST, LATER, torque_offset_Nm="0.5").shaft_torque == pytest.approx(-7.5)
 
 
+def test_gain_and_lag_of_the_sensor_are_taken_out():
+    """-7 N m shown in the mean, rising 3 N m/s at a lag of 0.1 s: -6.7; the gain shows 1.25."""
+    later = replace(LATER, shaft_torque=FIRST.shaft_torque + 0.09)
+    told = between(FIRST, later, torque_lag_ms=100.0, torque_gain_percent=25.0)
+    assert told.shaft_torque == pytest.approx(-6.7 / 1.25)
+
+
+def test_oil_begins_at_the_shell_and_warms_from_window_to_window():
+    last = replace(LATER, sequence_start=13, sequence_end=13, plc_time=1.06)
+    readings = [replace(one, shell_temperature_1=300.0) for one in (FIRST, LATER, last)]
+    assert after(*readings[:2]).window.oil_temperature == 300.0
+    assert after(*readings, every=0.03).window.oil_temperature > 300.0
+
+
 def test_a_sample_without_its_torque_falls_back_to_that_at_its_end():
     assert between(FIRST, replace(LATER, shaft_torque_integral=None)).shaft_torque == -9.0
 

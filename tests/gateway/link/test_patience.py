@@ -8,6 +8,7 @@ from contextlib import contextmanager
 import pytest
 
 from gateway.link.connector import Connector
+from gateway.link.patience import Settling
 from gateway.link.plc import LinkError, TcpLink
 from gateway.reasons import Reason
 from register_maps.register_map import Block
@@ -80,6 +81,16 @@ def test_refusal_of_the_first_request_is_a_reply() -> None:
         with pytest.raises(LinkError, match="illegal data address"):
             link.read(0, 2)
         link.close()
+
+
+def test_peer_that_hangs_up_before_the_first_request_is_told_when_it_is_asked() -> None:
+    """An error of the constructor would be taken for a mistake of ours."""
+    ours, theirs = socket.socketpair()
+    theirs.close()
+    settling = Settling(ours, b"request", deadline=1.0)
+    with pytest.raises(OSError):
+        settling.is_over()
+    ours.close()
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gateway.friction import friction_torque
+from gateway.friction.law import friction_torque
 from gateway.losses.fit import fit
 from gateway.losses.sections import LossesError, Section
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gateway.configuration.config import BenchConfig
+from gateway.configuration.sections import BenchConfig, RegulatorConfig
 from gateway.errors import ConfigError
 from gateway.losses.sections import LossesError, Trace, steady
 from gateway.recordings.steady_runs import _mean_torque, read
@@ -58,7 +58,9 @@ def test_what_the_inertia_takes_in_a_slow_change_is_no_friction():
 
 
 def test_the_configured_zero_of_the_sensor_is_taken_off():
-    (one,) = steady(trace(lambda t: 200.0, lambda t: -9.5), BENCH, torque_offset=0.5).sections
+    (one,) = steady(
+        trace(lambda t: 200.0, lambda t: -9.5), BENCH, RegulatorConfig(torque_offset=0.5)
+    ).sections
     assert one.friction == pytest.approx(626.0)
 
 

@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta, timezone
 from gateway.cycle.record import NOTHING
 from gateway.cycle.supervisor import State
 from gateway.monitoring.block import Change
-from gateway.monitoring.lines import json_line, json_problem_line, problem_line, text_line
+from gateway.monitoring.lines import json_line, json_note, text_line, text_note
 from gateway.reasons import Reason
 
 DATE = datetime(2026, 11, 23, 7, 8, 9, 123456, tzinfo=timezone(timedelta(hours=1)))
@@ -42,6 +42,6 @@ def test_operator_is_told_what_to_do_next() -> None:
 
 def test_words_of_the_link_have_a_line_of_their_own() -> None:
     words = "192.0.2.1:502 unit 1: cannot connect: Connection refused"
-    assert problem_line(words, DATE) == f"2026-11-23T07:08:09.123+01:00  link       {words}"
-    found = json.loads(json_problem_line(words, DATE))
+    assert text_note("link", words, DATE) == f"2026-11-23T07:08:09.123+01:00  link       {words}"
+    found = json.loads(json_note("link", words, DATE))
     assert (found["event"], found["level"], found["message"]) == ("link", "warning", words)

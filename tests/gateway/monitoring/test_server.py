@@ -36,7 +36,7 @@ def test_prometheus_reads_the_metrics_and_finds_the_values_in_si(web: Web) -> No
     web.publish(good(0, State.ARMED))
     web.publish(replace(good(1), latency=0.004))
     web.publish(replace(tick(2, read_back=False), state=State.RUN, fault=int(Reason.TIMEOUT)))
-    web.publish(good(3, State.RAMPDOWN, Reason.TIMEOUT))
+    web.publish(replace(good(3, State.RAMPDOWN, Reason.TIMEOUT), implausible=(0.25, 0.5, 0.0)))
     found = web.samples()
     assert found["gateway_info", "bench 1", "0.2.0"] == 1.0
     assert found["gateway_state", "RAMPDOWN"] == 1.0
@@ -46,6 +46,8 @@ def test_prometheus_reads_the_metrics_and_finds_the_values_in_si(web: Web) -> No
     assert found["gateway_trips_total",] == 1.0
     assert found["gateway_faults_total", "TIMEOUT"] == 1.0
     assert found["gateway_reasons_total", "TIMEOUT"] == 1.0
+    assert found["gateway_plausibility_ratio", "motor"] == 0.25
+    assert found["gateway_plausibility_ratio", "gear"] == 0.5
     assert found["gateway_motor_speed_radians_per_second",] == 0.1
     assert found["gateway_shaft_torque_newton_meters",] == -12.8
     assert math.isnan(found["gateway_armature_current_amperes",])

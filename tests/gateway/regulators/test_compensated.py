@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gateway.configuration.config import Config
-from gateway.friction import friction_torque
+from gateway.friction.law import friction_torque
 from gateway.regulators import compensated
 from gateway.regulators.window import Window
 

@@ -14,7 +14,7 @@ from plant_emulator.simulation.programs import (
     program,
     sample_times,
 )
-from register_maps.drive_programs import Sweep
+from register_maps.logs.drive_programs import Sweep
 
 ReadLog = Callable[[str], Log]
 

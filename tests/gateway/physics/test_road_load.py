@@ -6,7 +6,7 @@ from math import atan, sin
 import pytest
 
 from gateway.configuration.config import Config
-from gateway.road_load import road_load
+from gateway.physics.road_load import road_load
 
 CONFIG = Config()
 V = 14.0 / 3.6

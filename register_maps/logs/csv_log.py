@@ -12,7 +12,7 @@ import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
-from register_maps.log_table import (
+from register_maps.logs.log_table import (
     LogTable,
     LogTableError,
     check_count,

@@ -7,11 +7,11 @@ when the first such log is read or written. No file is opened here.
 
 import contextlib
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib import import_module
 from typing import Any, BinaryIO, Final
 
-from register_maps.log_table import (
+from register_maps.logs.log_table import (
     Column,
     LogTable,
     LogTableError,
@@ -30,14 +30,33 @@ def recognises(head: bytes) -> bool:
 
 def parse(data: bytes) -> LogTable:
     """Log in these bytes. Raises LogTableError."""
-    arrow, parquet = _packages()
-    try:
-        file = parquet.ParquetFile(arrow.BufferReader(data))
-        fields = list(file.schema_arrow)
+    with _opened(data) as (arrow, file, fields):
         return table(
             [with_metadata(field.name, _unit(field)) for field in fields],
             lambda k: _numbers(arrow, file, fields, k),
         )
+
+
+def units(data: bytes) -> dict[str, str]:
+    """Units of all columns by name, empty where there is none. Raises LogTableError."""
+    with _opened(data) as (_, _, fields):
+        return {field.name: _unit(field) for field in fields}
+
+
+def values(data: bytes, names: Sequence[str]) -> list[list[float]]:
+    """Values of these columns, NaN where one is missing. Raises LogTableError."""
+    with _opened(data) as (arrow, file, fields):
+        places = {field.name: k for k, field in enumerate(fields)}
+        return [_numbers(arrow, file, fields, places[name]) for name in names]
+
+
+@contextlib.contextmanager
+def _opened(data: bytes) -> Iterator[tuple[Any, Any, list[Any]]]:
+    """The package, the file and its fields; a damaged file raises LogTableError."""
+    arrow, parquet = _packages()
+    try:
+        file = parquet.ParquetFile(arrow.BufferReader(data))
+        yield arrow, file, list(file.schema_arrow)
     except (arrow.ArrowException, OSError, ValueError) as error:
         raise LogTableError(f"damaged Parquet file ({_line(error)})") from error
 

@@ -9,13 +9,13 @@ import contextlib
 import io
 import struct
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from importlib import import_module
 from math import nan
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
-from register_maps.log_table import (
+from register_maps.logs.log_table import (
     WITH_METADATA,
     Column,
     LogTable,
@@ -40,6 +40,9 @@ UNKNOWN_START: Final = datetime(1970, 1, 1, tzinfo=UTC)
 """Date of time zero for a log without a known date; a file must have one."""
 
 
+Taken = TypeVar("Taken")
+
+
 def recognises(head: bytes) -> bool:
     """Whether bytes with this begin are an MDF4 file."""
     return head.startswith(MAGIC)
@@ -47,13 +50,31 @@ def recognises(head: bytes) -> bool:
 
 def parse(data: bytes) -> LogTable:
     """Log in these bytes. Raises LogTableError."""
+    return _opened(data, _table)
+
+
+def units(data: bytes) -> dict[str, str]:
+    """Units of all columns by name, empty where there is none. Raises LogTableError.
+
+    The master in seconds is the column `time`.
+    """
+    return _opened(data, lambda file: {"time": "s"} | {n: u for n, (u, _) in _places(file).items()})
+
+
+def values(data: bytes, names: Sequence[str]) -> list[list[float]]:
+    """Values of these columns, all sampled at the same times. Raises LogTableError."""
+    return _opened(data, lambda file: _values(file, names))
+
+
+def _opened(data: bytes, take: Callable[[Any], Taken]) -> Taken:
+    """What `take` finds in the open file. Raises LogTableError for a damaged one."""
     asammdf = _package()
     _check_blocks(data)
     failure = ""
     with _silent(asammdf):
         try:
             with asammdf.MDF(io.BytesIO(data)) as file:
-                return _table(file)
+                return take(file)
         except LogTableError:
             raise
         except Exception as error:  # noqa: BLE001 - a damaged file makes it fail in any way
@@ -131,14 +152,38 @@ def _silent(asammdf: Any) -> Iterator[None]:
         asammdf.logger.disabled, sys.unraisablehook = logs, hook
 
 
-def _table(file: Any) -> LogTable:
-    """Log in an open file."""
-    places = [
+def _channels(file: Any) -> list[tuple[int, int]]:
+    """Group and index of every channel that is no master."""
+    return [
         (group, index)
         for group, content in enumerate(file.groups)
         for index, channel in enumerate(content.channels)
         if channel.channel_type not in MASTER
     ]
+
+
+def _places(file: Any) -> dict[str, tuple[str, tuple[int, int]]]:
+    """Unit and place of every channel by name; of channels with one name the first."""
+    found: dict[str, tuple[str, tuple[int, int]]] = {}
+    for group, index in _channels(file):
+        channel = file.groups[group].channels[index]
+        found.setdefault(channel.name, (_unit(channel), (group, index)))
+    return found
+
+
+def _values(file: Any, names: Sequence[str]) -> list[list[float]]:
+    """Values of channels by name, of `time` their common time."""
+    places = {name: place for name, (_, place) in _places(file).items()}
+    groups = {places[name][0]: name for name in names if name != "time"}
+    return [
+        _time(file, groups) if name == "time" else _numbers(file, name, *places[name])
+        for name in names
+    ]
+
+
+def _table(file: Any) -> LogTable:
+    """Log in an open file."""
+    places = _channels(file)
     names = [_name(file.groups[group].channels[index]) for group, index in places]
     groups = {
         group: name
@@ -152,9 +197,12 @@ def _table(file: Any) -> LogTable:
     return table([TIME, *names], numbers)
 
 
+def _unit(channel: Any) -> str:
+    return (channel.conversion and channel.conversion.unit) or channel.unit or ""
+
+
 def _name(channel: Any) -> str:
-    unit = (channel.conversion and channel.conversion.unit) or channel.unit
-    return with_metadata(channel.name, unit or "")
+    return with_metadata(channel.name, _unit(channel))
 
 
 def _time(file: Any, groups: Mapping[int, str]) -> list[float]:

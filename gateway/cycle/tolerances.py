@@ -1,0 +1,133 @@
+"""Tolerances and alarm levels of the parity relations, from the configuration (pure).
+
+A level covers the noise of the sensors and what a poll misses. The noise part follows from the rate
+of false alarms that is allowed.
+"""
+
+from dataclasses import dataclass
+from math import inf, log, sqrt
+from statistics import NormalDist
+
+from gateway.configuration.config import Config
+from gateway.configuration.sections import RegulatorConfig
+
+FULL_CURRENT = 72.0
+"""[A] Largest armature current of the drive (thesis, eq 3.5)."""
+STAIRCASE = 6.0
+"""[N m] Further tolerance of the motor's torque a scan under a regulator whose setpoint is a
+staircase, because the current then comes in pulses."""
+TRANSIENT, BUMP = 0.25, 25.0
+"""[N m s] Shares of two alarm levels for what a poll every 10 ms misses: those of e_1 and e_3."""
+SWING, TOP_SPEED, FASTEST_DRUM = 60.0, 8.0, 5.0
+"""[N m], [rad/s], [rad/s^2] Swings of motor torque, drum speed and drum acceleration. A filter in
+front of the PLC shows them later by its time constant."""
+GAP_SPREAD = 1.25
+"""Widest backlash over the configured one."""
+VISIBLE, VISIBLE_TORQUE = 2.5, 6.0
+"""Deviations of the noise that the partner of a stuck sensor shows, a speed or the current."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Params:
+    """Parameters of the relations in SI, and what is allowed.
+
+    flux_constant, flux_constant_1, flux_constant_2 : K_m, K_1, K_2 of the motor
+    regulator : its friction, and the known errors of the torque sensor
+    torque, torque_share : tolerance of e_1 a second [N m], and its share of the motor's torque [1]
+    full_torque : of the motor, at full flux and the largest current [N m]
+    stairs : further tolerance of e_1 for each scan of a window [N m]
+    speed, speed_share : tolerance of e_2 a second [rad/s], and its share of the speed [1]
+    truck_torque : tolerance of e_3 a second [N m at the drum]
+    motor_level, gear_level, drum_level : alarm levels of the sums [N m s], [rad], [N m s]
+    tare : mean of k Phi i + T_meas that a standing motor may show [N m]
+    stuck_torque, stuck_motor, stuck_drum : how far motor torque, drum and motor may move while the
+        sensor of torque, motor and drum stands still [N m], [rad/s of the drum]
+    """
+
+    motor_inertia: float
+    drum_inertia: float
+    gear_ratio: float
+    flux_constant: float
+    flux_constant_1: float
+    flux_constant_2: float
+    regulator: RegulatorConfig
+    torque: float
+    torque_share: float
+    full_torque: float
+    stairs: float
+    speed: float
+    speed_share: float
+    truck_torque: float
+    motor_level: float
+    gear_level: float
+    drum_level: float
+    tare: float
+    stuck_torque: float
+    stuck_motor: float
+    stuck_drum: float
+
+    @classmethod
+    def of(cls, config: Config) -> "Params":
+        """Parameters out of the configuration."""
+        bench, own = config.bench, config.plausibility
+        inertia, tail = bench.gear_inertia + bench.drum_inertia, _tail(config)
+        flux, lag = bench.flux_constant, max(bench.torque_filter, bench.speed_filter)
+        return cls(
+            motor_inertia=bench.motor_inertia,
+            drum_inertia=inertia,
+            gear_ratio=bench.gear_ratio,
+            flux_constant=flux,
+            flux_constant_1=bench.flux_constant_1,
+            flux_constant_2=bench.flux_constant_2,
+            regulator=config.regulator,
+            torque=own.torque,
+            torque_share=own.torque_share,
+            full_torque=flux * FULL_CURRENT,
+            stairs=STAIRCASE if _is_staircase(config) else 0.0,
+            speed=own.speed,
+            speed_share=own.speed_share,
+            truck_torque=own.truck_torque,
+            motor_level=TRANSIENT
+            + lag * SWING
+            + tail * sqrt(2.0) * bench.motor_inertia * own.motor_speed_noise
+            + _walk(config, own.torque, flux * own.current_noise, own.torque_noise),
+            gear_level=2.0 * GAP_SPREAD * bench.backlash_half_gap
+            + lag * TOP_SPEED
+            + _walk(
+                config, own.speed, own.drum_speed_noise, own.motor_speed_noise / bench.gear_ratio
+            ),
+            drum_level=BUMP
+            + lag * inertia * FASTEST_DRUM
+            + tail * sqrt(2.0) * inertia * own.drum_speed_noise,
+            tare=own.tare,
+            stuck_torque=VISIBLE_TORQUE * flux * own.current_noise,
+            stuck_motor=VISIBLE * own.drum_speed_noise if own.noisy_speeds else inf,
+            stuck_drum=VISIBLE * own.motor_speed_noise / bench.gear_ratio
+            if own.noisy_speeds
+            else inf,
+        )
+
+
+def _is_staircase(config: Config) -> bool:
+    """Whether the regulator gives its setpoint no slope."""
+    return config.regulator.name == "thesis" or config.regulator.torque == "instantaneous"
+
+
+def _chance(config: Config) -> float:
+    """Probability of a false alarm in one tick that the configuration allows, for each sum."""
+    return config.plausibility.false_alarms * config.loop.period / 6.0
+
+
+def _tail(config: Config) -> float:
+    """Deviations that normal noise exceeds with this probability."""
+    return -NormalDist().inv_cdf(_chance(config))
+
+
+def _walk(config: Config, tolerance: float, *deviations: float) -> float:
+    """Level that a sum of white noise passes with the allowed probability.
+
+    P(S > h) = exp(-2 k h / (s^2 dt)) for increments of mean -k dt and variance (s dt)^2: the
+    largest value of a random walk (E. S. Page, Biometrika 41 (1954) 100).
+    """
+    variance = sum(one * one for one in deviations) * config.loop.period
+    return -log(_chance(config)) * variance / (2.0 * tolerance)

@@ -1,0 +1,1 @@
+"""The gateway against a digital twin of its bench, in one virtual time."""

@@ -1,0 +1,82 @@
+"""The wheel torque of the truck of a recorded run, from the sensors and the model of the bench.
+
+    T_w = r_w / r_d ((J_g + J_d) theta_d'' + T_f + xi T_meas)               (thesis, eq 4.9)
+
+Nobody measures this torque on a bench. It is known as well as the parameter set.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from gateway.arrays import Array
+from gateway.configuration.config import Config
+from gateway.cycle.cycle import initial, step
+from gateway.cycle.supervisor import State
+from gateway.errors import GatewayError
+from gateway.offline.recording_replay import observations
+from gateway.recordings.recording import Recording
+from gateway.regulators import compensated
+from gateway.regulators.window import Window
+from plant_emulator.simulation.truck import PARKED_TORQUE
+from register_maps.register_map import RegisterMap
+from register_maps.signals import PlcState
+from register_maps.timing import SCAN
+
+SMOOTH: Final = 11
+"""Scans of the centred mean: the drum's acceleration is noisy, its integral is not."""
+STANDING_DRUM, STANDING_GEAR = 0.02, 0.005
+"""[rad/s] Speeds of drum and gear output below which the truck stands."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordedTorque:
+    """Driver that gives a recorded torque, one value a scan [N m]; NaN: the truck is parked."""
+
+    torque: Array
+
+    def torques(self, time: float, speed: float) -> tuple[float, float]:  # noqa: ARG002 - protocol
+        """Drive and brake torque at the wheel [N m]; a negative torque is that of the brake."""
+        index = round(time / SCAN)
+        value = self.torque[index] if index < len(self.torque) else np.nan
+        if np.isnan(value):
+            return 0.0, PARKED_TORQUE
+        return max(float(value), 0.0), max(-float(value), 0.0)
+
+
+def wheel_torque(found: Recording, config: Config, register_map: RegisterMap) -> Array:
+    """Torque of the truck at its wheel in each scan since it set off [N m]; NaN: it stands.
+
+    config : that of the run, with the friction of the parameter set
+
+    Raises GatewayError for a recording without a run in road load.
+    """
+    params = replace(
+        compensated.Params.of(config), under_compensation=0.0, under_compensation_slow=0.0
+    )
+    lever = config.truck.wheel_radius / config.bench.drum_radius
+    ends, torques, standing = [0.0], [0.0], [True]
+    state = initial(config, register_map)
+    for seen in observations(found.rows(), register_map):
+        state, output = step(config, register_map, state, seen)
+        window, newest = state.samples.window, state.samples.newest
+        if output.state is not State.RUN or window is None or newest is None:
+            continue
+        if newest.plc_state is not PlcState.ROAD_LOAD:
+            continue
+        ends.append(ends[-1] + window.duration)
+        torques.append(lever * compensated.truck_torque(params, window))
+        standing.append(_stands(window, config.bench.gear_ratio))
+    if len(ends) < SMOOTH:
+        raise GatewayError("no run in road load: there is no truck whose torque could be known")
+    middles = np.arange(round(ends[-1] / SCAN)) * SCAN + SCAN / 2
+    at = np.minimum(np.searchsorted(ends, middles), len(ends) - 1)
+    smooth = np.convolve(np.array(torques)[at], np.full(SMOOTH, 1.0 / SMOOTH), mode="same")
+    return np.where(np.array(standing)[at], np.nan, smooth)
+
+
+def _stands(window: Window, ratio: float) -> bool:
+    return (
+        abs(window.drum_speed) < STANDING_DRUM and abs(window.motor_speed) < STANDING_GEAR * ratio
+    )
