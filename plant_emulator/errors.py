@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 
 class EmulatorError(Exception):
-    """A request failed.
+    """A request failed. Base class of all errors of the emulator; exit code 1.
 
     argument : name of the argument that holds the bad value; the message then begins with the name,
         and a command puts its option there

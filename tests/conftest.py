@@ -3,11 +3,12 @@
 import os
 import shutil
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 # Fixtures that take 10 s and more. All tests that use one of them run in the same process.
-COSTLY = ("all_effects", "diagnosed", "measured")
+COSTLY = ("all_effects", "diagnosed", "emps_told", "measured")
 
 # A machine that runs tests may stop for longer than a gateway waits (another machine borrows its
 # processor). So a test bound to real time fails only when it fails this often.
@@ -21,6 +22,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         default="with",
         help="run the tests bound to real time with the others, leave them out, or run only them",
     )
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave files without a test bound to real time unread where only such tests are wanted."""
+    if config.getoption("--realtime") != "only" or collection_path.suffix != ".py":
+        return None
+    return None if "mark.realtime" in collection_path.read_text(encoding="utf-8") else True
 
 
 @pytest.hookimpl(tryfirst=True)  # pytest-xdist reads the groups in its own hook

@@ -19,6 +19,7 @@ SHELL = {
     "gateway.monitoring": "shared memory, clock, terminal, network",
     "gateway.recordings": "files, processes",
     "gateway.reports": "files",
+    "gateway.twin": "files",
     "gateway.runtime": "clock, processes, operating system",
     "gateway.workflows": "files, processes",
     "plant_emulator.effects": "files: it finds its effects by their names",
@@ -123,7 +124,7 @@ def test_importing_every_module_leaves_heavy_packages_alone(
         name
         for name in own_modules(graph)
         if name.partition(".")[0] == package
-        and not name.startswith(("gateway.demo.", "register_maps.command_line."))
+        and not name.startswith(("gateway.demo.", "gateway.twin.", "register_maps.command_line."))
     )
     program = (
         "import importlib, sys\n"

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+import clients
 import diagnoses
 import numpy as np
 import peers
@@ -37,6 +38,8 @@ FIXED_STEP = 1e-3
 SCAN = 10
 TICK_BUDGET = 50e-6
 WAKE_UP = 1e-3
+# Slowest read and write of the gateway over those of libmodbus in C.
+SLOWEST_CLIENT = 2.2
 MANY = 1000
 DIAGNOSIS_BUDGET = 60.0
 FIRST_RESULT = """
@@ -242,7 +245,18 @@ def gateway(_: Study) -> Rows:
     """The gateway's tick: 99 % of all wake-ups are late by less than WAKE_UP, whatever runs beside.
 
     The latency contains the emulator's reply, for which a busy machine has to find a processor.
+    Before that, one read and one write over the gateway's link beside libmodbus.
     """
+    name, peer, target = (
+        "gateway_client",
+        "libmodbus in C, same PLC: median of a cycle",
+        SLOWEST_CLIENT,
+    )
+    try:
+        ours, theirs = clients.measure()
+        yield row(name, ours, peer, theirs, 1.0 / target)
+    except clients.NoPeerError as error:
+        yield missing(name, f"libmodbus in C: {error}", 1.0 / target)
     for name, busy, metrics in (
         ("gateway", False, False),
         ("gateway_busy", True, False),

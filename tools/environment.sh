@@ -55,7 +55,7 @@ environment() { # .venv with this package, editable, and the pinned versions of 
 
 peers_present() {
     local program
-    for program in mbpoll tshark gcc pkg-config chromium systemd-analyze; do
+    for program in mbpoll tshark gcc pkg-config chromium systemd-analyze openssl; do
         command -v "$program" >/dev/null || return 1
     done
     pkg-config --exists libmodbus
@@ -64,9 +64,9 @@ peers_present() {
 peers() { # the foreign programs of the peer tests; without them those tests skip, or fail in CI
     peers_present && return
     [ -e "$root/.venv/peers_refused" ] && [ -z "${ROADLOAD_REQUIRE_PEERS:-}" ] && return
-    say "installing mbpoll, tshark, libmodbus, a C compiler, Chromium and systemd for the peer tests ..."
+    say "installing mbpoll, tshark, libmodbus, a C compiler, Chromium, systemd and openssl ..."
     debian_install mbpoll tshark libmodbus-dev gcc libc6-dev pkg-config &&
-        debian_install chromium systemd && return
+        debian_install chromium systemd openssl && return
     touch "$root/.venv/peers_refused"
     say "could not install all of them (no root, or no apt-get): peer tests that miss theirs skip"
 }

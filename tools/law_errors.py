@@ -23,10 +23,10 @@ from threadpoolctl import threadpool_limits
 from plant_emulator import effects, logs, parameter_sets
 from plant_emulator.blind import draw, laws, score
 from plant_emulator.blind.generate import measure, simulate_truth
+from plant_emulator.diagnosis.decision.procedure import Procedure
 from plant_emulator.diagnosis.execution.pool import InProcess, TaskRunner, build_model
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
 from plant_emulator.diagnosis.report.ranking import ranked_effect
-from plant_emulator.diagnosis.selection.procedure import Procedure
 from plant_emulator.recordings.recording import recording
 from plant_emulator.solver.kernel import kernel, use_own_effects
 from plant_emulator.workflows.workers import end_with_parent

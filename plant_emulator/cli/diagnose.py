@@ -21,6 +21,16 @@ Examples:
   plant-emulator diagnose program1.csv.gz program2.csv.gz program3.csv.gz --report gap.html
   plant-emulator diagnose run1.csv run2.csv --hold-out run3.csv --save bench.toml
   plant-emulator diagnose --model axis estimation.mat --hold-out validation.mat
+  plant-emulator diagnose --model axis run.csv --column position=enc:deg \\
+      --column force=iq*0.40:Nm --hold-out run.csv@12.5:20
+
+Columns of --model axis that need no --column: time_s; position_m, position_rad, velocity_m_s or
+velocity_rad_s; force_N or torque_Nm; load_force_N or load_torque_Nm; temperature_degC. The load
+acts against the drive. Any other column is chosen by its name: time, position, velocity, force (or
+torque), load, temperature. FACTOR may be several, as a torque constant times a gear ratio in
+force=iq*0.40*28:Nm; * multiplies, / divides. UNIT is that of the product. A file is text (CSV with
+any separator, decimal point or comma), MATLAB up to version 7, Parquet or MDF4. FILE@12.5:20 is a
+part of a file in time [s].
 """
 
 
@@ -39,7 +49,7 @@ Examples:
     type=click.Choice(["bench", "axis"]),
     default="bench",
     show_default=True,
-    help="The machine: the bench, or a single motor-driven axis (CSV or MATLAB logs).",
+    help="The machine: the bench, or a single motor-driven axis.",
 )
 @click.option(
     "--without", multiple=True, metavar="EFFECT", help="Take an effect out of the library."
@@ -50,6 +60,18 @@ Examples:
     multiple=True,
     metavar="FILE.py",
     help="File of your own effect beside the library; may be repeated.",
+)
+@click.option(
+    "--column",
+    "columns",
+    multiple=True,
+    metavar="NAME=COLUMN[*FACTOR][:UNIT]",
+    help="Column of an axis's files, as in position=enc:deg; may be repeated. See below.",
+)
+@click.option(
+    "--one-run",
+    is_flag=True,
+    help="LOGS are parts of one run of an axis; nothing is compared over the joints.",
 )
 @_options.reference
 @_options.workers("Processes that run fits side by side.")
@@ -78,6 +100,8 @@ def command(
     model: Literal["bench", "axis"],
     without: tuple[str, ...],
     effect_files: tuple[str, ...],
+    columns: tuple[str, ...],
+    one_run: bool,
     reference: Literal["linear", "staircase"] | None,
     workers: int,
     scheduler: str | None,
@@ -96,8 +120,7 @@ def command(
     from plant_emulator.cli._progress import progress
     from plant_emulator.workflows.diagnosis.diagnose import diagnose
 
-    if model == "axis":
-        _refuse_options_of_the_bench()
+    _refuse_options_of_another(model)
     with progress() as tell:
         found = diagnose(
             logs,
@@ -107,6 +130,8 @@ def command(
             without=without,
             effect_files=effect_files,
             reference=reference,
+            columns=columns,
+            one_run=one_run,
             workers=workers,
             scheduler=scheduler,
             progress=tell,
@@ -127,14 +152,16 @@ def command(
         click.echo(found.to_text())
 
 
-def _refuse_options_of_the_bench() -> None:
-    """Refuse options that a single axis would ignore."""
+def _refuse_options_of_another(model: Literal["bench", "axis"]) -> None:
+    """Refuse options that this model would ignore."""
     given = click.get_current_context().get_parameter_source
-    options = {"save": "--save", "next_program": "--next-program", "effect_files": "--effects"}
-    options |= {"parameters": "--parameters", "reference": "--reference"}
-    for name, option in options.items():
+    of_bench = {"save": "--save", "next_program": "--next-program", "effect_files": "--effects"}
+    of_bench |= {"parameters": "--parameters", "reference": "--reference"}
+    of_axis = {"columns": "--column", "one_run": "--one-run"}
+    other = "axis" if model == "bench" else "bench"
+    for name, option in (of_axis if model == "bench" else of_bench).items():
         if given(name) is not ParameterSource.DEFAULT:
-            raise click.UsageError(f"{option} belongs to --model bench")
+            raise click.UsageError(f"{option} belongs to --model {other}")
 
 
 def _write_next_program(found: Diagnosis, path: str) -> None:

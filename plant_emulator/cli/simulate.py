@@ -20,7 +20,9 @@ Examples:
 
 
 @click.command(cls=Command, epilog=EXAMPLE)
-@click.option("--program", required=True, metavar="NAME|LOG", help="A program, or a log to follow.")
+@click.option(
+    "--program", required=True, metavar="NAME|LOG", help="A program or its file, or a log."
+)
 @_options.parameters
 @_options.effect
 @click.option(
@@ -40,7 +42,7 @@ def command(
     start: Literal["fit", "middle"],
     out: str | None,
 ) -> None:
-    """Simulate a program (program1-4, program6, program6L) or the inputs of a log.
+    """Simulate a program (program1-4, program6, program6L, a file of one) or the inputs of a log.
 
     A log's start position in the backlash gap is fitted to it unless --start middle; a program
     starts in the middle of the gap.

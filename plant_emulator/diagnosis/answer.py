@@ -226,7 +226,8 @@ class Draft:
     place : subsystem; quantity, over : of the law, and the states that it depends on, in words
     form : the law as text, with unit; file : the effect file with it
     held_out_gain : share of the held-out gap that the draft closes [1]; None: there is none
-    bound : largest share that any law over single states could close [1]; None: not computed
+    bound_ci95 : of the largest share that any curve or law that was tried closes held out [1], see
+        `missing_law/bound.py`; bound : its upper end; None: the relations of the runs show no gap
     rivals : other laws that come near
     """
 

@@ -13,17 +13,15 @@ from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.answer import Answer, Logs
 from plant_emulator.diagnosis.calibration.confidence import confidence
+from plant_emulator.diagnosis.decision import subsystem
+from plant_emulator.diagnosis.decision.procedure import Procedure
 from plant_emulator.diagnosis.design.next_experiment import Advice
 from plant_emulator.diagnosis.execution.pool import TaskRunner, build_model
 from plant_emulator.diagnosis.execution.progress import ReportingPool
-from plant_emulator.diagnosis.fitting.derived_quantities import derived_quantities
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.task import Task
-from plant_emulator.diagnosis.parity.sensor_noise import sensor_noise
-from plant_emulator.diagnosis.parity.settings import SETTINGS
 from plant_emulator.diagnosis.prediction.gap import shows_shrinkage
 from plant_emulator.diagnosis.prediction.held_out import HeldOut
-from plant_emulator.diagnosis.prediction.remainder import unmodelled_remainder
 from plant_emulator.diagnosis.report.details import Details
 from plant_emulator.diagnosis.report.ranking import (
     hypotheses_to_rank,
@@ -33,8 +31,9 @@ from plant_emulator.diagnosis.report.ranking import (
 )
 from plant_emulator.diagnosis.report.shrinkage import held_out_gap, waterfall
 from plant_emulator.diagnosis.report.statement import statement, verdict
-from plant_emulator.diagnosis.selection import subsystem
-from plant_emulator.diagnosis.selection.procedure import Procedure
+from plant_emulator.diagnosis.search.sensor_noise import sensor_noise
+from plant_emulator.diagnosis.search.settings import SETTINGS
+from plant_emulator.diagnosis.search.spectra import spectra
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -42,21 +41,19 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.answer import (
         HeldOutGap,
         Location,
-        Quantity,
         RankedEffect,
         Undetectable,
         Verdict,
     )
     from plant_emulator.diagnosis.calibration.confidence import Case
+    from plant_emulator.diagnosis.decision.verdict import Decision
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
     from plant_emulator.diagnosis.execution.progress import Progress
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
     from plant_emulator.diagnosis.prediction.gap import Gap
     from plant_emulator.diagnosis.prediction.held_out import Gaps, Plan
-    from plant_emulator.diagnosis.prediction.remainder import Remainder
-    from plant_emulator.diagnosis.prediction.trace import Trace
-    from plant_emulator.diagnosis.selection.verdict import Decision
+    from plant_emulator.diagnosis.search.spectra import Spectrum
 
 # Thresholds of the hypothesis tests, for the report.
 THRESHOLDS = {
@@ -158,18 +155,20 @@ class Diagnose:
     def diagnose(self) -> Findings:
         """Test the hypotheses, predict the held-out runs, locate the gap; give the findings."""
         tests = self._test()
+        # Asked for first, so that it is looked for beside the predictions.
+        located = self.runner.map(
+            subsystem.locate_gap, [Task(base=tests.explained.null, runs=self.plan.fitted)]
+        )
         gaps = HeldOut(runner=tests.runner, plan=self.plan).gaps(tests.explained, tests.effects)
         tests = tests.confirmed_by(gaps)
-        drawn = gaps.traces(tests.effects)
-        remainder = self._remainder(tests, drawn)
         return Findings(
-            answer=self._answer(tests, gaps, remainder),
+            answer=self._answer(tests, gaps, next(located)),
             details=Details(
-                traces=drawn,
+                traces=gaps.traces(tests.effects),
                 waterfall=waterfall(gaps.by_effects, tests.effects),
                 settings={**self.settings, **THRESHOLDS},
                 notes=(*self.notes, *gaps.notes),
-                remainder=remainder,
+                spectra=self._spectra(tests),
             ),
             final=tests.final,
             fixed={name: self._fixed_values(name) for name in tests.decision.effects},
@@ -180,27 +179,26 @@ class Diagnose:
         explained, decision, runner = procedure.run()
         return _Tests(explained=explained, decision=decision, runner=runner)
 
-    def _remainder(self, tests: _Tests, drawn: Sequence[Trace]) -> Remainder | None:
-        """The unmodelled remainder of a machine that is modelled in outline; else None."""
-        if self.model.reaches_noise:
-            return None
-        return unmodelled_remainder(self.model, tests.final, self.plan.fitted, drawn)
+    def _spectra(self, tests: _Tests) -> tuple[Spectrum, ...]:
+        """Spectra of the channels, with their noise."""
+        model, explained = build_model(tests.runner.recipe), tests.explained
+        return spectra(model, explained.final, self.plan.fitted, explained.noise)
 
-    def _answer(self, tests: _Tests, gaps: Gaps, remainder: Remainder | None) -> Answer:
-        location = self._location(tests)
-        gap = held_out_gap(gaps.by_effects, gaps.runs, tests.effects, tests.reference(gaps))
+    def _answer(self, tests: _Tests, gaps: Gaps, located: Location | None) -> Answer:
+        location = self._location(tests, located)
+        reference = tests.reference(gaps)
+        gap = held_out_gap(gaps.by_effects, gaps.runs, tests.effects, reference, gaps.fitted)
         hidden = undetectable(tests.explained, self.model.candidates)
-        derived = derived_quantities(self.model, tests.final, self.plan.fitted)
         return Answer(
             logs=Logs(
                 estimation=tuple(self.model.runs[k].source for k in self.plan.fitted),
                 held_out=tuple(dict.fromkeys(run.source for run in gaps.runs)),
             ),
-            verdict=self._verdict(tests, gap, location, hidden, derived, remainder),
+            verdict=self._verdict(tests, gap, location, hidden),
             location=location,
             gap=gap,
             ranking=tuple(
-                self._rank(one, tests, gaps.gain(one.effect), derived.get(one.effect, ()))
+                self._rank(one, tests, gaps.gain(one.effect))
                 for one in hypotheses_to_rank(tests.explained)
             ),
             undetectable=hidden,
@@ -214,16 +212,12 @@ class Diagnose:
         gap: HeldOutGap,
         location: Location,
         hidden: Sequence[Undetectable],
-        derived: Mapping[str, tuple[Quantity, ...]],
-        remainder: Remainder | None,
     ) -> Verdict:
         sentence = statement(
             tests.decision,
             self.model.candidates,
             gap.closed_fraction,
             location.subsystem,
-            terms=derived,
-            remainder=remainder,
         )
         next_experiment = Advice(runner=tests.runner).next_experiment(
             tests.explained, tests.decision, location, [one.effect for one in hidden]
@@ -236,9 +230,7 @@ class Diagnose:
             next_experiment=next_experiment,
         )
 
-    def _location(self, tests: _Tests) -> Location:
-        task = Task(base=tests.explained.null, runs=self.plan.fitted)
-        (located,) = self.runner.map(subsystem.locate_gap, [task])
+    def _location(self, tests: _Tests, located: Location | None) -> Location:
         if located is None:
             shares = subsystem.evidence_shares(tests.explained, self.model.candidates)
         else:
@@ -251,9 +243,8 @@ class Diagnose:
         hypothesis: Hypothesis,
         tests: _Tests,
         gain: float | None,
-        derived: tuple[Quantity, ...],
     ) -> RankedEffect:
-        entry = ranked_effect(
+        return ranked_effect(
             hypothesis,
             tests.explained,
             tests.decision.effects,
@@ -261,7 +252,6 @@ class Diagnose:
             gain=gain,
             model_form_errors=self.model_form_errors,
         )
-        return replace(entry, parameters=(*entry.parameters, *derived))
 
     def _confidence(self, tests: _Tests) -> float | None:
         if self.cases is None:

@@ -1,8 +1,8 @@
-"""What an effect does to the data, at one of two fidelities: local relations, or free simulation.
+"""A linear regression of the data on nuisance parameters and effects, at one of two fidelities.
 
-Both are one linear regression, y = F theta + columns of effects + noise. F is what the nuisance
-parameters and unknown starts do. The relations see what an effect breaks at this instant, the
-simulation sees what adds up.
+y = F theta + columns of effects + noise; F holds the columns of the nuisance parameters and of the
+unknown start states. In the parity relations between samples a column shows what an effect breaks
+at this instant; in the free simulation it shows what adds up over a run.
 """
 
 from __future__ import annotations
@@ -49,4 +49,4 @@ class Fidelity(Protocol):
         """The column before the noise that the rows show themselves is whitened."""
 
     def values_at(self, theta: Array) -> Values:
-        """Parameters, and states of the runs, at these nuisance coefficients."""
+        """Parameters and states of the runs that belong to these nuisance coefficients."""

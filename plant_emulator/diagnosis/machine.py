@@ -1,7 +1,7 @@
 """What the diagnosis asks of a machine: parameters, effects, states, and simulated residuals.
 
-The bench is one such machine, a single motor-driven axis another (`machines`). Every other module
-of the diagnosis knows a machine only as the `Model` of this module.
+The bench is such a machine (`machines`): it is modelled down to the noise of its sensors. The rooms
+that search, fit and predict know a machine only as the `Model` of this module.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.answer import Location
     from plant_emulator.diagnosis.fidelity import Fidelity
@@ -21,18 +21,6 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
     Whiteners = Mapping[int, Sequence[Whitener]]
-
-
-@dataclass(frozen=True, kw_only=True)
-class DerivedQuantity:
-    """A quantity that follows from the values of a fit, such as a friction coefficient.
-
-    formula : from the values of a fit by name to the quantity [unit]
-    """
-
-    name: str
-    unit: str
-    formula: Callable[[Mapping[str, float]], float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +37,6 @@ class Candidate:
     needs : what a log must have to show the effect; empty where it needs nothing special
     stochastic : unknowns of each run that follow chance, so that no fit and no measurement finds
         them; empty for an effect that is not random
-    derived : further quantities that the field knows the effect by
     exact_form : whether its law can have no other form, as a factor or an offset; such a law leaves
         nothing where it is the cause
     """
@@ -65,7 +52,6 @@ class Candidate:
     title: str
     needs: str = ""
     stochastic: tuple[Unknown, ...] = ()
-    derived: tuple[DerivedQuantity, ...] = ()
     exact_form: bool = False
 
 
@@ -109,14 +95,6 @@ class Model(Protocol):
         """Subsystem of each parameter, by name."""
 
     @property
-    def reaches_noise(self) -> bool:
-        """Whether only the noise is left with the right effects.
-
-        A machine that is modelled down to its sensors reaches the noise. A machine that is modelled
-        in outline leaves a remainder, so that only the evidence of an effect counts.
-        """
-
-    @property
     def states(self) -> tuple[Unknown, ...]:
         """The initial states of a run, without the states of effects."""
 
@@ -136,6 +114,9 @@ class Model(Protocol):
 
         It is the same as `residual` where the noise is white.
         """
+
+    def rough(self) -> Model:
+        """Give the machine with residuals that are good enough to compare, not to differentiate."""
 
     def input_noise(
         self, run: int, where: FitResult, state: Mapping[str, float]
@@ -179,4 +160,4 @@ class Model(Protocol):
         """
 
     def missing_experiments(self, runs: Sequence[int]) -> Mapping[str, Sequence[str]]:
-        """What would show more of each subsystem and is in none of these runs, by subsystem."""
+        """Manoeuvres, by subsystem, that would excite it and that no run contains."""

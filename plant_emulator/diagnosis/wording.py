@@ -196,4 +196,7 @@ def describe_draft_gain(draft: Draft) -> str:
     if draft.held_out_gain is None or draft.held_out_gain_ci95 is None:
         return "no held-out run can be predicted"
     low, high = map(percent, draft.held_out_gain_ci95)
-    return f"closes {percent(draft.held_out_gain)} ({low} to {high}) of the held-out gap"
+    told = f"closes {percent(draft.held_out_gain)} ({low} to {high}) of the held-out gap"
+    if draft.bound is None:
+        return told
+    return f"{told}; at most {percent(draft.bound)}"

@@ -99,7 +99,7 @@ def autocovariance(residual: Array) -> Array:
 
 
 def _with_spectrum(covariance: Array) -> Array:
-    """The autocovariance with what of its spectrum came out negative set to 0."""
+    """The autocovariance with the negative values of its spectrum set to 0."""
     both = np.concatenate([covariance, covariance[:0:-1]])
     spectrum = np.maximum(np.fft.rfft(both).real, 0.0)
     return np.asarray(np.fft.irfft(spectrum, len(both))[: len(covariance)])
@@ -109,10 +109,12 @@ def colour(slopes: Array, covariance: Array) -> Array:
     """G J: each column of the Jacobian multiplied by the residual's covariance matrix."""
     if len(covariance) == 1:
         return np.asarray(slopes * covariance[0])
-    from scipy.signal import oaconvolve
-
     both = np.concatenate([covariance[:0:-1], covariance])
-    return np.asarray(oaconvolve(slopes, both[:, None], mode="same", axes=0))
+    whole = len(slopes) + len(both) - 1
+    length = 2 ** int(np.ceil(np.log2(whole)))
+    spectrum = np.fft.rfft(slopes, length, axis=0) * np.fft.rfft(both, length)[:, None]
+    first = len(covariance) - 1
+    return np.asarray(np.fft.irfft(spectrum, length, axis=0)[first : first + len(slopes)])
 
 
 def correlation_time(residual: Array) -> float:

@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.signals.smoothing import fit_parabolas
+
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
@@ -60,15 +62,13 @@ def start_values(
 
 
 def _table(log: Log) -> dict[str, Array]:
-    """Smoothed signals and derivatives of a log [SI], four to a window: more say nothing new."""
-    from scipy.signal import savgol_filter
-
+    """Smoothed signals and derivatives of a log [SI], sampled four times per smoothing window."""
     interval = float(np.median(np.diff(log.time)))
     length = max(5, 2 * round(WINDOW / interval / 2) + 1)
     length = min(length, len(log.time) - (1 - len(log.time) % 2))
 
     def smooth(name: str, order: int = 0) -> Array:
-        whole = savgol_filter(log[name], length, 2, deriv=order, delta=interval)
+        whole = fit_parabolas(log[name], length, interval, order)
         return np.asarray(whole[length // 8 :: max(1, length // 4)])
 
     table = {
@@ -136,7 +136,7 @@ def _mechanical(
 def _positive(
     names: Sequence[str], solution: Array, values: Mapping[str, float]
 ) -> dict[str, float]:
-    """The values found; where one is no physical value, all are left at what was believed."""
+    """The solution by name; empty if a value is not positive."""
     if not (solution > 0.0).all():
         return {}
     return {n: float(s) for n, s in zip(names, solution, strict=True) if n in values}

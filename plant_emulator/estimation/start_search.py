@@ -34,7 +34,8 @@ SCANS: tuple[tuple[str, float, int], ...] = (
     (GAP_POSITION, 1.0, 41),
 )
 FINE_SCANS = SCANS[-3:]
-SCAN_TOLERANCE = 1e-4
+# Accuracy of a scan: tolerance and largest step [s].
+SCAN_TOLERANCE, SCAN_STEP = 1e-4, 0.1
 
 
 class Search:
@@ -59,7 +60,8 @@ class Search:
     def loss(self, run: int, values: Mapping[str, float], gap: float) -> float:
         """Cauchy's loss of a run at these values [SI] and this gap position."""
         self.simulations += 1
-        return cauchy_loss(self.recordings[run].residual(values, gap, SCAN_TOLERANCE))
+        residual = self.recordings[run].residual(values, gap, SCAN_TOLERANCE, SCAN_STEP)
+        return cauchy_loss(residual)
 
     def total(self, values: Mapping[str, float]) -> float:
         """Loss of all runs at the gap positions found so far."""

@@ -64,7 +64,14 @@ def experiments(
     """
     if all(p.identifiable for p in found.parameters):
         return []
-    errors = promised_errors(found, recordings, values)
+    return sharpest(found, promised_errors(found, recordings, values))
+
+
+def sharpest(found: Identification, errors: Mapping[str, Array]) -> list[Experiment]:
+    """For every parameter that is not identifiable, the program with the least standard error.
+
+    errors : standard errors of the parameters [unit], by program, see `promised_errors`
+    """
     if not errors:
         return []
     answers = []

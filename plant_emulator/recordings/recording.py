@@ -48,7 +48,11 @@ class Recording:
         return is_estimated(self.log)
 
     def residual(
-        self, values: Mapping[str, float], gap_position: float, tolerance: float = TOLERANCE
+        self,
+        values: Mapping[str, float],
+        gap_position: float,
+        tolerance: float = TOLERANCE,
+        largest_step: float | None = None,
     ) -> Array:
         """Whitened residual: measured minus simulated over the noise, shape (channels, samples).
 
@@ -60,15 +64,25 @@ class Recording:
         Where the model cannot be simulated at these values, every sample is IMPOSSIBLE.
         """
         try:
-            return self.strict_residual(values, gap_position, tolerance)
+            return self.strict_residual(values, gap_position, tolerance, largest_step)
         except UnsettledError:
             return np.where(self.use, IMPOSSIBLE, 0.0)
 
     def strict_residual(
-        self, values: Mapping[str, float], gap_position: float, tolerance: float = TOLERANCE
+        self,
+        values: Mapping[str, float],
+        gap_position: float,
+        tolerance: float = TOLERANCE,
+        largest_step: float | None = None,
     ) -> Array:
         """Residual as in `residual`; raises UnsettledError where the model cannot be simulated."""
-        found = simulate(self.inputs, values, gap_position=gap_position, tolerance=tolerance)
+        found = simulate(
+            self.inputs,
+            values,
+            gap_position=gap_position,
+            tolerance=tolerance,
+            largest_step=largest_step,
+        )
         return self.residual_of(found)
 
     def residual_of(self, found: Log) -> Array:

@@ -1,4 +1,6 @@
-"""Rows that were taken a little early or late but stamped regularly, told by the reference (pure).
+"""Corrects sampling jitter: the reference shows when each row was taken (pure).
+
+Rows may be taken a little early or late and yet be stamped regularly.
 
 A drive's reference is smooth between its corners: straight, or bent slowly. A row that was taken
 late shows a reference further along, so on a slope its departure from a local line, over the slope,
@@ -42,7 +44,7 @@ MOST = 0.4
 
 
 def restamped(log: Log) -> tuple[Log, float]:
-    """The log with its rows at the times that its reference tells, and the jitter's deviation [s].
+    """The log with its rows at the times that its reference shows, and the jitter's deviation [s].
 
     A staircase (a log with a truck) tells nothing and stays as it is. So does one with knees
     between its samples, which bears the stamps of the PLC itself.
@@ -60,7 +62,7 @@ def restamped(log: Log) -> tuple[Log, float]:
 
 
 def lateness(time: Array, reference: Array) -> tuple[Array, Array]:
-    """How late every row was taken [s], and whether the reference tells, shape (n,) each.
+    """Timing error of every row [s], and whether the reference determines it, shape (n,) each.
 
     By least squares over windows around, before or behind a row: the first of those that fit best.
     """

@@ -1,4 +1,4 @@
-"""A log of a single motor-driven axis: time, position and force."""
+"""A log of a single motor-driven axis: time, motion, force, and what else was measured."""
 
 from __future__ import annotations
 
@@ -13,6 +13,10 @@ if TYPE_CHECKING:
 class AxisLog:
     """The samples of an axis, shape (n,) each: linear [s, m, N] or rotary [s, rad, N m].
 
+    position : as measured; where only the velocity was, the velocity's integral from 0
+    velocity : [m/s or rad/s] of a log without a measured position; None: the position was measured
+    load : external force that acts against the drive's [N or N m]; None: not measured
+    temperature : of the axis [degC]; None: not measured
     source : name of the log in messages and answers
     other : columns of its file that were not used
     """
@@ -22,4 +26,7 @@ class AxisLog:
     force: Array
     rotary: bool
     source: str
+    velocity: Array | None = None
+    load: Array | None = None
+    temperature: Array | None = None
     other: tuple[str, ...] = ()

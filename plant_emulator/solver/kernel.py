@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache, wraps
+from functools import cache, cached_property, wraps
 from math import nan
 from types import ModuleType, SimpleNamespace
 from typing import TYPE_CHECKING, Any, cast
@@ -70,10 +70,17 @@ class Kernel:
 
         Raises ParameterError for a name that is no parameter.
         """
-        for name in values:
-            if name not in self.parameters:
-                raise ParameterError(f"{name}: neither a parameter of the bench nor of an effect")
-        return record(self.parameters, {**effects.neutral_values(self.effects), **values})
+        for name in values.keys() - self._names:
+            raise ParameterError(f"{name}: neither a parameter of the bench nor of an effect")
+        return record(self.parameters, {**self._neutral_values, **values})
+
+    @cached_property
+    def _names(self) -> frozenset[str]:
+        return frozenset(self.parameters)
+
+    @cached_property
+    def _neutral_values(self) -> Mapping[str, float]:
+        return effects.neutral_values(self.effects)
 
     def stage_record(self) -> Record:
         """A stage record with all fields zero."""

@@ -1,136 +1,186 @@
-"""Reads a run of a single motor-driven axis: a CSV file, or a MATLAB file of a known bench.
+"""Reads a run of a single motor-driven axis: text, MATLAB, Parquet or MDF4.
 
-CSV: `time_s`, and `position_m` with `force_N`, or `position_rad` with `torque_Nm`; gzip or plain.
-The variables of a MATLAB file say which bench it is of:
-
-    t, qm, vir, gtau    a position-controlled screw: position [m], command [V], gain [N/V];
-                        force = gtau vir, which already includes `pulses_N`
-    data, Cu            a motor bench: seven columns time [s], reference, position [rad], speed,
-                        torque command, torque [N m], current [A]; torque = Cu current
+Columns with accepted names (`axis_files/columns.py`) need no choice. Any other column is chosen,
+as in `position=enc:deg` or `force=iq*0.40:Nm`. A log needs a time, a position or a velocity, and a
+force or torque; it may hold an external load and a temperature.
 """
 
 from __future__ import annotations
 
-import gzip
-import zlib
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from plant_emulator.errors import LogError
+from plant_emulator.recordings.axis_magnitudes import check_magnitudes
 from plant_emulator.signals.axis_log import AxisLog
-from register_maps.csv_log import GZIP, TIME, CsvLogError, parse
-from register_maps.signals import LOG_COLUMNS, LogColumn
+from plant_emulator.workflows.axis_files import channels, matlab, text, units
+from plant_emulator.workflows.axis_files.columns import (
+    ACCEPTED,
+    Choice,
+    choices,
+    quantity_of,
+    unit_behind,
+    unit_in,
+)
+from register_maps.logs import mdf4_log, parquet_log
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from plant_emulator.signals.log import Array
+    from plant_emulator.workflows.axis_files.table import Table
 
-MATLAB = b"MATLAB"
-SCREW = ("t", "qm", "vir", "gtau")
-MOTOR = ("data", "Cu")
-MOTOR_COLUMNS = 7
+# What a log must hold, and how a user chooses it.
+NEEDED = {
+    "time": "time=COLUMN:s",
+    "position": "position=COLUMN:deg, or velocity=COLUMN:rpm",
+    "force": "force=COLUMN:Nm",
+}
+# A jump is told from a motion where most steps between samples are shorter [rad].
+SLOW = 0.5
+MECHANICAL = ("position", "velocity", "force", "load")
 
 
-def read(path: str | Path) -> AxisLog:
-    """The run in that file; LogError says file, line or variable, and what was expected."""
+def read(path: str | Path, columns: Sequence[str] | Mapping[str, str] = ()) -> AxisLog:
+    """The run in that file, in SI units.
+
+    columns : NAME=COLUMN[*FACTOR][:UNIT] for columns without an accepted name
+    Raises LogError, which says file, line or column, and what was expected.
+    """
     path = Path(path)
     if not path.is_file():
         raise LogError(f"{path}: no such file; a log of an axis is needed")
+    table, given = _table(path), choices(columns)
+    chosen = _chosen(table, given)
+    kept = {name: _unit(table, choice) for name, choice in chosen.items()}
+    rotary = _is_rotary(table, chosen, {name: own for name, (_, own) in kept.items()})
+    taken = table.take([choice.column for choice in chosen.values()])
+    values = {
+        name: _converted(table, choice, found, *kept[name])
+        for (name, choice), found in zip(chosen.items(), taken, strict=True)
+    }
+    time = values.pop("time")
+    table.check_increasing(chosen["time"].column, time)
+    if "velocity" in values:
+        values["position"] = _integral(time, values["velocity"])
+    elif rotary:
+        values["position"] = _unwrapped(values["position"])
+    used = {choice.column for choice in chosen.values()}
+    log = AxisLog(
+        time=time,
+        **values,
+        rotary=rotary,
+        source=str(path),
+        other=(*(name for name in table.names if name not in used), *table.others),
+    )
+    sure = {choice.quantity for choice in (*given, *table.known) if choice.unit}
+    check_magnitudes(log, {name: c.column for name, c in chosen.items() if name not in sure})
+    return log
+
+
+def _table(path: Path) -> Table:
     data = path.read_bytes()
-    return _matlab(path) if data.startswith(MATLAB) else _csv(data, path)
+    if data.startswith(matlab.MAGIC):
+        return matlab.table(str(path))
+    if mdf4_log.recognises(data) or parquet_log.recognises(data):
+        return channels.table(data, str(path))
+    return text.table(data, str(path))
 
 
-def _column(column: str, signal: str, unit: str) -> LogColumn:
-    return LogColumn(
-        column=column, signal=signal, unit=unit, needed=True, measured=None, decimals=6
+def _chosen(table: Table, given: Sequence[Choice]) -> dict[str, Choice]:
+    """The column of every quantity by its name; a given choice goes before a name of the file."""
+    found = {choice.quantity: choice for choice in table.known}
+    for name in table.names:
+        quantity = quantity_of(name)
+        if quantity and quantity not in found:
+            found[quantity] = Choice(quantity=quantity, column=name)
+    named = {choice.quantity: choice for choice in given}
+    found |= named
+    if "position" in found and "velocity" in found:
+        found.pop("position" if "velocity" in named and "position" not in named else "velocity")
+    for quantity, example in NEEDED.items():
+        if quantity not in found and not (quantity == "position" and "velocity" in found):
+            raise _missing(table, quantity, example)
+    for name in table.names:
+        other = unit_behind(name)
+        if other and other[0] in ("load", "temperature") and other[0] not in found:
+            raise _in_another_unit(table, name, *other)
+    for choice in found.values():
+        if choice.column not in table.names:
+            raise LogError(
+                f"{table.path}: {table.header}: no column {choice.column}; "
+                f"it has {', '.join(table.names)}"
+            )
+    return found
+
+
+def _missing(table: Table, quantity: str, example: str) -> LogError:
+    """Error for a quantity without a column, with the choice that the user may have to make."""
+    wanted = ("position", "velocity") if quantity == "position" else (quantity,)
+    for name in table.names:
+        other = unit_behind(name)
+        if other and other[0] in wanted:
+            return _in_another_unit(table, name, *other)
+    accepted = [name for name, (of, _) in ACCEPTED.items() if of in wanted]
+    return LogError(
+        f"{table.path}: {table.header}: no column for the {quantity}; it has "
+        f"{', '.join(table.names)}; {' or '.join(accepted)} is needed, or --column {example}"
     )
 
 
-LINEAR = (_column("position_m", "position", "m"), _column("force_N", "force", "N"))
-ROTARY = (_column("position_rad", "position", "rad"), _column("torque_Nm", "torque", "N m"))
-
-
-def _csv(data: bytes, path: Path) -> AxisLog:
-    rotary = any(column.column.encode() in _header(data) for column in ROTARY)
-    position, force = ROTARY if rotary else LINEAR
-    columns = {c.column: c for c in (LOG_COLUMNS[TIME], position, force)}
-    try:
-        found = parse(data, columns)
-    except CsvLogError as error:
-        raise LogError(f"{path}: {error}") from error
-    time, q, f = (np.array(found.signals[name]) for name in ("time", position.signal, force.signal))
-    return AxisLog(
-        time=time, position=q, force=f, rotary=rotary, source=str(path), other=found.other
+def _in_another_unit(table: Table, name: str, quantity: str, unit: str) -> LogError:
+    return LogError(
+        f"{table.path}: {table.header}: column {name} is in {unit}: say so by "
+        f"--column {quantity}={name}:{unit}"
     )
 
 
-def _header(data: bytes) -> bytes:
-    """First line of a CSV file; empty for a damaged file, which the reader refuses."""
-    try:
-        text = gzip.decompress(data) if data.startswith(GZIP) else data
-    except (OSError, EOFError, zlib.error):
-        return b""
-    return text.split(b"\n", 1)[0]
-
-
-def _matlab(path: Path) -> AxisLog:
-    from scipy.io import loadmat
-
-    try:
-        found = loadmat(path)
-    except Exception as error:
-        raise LogError(f"{path}: no readable MATLAB file up to version 7 ({error})") from error
-    other = tuple(name for name in found if not name.startswith("__"))
-    if all(name in found for name in SCREW):
-        time, position, voltage = (_vector(found, name, path) for name in SCREW[:3])
-        force = voltage * _number(found, "gtau", path)
-        return replace(_log(path, time, position, force, rotary=False), other=other)
-    if all(name in found for name in MOTOR):
-        table = _numbers(found, "data", path)
-        if table.ndim != 2 or table.shape[1] != MOTOR_COLUMNS:
-            raise LogError(f"{path}: data has shape {table.shape}; {MOTOR_COLUMNS} columns needed")
-        torque = table[:, 6] * _number(found, "Cu", path)
-        return replace(_log(path, table[:, 0], table[:, 2], torque, rotary=True), other=other)
-    raise LogError(
-        f"{path}: variables {', '.join(sorted(other))}; known: {', '.join(SCREW)}, "
-        f"or {', '.join(MOTOR)}; write any other log as CSV"
-    )
-
-
-def _numbers(found: dict[str, Any], name: str, path: Path) -> Array:
-    try:
-        return np.asarray(found[name], dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise LogError(f"{path}: {name} holds no numbers") from error
-
-
-def _vector(found: dict[str, Any], name: str, path: Path) -> Array:
-    values = _numbers(found, name, path)
-    if values.size != max(values.shape, default=0):
-        raise LogError(f"{path}: {name} has shape {values.shape}; one row or column is needed")
-    return values.ravel()
-
-
-def _number(found: dict[str, Any], name: str, path: Path) -> float:
-    values = _numbers(found, name, path)
-    if values.size != 1:
-        raise LogError(f"{path}: {name} has {values.size} values; one is needed")
-    return float(values.ravel()[0])
-
-
-def _log(path: Path, time: Array, position: Array, force: Array, *, rotary: bool) -> AxisLog:
-    """The run, if its channels are of one length, finite, and its time increases."""
-    if not len(time) == len(position) == len(force):
+def _unit(table: Table, choice: Choice) -> tuple[str, str]:
+    """Unit of a column times its factor, and the unit of the log into which it is converted."""
+    words = choice.unit or table.units.get(choice.column) or unit_in(choice.column)
+    expected = " or ".join(units.QUANTITIES[choice.quantity])
+    if not words:
         raise LogError(
-            f"{path}: {len(time)} times, {len(position)} positions, {len(force)} forces; "
-            "as many of each are needed"
+            f"{table.path}: column {choice.column}: no unit is known; write it as in "
+            f"--column {choice.text}:{units.QUANTITIES[choice.quantity][-1].replace(' ', '')}"
         )
-    for name, values in (("time", time), ("position", position), ("force", force)):
-        if not np.isfinite(values).all():
-            row = int(np.argmin(np.isfinite(values)))
-            raise LogError(f"{path}: {name}[{row}] is {values[row]}; a finite number is needed")
-    if len(time) < 2 or not (np.diff(time) > 0.0).all():
-        raise LogError(f"{path}: time does not increase strictly")
-    return AxisLog(time=time, position=position, force=force, rotary=rotary, source=str(path))
+    own = units.target(choice.quantity, words)
+    if own is None:
+        raise LogError(
+            f"{table.path}: column {choice.column}: {words!r} is no unit of a "
+            f"{choice.quantity}; one that converts to {expected} is needed"
+        )
+    return words, own
+
+
+def _converted(table: Table, choice: Choice, values: Array, unit: str, own: str) -> Array:
+    """Values of a column in the unit of the log."""
+    table.check_finite(choice.column, values)
+    return units.converted(values * choice.factor, unit, own)
+
+
+def _is_rotary(table: Table, chosen: Mapping[str, Choice], kept: Mapping[str, str]) -> bool:
+    """Whether the axis turns; raises LogError for quantities that do not belong together."""
+    turns = {name: "rad" in own or own == "N m" for name, own in kept.items() if name in MECHANICAL}
+    if len(set(turns.values())) > 1:
+        told = ", ".join(f"{chosen[name].column} in {kept[name]}" for name in turns)
+        raise LogError(
+            f"{table.path}: {told}: an angle needs a torque and a length a force; a factor such as "
+            "2 pi / pitch makes one of the other"
+        )
+    return all(turns.values())
+
+
+def _integral(time: Array, velocity: Array) -> Array:
+    """The position that the velocity gives, 0 at the start; shape (n,)."""
+    means = 0.5 * (velocity[1:] + velocity[:-1])
+    return np.concatenate([[0.0], np.cumsum(means * np.diff(time))])
+
+
+def _unwrapped(position: Array) -> Array:
+    """Angles without the jumps of an encoder that begins anew each revolution; shape (n,)."""
+    within = np.ptp(position) <= 2.0 * np.pi
+    slow = np.median(np.abs(np.diff(position))) < SLOW
+    return np.unwrap(position) if within and slow else position

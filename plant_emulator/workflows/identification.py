@@ -89,7 +89,10 @@ class IdentificationResult:
         return report.parameter_table(self.fit)
 
     def plot(self, path: str | Path) -> None:
-        """Plot every log beside its simulation to a file."""
+        """Plot every log beside its simulation to a file: PNG, SVG or PDF by its suffix.
+
+        Raises InputError where the file cannot be written, ValueError for another suffix.
+        """
         from plant_emulator.workflows.validation_plot import draw_validation
 
         draw_validation([(c.measured, c.simulated) for c in (*self.fitted, *self.held_out)], path)

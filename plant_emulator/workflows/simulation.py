@@ -28,6 +28,7 @@ from plant_emulator.workflows.arguments import (
     check_signals,
     check_start,
 )
+from plant_emulator.workflows.next_program import read_drive_program
 
 if TYPE_CHECKING:
     from plant_emulator.simulation.programs import Program
@@ -47,8 +48,9 @@ def simulate(
 ) -> Log:
     """Simulate a drive program, or the bench under the inputs of a log; all signals are SI.
 
-    source : a drive program or its name ("program1"), a log, or the path of a log file. The inputs
-        of a log are its speed reference and, if it has one, its wheel torque.
+    source : a drive program or its name ("program1"), a log, or the path of a file: of a log, or of
+        a drive program that holds times and references alone. The inputs of a log are its speed
+        reference and, if it has one, its wheel torque.
     parameters : a parameter set, the name of a shipped one, or the path of its file
     effects : effects beyond those of the set, by effect and parameter [SI], or as the texts
         "NAME[:PARAM=VALUE,...]" of the command line. A parameter without value takes its plausible
@@ -58,6 +60,9 @@ def simulate(
         wheel torque, else "linear"
     start : "fit" fits the position in the backlash gap at the start to a log, and with it the start
         states of the set's effects; "middle" starts in the middle of the gap, as a program does
+
+    Returns a log with the inputs, `motor_speed` and `drum_speed` [rad/s], `armature_current` [A],
+    `armature_voltage` [V], `shaft_torque` [N m] and `shell_temperature` [K], shape (samples,) each.
     Raises InputError for a source, a set or an effect that cannot be used, and UnsettledError where
     the equations cannot be solved.
     """
@@ -110,7 +115,7 @@ def read_source(source: str | Path | Log | Program) -> Log | Program:
         raise InputError(f"{source!r}: a log, a program, or the name of one is expected")
     name = str(source)
     if name not in PROGRAMS and Path(name).exists():
-        return logs.read(name)
+        return read_drive_program(name) or logs.read(name)
     return program(name)
 
 

@@ -59,7 +59,10 @@ class TruckIdentification:
         return table(self.answer, self.fit.run.truck, self.origin)
 
     def plot(self, path: str | Path) -> None:
-        """Plot measured and simulated velocity, residual and torque to a file."""
+        """Plot velocity, residual and torque to a file: PNG, SVG or PDF by its suffix.
+
+        Raises InputError where the file cannot be written, ValueError for another suffix.
+        """
         from plant_emulator.workflows.road_load_plot import plot
 
         plot(self.fit, path)

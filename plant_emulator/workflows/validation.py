@@ -27,7 +27,11 @@ SCHEMA = "validation/1"
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class ValidationResult:
-    """Logs beside their simulations; `print` shows the measures as the command `validate` does."""
+    """Logs beside their simulations; `print` shows the measures as the command `validate` does.
+
+    comparisons : measured and simulated log and the measures of every channel, a log each
+    parameter_set : the set that was validated
+    """
 
     comparisons: tuple[Comparison, ...]
     parameter_set: ParameterSet
@@ -46,7 +50,10 @@ class ValidationResult:
         return fit_table(self.comparisons)
 
     def plot(self, path: str | Path) -> None:
-        """Plot every log beside its simulation to a file."""
+        """Plot every log beside its simulation to a file: PNG, SVG or PDF by its suffix.
+
+        Raises InputError where the file cannot be written, ValueError for another suffix.
+        """
         from plant_emulator.workflows.validation_plot import draw_validation
 
         draw_validation([(c.measured, c.simulated) for c in self.comparisons], path)

@@ -28,22 +28,18 @@ def demo(out: Path, *options: str) -> list[dict]:
     return summary["runs"]
 
 
-@pytest.mark.parametrize(
-    ("regulator", "val1", "val2"), [("thesis", 98.0, 98.0), ("compensated", 98.4, 98.3)]
-)
-def test_replayed_torque_gives_both_trucks_the_speed_of_the_road(tmp_path, regulator, val1, val2):
-    runs = demo(tmp_path, "--fast", "--regulator", regulator)
+def test_replayed_torque_gives_both_trucks_the_speed_of_the_road(tmp_path):
+    runs = demo(tmp_path, "--fast", "--regulator", "compensated")
     assert [run["truck_kg"] for run in runs] == [3640.0, 5240.0]
     for run in runs:
-        assert run["velocity"]["val1"] >= val1
-        assert run["velocity"]["val2"] >= val2
+        assert run["velocity"]["val1"] >= 98.4
+        assert run["velocity"]["val2"] >= 98.3
         assert run["stop_reason"] == "REMOTE_OFF"
 
 
-@pytest.mark.parametrize("period", ["20", "50"])
-@pytest.mark.parametrize("regulator", ["thesis", "compensated"])
+@pytest.mark.parametrize(("regulator", "period"), [("thesis", "20"), ("compensated", "50")])
 def test_slower_poll_gives_a_truck_the_speed_of_the_road(tmp_path, regulator, period):
-    """Every truck at every period: test_the_drum_goes_as_the_truck_would_on_the_road."""
+    """Each truck at each period: test_the_drum_goes_as_the_truck_would_on_the_road."""
     options = ("--regulator", regulator, "--period", period)
     (run,) = demo(tmp_path, "--fast", "--load", "1600", *options)
     assert run["truck_kg"] == 5240.0
@@ -65,40 +61,24 @@ def test_driver_who_holds_his_speed_feels_road_load_and_spends_its_energy(
 
 
 @pytest.mark.realtime
-@pytest.mark.parametrize(
-    ("regulator", "load", "val1", "val2"),
-    [("thesis", "0", 98.0, 98.0), ("compensated", "1600", 98.4, 98.3)],
-)
-def test_truck_goes_as_on_the_road_in_real_time(tmp_path, regulator, load, val1, val2):
-    (run,) = demo(tmp_path, "--regulator", regulator, "--load", load)
-    assert run["truck_kg"] == 3640.0 + float(load)
-    assert run["velocity"]["val1"] >= val1
-    assert run["velocity"]["val2"] >= val2
+@pytest.mark.slow
+def test_truck_goes_as_on_the_road_in_real_time(tmp_path):
+    (run,) = demo(tmp_path, "--regulator", "compensated", "--load", "1600")
+    assert run["truck_kg"] == 5240.0
+    assert run["velocity"]["val1"] >= 98.4
+    assert run["velocity"]["val2"] >= 98.3
     assert run["cycles"] == pytest.approx(3000, rel=0.02)
 
 
-@pytest.mark.parametrize(("load", "period", "val1"), [("0", "20", 96.0), ("1600", "50", 97.0)])
-def test_instantaneous_torque_aliases_with_the_staircase_as_the_thesis_did(
-    tmp_path, load, period, val1
-):
-    """Integrated torque has to reach 97.8 at both periods.
+def test_instantaneous_torque_aliases_with_the_staircase_as_the_thesis_did(tmp_path):
+    """Integrated torque has to reach 97.8 at this period too.
 
     How far below instantaneous torque falls depends on where in the period its sample meets the
     torque pulse of the staircase: on dead time and scan, modulo the period.
     """
-    options = ("--regulator", "thesis", "--torque", "instantaneous", "--period", period)
-    (run,) = demo(tmp_path, "--fast", "--load", load, *options)
-    assert run["velocity"]["val1"] < val1
-
-
-def test_friction_that_is_ten_percent_off_is_felt_in_force_and_not_in_speed(tmp_path):
-    stiffer = TABLE.read_text().replace("value = 345.38", "value = 379.918")
-    (tmp_path / "stiff.toml").write_text(stiffer.replace("value = 35.989", "value = 39.588"))
-    options = ("--fast", "--driver", "pi", "--load", "0")
-    (run,) = demo(tmp_path, *options, "--bench-parameters", str(tmp_path / "stiff.toml"))
-    error = run["force"]["mean_error_newton"] / run["force"]["target_newton"]
-    assert 0.2 < abs(error) < 0.4
-    assert run["velocity"]["val1"] > 98.0
+    options = ("--regulator", "thesis", "--torque", "instantaneous", "--period", "50")
+    (run,) = demo(tmp_path, "--fast", "--load", "1600", *options)
+    assert run["velocity"]["val1"] < 97.0
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,8 @@
 """The emulator as a process: its first line, its control from outside and its end."""
 
 import signal
+import socket
+import struct
 import subprocess
 import sys
 import time
@@ -99,6 +101,31 @@ def test_signal_ends_it_cleanly_with_its_log_written(number, tmp_path):
     assert process.returncode == 0
     assert "real-time factor" in errors
     assert len(logs.read(tmp_path / "run.csv").time) > 5
+
+
+@pytest.mark.slow
+def test_bad_clients_leave_no_bytes_on_the_terminal():
+    """No Modbus, a protocol id, an unknown function, 126 registers, a reset in the middle."""
+    process = started()
+    assert process.stdout is not None
+    address = ("127.0.0.1", int(process.stdout.readline().rpartition(":")[2]))
+    for nonsense in (
+        b"GET / HTTP/1.1",
+        bytes(12),
+        b"\0\1\0\0\0\2\1\x44",
+        b"\0\1\0\0\0\6\1\3\0\0\0\x7e",
+    ):
+        with socket.create_connection(address, timeout=10) as wire:
+            wire.sendall(nonsense)
+            wire.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    with socket.create_connection(address, timeout=10) as wire:
+        wire.sendall(b"\0\1\0\0\0\6\1\3\0\0\0\1")
+        assert len(wire.recv(100)) == 11
+    process.send_signal(signal.SIGTERM)
+    out, errors = process.communicate(timeout=10)
+    assert out == ""
+    assert errors.count("\n") == 1
+    assert "real-time factor" in errors
 
 
 @pytest.mark.slow

@@ -242,7 +242,8 @@ def test_tshark_sees_not_one_write_in_shadow(tshark, tmp_path):
         gateway(tmp_path, emulator.port, "--shadow") as daemon,
     ):
         emulator.set_remote(on=True)
-        daemon.runs_for(3.0)
+        until(lambda: "SHADOW" in daemon.output)  # a busy machine takes seconds to start it
+        daemon.runs_for(2.0)
         assert daemon.stop() == 0, daemon.output
     requests = capture.requests()
     assert Counter(requests)[3] > 100

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 import gateway.cli
 import plant_emulator.cli
 from gateway.config_file import load
-from gateway.road_load import road_load
+from gateway.physics.road_load import road_load
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT / "tests" / "data" / "road_practice"

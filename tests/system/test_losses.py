@@ -39,11 +39,11 @@ def gateway(*arguments: object) -> Result:
     return CliRunner().invoke(main, [str(one) for one in arguments])
 
 
-def sweep(folder: Path, parameters: Path, period_ms: int) -> Path:
+def sweep(folder: Path, parameters: Path, period_ms: int, hold: float | None) -> Path:
     """The recording of a sweep of steady speeds, without waiting for the clock."""
     with EmulatorProcess(parameters=str(parameters), truck_mass=None, speed=None) as emulator:
         set_up = {"plc.port": str(emulator.port), "loop.period_ms": str(period_ms)}
-        config = sweep_config(Config().with_values(set_up), speeds=None, hold=None)
+        config = sweep_config(Config().with_values(set_up), speeds=None, hold=hold)
         assert config.program is not None
         session = Session(
             config=config,
@@ -56,25 +56,31 @@ def sweep(folder: Path, parameters: Path, period_ms: int) -> Path:
 
 
 def cruise_error(folder: Path, parameters: Path, *options: object) -> float:
-    """Error of the force in cruise over the road load; truck of 3640 kg with a driver."""
+    """Error of the force in cruise over the road load; truck of 3640 kg with a driver.
+
+    The driver keeps his speed however large the error of the force is.
+    """
     out = folder / "demo"
     fixed = ("--fast", "--driver", "pi", "--load", 0, "--bench-parameters", parameters)
     shown = gateway("demo", "--out", out, *fixed, *options)
     assert shown.exit_code == 0, shown.output
     (run,) = json.loads((out / "summary.json").read_text())["runs"]
     assert run["truck_kg"] == 3640.0
+    assert run["velocity"]["val1"] > 98.0
     return run["force"]["mean_error_newton"] / run["force"]["target_newton"]
 
 
 @pytest.fixture(
-    scope="module", params=[(1.1, 10), (0.9, 20)], ids=["10 % up", "10 % down, polled slowly"]
+    scope="module",
+    params=[(1.1, 10, 3.0), (0.9, 20, None)],
+    ids=["10 % up, held for 3 s", "10 % down, polled slowly"],
 )
 def measured(request, tmp_path_factory) -> tuple[float, Path, Path]:
     """Share of the thesis's friction, the bench's parameter set, the recording of its sweep."""
-    share, period_ms = request.param
+    share, period_ms, hold = request.param
     folder = tmp_path_factory.mktemp("bench")
     parameters = bench(folder, share)
-    return share, parameters, sweep(folder, parameters, period_ms)
+    return share, parameters, sweep(folder, parameters, period_ms, hold)
 
 
 def test_sweep_finds_the_friction_of_the_bench(measured, tmp_path):

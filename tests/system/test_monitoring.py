@@ -69,7 +69,7 @@ def test_metrics_and_health_follow_a_run_and_end_with_it(
     assert asked(port, "healthz")[0] == 0
     lines = daemon.output.splitlines()
     events = [json.loads(line) for line in lines if line.startswith("{")]
-    assert [event["state"] for event in events if event["state"] == "RUN"] == ["RUN"]
+    assert [event["state"] for event in events if event.get("state") == "RUN"] == ["RUN"]
     assert events[-1]["state"] == "OFF"
 
 

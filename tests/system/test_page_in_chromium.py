@@ -60,6 +60,8 @@ def test_page_shows_state_values_trend_and_changes_and_complains_of_nothing(chro
         assert part in shown
     assert re.search(r'id="motor_speed" points="[\d., ]+"', document)
     assert re.search(r'id="gone" role="alert" hidden', document)
+    assert '<table id="status" class="warning">' in document
+    assert '<section id="counted">' in document
     assert "  RUN" in shown
 
 

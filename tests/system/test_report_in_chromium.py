@@ -11,7 +11,7 @@ import pytest
 from matplotlib.image import imread
 
 from plant_emulator.diagnosis.report.document import from_json
-from plant_emulator.diagnosis.report.html import html
+from plant_emulator.diagnosis.report.html.page import html
 from tests.plant_emulator.diagnosis import answers
 from tests.system.conftest import FITTED, PREDICTED, Diagnosed
 

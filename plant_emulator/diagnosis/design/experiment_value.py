@@ -106,7 +106,7 @@ def fit_alternative(model: Model, asked: Alternative) -> FitResult:
 
 
 def discriminability(model: Model, asked: PlannedRun) -> float:
-    """Norm of what an alternative cannot follow in a planned run, in the noise (a step)."""
+    """Norm of the part of a planned run that the alternative cannot reproduce [deviations]."""
     alternative = asked.fitted
     own = model.initial_states(asked.planned, alternative.effects, alternative.values)
     ahead = model.residual(asked.planned, alternative.effects)({**alternative.values, **own})

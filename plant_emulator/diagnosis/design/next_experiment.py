@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from plant_emulator.diagnosis.answer import Location
+    from plant_emulator.diagnosis.decision.verdict import Decision
     from plant_emulator.diagnosis.execution.pool import Recipe, TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.explanation import Explanation
-    from plant_emulator.diagnosis.selection.verdict import Decision
 
 # Alternatives that are simulated, the nearest ones first; each costs a fit a run.
 MOST_ALTERNATIVES = 2

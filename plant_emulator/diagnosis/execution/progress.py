@@ -21,6 +21,7 @@ LABELS = {
     "start": "fit without effects",
     "find_input_noise": "noise of the inputs",
     "estimate_noise": "noise of the sensors",
+    "start_states": "what each effect promises",
     "screen": "what each effect promises",
     "confirm": "first fits of effects",
     "advance": "fits in the new noise",
@@ -58,8 +59,11 @@ class ReportingPool:
         label = LABELS.get(function.__name__, OTHER_LABEL)
         if items:
             self.progress(label, 0.0)
-        for done, answer in enumerate(self.pool.map(function, recipe, items)):
-            self.progress(label, (done + 1) / len(items))
+        return self._each(self.pool.map(function, recipe, items), label, len(items))
+
+    def _each(self, answers: Iterator[Answer], label: str, count: int) -> Iterator[Answer]:
+        for done, answer in enumerate(answers):
+            self.progress(label, (done + 1) / count)
             yield answer
 
     def close(self) -> None:

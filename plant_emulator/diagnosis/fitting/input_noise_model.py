@@ -67,6 +67,10 @@ class _InputNoiseModel:
             "Model", _InputNoiseModel(self._model.with_planned_runs(where, runs), self._noise)
         )
 
+    def rough(self) -> Model:
+        """See `Model`."""
+        return cast("Model", _InputNoiseModel(self._model.rough(), self._noise))
+
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
         """See `Model`."""
         return whitened_function(self._model.residual(run, effects), self._noise.get(run))

@@ -22,7 +22,6 @@ import numpy as np
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.estimation.covariance import correlation_time, structure
 from plant_emulator.estimation.least_squares import (
-    DIFFERENCE_NORM,
     SUSPECT_MEAN_SQUARE,
     estimate,
     linearise_at,
@@ -48,8 +47,6 @@ SIGNIFICANT_ERRORS = 3.0
 AT_BOUND = 0.95
 # Standard deviation of the shrinkage prior of a size [plausible sizes].
 SHRINKAGE = 2.0
-# A fit from another start replaces a fit where its cost is lower by more than this [chi squared].
-WORTHWHILE_FALL = 1.0
 
 
 def joint_unknowns(
@@ -94,14 +91,12 @@ def fit(
     near: Estimate | None = None,
     *,
     shrinkage: bool = False,
-    difference: float = DIFFERENCE_NORM,
 ) -> FitResult:
     """Fit parameters, states and these effects to these runs, from these start values.
 
     iterations : at most so many; None: as many as `estimate` allows
     near : an estimate of the same runs; slopes of its unknowns follow by secants, see `estimate`
     shrinkage : see `joint_unknowns`
-    difference : see `estimate`
     """
     unknowns = with_starts(
         joint_unknowns(model, effects, runs, shrinkage=shrinkage), values, states
@@ -112,7 +107,6 @@ def fit(
         settled=COST_TOLERANCE if near is None else SECANT_COST_TOLERANCE,
         iterations=iterations,
         follow=near,
-        difference=difference,
     )
     reached = to_result(effects, found, len(runs))
     candidates = {name: model.candidates[name] for name in effects}

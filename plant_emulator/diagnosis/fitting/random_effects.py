@@ -190,6 +190,10 @@ class _WeightedModel:
             "Model", _WeightedModel(self._model.with_planned_runs(where, runs), self._weights)
         )
 
+    def rough(self) -> Model:
+        """See `Model`."""
+        return cast("Model", _WeightedModel(self._model.rough(), self._weights))
+
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
         """See `Model`."""
         plain, weight = self._model.residual(run, effects), self._weights.get(run, 1.0)

@@ -127,7 +127,7 @@ class LinearModel:
 
 
 class _SizeSearch:
-    """The search for the sizes: first the group of the largest gain, then all again in turn."""
+    """The search for the sizes: first the group of the largest gain, then all taken ones anew."""
 
     def __init__(self, gram: Array, product: Array, counts: Sequence[int]) -> None:
         self.gram, self.product, self.counts = gram, product, counts
@@ -142,43 +142,58 @@ class _SizeSearch:
 
     def run(self) -> None:
         """Search the sizes of the largest evidence."""
-        absent = list(range(1, len(self.counts)))
-        while absent:
-            gain, group, size = max(self._trial(group, GROUP_SIZES) for group in absent)
-            if gain <= self.best + WORTHWHILE_GAIN:
-                break
-            self.best, self.sizes[group] = gain, size
-            absent.remove(group)
         for _ in range(MOST_SWEEPS):
             before = self.best
-            for k in range(1, len(self.counts)):
-                value, group, size = self._trial(k, np.append(0.0, GROUP_SIZES))
+            self._take_groups()
+            for k in np.flatnonzero(self.sizes[1:]) + 1:
+                ((value, group, size),) = self._trials([int(k)], np.append(0.0, GROUP_SIZES))
                 if value > self.best:
                     self.best, self.sizes[group] = value, size
             if self.best - before < WORTHWHILE_GAIN:
                 break
 
-    def _trial(self, group: int, sizes: Array) -> tuple[float, int, float]:
-        """The best of these sizes of a group, with the others as they are: value, group, size.
+    def _take_groups(self) -> None:
+        """Take the group of the largest gain, until none is worth it."""
+        while absent := [int(k) for k in np.flatnonzero(self.sizes == 0.0)]:
+            value, group, size = max(self._trials(absent, GROUP_SIZES))
+            if value <= self.best + WORTHWHILE_GAIN:
+                break
+            self.best, self.sizes[group] = value, size
 
-        With the others integrated out, the group's own products give all sizes at once.
+    def _trials(self, groups: Sequence[int], sizes: Array) -> list[tuple[float, int, float]]:
+        """The best of these sizes of each of these groups alone: value, group, size.
+
+        The other groups stay as they are. With them integrated out, a group's own products give all
+        sizes at once.
         """
         from scipy.linalg import solve_triangular
 
-        own = self.group_of == group
-        used = (self.sizes[self.group_of] > 0.0) & ~own
+        rest = np.isin(self.group_of, groups)
+        used = (self.sizes[self.group_of] > 0.0) & ~rest
         deviations = self.sizes[self.group_of][used]
         lower = np.linalg.cholesky(_system(self.gram[np.ix_(used, used)], deviations))
-        right = np.column_stack([self.product[used], self.gram[np.ix_(used, own)]])
+        right = np.column_stack([self.product[used], self.gram[np.ix_(used, rest)]])
         solved = solve_triangular(lower, deviations[:, None] * right, lower=True)
         v, cross = solved[:, 0], solved[:, 1:]
-        others = 0.5 * v @ v - np.log(np.diag(lower)).sum()
-        spectrum, vectors = np.linalg.eigh(self.gram[np.ix_(own, own)] - cross.T @ cross)
-        seen = (vectors.T @ (self.product[own] - cross.T @ v)) ** 2
-        grown = 1.0 + np.outer(sizes**2, np.maximum(spectrum, 0.0))
-        values = 0.5 * ((sizes**2)[:, None] * seen / grown - np.log(grown)).sum(axis=1)
-        k = int(np.argmax(values))
-        return float(others + values[k]), group, float(sizes[k])
+        others = float(0.5 * v @ v - np.log(np.diag(lower)).sum())
+        found = []
+        for group in groups:
+            own, column = self.group_of == group, self.group_of[rest] == group
+            along = self.product[own] - cross[:, column].T @ v
+            gram = self.gram[np.ix_(own, own)] - cross[:, column].T @ cross[:, column]
+            value, size = _best_size(gram, along, sizes)
+            found.append((others + value, group, size))
+        return found
+
+
+def _best_size(gram: Array, along: Array, sizes: Array) -> tuple[float, float]:
+    """Gain of a group of columns at the best of these sizes, and that size."""
+    spectrum, vectors = np.linalg.eigh(gram)
+    seen = (vectors.T @ along) ** 2
+    grown = 1.0 + np.outer(sizes**2, np.maximum(spectrum, 0.0))
+    values = 0.5 * ((sizes**2)[:, None] * seen / grown - np.log(grown)).sum(axis=1)
+    k = int(np.argmax(values))
+    return float(values[k]), float(sizes[k])
 
 
 def variance_gain(residual: Array, weight: Array) -> float:

@@ -291,12 +291,11 @@ class WhitenedRelations:
 
         Rows of relations that the run lacks are left out.
         """
-        from scipy.linalg import solve_banded
+        from scipy.linalg.lapack import dtbtrs
 
         count = len(self.value)
         stacked = np.moveaxis(rows[:count], 0, 1).reshape(count * rows.shape[1], -1)
-        below = len(self.factor) - 1
-        return np.asarray(solve_banded((below, 0), self.factor, stacked))
+        return np.asarray(dtbtrs(self.factor, stacked, uplo="L")[0])
 
 
 def relation_residuals(

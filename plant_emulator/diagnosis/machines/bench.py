@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import pickle
+from copy import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -56,6 +57,9 @@ if TYPE_CHECKING:
 # Tolerance of a run with a truck. It takes half the time of the usual tolerance, because every
 # sample of such a run is a corner; it changes the residual by less than a hundredth of the noise.
 TRUCK_TOLERANCE = 1e-4
+# Tolerance and largest step [s] of rough runs. They take half the time, and change the residual by
+# some hundredths of the noise, which is more than a derivative bears.
+ROUGH = (1e-5, 0.03)
 # Simulated logs that are kept: the screening asks two questions about each.
 KEPT_LOGS = 120
 
@@ -91,8 +95,6 @@ class BenchModel:
     parity relations know the nominal equations only.
     """
 
-    reaches_noise = True
-
     def __init__(
         self,
         recordings: Sequence[Recording],
@@ -106,6 +108,7 @@ class BenchModel:
         self._values = values_of(parameters)
         self.nominal_set = parameters
         self._kept: dict[tuple[object, ...], Log] = {}
+        self._roughly: BenchModel | None = None  # a rough model is its own
         known = {**kernel().effects, **effects}
         plausible = {name: effect.plausible() for name, effect in effects.items()}
         everything = {**plausible, **parameters.effects}
@@ -161,6 +164,13 @@ class BenchModel:
 
     unwhitened_residual = residual
 
+    def rough(self) -> BenchModel:
+        """See `Model`: simulated in longer steps."""
+        if self._roughly is None:
+            self._roughly = copy(self)
+            vars(self._roughly).update(_kept={}, _roughly=self._roughly)
+        return self._roughly
+
     def simulated(self, run: int, values: Mapping[str, float]) -> Log:
         """The log that a run would have given at these values of everything."""
         key = (run, *sorted(values.items()))
@@ -173,8 +183,10 @@ class BenchModel:
     def _simulate(self, run: int, values: Mapping[str, float]) -> Log:
         inputs = self._recordings[run].inputs
         own, gap = split_gap_position(values)
-        tolerance = TRUCK_TOLERANCE if inputs.truck else TOLERANCE
-        return simulate(inputs, own, gap_position=gap, tolerance=tolerance)
+        tolerance, step = ROUGH if self._roughly is self else (TOLERANCE, None)
+        if inputs.truck:
+            tolerance = TRUCK_TOLERANCE
+        return simulate(inputs, own, gap_position=gap, tolerance=tolerance, largest_step=step)
 
     def relations(
         self,
@@ -183,7 +195,7 @@ class BenchModel:
         whiteners: Mapping[int, Sequence[Whitener]] | None = None,
     ) -> BenchRelations | None:
         """See `Model`; None with effects of the set, which the relations do not know."""
-        return None if self._given else BenchRelations(self, where, runs, whiteners)
+        return None if self._given else BenchRelations(self.rough(), where, runs, whiteners)
 
     def input_noise(
         self, run: int, where: FitResult, state: Mapping[str, float]

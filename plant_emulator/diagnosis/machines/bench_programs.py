@@ -129,7 +129,7 @@ def _simulate_recording(
 
 
 def missing_experiments(logs: Sequence[Log], base_speed: float) -> dict[str, tuple[str, ...]]:
-    """What would show more of each subsystem and is in none of these logs, by subsystem.
+    """Manoeuvres, by subsystem, that would excite it and that no log contains.
 
     base_speed : motor speed above which the field is weakened [rad/s]
     """

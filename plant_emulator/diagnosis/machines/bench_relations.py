@@ -1,4 +1,4 @@
-"""The whitened parity relations of a bench around a fit, and what effects do to them.
+"""The whitened parity relations of a bench around a fit, and the responses of effects in them.
 
 The rows are those of `BlockRegression`: the relations of all runs, then the drum speeds behind the
 measured motor speed. A column is the difference of two simulated logs, with and without the effect,
@@ -21,7 +21,7 @@ from plant_emulator.diagnosis.localisation.parity_relations import (
     relation_residuals,
 )
 from plant_emulator.diagnosis.machines.thinning import thin
-from plant_emulator.diagnosis.parity.rich_model import rich_columns
+from plant_emulator.diagnosis.search.rich_model import rich_columns
 from plant_emulator.errors import UnsettledError
 from plant_emulator.estimation.noise.channel_noise import LINE_PRIOR, NoiseSeries, line_columns
 from plant_emulator.estimation.noise.estimate import estimate_channel_noise
@@ -55,7 +55,7 @@ WITHIN = 5.0
 
 
 class Bench(Protocol):
-    """What the relations ask of the bench."""
+    """The interface of a bench that `BenchRelations` uses."""
 
     nominal_set: ParameterSet
     candidates: Mapping[str, Candidate]
@@ -126,7 +126,7 @@ class BenchRelations:
 
     @cached_property
     def whiteners(self) -> list[tuple[NDArray[np.int_], Whitener]]:
-        """The rows of each kind in each run, and what makes them white.
+        """The rows of each kind in each run, and the filters that whiten them.
 
         The noise is estimated on what a rich model leaves: see `rich_columns`.
         """
@@ -169,7 +169,7 @@ class BenchRelations:
 
     @cached_property
     def _data(self) -> Array:
-        """The rows, with what the effects of the fit do taken off."""
+        """The rows without the response of the effects of the fit."""
         y = self.site.model.y
         return y - (self._with_effects - self.plain) if self.where.effects else y
 
@@ -180,7 +180,7 @@ class BenchRelations:
         return np.concatenate([*parameters, *self._lines(), drum], axis=1)
 
     def _lines(self) -> Iterator[Array]:
-        """What the lines in a channel do to the rows."""
+        """Response of the rows to the mains lines in a channel."""
         for k, own in enumerate(self.channels):
             m, names = self.site.signals[k], self.recordings[k].channels
             for name, whitener in zip(names, own, strict=bool(own)):
@@ -190,7 +190,7 @@ class BenchRelations:
                     yield self._changed(k, name, level * column)[:, None]
 
     def _changed(self, k: int, name: str, change: Array) -> Array:
-        """Change of the rows where a channel of a run reads otherwise, shape (n,)."""
+        """Response of the rows to an error of one channel of one run, shape (n,)."""
         m, p = self.site.signals[k], self.site.values
         field, none = FIELDS[name], [None] * len(self.runs)
         other = replace(m, **{field: getattr(m, field) + change})
@@ -225,7 +225,7 @@ class BenchRelations:
         return self._known[key]
 
     def _rows(self, effects: Sequence[str], more: Sequence[Mapping[str, float]]) -> Array | None:
-        """Rows that simulated runs leave in the nominal equations; None: not simulated."""
+        """Rows of simulated runs in the nominal equations; None: one was not simulated."""
         relation, speed = [], []
         for k, extra in enumerate(more):
             try:

@@ -18,6 +18,7 @@ from plant_emulator.diagnosis.prediction.gap import (
     measure_gap,
     predict,
 )
+from plant_emulator.diagnosis.prediction.trace import traces
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -25,8 +26,12 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model
-    from plant_emulator.diagnosis.prediction.gap import Gap, Prediction
     from plant_emulator.diagnosis.prediction.held_out import Plan
+    from plant_emulator.diagnosis.prediction.trace import Trace
+
+
+# Share of the gap that each term of a law has to close more than a law without the term.
+WORTH_A_TERM = 0.02
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,12 +54,20 @@ class Result:
 
     fit : joint fit; gain : share of the held-out gap that the draft closes [1], None: there is none
     interval : 95 % interval of the gain
+    traces : held-out runs, measured and predicted without and with the draft
     """
 
     effect: str
     fit: FitResult
     gain: float | None
     interval: tuple[float, float] | None
+    traces: tuple[Trace, ...]
+
+    def is_draft(self, terms: int) -> bool:
+        """Whether a law of so many terms closes a part of the gap for certain, and is worth it."""
+        if self.gain is None or self.interval is None:
+            return False
+        return self.interval[0] > 0.0 and self.gain > WORTH_A_TERM * terms
 
 
 def enter(model: Model, entry: Entry) -> FitResult:
@@ -88,15 +101,18 @@ def hold(runner: TaskRunner, plan: Plan, entries: Sequence[Entry]) -> list[Resul
     found = list(runner.map(predict, folds))
     count = len(plan.folds)
     parts = [found[k : k + count] for k in range(0, len(found), count)]
-    gaps = _gaps(runner, plan, parts)
+    held_out = [runner.model.runs[run] for _, predicted in plan.folds for run in predicted]
+    lengths = block_lengths(parts[0])
+    gaps = [measure_gap(held_out, part, lengths) for part in parts]
     return [
         Result(
             effect=entry.effect,
             fit=one,
             gain=closed_fraction(gaps[0], gap),
             interval=closed_fraction_interval(gaps[0], gap),
+            traces=traces(held_out, parts[0], part),
         )
-        for entry, one, gap in zip(entries, fits, gaps[1:], strict=True)
+        for entry, one, gap, part in zip(entries, fits, gaps[1:], parts[1:], strict=True)
     ]
 
 
@@ -110,10 +126,3 @@ def _fold(
         start=replace(start, states=states),
         as_fitted=plan.as_fitted,
     )
-
-
-def _gaps(runner: TaskRunner, plan: Plan, parts: Sequence[Sequence[Prediction]]) -> list[Gap]:
-    """The held-out gaps of these predictions, each of one hypothesis."""
-    runs = [runner.model.runs[run] for _, predicted in plan.folds for run in predicted]
-    lengths = block_lengths(parts[0])
-    return [measure_gap(runs, part, lengths) for part in parts]

@@ -28,7 +28,7 @@ HALF_INTERVAL = 1.96
 
 def curve(regression: BlockRegression, quantity: Quantity, state: State) -> Curve:
     """The curve of a quantity over a state, fitted to all runs."""
-    knots = _knots(state)
+    knots = knots_of(state)
     columns = [
         columns_of(regression, quantity, k, linear_splines(own, knots))
         for k, own in enumerate(state.values)
@@ -50,7 +50,7 @@ def curve(regression: BlockRegression, quantity: Quantity, state: State) -> Curv
     )
 
 
-def _knots(state: State) -> Array:
+def knots_of(state: State) -> Array:
     """Knots at quantiles of the state's values, the ends included, each one once."""
     values = np.concatenate(list(state.values))
     return np.unique(np.quantile(values, np.linspace(0.0, 1.0, KNOTS)))

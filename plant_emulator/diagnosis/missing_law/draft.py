@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
+from plant_emulator.diagnosis.missing_law.bound import bound
 from plant_emulator.diagnosis.missing_law.curve import curve
 from plant_emulator.diagnosis.missing_law.law_search import DRAFTED_GAIN, null_loss, search
 from plant_emulator.diagnosis.missing_law.quantities import quantities
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.answer import Curve
     from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.missing_law.bound import Bound
     from plant_emulator.diagnosis.missing_law.law_search import Law, Search
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
@@ -40,10 +42,21 @@ class Sketch:
     curve: Curve
 
 
-def sketches(
-    recordings: Sequence[Recording], parameters: ParameterSet, null: FitResult
-) -> list[Sketch]:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sketchbook:
     """Laws that are worth a contest, the best one first; empty where no law closes a gap.
+
+    bound : how much of the gap any law could close; None: the relations show no gap
+    """
+
+    sketches: tuple[Sketch, ...]
+    bound: Bound | None
+
+
+def sketch(
+    recordings: Sequence[Recording], parameters: ParameterSet, null: FitResult
+) -> Sketchbook:
+    """Sketch the laws that are worth a contest, and bound what any law could close.
 
     null : converged fit without effects; at least two recordings, because other runs judge
     """
@@ -53,40 +66,36 @@ def sketches(
         regression = BlockRegression(recordings, parameters, null)
         before = null_loss(regression)
         searches = [search(regression, one, before) for one in quantities(regression)]
-        return [_sketch(regression, *pair) for pair in _contenders(searches)]
+        found = tuple(_sketch(regression, *pair) for pair in _contenders(searches))
+        return Sketchbook(sketches=found, bound=bound(regression, searches))
 
 
-def _contenders(searches: Sequence[Search]) -> list[tuple[Search, tuple[int, ...]]]:
-    """The best law, its shorter or longer form, and rivals, of all quantities."""
+def _contenders(searches: Sequence[Search]) -> list[tuple[Search, Law]]:
+    """The best law, its shorter or longer form, and rivals, of all quantities.
+
+    A short law and a long one that resemble each other both enter: a simulation decides whether the
+    further terms are worth it.
+    """
     every = []
     for one in searches:
         nested = one.nested()
         every += [(one, chosen) for chosen in {nested[0], nested[-1], *one.singles()}]
     every = [pair for pair in every if pair[0].gain(pair[1]) >= DRAFTED_GAIN]
     every.sort(key=lambda pair: -pair[0].score(pair[1]))
-    found: list[tuple[Search, tuple[int, ...]]] = []
+    found: list[tuple[Search, Law]] = []
     for one, chosen in every:
-        near = not found or one.score(chosen) >= RIVAL_SHARE * found[0][0].score(found[0][1])
-        if near and all(_form(one, chosen) != _form(*other) for other in found):
-            found.append((one, chosen))
+        if one.score(chosen) < RIVAL_SHARE * every[0][0].score(every[0][1]):
+            break
+        law = one.law(chosen)
+        alike = [other for _, other in found if law.resembles(other)]
+        if all((len(law.terms) > 1) != (len(other.terms) > 1) for other in alike):
+            found.append((one, law))
         if len(found) == MOST_LAWS:
             break
     return found
 
 
-def _form(one: Search, chosen: Sequence[int]) -> tuple[object, ...]:
-    """What tells two laws apart: the quantity, and functions and states without their scales."""
-    factors = {
-        (factor.function, factor.state.name)
-        for j in chosen
-        for factor in one.terms[j].factors
-        if factor.state.kind != "direction"
-    }
-    return (one.quantity.name, min(len(chosen), 2), frozenset(factors))
-
-
-def _sketch(regression: BlockRegression, one: Search, chosen: tuple[int, ...]) -> Sketch:
-    law = one.law(chosen)
+def _sketch(regression: BlockRegression, one: Search, law: Law) -> Sketch:
     smooth = [state for term in law.terms for state in term.states if state.kind != "angle"]
     state = smooth[0] if smooth else one.quantity.states[0]
     return Sketch(law=law, curve=curve(regression, one.quantity, state))

@@ -32,6 +32,8 @@ WORTHWHILE_GAIN = 25.0
 # A law is drafted from this held-out gain on [twice the log of the odds]. Runs without any gap gave
 # up to 60, because the drum's flight through the gap is linearised.
 DRAFTED_GAIN = 100.0
+# Correlation from which on two laws have the same shape: they differ by a tenth of their size.
+SAME_SHAPE = 0.995
 # A factor more costs this [as above]: of two terms that say the same, the shorter one counts.
 PRICE_OF_FACTOR = 5.0
 
@@ -68,6 +70,42 @@ class Law:
             ]
             found = found + size * Term(tuple(at)).values(0, len(knots))[:, 0]
         return found
+
+    def resembles(self, other: Law) -> bool:
+        """Whether the other law is hardly another one: of the same functions, or the same shape.
+
+        The shape is that in all runs, apart from a constant: friction and offset of the bench take
+        a constant.
+        """
+        if self.quantity.name != other.quantity.name:
+            return False
+        if self._functions == other._functions:
+            return True
+        if any(term.own for term in (*self.terms, *other.terms)):
+            return False
+        one, two = (law.values - law.values.mean() for law in (self, other))
+        size = np.linalg.norm(one) * np.linalg.norm(two)
+        return bool(abs(one @ two) >= SAME_SHAPE * size)
+
+    @property
+    def _functions(self) -> frozenset[tuple[str, str, float]]:
+        """Functions and states of the law, with harmonics, without other scales."""
+        return frozenset(
+            (f.function, f.state.name, f.scale if f.function == "turn" else 0.0)
+            for term in self.terms
+            for f in term.factors
+        )
+
+    @property
+    def values(self) -> Array:
+        """Values over the intervals of all runs, shape (n,); 0 for a term of an angle."""
+        counts = [len(own) for own in self.quantity.states[0].values]
+        found = [np.zeros(count) for count in counts]
+        for size, term in zip(self.coefficients, self.terms, strict=True):
+            if not term.own:
+                for run, count in enumerate(counts):
+                    found[run] += size * term.values(run, count)[:, 0]
+        return np.concatenate(found)
 
     @property
     def text(self) -> str:

@@ -19,7 +19,7 @@ from plant_emulator.identification.experiment_design import noise_levels
 from plant_emulator.model.stage import split_gap_position
 from plant_emulator.simulation.programs import SpeedProgram
 from plant_emulator.simulation.simulate import inputs_of, simulate
-from register_maps.drive_programs import Sweep
+from register_maps.logs.drive_programs import Sweep
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

@@ -60,6 +60,12 @@ class RunRows:
         inner = np.eye(self.own.shape[1]) + self.own.T @ self.own
         return float(0.5 * (self.y @ self.y - mine @ np.linalg.solve(inner, mine)))
 
+    def squares(self, left: Array) -> Array:
+        """Squares of a residual with the run's own coefficients fitted, and their price shared."""
+        inner = np.eye(self.own.shape[1]) + self.own.T @ self.own
+        found = np.linalg.solve(inner, self.own.T @ left)
+        return np.asarray((left - self.own @ found) ** 2 + found @ found / len(left))
+
 
 def run_rows(regression: BlockRegression, model: LinearModel) -> list[RunRows]:
     """The rows of every run of a linear model of a regression, without terms."""
@@ -106,6 +112,7 @@ class Products:
     shared : number of shared nuisance columns, which come first
     scale : length of each term's column in all runs, to which the products are scaled
     own : whether each run has a coefficient of its own of each term's column
+    width : prior standard deviation of a term's coefficient, scaled
     """
 
     grams: Sequence[Array]
@@ -114,6 +121,7 @@ class Products:
     shared: int
     scale: Array
     own: NDArray[np.bool_]
+    width: float = WIDE
 
     def coefficients(self, chosen: Sequence[int], runs: Sequence[int]) -> Array:
         """Nuisance and shared coefficients of the chosen columns, fitted to some runs (scaled)."""
@@ -135,7 +143,7 @@ class Products:
         """The run's own coefficients of the chosen columns, fitted to it (scaled)."""
         shared, own = self._split(chosen)
         gram, product = self.grams[run], self.products[run]
-        inner = gram[np.ix_(own, own)] + WIDE**-2.0 * np.eye(len(own))
+        inner = gram[np.ix_(own, own)] + self.width**-2.0 * np.eye(len(own))
         return np.asarray(np.linalg.solve(inner, product[own] - gram[np.ix_(own, shared)] @ found))
 
     def held_out_losses(self, chosen: Sequence[int]) -> Array:
@@ -157,7 +165,7 @@ class Products:
         gram, product = self.grams[run], self.products[run]
         if not len(own):
             return gram[np.ix_(shared, shared)], product[shared], self.losses[run]
-        inner = gram[np.ix_(own, own)] + WIDE**-2.0 * np.eye(len(own))
+        inner = gram[np.ix_(own, own)] + self.width**-2.0 * np.eye(len(own))
         cross = gram[np.ix_(own, shared)]
         solved = np.linalg.solve(inner, np.column_stack([cross, product[own]]))
         return (
@@ -174,7 +182,7 @@ class Products:
 
     def _precision(self, chosen: Sequence[int]) -> Array:
         count = len(self._split(chosen)[0]) - self.shared
-        return np.array([1.0] * self.shared + [WIDE**-2.0] * count)
+        return np.array([1.0] * self.shared + [self.width**-2.0] * count)
 
 
 def products(

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.diagnosis.fitting.evidence import NOISE_UNCERTAINTY
 from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
 from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
 from plant_emulator.diagnosis.prediction import block_bootstrap
@@ -73,11 +74,20 @@ def predict(model: Model, fold: Fold) -> Prediction:
 def refit_fold(model: Model, fold: Fold) -> FitResult:
     """Fit the fold's hypothesis to its fitted runs, and continue until the fit converges.
 
-    The sizes have a shrinkage prior: a size that these runs do not show would end anywhere.
+    The sizes have a shrinkage prior: a size that these runs do not show would end anywhere. The fit
+    to all runs is near, so that slopes are differenced there only and follow by secants.
     """
-    found = fold.start
+    found, near = fold.start, linearise(model, fold.start, fold.fitted)
     for _ in range(1 + CONTINUATIONS):
-        found = fit(model, found.effects, fold.fitted, found.values, found.states, shrinkage=True)
+        found = fit(
+            model,
+            found.effects,
+            fold.fitted,
+            found.values,
+            found.states,
+            near=near,
+            shrinkage=True,
+        )
         if found.converged:
             break
     return found
@@ -215,12 +225,18 @@ def _closed_fractions(reference: Gap, before: Array, after: Array) -> Array:
 
 
 def closed_fraction_interval(reference: Gap, explained: Gap) -> tuple[float, float] | None:
-    """95 % interval of the closed fraction [1]; draws without samples of a channel do not count."""
+    """95 % interval of the closed fraction [1].
+
+    Each draw has a noise variance of its own in every channel, as uncertain as the estimate of it.
+    Draws without samples of a channel do not count.
+    """
     if closed_fraction(reference, explained) is None:
         return None
     with np.errstate(invalid="ignore"):
         before, after = (np.divide(*found.resampled) for found in (reference, explained))
-    drawn = _closed_fractions(reference, before, after)
+    errors = np.random.default_rng(block_bootstrap.SEED).standard_normal(before.shape)
+    noise = 1.0 + NOISE_UNCERTAINTY * errors
+    drawn = _closed_fractions(reference, before * noise, after * noise)
     drawn = drawn[np.isfinite(drawn)]
     if not len(drawn):
         return None

@@ -62,6 +62,8 @@ class Gaps:
     predictions, by_effects : predictions and gap of each hypothesis, by its effects or NOMINAL
     predictable : whether any run can be predicted with the accepted effects
     notes : on folds without a prediction and fits that did not converge
+    fitted : gap that the fit to all runs leaves with the accepted effects on the same runs; None:
+        it is what the predictions belong to
     """
 
     runs: Sequence[MeasuredRun]
@@ -69,6 +71,7 @@ class Gaps:
     by_effects: Mapping[tuple[str, ...], Gap]
     predictable: bool
     notes: tuple[str, ...]
+    fitted: Gap | None = None
 
     @property
     def nominal(self) -> Gap:
@@ -114,7 +117,27 @@ class HeldOut:
             by_effects={key: measure_gap(runs, one, lengths) for key, one in predictions.items()},
             predictable=bool(usable),
             notes=(*notes, *self.convergence_notes(folds, predictions)),
+            fitted=self._fitted_gap(explained, followed, folds, lengths),
         )
+
+    def _fitted_gap(
+        self,
+        explained: Explanation,
+        followed: tuple[str, ...],
+        folds: Folds,
+        lengths: Sequence[int],
+    ) -> Gap | None:
+        """What the fit to all runs leaves on the predicted runs; None: each was held out of it."""
+        found = explained.final if followed else explained.null
+        runs = [run for _, predicted in folds for run in predicted]
+        if not set(runs) <= set(self.plan.fitted):
+            return None
+        alone = [
+            replace(self._fold(found, (run,), (run,), refitted=False), as_fitted=True)
+            for run in runs
+        ]
+        predictions = list(self.runner.map(predict, alone))
+        return measure_gap([self.runner.model.runs[run] for run in runs], predictions, lengths)
 
     def usable_folds(
         self, explained: Explanation, followed: tuple[str, ...]

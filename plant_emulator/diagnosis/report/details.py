@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.prediction.remainder import Remainder
     from plant_emulator.diagnosis.prediction.trace import Trace
+    from plant_emulator.diagnosis.search.spectra import Spectrum
     from plant_emulator.signals.log import Array
 
 
@@ -50,6 +51,8 @@ class Details:
     notes : what was noticed about the logs, a sentence each
     remainder : the unmodelled remainder; None for a machine that is modelled down to its noise
     inputs : of the runs that nobody measured
+    spectra : of the channels of a machine that is modelled down to its noise
+    draft_traces : held-out runs, predicted without and with the best draft of a missing law
     """
 
     traces: tuple[Trace, ...]
@@ -58,3 +61,5 @@ class Details:
     notes: tuple[str, ...]
     remainder: Remainder | None = None
     inputs: tuple[EstimatedInput, ...] = ()
+    spectra: tuple[Spectrum, ...] = ()
+    draft_traces: tuple[Trace, ...] = ()

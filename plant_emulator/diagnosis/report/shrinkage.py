@@ -27,12 +27,18 @@ if TYPE_CHECKING:
 
 
 def held_out_gap(
-    gaps: Gaps, runs: Sequence[MeasuredRun], effects: tuple[str, ...], reference: Gap | None
+    gaps: Gaps,
+    runs: Sequence[MeasuredRun],
+    effects: tuple[str, ...],
+    reference: Gap | None,
+    fitted: Gap | None = None,
 ) -> HeldOutGap:
     """The gap of every channel with these effects, and the share that they close.
 
     runs : the held-out runs behind the gaps
     reference : the gap that is to be closed; None: no share is told
+    fitted : gap that the fit to all runs leaves; the predictions belong to fits to fewer runs, so
+        that the interval of the share reaches from theirs to its share
     """
     explained = gaps[effects]
     return HeldOutGap(
@@ -41,10 +47,17 @@ def held_out_gap(
         explained=nrmsd(explained, runs),
         noise_floor=noise_floor(gaps[()], runs),
         closed_fraction=None if reference is None else closed_fraction(reference, explained),
-        closed_fraction_ci95=None
-        if reference is None
-        else closed_fraction_interval(reference, explained),
+        closed_fraction_ci95=None if reference is None else _interval(reference, explained, fitted),
     )
+
+
+def _interval(reference: Gap, explained: Gap, fitted: Gap | None) -> tuple[float, float] | None:
+    """95 % interval of the closed fraction of the fit to all runs [1]."""
+    interval = closed_fraction_interval(reference, explained)
+    most = None if fitted is None else closed_fraction(reference, fitted)
+    if interval is None or most is None:
+        return interval
+    return interval[0], max(interval[1], most)
 
 
 def nrmsd(gap: Gap, runs: Sequence[MeasuredRun]) -> dict[str, float]:
@@ -58,7 +71,7 @@ def noise_floor(gap: Gap, runs: Sequence[MeasuredRun]) -> dict[str, float]:
 
 
 def _shares(gap: Gap, runs: Sequence[MeasuredRun], times: Array) -> list[float]:
-    """So many times the noise of each channel over the range of its samples that count."""
+    """Multiples of each channel's noise over the measured range of the channel [1]."""
     found = []
     for k, name in enumerate(gap.channels):
         own = [(r, w) for r, w in zip(runs, gap.weights, strict=True) if name in r.channels]

@@ -5,16 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.answer import ParameterDeviation, Verdict
-from plant_emulator.diagnosis.prediction.remainder import describe_band, describe_fall
-from plant_emulator.diagnosis.wording import in_words, number, percent, quantity
+from plant_emulator.diagnosis.wording import in_words, percent, quantity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.answer import Quantity
+    from plant_emulator.diagnosis.decision.verdict import Decision
     from plant_emulator.diagnosis.machine import Candidate
-    from plant_emulator.diagnosis.prediction.remainder import Remainder
-    from plant_emulator.diagnosis.selection.verdict import Decision
 
     Terms = Mapping[str, Sequence[Quantity]]
 
@@ -53,53 +51,34 @@ def statement(
     candidates: Mapping[str, Candidate],
     closed: float | None,
     subsystem: str | None,
-    *,
-    terms: Terms | None = None,
-    remainder: Remainder | None = None,
 ) -> str:
     """The verdict in one sentence.
 
     closed : closed fraction of the held-out gap; subsystem : where the gap lies
-    terms : by effect, the quantities that the field knows it by
-    remainder : of a machine that is modelled in outline
     """
     match decision.kind:
         case "effect":
-            return _effects(decision, candidates, closed, terms or {}, remainder)
+            return _effects(decision, candidates, closed)
         case "parameter":
             return _other_values(decision)
         case "none":
             return "The logs show no gap beyond the noise of the sensors."
     where = "" if subsystem is None else f" It lies in the {in_words(subsystem)}."
-    if remainder is not None:
-        where = f" Of the held-out {remainder.channel}, {describe_band(remainder)}."
     return f"There is a gap whose cause is unknown: {decision.reason}.{where}"
 
 
-def _effects(
-    decision: Decision,
-    candidates: Mapping[str, Candidate],
-    closed: float | None,
-    terms: Terms,
-    remainder: Remainder | None,
-) -> str:
-    named = [
-        _describe_effect(name, candidates[name], terms.get(name, ())) for name in decision.effects
-    ]
-    share = "" if closed is None else f"the held-out gap closes by {percent(closed)}"
-    if remainder is not None:
-        share = f"{describe_fall(remainder)}; {describe_band(remainder)}"
+def _effects(decision: Decision, candidates: Mapping[str, Candidate], closed: float | None) -> str:
+    named = [_describe_effect(name, candidates[name]) for name in decision.effects]
     them = "it" if len(decision.effects) == 1 else "them"
-    more = f"; with {them} {share}" if share else ""
+    more = "" if closed is None else f"; with {them} the held-out gap closes by {percent(closed)}"
     return f"The machine has what the model lacks: {' and '.join(named)}{more}."
 
 
-def _describe_effect(name: str, candidate: Candidate, terms: Sequence[Quantity]) -> str:
-    """An effect, what it is, and its terms."""
+def _describe_effect(name: str, candidate: Candidate) -> str:
+    """An effect, and what it is."""
     title = f"{candidate.title[:1].lower()}{candidate.title[1:]}"
-    values = ", ".join(f"{number(t.value, 4)} {t.unit} {t.name}" for t in terms)
     chance = ", random, so that no simulation can follow it" if candidate.stochastic else ""
-    return f"{name} ({title}{chance}{': ' if values else ''}{values})"
+    return f"{name} ({title}{chance})"
 
 
 def _other_values(decision: Decision) -> str:

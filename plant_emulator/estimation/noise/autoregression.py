@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 # A step of time over the usual step that breaks a series.
 BREAK = 1.5
+# Behind a hole a long memory is used once it is whole, and until then so much of it [samples]: what
+# lies further back says little, and a predictor of each order would take most of the time.
+SHORT = 12
 # Least share of the variance that a predictor leaves [1]: no noise is more predictable.
 LEAST_LEFT = 1e-4
 
@@ -76,18 +79,17 @@ class Autoregression:
 
         known : number of samples that precede each one without a break
         """
-        order = self.order
+        used = np.where(known >= self.order, self.order, np.minimum(known, SHORT))
         left = series.copy()
-        if order:
-            from scipy.signal import lfilter
-
-            whole = lfilter(np.concatenate([[1.0], -self.predictors[-1]]), [1.0], series)
-            left = np.where(known >= order, whole, left)
-        for m in range(1, order):
-            behind_break = np.flatnonzero(known == m)
+        for m in {self.order, min(self.order, SHORT)} - {0}:
+            whole = series.copy()
+            whole[1:] -= np.convolve(series, self.predictors[m])[: len(series) - 1]
+            left = np.where(used == m, whole, left)
+        for m in range(1, min(self.order, SHORT)):
+            behind_break = np.flatnonzero(used == m)
             past = series[behind_break[:, None] - np.arange(1, m + 1)]
             left[behind_break] -= past @ self.predictors[m]
-        return np.asarray(left / np.asarray(self.deviations)[np.minimum(known, order)])
+        return np.asarray(left / np.asarray(self.deviations)[used])
 
 
 def samples_since_break(time: Array) -> NDArray[np.int_]:

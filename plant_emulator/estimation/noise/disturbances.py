@@ -1,4 +1,4 @@
-"""What sits on the noise of a channel: outliers, and lines of the mains (pure)."""
+"""Detects outliers and lines of the mains in a residual (pure)."""
 
 from __future__ import annotations
 

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from threadpoolctl import threadpool_limits
 
+from plant_emulator.diagnosis.axis.diagnose import AxisRuns, diagnose_axis
 from plant_emulator.diagnosis.diagnose import Diagnose
 from plant_emulator.diagnosis.execution.progress import ReportingPool
 from plant_emulator.diagnosis.report.document import to_json
-from plant_emulator.diagnosis.report.html import html
+from plant_emulator.diagnosis.report.html.page import html
 from plant_emulator.diagnosis.report.terminal import lines
 from plant_emulator.diagnosis.wording import KINDS, percent
 from plant_emulator.errors import DiagnosisError, InputError, report_unwritable
@@ -124,6 +125,8 @@ def diagnose(
     without: str | Sequence[str] = (),
     effect_files: str | Path | Sequence[str | Path] = (),
     reference: Literal["linear", "staircase"] | None = None,
+    columns: Sequence[str] | Mapping[str, str] = (),
+    one_run: bool = False,
     workers: int = 1,
     scheduler: str | None = None,
     progress: Progress | None = None,
@@ -133,13 +136,17 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnose the gap between the model and the machine that the logs were recorded on.
 
-    logs : paths of log files, or logs that were read, all of one machine
+    logs : paths of log files, or logs that were read, all of one machine; for an axis also a part
+        in time of a file, FILE@12.5:20 [s]
     hold_out : logs to predict; without any, every log is held out in turn
     parameters : a parameter set, the name of a shipped one, or the path of its file
     model : the roller bench, or a single motor-driven axis
     without : names of effects to take out of the library
     effect_files : files of your own effects beside the library
     reference : what holds between samples of the speed reference; None: as the log says
+    columns : of the files of an axis, as {"position": "enc:deg", "force": "iq*0.40:Nm"}
+    one_run : whether the logs of an axis are parts of one run; its last part is predicted if no
+        log is held out, and nothing is compared over the joints
     workers : processes that fit side by side; more than one needs `if __name__ == "__main__":`
         in a script, because every process imports it
     scheduler : address of a Dask scheduler to use in their place, tcp://host:port
@@ -155,10 +162,12 @@ def diagnose(
     check_choice("model", model, ("bench", "axis"))
     check_reference(reference)
     check_count("workers", workers, 1)
-    axis = model == "axis"
-    given = None if axis else _set(parameters, effect_files)
+    if model == "bench" and (columns or one_run):
+        raise InputError("columns and one_run belong to the model axis")
+    given = None if model == "axis" else _set(parameters, effect_files)
+    runs: Runs[Any]
     if given is None:
-        runs = axis_runs(logs, hold_out, without=without)
+        runs = axis_runs(logs, hold_out, without=without, columns=columns, one_run=one_run)
     else:
         runs = bench_runs(
             logs,
@@ -171,16 +180,7 @@ def diagnose(
     pool = make_pool(workers, scheduler)
     try:
         with threadpool_limits(1):
-            findings = Diagnose(
-                pool,
-                runs.recipe,
-                runs.plan,
-                settings={**(settings or {}), **runs.settings},
-                cases=None if axis else trial_cases(),
-                model_form_errors=None if axis else load_model_form_errors(),
-                notes=runs.notes,
-                progress=progress,
-            ).diagnose()
+            findings = _findings(runs, pool, settings or {}, progress)
             shown = pool if progress is None else ReportingPool(pool, progress)
             findings, drafted = _with_drafts(findings, runs, shown, draft, Path(draft_folder))
     finally:
@@ -195,8 +195,29 @@ def diagnose(
     )
 
 
+def _findings(
+    runs: Runs[Any], pool: Pool, settings: Mapping[str, str], progress: Progress | None
+) -> Findings:
+    """Diagnose the bench, or an axis, which needs no other processes."""
+    told = {**settings, **runs.settings}
+    if isinstance(runs.recipe, AxisRuns):
+        return diagnose_axis(
+            runs.recipe, runs.plan, settings=told, notes=runs.notes, progress=progress
+        )
+    return Diagnose(
+        pool,
+        runs.recipe,
+        runs.plan,
+        settings=told,
+        cases=trial_cases(),
+        model_form_errors=load_model_form_errors(),
+        notes=runs.notes,
+        progress=progress,
+    ).diagnose()
+
+
 def _with_drafts(
-    findings: Findings, runs: Runs, pool: Pool, wanted: str, folder: Path
+    findings: Findings, runs: Runs[Any], pool: Pool, wanted: str, folder: Path
 ) -> tuple[Findings, Drafted | None]:
     """The findings with the drafts of a missing law, if these are wanted."""
     verdict = findings.answer.verdict
@@ -217,7 +238,15 @@ def _with_drafts(
         advised = f"drive {describe(drafted.next_program)}: it separates {names}"
         verdict = replace(verdict, next_experiment=advised)
     answer = replace(findings.answer, verdict=verdict, drafts=drafted.drafts)
-    return replace(findings, answer=answer), drafted
+    notes = findings.details.notes
+    if drafted.bound is not None and not drafted.drafts:
+        limit = percent(drafted.bound.interval[1])
+        notes = (
+            *notes,
+            f"no missing law is drafted: no law that was tried closes more than {limit}",
+        )
+    details = replace(findings.details, draft_traces=drafted.traces, notes=notes)
+    return replace(findings, answer=answer, details=details), drafted
 
 
 def _set(parameters: ParameterSet | str | Path, effect_files: Sequence[str | Path]) -> ParameterSet:

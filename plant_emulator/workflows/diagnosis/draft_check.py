@@ -1,4 +1,4 @@
-"""The contest for an effect file that a person wrote: what it closes of the gap of some logs."""
+"""Evaluates an effect file that a person wrote: joint fit and closed fraction of the gap."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,8 +12,9 @@ from plant_emulator.diagnosis.answer import Draft
 from plant_emulator.diagnosis.execution.pool import TaskRunner, build_model
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.machines.bench import BenchModel, BenchRecipe
-from plant_emulator.diagnosis.missing_law.contest import Entry, hold
-from plant_emulator.diagnosis.missing_law.draft import sketches
+from plant_emulator.diagnosis.missing_law.bound import Bound
+from plant_emulator.diagnosis.missing_law.contest import WORTH_A_TERM, Entry, hold
+from plant_emulator.diagnosis.missing_law.draft import sketch
 from plant_emulator.diagnosis.missing_law.effect_text import effect_text
 from plant_emulator.diagnosis.missing_law.next_run import best_separation
 from plant_emulator.errors import report_unwritable
@@ -26,29 +27,31 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.execution.pool import Pool
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.missing_law.contest import Result
-    from plant_emulator.diagnosis.missing_law.draft import Sketch
+    from plant_emulator.diagnosis.missing_law.draft import Sketch, Sketchbook
     from plant_emulator.diagnosis.missing_law.law_search import Law
+    from plant_emulator.diagnosis.prediction.trace import Trace
     from plant_emulator.recordings.recording import Recording
     from plant_emulator.simulation.programs import SpeedProgram
     from plant_emulator.workflows.diagnosis.runs import Runs
-
-# Share of the gap that a longer law has to close more than a shorter one.
-WORTH_A_TERM = 0.02
 
 
 @dataclass(frozen=True, kw_only=True)
 class Drafted:
     """The drafts, the best one first, and the joint fit of each; see `answer.Draft`.
 
+    bound : how much of the gap any law could close; None: the relations show no gap
+    traces : held-out runs, predicted without and with the best draft
     next_program : the drive program that separates the two best drafts; None: there is one draft
     """
 
     drafts: tuple[Draft, ...] = ()
     fits: tuple[FitResult, ...] = ()
+    bound: Bound | None = None
+    traces: tuple[Trace, ...] = ()
     next_program: SpeedProgram | None = None
 
 
-def draft(runs: Runs, null: FitResult | None, pool: Pool, folder: Path) -> Drafted | None:
+def draft(runs: Runs[Any], null: FitResult | None, pool: Pool, folder: Path) -> Drafted | None:
     """Draft the missing law of these runs of the bench; no drafts where no law closes a gap.
 
     null : converged fit without effects; None: it is made here
@@ -62,9 +65,10 @@ def draft(runs: Runs, null: FitResult | None, pool: Pool, folder: Path) -> Draft
         return None
     if null is None:
         null = fit_null(BenchModel(runs.fitted, recipe.parameters, {}), range(len(runs.fitted)))
-    found = sketches(runs.fitted, recipe.parameters, null)
+    book = sketch(runs.fitted, recipe.parameters, null)
+    found = book.sketches
     if not found:
-        return Drafted()
+        return Drafted(bound=book.bound)
     files = _write(found, folder)
     own = replace(recipe, without=_library(recipe), own=(*recipe.own, *files))
     runner = TaskRunner(pool=pool, recipe=own, model=build_model(own), runs=runs.plan.fitted)
@@ -72,7 +76,7 @@ def draft(runs: Runs, null: FitResult | None, pool: Pool, folder: Path) -> Draft
         Entry(effect=file.stem, values=one.law.parameters, null=null, runs=runs.plan.fitted)
         for one, file in zip(found, files, strict=True)
     ]
-    drafted = _ranked(found, files, hold(runner, runs.plan, entries))
+    drafted = _ranked(book, files, hold(runner, runs.plan, entries))
     return replace(drafted, next_program=_next_program(runs.fitted, recipe, drafted.fits))
 
 
@@ -105,22 +109,45 @@ def _write(found: Sequence[Sketch], folder: Path) -> list[Path]:
     return files
 
 
-def _ranked(found: Sequence[Sketch], files: Sequence[Path], results: Sequence[Result]) -> Drafted:
-    """The drafts that certainly close a part of the held-out gap, the best one first."""
+def _ranked(book: Sketchbook, files: Sequence[Path], results: Sequence[Result]) -> Drafted:
+    """The drafts that certainly close a part of the held-out gap worth their terms, best first.
+
+    Of two laws that the fit has made alike, the better one stays.
+    """
     rows = [
-        (one, file, result)
-        for one, file, result in zip(found, files, results, strict=True)
-        if result.interval is not None and result.interval[0] > 0.0
+        (one, _fitted(one, result), file, result)
+        for one, file, result in zip(book.sketches, files, results, strict=True)
+        if result.is_draft(len(one.law.terms))
     ]
-    rows.sort(key=lambda row: WORTH_A_TERM * len(row[0].law.terms) - (row[2].gain or 0.0))
-    forms = [_fitted(one, result).text for one, _, result in rows]
+    rows.sort(key=lambda row: WORTH_A_TERM * len(row[1].terms) - (row[3].gain or 0.0))
+    kept: list[tuple[Sketch, Law, Path, Result]] = []
+    for row in rows:
+        if not any(row[1].resembles(other[1]) for other in kept):
+            kept.append(row)
+    best = _with_drafts(book.bound, [result for *_, result in kept])
     return Drafted(
         drafts=tuple(
-            _draft(one, file, result, tuple(f for f in forms if f != form))
-            for (one, file, result), form in zip(rows, forms, strict=True)
+            _draft(row, best, tuple(other[1].text for other in kept if other is not row))
+            for row in kept
         ),
-        fits=tuple(result.fit for _, _, result in rows),
+        fits=tuple(result.fit for *_, result in kept),
+        bound=best,
+        traces=kept[0][-1].traces if kept else (),
     )
+
+
+def _with_drafts(found: Bound | None, results: Sequence[Result]) -> Bound | None:
+    """The bound, or what the drafts close by simulation where that is more."""
+    closed = [
+        Bound(share=result.gain, interval=result.interval)
+        for result in results
+        if result.gain is not None and result.interval is not None
+    ]
+    every = [*closed, *([] if found is None else [found])]
+    if not every:
+        return None
+    low, high = (max(one.interval[end] for one in every) for end in (0, 1))
+    return Bound(share=max(one.share for one in every), interval=(low, high))
 
 
 def _fitted(one: Sketch, result: Result) -> Law:
@@ -130,8 +157,10 @@ def _fitted(one: Sketch, result: Result) -> Law:
     return one.law.fitted(own)
 
 
-def _draft(one: Sketch, file: Path, result: Result, rivals: tuple[str, ...]) -> Draft:
-    gain, interval, law = result.gain, result.interval, _fitted(one, result)
+def _draft(
+    row: tuple[Sketch, Law, Path, Result], bound: Bound | None, rivals: tuple[str, ...]
+) -> Draft:
+    one, law, file, result = row
     drawn = law.over_state(one.curve.over, np.array(one.curve.knots))
     return Draft(
         place=law.quantity.place,
@@ -139,10 +168,10 @@ def _draft(one: Sketch, file: Path, result: Result, rivals: tuple[str, ...]) -> 
         over=", ".join(law.over) or "nothing",
         form=law.text,
         file=str(file),
-        held_out_gain=gain,
-        held_out_gain_ci95=interval,
-        bound=None,
-        bound_ci95=None,
+        held_out_gain=result.gain,
+        held_out_gain_ci95=result.interval,
+        bound=None if bound is None else bound.interval[1],
+        bound_ci95=None if bound is None else bound.interval,
         rivals=rivals,
         curve=replace(one.curve, law=None if drawn is None else tuple(drawn.tolist())),
     )

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
 from plant_emulator import effects
-from plant_emulator.diagnosis.machines.axis import AxisRecipe
-from plant_emulator.diagnosis.machines.axis_effects import EFFECTS as AXIS_EFFECTS
+from plant_emulator.diagnosis.axis.diagnose import AxisRuns
+from plant_emulator.diagnosis.axis.effects import NAMES as AXIS_EFFECTS
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
 from plant_emulator.diagnosis.report.details import EstimatedInput
 from plant_emulator.errors import DiagnosisError
+from plant_emulator.recordings.axis_preflight import axis_notes
 from plant_emulator.recordings.wheel_torque import deviation
 from plant_emulator.signals.axis_log import AxisLog
 from plant_emulator.signals.log import WHEEL_TORQUE, Log
-from plant_emulator.workflows import axis_reader
+from plant_emulator.workflows.diagnosis.axis_parts import file_of, read_runs
 from plant_emulator.workflows.diagnosis.plan import plan_of_runs, plan_recordings
 from plant_emulator.workflows.loading import (
     check_distinct,
@@ -25,12 +27,11 @@ from plant_emulator.workflows.loading import (
     load_recordings,
 )
 from plant_emulator.workflows.provenance import file_hash, program_version, today
-from register_maps.poll_quality import PollQuality
+from register_maps.logs.poll_quality import PollQuality
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
+    from collections.abc import Collection, Sequence
 
-    from plant_emulator.diagnosis.execution.pool import Recipe
     from plant_emulator.diagnosis.prediction.held_out import Plan
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
@@ -40,8 +41,11 @@ if TYPE_CHECKING:
     Source = str | Path | Log | AxisLog
 
 
+RecipeT = TypeVar("RecipeT")
+
+
 @dataclass(frozen=True, kw_only=True)
-class Runs:
+class Runs(Generic[RecipeT]):
     """The runs of a diagnosis.
 
     notes : what the preflight noticed about the logs
@@ -50,7 +54,7 @@ class Runs:
     inputs : of the runs that nobody measured
     """
 
-    recipe: Recipe
+    recipe: RecipeT
     plan: Plan
     notes: tuple[str, ...]
     settings: Mapping[str, str]
@@ -66,7 +70,7 @@ def bench_runs(
     without: Sequence[str] = (),
     effect_files: Sequence[str | Path] = (),
     reference: str | None = None,
-) -> Runs:
+) -> Runs[BenchRecipe]:
     """The runs of logs of the bench.
 
     without : effects that are taken out of the library; effect_files : files of effects beside it
@@ -103,25 +107,41 @@ def bench_runs(
 
 
 def axis_runs(
-    logs: Sequence[Source], held_out: Sequence[Source], *, without: Sequence[str] = ()
-) -> Runs:
-    """The runs of logs of a single axis; arguments and errors as those of `bench_runs`."""
-    given = (*logs, *held_out)
-    read = [_axis_log(one) for one in given]
-    for log in read:
-        check_unlabelled(log)
-    check_distinct([(log.source, np.stack([log.time, log.position, log.force])) for log in read])
-    if len(read) < 2:
-        raise DiagnosisError(
-            f"{read[0].source}: one run of an axis cannot be held out; give another run"
-        )
+    logs: Sequence[Source],
+    held_out: Sequence[Source],
+    *,
+    without: Sequence[str] = (),
+    columns: Sequence[str] | Mapping[str, str] = (),
+    one_run: bool = False,
+) -> Runs[AxisRuns]:
+    """The runs of logs of a single axis; arguments and errors as those of `bench_runs`.
+
+    columns : NAME=COLUMN[*FACTOR][:UNIT] for columns of files without an accepted name
+    one_run : the files of `logs` are one run
+    """
     _check_names(without, AXIS_EFFECTS)
-    plan = plan_of_runs(len(read), len(logs))
+    sources = [_axis_source(one) for one in (*logs, *held_out)]
+    fitted, predicted = read_runs(
+        sources[: len(logs)], sources[len(logs) :], columns, one_run=one_run
+    )
+    runs = [*fitted, *predicted]
+    for log in runs:
+        check_unlabelled(log)
+    check_distinct([(log.source, np.stack([log.time, log.position, log.force])) for log in runs])
+    plan = plan_of_runs(len(runs), len(fitted))
+    words = columns if not isinstance(columns, Mapping) else map("=".join, columns.items())
+    settings = {
+        "model": "axis",
+        "columns": ", ".join(words) or "-",
+        "files": "parts of one run" if one_run else "a run each",
+        "without": ", ".join(without) or "-",
+    }
+    files = dict.fromkeys(file_of(one) for one in sources if not isinstance(one, AxisLog))
     return Runs(
-        recipe=AxisRecipe(tuple(read), fitted=plan.fitted, without=tuple(without)),
+        recipe=AxisRuns(tuple(runs), tuple(without)),
         plan=plan,
-        notes=(),
-        settings=_settings({"model": "axis", "without": ", ".join(without) or "-"}, given),
+        notes=tuple(axis_notes(runs)),
+        settings=_settings(settings, list(files)),
     )
 
 
@@ -158,10 +178,10 @@ def _bench_source(source: Source) -> str | Path | Log:
     return source
 
 
-def _axis_log(source: Source) -> AxisLog:
+def _axis_source(source: Source) -> str | Path | AxisLog:
     if isinstance(source, Log):
         raise DiagnosisError(f"{source.source}: a log of the bench needs the model bench")
-    return source if isinstance(source, AxisLog) else axis_reader.read(source)
+    return source
 
 
 def _check_names(without: Sequence[str], library: Collection[str]) -> None:

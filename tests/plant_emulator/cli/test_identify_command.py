@@ -66,6 +66,7 @@ def test_answer_has_the_keys_of_its_schema(fitted: tuple[Path, Result]) -> None:
     assert answer["converged"] is True
 
 
+@pytest.mark.slow
 def test_person_reads_values_errors_and_what_is_not_determined(
     fitted: tuple[Path, Result],
 ) -> None:
@@ -81,6 +82,7 @@ def test_person_reads_values_errors_and_what_is_not_determined(
     assert max(len(line) for line in lines if "/" not in line) <= 100
 
 
+@pytest.mark.slow
 def test_saved_set_says_where_it_comes_from_and_predicts_as_the_fit_did(
     fitted: tuple[Path, Result],
 ) -> None:
@@ -98,6 +100,7 @@ def test_saved_set_says_where_it_comes_from_and_predicts_as_the_fit_did(
         assert again[channel]["val1"] == pytest.approx(fit["val1"], abs=1e-5), channel
 
 
+@pytest.mark.slow
 def test_table_is_read_by_a_spreadsheet(fitted: tuple[Path, Result]) -> None:
     folder, _ = fitted
     rows = list(csv.DictReader((folder / "a.csv").read_text().splitlines()))
@@ -106,6 +109,7 @@ def test_table_is_read_by_a_spreadsheet(fitted: tuple[Path, Result]) -> None:
     assert inertia["unit"] == "kg m^2"
 
 
+@pytest.mark.slow
 def test_plot_is_a_picture(fitted: tuple[Path, Result]) -> None:
     folder, _ = fitted
     assert (folder / "a.png").read_bytes().startswith(b"\x89PNG")

@@ -239,8 +239,8 @@ def drafted() -> dict[str, Any]:
         "file": "drafts/draft_gear_1.py",
         "held_out_gain": 0.81,
         "held_out_gain_ci95": [0.77, 0.84],
-        "bound": None,
-        "bound_ci95": None,
+        "bound": 0.93,
+        "bound_ci95": [0.87, 0.93],
         "rivals": ["-8.2 sqrt(w) N m"],
         "curve": curve,
     }

@@ -10,7 +10,7 @@ from plant_emulator.signals.axis_log import AxisLog
 Array = NDArray[np.float64]
 
 MASS, VISCOUS, COULOMB, OFFSET = 80.0, 150.0, 25.0, -4.0
-PERIOD, LENGTH = 1e-3, 15.0
+PERIOD, LENGTH = 1e-3, 10.0
 # Standard deviation of the force's noise [N]; smooth noise would be signal.
 NOISE = 2.0
 

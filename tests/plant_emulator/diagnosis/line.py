@@ -10,7 +10,7 @@ from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.explanation import Explanation
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.machine import Candidate, MeasuredRun
-from plant_emulator.diagnosis.parity.search import Search
+from plant_emulator.diagnosis.search.search import Search
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.recordings.input_noise import NoiseDirections
 from plant_emulator.signals.log import Array
@@ -53,7 +53,6 @@ class Line:
     units: Mapping[str, str] = {"a": "1", "b": "1"}
     subsystems: Mapping[str, str] = {"a": "level", "b": "slope"}
     states: tuple[Unknown, ...] = ()
-    reaches_noise = True
 
     def __init__(self, measured: Sequence[Array], names: Sequence[str] = tuple(SHAPES)) -> None:
         self.measured = list(measured)
@@ -80,6 +79,10 @@ class Line:
             return (self.measured[run] - y)[None, :]
 
         return residual
+
+    def rough(self) -> "Line":
+        """See `Model`."""
+        return self
 
     def input_noise(
         self, run: int, where: FitResult, state: Mapping[str, float]

@@ -10,7 +10,7 @@ from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
 from plant_emulator.diagnosis.machine import MeasuredRun
 from plant_emulator.diagnosis.prediction.gap import Prediction, measure_gap
 from plant_emulator.diagnosis.prediction.trace import traces
-from plant_emulator.diagnosis.report.html_traces import path, rms
+from plant_emulator.diagnosis.report.html.traces import path, rms
 from plant_emulator.diagnosis.report.ranking import hypotheses_to_rank, ranked_effect
 from plant_emulator.diagnosis.report.shrinkage import noise_floor, nrmsd
 from plant_emulator.signals.log import Array

@@ -7,7 +7,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.report.details import EstimatedInput
 from plant_emulator.diagnosis.report.document import from_json
-from plant_emulator.diagnosis.report.html import html
+from plant_emulator.diagnosis.report.html.page import html
 from plant_emulator.workflows.diagnosis.runs import sampling
 from tests.plant_emulator.diagnosis import answers
 

@@ -13,10 +13,10 @@ from plant_emulator.diagnosis.answer import Cell
 from plant_emulator.diagnosis.prediction.trace import Trace
 from plant_emulator.diagnosis.report.details import Step
 from plant_emulator.diagnosis.report.document import from_json
-from plant_emulator.diagnosis.report.html import MOST_RUNS, html
-from plant_emulator.diagnosis.report.html_pictures import waterfall
-from plant_emulator.diagnosis.report.html_style import STYLE
-from plant_emulator.diagnosis.report.html_traces import path
+from plant_emulator.diagnosis.report.html.page import MOST_RUNS, html
+from plant_emulator.diagnosis.report.html.pictures import waterfall
+from plant_emulator.diagnosis.report.html.style import STYLE
+from plant_emulator.diagnosis.report.html.traces import path
 from tests.plant_emulator.diagnosis import answers
 
 HOSTILE = "<script>alert(1)</script>\"'&amp;]]>--><svg onload=x>\x1b[31m\x00\ud800\u202e"
@@ -338,10 +338,25 @@ def test_search_and_noise_stand_in_tables() -> None:
     assert "30 ms" in found
 
 
+TITLE = "The missing law, drafted"
+
+
 def test_draft_is_drawn_with_its_curve_band_law_and_rivals():
-    found = section(page("drafted"), "The missing law, drafted")
+    found = section(page("drafted"), TITLE)
     best, other = found.findall("figure")
     assert [p.get("class") for p in best.iter("path")] == ["after", "edge", "edge", "before"]
     assert [p.get("class") for p in other.iter("path")] == ["after", "edge", "edge"]
     assert "rivals: -8.2 sqrt(w) N m" in words(found)
     assert "drafts/draft_gear_1.py" in words(found)
+
+
+def test_draft_is_followed_by_the_channel_that_it_changes_most():
+    changed = answers.traces(source="held_out.csv")
+    found = section(page("drafted", replace(answers.DETAILS, draft_traces=changed)), TITLE)
+    curve, change, _ = found.findall("figure")
+    told = [s.get("aria-label") for s in change.iter("svg")]
+    # the offset is 0.02 of each signal's largest value, and the noise 0.004 of it
+    assert len(told) == 1
+    assert "held_out.csv over time, measured and predicted" in told[0]
+    assert "after" in {p.get("class") for p in change.iter("path")}
+    assert len(curve.findall("figcaption")) == 1

@@ -2,8 +2,8 @@
 
 import pytest
 
+from plant_emulator.diagnosis.decision.verdict import Decision, Deviation
 from plant_emulator.diagnosis.report.statement import statement
-from plant_emulator.diagnosis.selection.verdict import Decision, Deviation
 from tests.plant_emulator.diagnosis.line import effect
 
 

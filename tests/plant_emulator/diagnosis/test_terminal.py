@@ -224,7 +224,7 @@ def test_draft_says_its_law_what_it_closes_and_the_rival():
     k = next(k for k, row in enumerate(rows) if row.startswith("draft "))
     told = " ".join(" ".join(rows[k : k + 3]).split())
     assert "friction of the gear at its output: -31.4 exp(-(w/0.5)^2) N m" in told
-    assert "closes 81 % (77 % to 84 %) of the held-out gap" in told
+    assert "closes 81 % (77 % to 84 %) of the held-out gap; at most 93 %" in told
     assert "rivals -8.2 sqrt(w) N m; file drafts/draft_gear_1.py" in told
 
 

@@ -14,6 +14,7 @@ from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.model.stage import STAGE
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
+from plant_emulator.solver.kernel import kernel, partial_kernel
 from tests.plant_emulator.runs import linear
 
 ReadLog = Callable[[str], Log]
@@ -77,16 +78,22 @@ def test_some_parameter_differs_between_absent_and_plausible(name: str) -> None:
     assert any(p.neutral != p.plausible for p in effects.load(name).parameters.values())
 
 
-@every_effect
 @pytest.mark.parametrize("run", [*RUNS, "truck"])
-def test_effect_is_absent_at_its_neutral_value(
-    name: str, run: str, nominal: ParameterSet, inputs: dict[str, Log],
+@pytest.mark.parametrize("remembering", [True, False, None])
+def test_effects_are_absent_at_their_neutral_values(
+    remembering: bool | None, run: str, nominal: ParameterSet, inputs: dict[str, Log],
     without: Callable[[str], Log],
 ) -> None:  # fmt: skip
-    neutral = {key: p.neutral for key, p in effects.load(name).parameters.items()}
-    found = simulate(inputs_of(inputs[run]), values_of(nominal, {name: neutral}))
+    """In the kernels that have them; by itself `simulate` leaves out an effect that is neutral."""
+    model = kernel() if remembering is None else partial_kernel(remembering=remembering)
+    found = simulate(inputs_of(inputs[run]), nominal.values(), kernel=model)
     for signal in found.signals:
         np.testing.assert_array_equal(found[signal], without(run)[signal])
+
+
+def test_every_effect_is_in_one_of_the_kernels_with_a_part_of_them() -> None:
+    parts = [{*partial_kernel(remembering=which).effects} for which in (True, False)]
+    assert parts[0] | parts[1] == {*kernel().effects} == {*effects.names()}
 
 
 @every_effect

@@ -285,7 +285,7 @@ def repeats(nominal: ParameterSet, log: Log, count: int) -> Sequence[np.ndarray]
 
 @pytest.mark.slow
 def test_intervals_cover_the_truth_at_their_rate(nominal: ParameterSet, bench_log: Reader) -> None:
-    errors = np.array(repeats(nominal, bench_log("bench_nominal/program1"), 30))
+    errors = np.array(repeats(nominal, bench_log("bench_nominal/program1"), 20))
     covered = np.abs(errors) <= 1.96
     names = (*FREE, "armature_resistance", "flux_constant")  # the logs have the voltage
     shares = zip(names, covered.mean(0), strict=True)

@@ -257,10 +257,11 @@ def test_warm_armature_shows_in_the_voltage_and_only_there(
     (found,) = detection_limits(model, fit_null(model, range(3)), range(3))
     entry = effect_detectability(found, model.candidates[HEATING])
     if logged:
-        assert found.orthogonal_norm > 7.0
-        assert entry.needs is None
+        assert found.total_norm > 20.0
+        assert found.smallest_size < 2.0
     else:
-        assert found.orthogonal_norm < 7.0
+        assert found.total_norm < 7.0
+        assert found.smallest_size == float("inf")
         assert "armature_voltage_V" in str(entry.needs)
 
 

@@ -1,6 +1,7 @@
 """Road load from coast-downs of the thesis's trucks, simulated by hand, with grade and noise."""
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
@@ -16,8 +17,9 @@ GRADE = 0.001 * 9.81
 STEP, NOISE = 0.05, 0.02
 
 
-def coasting(mass, f0, f1, *, direction=1, seed=0, noise=NOISE):
-    """Time and velocity at 20 Hz: 2 s of travel at 14 km/h, then a roll-out to standstill."""
+@cache
+def rolling(mass, f0, f1, direction):
+    """Speed at 20 Hz: 2 s of travel at 14 km/h, then a roll-out to standstill."""
     inertia = mass + 0.03 * (mass + 25.0)
     fine, speed, speeds = 0.001, 14.0 / 3.6, []
     for number in range(60_000):
@@ -25,7 +27,12 @@ def coasting(mass, f0, f1, *, direction=1, seed=0, noise=NOISE):
             force = f0 + f1 * speed + direction * GRADE * mass
             speed = max(0.0, speed - fine * force / inertia)
         speeds.append(speed)
-    taken = np.array(speeds[:: round(STEP / fine)])
+    return np.array(speeds[:: round(STEP / fine)])
+
+
+def coasting(mass, f0, f1, *, direction=1, seed=0, noise=NOISE):
+    """Time and velocity of a roll-out at 20 Hz."""
+    taken = rolling(mass, f0, f1, direction)
     random = np.random.default_rng(seed)
     return np.arange(len(taken)) * STEP, direction * taken + noise * random.standard_normal(
         len(taken)

@@ -155,6 +155,7 @@ def test_stages_that_do_not_settle_are_counted(
     assert unsolved.unsettled > 0
 
 
+@pytest.mark.slow
 def test_bench_that_is_not_finite_any_more_is_refused(
     nominal: ParameterSet, model_with: Callable[[str], Kernel]
 ) -> None:

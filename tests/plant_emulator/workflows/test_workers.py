@@ -8,18 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from plant_emulator.cli import main
 from plant_emulator.diagnosis.execution import pool
-from plant_emulator.diagnosis.fitting import nuisance_space, steps
-from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.machine import Model
 from plant_emulator.errors import EmulatorError, InputError
 from plant_emulator.workflows.workers import Cluster, Processes
-from tests.plant_emulator.diagnosis.line import TIME, Line, noisy
 
 
 @dataclass
@@ -120,20 +116,6 @@ def test_model_is_returned_though_another_thread_lets_it_go(
     monkeypatch.setattr(pool, "_MODELS", Cleared())
     model: Any = pool.build_model(Number(3))
     assert model == 3
-
-
-def test_nuisance_space_is_returned_though_another_thread_lets_it_go(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    line = Line([noisy(2.0 + 3.0 * TIME + np.abs(TIME), 1)], ["kink"])
-    task = Task(base=steps.start(line, (0,)), runs=(0,), effect="kink")
-    undisturbed = steps.show(line, task)
-    monkeypatch.setattr(nuisance_space, "_LAST", Cleared())
-    shown = steps.show(line, task)
-    assert shown is not None
-    assert undisturbed is not None
-    assert shown.start == undisturbed.start
-    assert shown.orthogonal_norm == undisturbed.orthogonal_norm > 10.0
 
 
 @pytest.mark.parametrize("address", ["nonsense", "foo://host:1", "tcp://127.0.0.1:x", "tcp://"])

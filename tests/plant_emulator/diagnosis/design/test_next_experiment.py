@@ -10,6 +10,7 @@ import pytest
 
 from plant_emulator import parameter_sets
 from plant_emulator.diagnosis.answer import Location
+from plant_emulator.diagnosis.decision.verdict import Decision
 from plant_emulator.diagnosis.design.next_experiment import Advice
 from plant_emulator.diagnosis.execution.pool import InProcess, TaskRunner
 from plant_emulator.diagnosis.fit_result import FitResult
@@ -17,7 +18,6 @@ from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
 from plant_emulator.diagnosis.machine import Candidate, MeasuredRun
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
-from plant_emulator.diagnosis.selection.verdict import Decision
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.input_noise import NoiseDirections
@@ -68,7 +68,6 @@ class Slope:
     units: Mapping[str, str] = {"b": "1"}
     subsystems: Mapping[str, str] = {"b": "road"}
     states: tuple[Unknown, ...] = ()
-    reaches_noise = True
 
     def __init__(
         self,

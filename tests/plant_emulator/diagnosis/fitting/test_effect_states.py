@@ -1,16 +1,12 @@
 """An effect with a frequency and a phase of its own in every run, on the smallest machine."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from math import pi
 
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null, linearise
-from plant_emulator.diagnosis.fitting.looks import look
-from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace, gain_at_best_angle
-from plant_emulator.diagnosis.fitting.signature import signature
+from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.machine import Candidate
 from plant_emulator.diagnosis.prediction.gap import Fold, refit_fold
 from plant_emulator.estimation.robust_scan import scan_unknowns
@@ -58,43 +54,7 @@ class Beating(Line):
         return residual
 
 
-class Loaded(Beating):
-    """The beat has a load besides, 100 times larger at its usual size, that these runs lack."""
-
-    def __init__(self, measured: Sequence[Array]) -> None:
-        super().__init__(measured)
-        load = linear("beat_load", 100.0)
-        self.candidates = {
-            "beat": replace(
-                BEAT,
-                sizes=(*BEAT.sizes, replace(load, lower=0.0)),
-                neutral={**BEAT.neutral, "beat_load": 0.0},
-                units={**BEAT.units, "beat_load": "1"},
-            )
-        }
-
-    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
-        """See `Model`."""
-        plain = super().residual(run, effects)
-        return lambda v: plain(v) - v.get("beat_load", 0.0) * TIME**3
-
-
 RUNS = ((3.37, 2.0), (-1.62, -0.7), (4.81, 0.4))
-
-
-def test_size_that_the_runs_lack_does_not_hide_the_one_that_they_show() -> None:
-    model = Loaded([noisy(2.0 + wave(0.5, *own), seed) for seed, own in enumerate(RUNS)])
-    base = fit_null(model, range(3))
-    found = signature(
-        model, "beat", base, range(3), NuisanceSpace(linearise(model, base, range(3)))
-    )
-    assert found is not None
-    assert found.start["beat_load"] == 0.0
-    assert abs(found.start["beat_size"]) == pytest.approx(0.3)  # of those tried the nearest to 0.5
-    # By hand: half of 6000 squares of 0.5 less those of the 0.2 that is left.
-    assert found.gain == pytest.approx(3000.0 * (0.5**2 - 0.2**2), rel=0.2)
-    for states, (rate, _) in zip(found.states, RUNS, strict=True):
-        assert abs(states["beat_rate"]) == pytest.approx(abs(rate), abs=0.1)
 
 
 def test_beat_of_another_frequency_and_phase_in_every_run_is_found() -> None:
@@ -143,55 +103,6 @@ def test_held_out_run_starts_in_the_valley_of_its_own_beat() -> None:
     )
     folded = np.sign(found["beat_rate"]) * np.array([found["beat_rate"], found["beat_phase"]])
     np.testing.assert_allclose(folded, [3.37, 2.0], atol=0.3)
-
-
-class Spike(Line):
-    """A spike 5 ms wide, at a time that is unknown: away from there nothing leads to it."""
-
-    def __init__(self, measured: Sequence[Array], **kind: Sequence[Unknown]) -> None:
-        super().__init__(measured, ("cube",))
-        neutral = {u.name: 0.0 for u in kind["sizes"]}
-        self.candidates = {"cube": replace(self.candidates["cube"], neutral=neutral, **kind)}
-
-    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
-        """See `Model`."""
-        plain = super().residual(run, ())
-        return lambda v: plain(v) - (spike(v["cube_time"], v["cube_size"]) if effects else 0.0)
-
-
-def spike(time: float, size: float = 40.0) -> Array:
-    """At this time, of this size."""
-    return size * np.exp(-(((TIME - time) / 0.005) ** 2))
-
-
-@pytest.mark.parametrize(
-    ("time", "step", "found"), [(0.617, 0.005, True), (-0.617, 0.005, True), (0.617, None, False)]
-)
-@pytest.mark.parametrize("states", [(), (linear("warmth", 0.0, std=1.0),)])
-@pytest.mark.parametrize("kind", ["sizes", "shapes"])
-def test_what_has_many_valleys_is_looked_for_step_by_step(
-    kind: str, states: tuple[Unknown, ...], time: float, step: float | None, found: bool
-) -> None:
-    at = linear("cube_time", 0.3, scale=0.3, step=step, prior=0.3, std=0.6)
-    size = linear("cube_size", 40.0, scale=40.0)
-    unknowns = {"sizes": (size, replace(at, std=None)), "shapes": (), "states": states}
-    if kind == "shapes":
-        unknowns |= {"sizes": (size,), "shapes": (at,)}
-    model = Spike([noisy(2.0 + spike(time))], **unknowns)
-    base = fit_null(model, [0])
-    sizes = {"cube_size": 40.0, "cube_time": 0.3}
-    start = replace(base, values={**base.values, **sizes}, states=({u.name: 0.0 for u in states},))
-    where = look(model, ("cube",), [0], start).values["cube_time"]
-    assert (where == pytest.approx(time, abs=1e-3)) is found
-
-
-def test_angle_of_a_signature_that_is_more_than_a_cosine() -> None:
-    """By hand: 2 times mean, cosine and sine of 1 rad along three axes fit a residual in full."""
-    mean, cosine, sine = np.eye(3)
-    residual = -2.0 * (mean + np.cos(1.0) * cosine + np.sin(1.0) * sine)
-    gain, angle = gain_at_best_angle(mean + cosine, mean + sine, mean - cosine, residual)
-    assert angle == pytest.approx(1.0, abs=pi / 24.0)
-    assert gain == pytest.approx(8.0, rel=0.01)
 
 
 def test_prediction_has_no_more_of_an_effect_than_the_fitted_runs_show() -> None:

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from plant_emulator.diagnosis.decision.procedure import Procedure
 from plant_emulator.diagnosis.execution.pool import InProcess
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
 from plant_emulator.diagnosis.fitting.random_effects import WeightedRecipe, fit_random_effect
 from plant_emulator.diagnosis.fitting.task import Task
-from plant_emulator.diagnosis.parity.screening import screen
-from plant_emulator.diagnosis.selection.procedure import Procedure
+from plant_emulator.diagnosis.search.screening import screen
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import (
     TIME,

@@ -7,7 +7,7 @@ import pytest
 from plant_emulator import parameter_sets
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.machines.bench import BenchModel
-from plant_emulator.diagnosis.missing_law.draft import Sketch, sketches
+from plant_emulator.diagnosis.missing_law.draft import Sketchbook, sketch
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
 
@@ -16,25 +16,28 @@ PARAMETERS = parameter_sets.load("thesis_table_3_1")
 pytestmark = pytest.mark.slow
 
 
-def drafted(*logs: Log) -> list[Sketch]:
+def drafted(*logs: Log) -> Sketchbook:
     recordings = [recording(log) for log in logs]
     null = fit_null(BenchModel(recordings, PARAMETERS, {}), range(len(recordings)))
-    return sketches(recordings, PARAMETERS, null)
+    return sketch(recordings, PARAMETERS, null)
 
 
 def test_lag_of_the_torque_sensor_is_drawn_with_its_time_constant(
     bench_log: Callable[[str], Log],
 ) -> None:
     found = drafted(*(bench_log(f"bench_practice/practice_003/program{k}") for k in (1, 2, 3)))
-    simplest = min((sketch.law for sketch in found), key=lambda law: len(law.terms))
-    assert {sketch.law.quantity.place for sketch in found} == {"torque_sensor"}
+    simplest = min((one.law for one in found.sketches), key=lambda law: len(law.terms))
+    assert {one.law.quantity.place for one in found.sketches} == {"torque_sensor"}
     assert simplest.terms[0].text == "(lag(T, 0.1 s) - T)"  # the label: 0.1 s
     assert simplest.coefficients[0] == pytest.approx(1.0, abs=0.15)
 
 
 def test_loss_of_the_gear_is_drawn_over_its_load(bench_log: Callable[[str], Log]) -> None:
     logs = [bench_log(f"bench_practice/practice_009/program{k}") for k in (1, 6)]
-    best, *_ = drafted(*logs)
+    book = drafted(*logs)
+    best = book.sketches[0]
+    assert book.bound is not None
+    assert 0.9 < book.bound.interval[0] <= book.bound.share <= book.bound.interval[1] <= 1.0
     assert best.law.quantity.place == "gear"
     assert best.law.terms[0].text == "|T|"
     assert best.law.coefficients[0] == pytest.approx(0.14, abs=0.03)  # the label: 0.14
@@ -49,4 +52,5 @@ def test_a_bench_without_an_effect_gets_no_draft(
     bench_log: Callable[[str], Log], case: str
 ) -> None:
     logs = [bench_log(f"bench_practice/{case}/program{k}") for k in (1, 2, 3)]
-    assert drafted(*logs) == []
+    book = drafted(*logs)
+    assert (book.sketches, book.bound) == ((), None)

@@ -1,0 +1,323 @@
+"""The answer of an axis: verdict, held-out gap, ranking, and what these logs cannot show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.diagnosis.answer import (
+    Answer,
+    HeldOutGap,
+    Location,
+    Logs,
+    ParameterDeviation,
+    RankedEffect,
+    Undetectable,
+    Verdict,
+)
+from plant_emulator.diagnosis.axis.quantities import UNITS, quantities
+from plant_emulator.diagnosis.prediction.remainder import Remainder, describe_band, describe_fall
+from plant_emulator.diagnosis.prediction.trace import Trace
+from plant_emulator.diagnosis.report.details import Step
+from plant_emulator.diagnosis.wording import number
+from plant_emulator.signals.frequency_bands import BANDS, power
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from plant_emulator.diagnosis.axis.effects.effect import Effect
+    from plant_emulator.diagnosis.axis.held_out import HeldOut
+    from plant_emulator.diagnosis.axis.regression import Fit, Term
+    from plant_emulator.diagnosis.axis.search import Search
+    from plant_emulator.diagnosis.axis.verdict import Decision
+    from plant_emulator.signals.log import Array
+
+# Effects of a ranking that are predicted and shown.
+SHOWN = 6
+# A gap is open from this multiple of its floor on, as for the bench.
+OPEN_GAP = 1.1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Findings:
+    """What the answer is made of; floor : rms of the force's error [N or N m]; see `floor`."""
+
+    search: Search
+    held_out: HeldOut
+    decision: Decision
+    floor: float
+    sources: tuple[str, ...]
+    fitted: tuple[int, ...]
+    library: Sequence[Effect]
+
+    @property
+    def rotary(self) -> bool:
+        """Whether the axis turns."""
+        return self.search.scale.rotary
+
+    @property
+    def channel(self) -> str:
+        """Name of the force's channel."""
+        return "torque" if self.rotary else "force"
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """The named effects."""
+        return self.decision.found.terms if self.decision.kind == "effect" else ()
+
+
+def answer(f: Findings) -> Answer:
+    """The whole answer."""
+    gap = _gap(f)
+    return Answer(
+        logs=Logs(
+            estimation=tuple(f.sources[k] for k in f.fitted),
+            held_out=tuple(dict.fromkeys(f.sources[k] for k in f.held_out.runs)),
+        ),
+        verdict=_verdict(f),
+        location=_location(f),
+        gap=gap,
+        ranking=_ranking(f),
+        undetectable=_undetectable(f),
+        trace=tuple(f.search.trace),
+    )
+
+
+def traces(f: Findings) -> tuple[Trace, ...]:
+    """The predicted runs, measured and predicted."""
+    before, after = f.held_out.errors(()), f.held_out.errors(f.terms)
+    return tuple(
+        Trace(
+            source=f.sources[run],
+            channel=f.channel,
+            unit=UNITS[f.rotary]["offset"],
+            time=f.held_out.rows[run].time,
+            measured=y,
+            recalibrated=y - first,
+            explained=y - second,
+            noise=f.floor,
+        )
+        for run, y, first, second in zip(
+            f.held_out.runs, f.held_out.measured(), before, after, strict=True
+        )
+    )
+
+
+def remainder(f: Findings) -> Remainder:
+    """What the named effects leave, by frequency."""
+    regression, found = f.search.regression, f.decision.found
+    fitted = set(f.fitted).isdisjoint(f.held_out.runs)
+    own = [(regression.residual(found, k), r.time) for k, r in enumerate(regression.rows)]
+    after = f.held_out.errors(f.terms)
+    times = [f.held_out.rows[k].time for k in f.held_out.runs]
+    return Remainder(
+        channel=f.channel,
+        unit=UNITS[f.rotary]["offset"],
+        before=f.held_out.relative(()),
+        after=f.held_out.relative(f.terms),
+        held_out=_power(list(zip(after, times, strict=True))),
+        fitted=_power(own) if fitted else None,
+    )
+
+
+def steps(f: Findings) -> tuple[Step, ...]:
+    """The waterfall of the held-out gap, in multiples of the floor."""
+    found = []
+    names = [t.effect.name for t in f.terms]
+    for k in range(len(f.terms) + 1):
+        label = (
+            "recalibrated" if k == 0 else f"with {names[0]}" if k == 1 else f"and {names[k - 1]}"
+        )
+        e = np.concatenate(f.held_out.errors(f.terms[:k]))
+        gap = float(np.sqrt(np.mean(e**2))) / f.floor
+        found.append(Step(label=label, gap=gap, low=gap, high=gap))
+    return (*found, Step(label="floor", gap=1.0, low=1.0, high=1.0))
+
+
+def _power(residuals: Sequence[tuple[Array, Array]]) -> Array:
+    """Mean power of residuals in each of BANDS, weighted by their lengths [unit^2]."""
+    widths = np.array([high - low for low, high in BANDS])
+    each = [widths * power(e, float(np.median(np.diff(time)))) for e, time in residuals]
+    return np.average(each, axis=0, weights=[len(e) for e, _ in residuals])
+
+
+def _verdict(f: Findings) -> Verdict:
+    d = f.decision
+    return Verdict(
+        kind=d.kind,
+        effects=tuple(t.effect.name for t in f.terms),
+        classes=tuple((t.effect.name, *f.search.rivals(d.found, t.effect.name)) for t in f.terms),
+        parameters=_deviations(f),
+        confidence=None,
+        statement=_statement(f),
+        next_experiment=_next(f),
+    )
+
+
+def _next(f: Findings) -> str | None:
+    """The channel that an unknown cause asks for first."""
+    if f.decision.kind != "unknown" or f.search.regression.rows[0].run.log.load is not None:
+        return None
+    column = "load_torque_Nm" if f.rotary else "load_force_N"
+    return f"log the external load ({column}): a load that is missing in the logs looks like this"
+
+
+def _deviations(f: Findings) -> tuple[ParameterDeviation, ...]:
+    """Inertias of single runs that differ from that of the fitted runs."""
+    unit = UNITS[f.rotary]["inertia"]
+    return tuple(
+        ParameterDeviation(
+            name="inertia",
+            nominal=float(f.search.null.values[0]),
+            estimated=value,
+            standard_error=error,
+            unit=unit,
+        )
+        for _, value, error in f.decision.inertia
+    )
+
+
+def _statement(f: Findings) -> str:
+    d, rest = f.decision, remainder(f)
+    match d.kind:
+        case "effect":
+            named = " and ".join(_named(f, t) for t in f.terms)
+            them = "it" if len(f.terms) == 1 else "them"
+            return (
+                f"The machine has what the model lacks: {named}; with {them} "
+                f"{describe_fall(rest)}; {describe_band(rest)}."
+            )
+        case "parameter":
+            first = d.inertia[0]
+            change = 100.0 * (first[1] / float(f.search.null.values[0]) - 1.0)
+            return (
+                f"The equations hold with other values: the inertia of {f.sources[first[0]]} is "
+                f"{change:+.1f} %; no unmodelled effect is needed."
+            )
+        case "none":
+            return (
+                f"The logs show no gap worth a name: the held-out {f.channel} error "
+                f"norm(e)/norm(y) is {100.0 * rest.before:.2f} %."
+            )
+    return (
+        f"There is a gap whose cause is unknown: {d.reason}. Of the held-out {f.channel}, "
+        f"{describe_band(rest)}."
+    )
+
+
+def _named(f: Findings, term: Term) -> str:
+    """An effect, what it is, and its values."""
+    told = quantities(f.search.regression, f.decision.found, term)
+    ways = [q for q in told if q.name in ("forwards", "backwards")]
+    if ways:
+        values = ", ".join(f"{number(q.value, 4)} {q.unit} {q.name}" for q in ways)
+        return f"{term.effect.name} ({term.effect.title}: {values})"
+    return f"{term.effect.name} ({term.effect.title})"
+
+
+def _location(f: Findings) -> Location:
+    """Where the evidence lies: what the best effect of each subsystem closes."""
+    falls: dict[str, float] = {}
+    for found in _singles(f.search):
+        (term,) = found.terms
+        fall = max(0.0, f.search.null.cost - found.cost)
+        falls[term.effect.subsystem] = max(fall, falls.get(term.effect.subsystem, 0.0))
+    total = sum(falls.values())
+    ordered = sorted(falls.items(), key=lambda one: -one[1])
+    shares = {name: fall / total for name, fall in ordered if fall > 0.0}
+    subsystem = None
+    if f.decision.kind == "effect":
+        subsystem = max((t.effect.subsystem for t in f.terms), key=lambda s: shares.get(s, 0.0))
+    elif f.decision.kind == "parameter":
+        subsystem = "drum"
+    elif f.decision.kind == "unknown":
+        subsystem = next(iter(shares), "gear")
+    return Location(subsystem=subsystem, channel=None, phase=None, shares=shares, cells=())
+
+
+def _singles(search: Search) -> list[Fit]:
+    """Fits with one effect that physics allows, the best first."""
+    found = [f for f in search.sets.values() if len(f.terms) == 1 and isfinite(search.value(f))]
+    return sorted(found, key=search.value)
+
+
+def _gap(f: Findings) -> HeldOutGap:
+    """NRMSD of the force, and the share that the named effects close."""
+    span = float(np.ptp(np.concatenate(f.held_out.measured())))
+    before, after = (
+        float(np.sqrt(np.mean(np.concatenate(f.held_out.errors(t)) ** 2))) for t in ((), f.terms)
+    )
+    closed, interval = None, None
+    if f.terms and before >= OPEN_GAP * f.floor:
+        share = f.held_out.share(f.terms, ())
+        closed = _closed(before, after, f.floor)
+        ends = [_closed(before, before * (1.0 - s), f.floor) for s in (share.low, share.high)]
+        interval = (ends[0], ends[1])
+    at = {f.channel: before / span}
+    return HeldOutGap(
+        nominal=at,
+        recalibrated=at,
+        explained={f.channel: after / span},
+        noise_floor={f.channel: f.floor / span},
+        closed_fraction=closed,
+        closed_fraction_ci95=interval,
+    )
+
+
+def _closed(before: float, after: float, floor: float) -> float:
+    """Share of the gap beyond the floor that is closed [1]."""
+    return 1.0 - max(0.0, (after / floor) ** 2 - 1.0) / ((before / floor) ** 2 - 1.0)
+
+
+def _ranking(f: Findings) -> tuple[RankedEffect, ...]:
+    """The named effects, and the best others alone."""
+    singles = {found.names[0]: found for found in _singles(f.search)}
+    shown = [*dict.fromkeys([*(t.effect.name for t in f.terms), *list(singles)[:SHOWN]])]
+    entries = []
+    for name in shown:
+        accepted = [t for t in f.terms if t.effect.name == name]
+        found = f.decision.found if accepted else singles[name]
+        term = accepted[0] if accepted else found.terms[0]
+        alone = singles.get(name)
+        gain = None
+        if alone is not None:
+            share = f.held_out.share(alone.terms, ())
+            gain = 1.0 - (1.0 - share.value) ** 2
+        entries.append(
+            RankedEffect(
+                effect=name,
+                subsystem=term.effect.subsystem,
+                evidence=2.0 * _evidence(f, found, name),
+                held_out_gain=gain,
+                parameters=quantities(f.search.regression, found, term),
+                accepted=bool(accepted),
+            )
+        )
+    return tuple(entries)
+
+
+def _evidence(f: Findings, found: Fit, name: str) -> float:
+    """Log evidence of an effect beside the others of a fit."""
+    rest = f.search.sets.get(frozenset(found.names) - {name}, f.search.null)
+    return f.search.value(rest) - f.search.value(found)
+
+
+def _undetectable(f: Findings) -> tuple[Undetectable, ...]:
+    """Effects that need what these runs do not have."""
+    there = {e.name for e in f.search.library}
+    missing = {e.name: e.needs for e in f.library if e.name not in there}
+    return tuple(
+        Undetectable(effect=name, reason=f"needs {needs}" if needs else "not in these runs")
+        for name, needs in missing.items()
+    )
+
+
+def describe_floor(rms: float, repeats: float | None, unit: str) -> str:
+    """A note on what the floor is."""
+    if repeats is None:
+        told = f"the logs hold no repeats: the floor is the sensors' noise, {number(rms)} {unit}"
+        return f"{told}; what a repeat would leave is not known"
+    return f"repeats of a run leave {number(repeats)} {unit} of each other: the floor of the gap"

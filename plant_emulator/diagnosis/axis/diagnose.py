@@ -1,0 +1,143 @@
+"""One diagnosis of an axis, from logs to the findings.
+
+1. The motion is smoothed, the force averaged with the kernel of the motion (`start`).
+2. A queue over sets of effects ranks them by evidence (`search`).
+3. The held-out runs confirm what is named (`held_out`, `verdict`).
+4. The answer and the details of the report are put together (`answer`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from plant_emulator.diagnosis.axis import answer as told
+from plant_emulator.diagnosis.axis.effects import LIBRARY
+from plant_emulator.diagnosis.axis.floor import repeat_floor, sensor_floor
+from plant_emulator.diagnosis.axis.held_out import HeldOut
+from plant_emulator.diagnosis.axis.quantities import UNITS
+from plant_emulator.diagnosis.axis.regression import NAMES
+from plant_emulator.diagnosis.axis.search import Search
+from plant_emulator.diagnosis.axis.settings import SETTINGS
+from plant_emulator.diagnosis.axis.start import best_width, prepared, start
+from plant_emulator.diagnosis.axis.verdict import decide
+from plant_emulator.diagnosis.diagnose import Findings
+from plant_emulator.diagnosis.fit_result import FitResult
+from plant_emulator.diagnosis.report.details import Details
+from plant_emulator.errors import LogError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.diagnosis.axis.regression import Term
+    from plant_emulator.diagnosis.execution.progress import Progress
+    from plant_emulator.diagnosis.prediction.held_out import Plan
+    from plant_emulator.signals.axis_log import AxisLog
+
+# Searches at most: the width of the Coulomb friction is found anew beside the effects.
+ROUNDS = 3
+# Relative difference of two widths that are the same.
+CLOSE = 0.1
+# Thresholds of the verdict, for the report.
+THRESHOLDS = {
+    "gain of log evidence that an effect needs": f"{SETTINGS.needed:g}",
+    "share that an effect has to close on held-out runs": f"{SETTINGS.worth:g}",
+}
+
+
+@dataclass(frozen=True)
+class AxisRuns:
+    """The runs of an axis, the fitted ones first; without : effects to take out of the library."""
+
+    logs: tuple[AxisLog, ...]
+    without: tuple[str, ...] = ()
+
+
+def diagnose_axis(
+    runs: AxisRuns,
+    plan: Plan,
+    *,
+    settings: Mapping[str, str],
+    notes: Sequence[str] = (),
+    progress: Progress | None = None,
+) -> Findings:
+    """Test the effects, predict the held-out runs; give the findings.
+
+    progress : called with the label of each step and its done share [1]
+    Raises LogError for logs that are too short, do not move, or are of two kinds of axes.
+    """
+    logs = runs.logs
+    check_alike(logs)
+    tell = progress or (lambda _label, _share: None)
+    effects = [e for e in LIBRARY if e.name not in runs.without]
+    tell("reading the motion", 0.0)
+    prepared_runs, scale = prepared(logs)
+    own = prepared_runs[: len(plan.fitted)]
+    tell("testing effects", 0.3)
+    width = 0.0
+    terms: tuple[Term, ...] = ()
+    for _ in range(ROUNDS):
+        before, width = width, best_width(own, scale, terms)
+        if abs(width - before) <= CLOSE * width:
+            break
+        scale = replace(scale, width=width)
+        regression, rows, library = start(prepared_runs, scale, len(own), effects, width)
+        search = Search(regression=regression, library=library, scale=scale)
+        search.run()
+        terms = search.best.terms
+    tell("predicting held-out runs", 0.8)
+    held_out = HeldOut(rows=rows, regression=regression, folds=plan.folds)
+    repeats = repeat_floor(held_out)
+    floor = max(sensor_floor(rows, regression.base.inertia), repeats or 0.0)
+    decision = decide(search, held_out, floor)
+    found = told.Findings(
+        search=search,
+        held_out=held_out,
+        decision=decision,
+        floor=floor,
+        sources=tuple(log.source for log in logs),
+        fitted=plan.fitted,
+        library=effects,
+    )
+    answer = told.answer(found)
+    tell("done", 1.0)
+    return Findings(
+        answer=answer,
+        details=Details(
+            traces=told.traces(found),
+            waterfall=told.steps(found),
+            settings={**settings, **THRESHOLDS},
+            notes=(*notes, told.describe_floor(floor, repeats, UNITS[scale.rotary]["offset"])),
+            remainder=told.remainder(found),
+        ),
+        final=_final(found),
+        fixed={},
+    )
+
+
+def check_alike(logs: Sequence[AxisLog]) -> None:
+    """Refuse logs of a linear and of a rotary axis together."""
+    kinds = {False: "linear (m, N)", True: "rotary (rad, N m)"}
+    for log in logs[1:]:
+        if log.rotary != logs[0].rotary:
+            raise LogError(
+                f"{log.source}: {kinds[log.rotary]}, while {logs[0].source} is "
+                f"{kinds[logs[0].rotary]}; logs of one axis are needed"
+            )
+
+
+def _final(found: told.Findings) -> FitResult:
+    """The fit behind the answer, as every diagnosis has one."""
+    fit, regression = found.decision.found, found.search.regression
+    errors = fit.covariance.diagonal() ** 0.5
+    return FitResult(
+        effects=tuple(t.effect.name for t in found.terms),
+        values=dict(zip(NAMES, map(float, fit.values), strict=False)),
+        states=tuple({} for _ in regression.rows),
+        cost=fit.cost,
+        sum_of_squares=fit.cost,
+        samples=fit.count,
+        effective_fraction=regression.independent,
+        standard_errors=dict(zip(NAMES, map(float, errors), strict=False)),
+        converged=True,
+    )

@@ -1,0 +1,96 @@
+"""What a set of effects leaves on runs that were not fitted.
+
+A fold fits some runs and predicts others. A predicted run keeps all values but its own friction
+level, which is known as well as that of a fitted run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.diagnosis.axis.effects import TIMING
+from plant_emulator.diagnosis.axis.regression import Term, residual
+from plant_emulator.diagnosis.prediction import block_bootstrap
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from plant_emulator.diagnosis.axis.regression import Regression, Rows
+    from plant_emulator.signals.log import Array
+
+    Folds = Sequence[tuple[tuple[int, ...], tuple[int, ...]]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Share:
+    """Share by which an error falls [1], and its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeldOut:
+    """The folds of a diagnosis.
+
+    rows : of all runs; regression : of the fitted runs, whose noise and reference all folds share
+    """
+
+    rows: Sequence[Rows]
+    regression: Regression
+    folds: Folds
+    known: dict[object, list[Array]] = field(default_factory=dict)
+
+    @property
+    def runs(self) -> list[int]:
+        """Numbers of the predicted runs, in the order of the errors."""
+        return [run for _, predicted in self.folds for run in predicted]
+
+    def errors(self, terms: Sequence[Term], *, timing: bool = False) -> list[Array]:
+        """Force that a prediction misses, one array of rows a predicted run.
+
+        timing : whether the stamps of force and motion may differ
+        """
+        terms = (*terms, Term(TIMING)) if timing else tuple(terms)
+        key = tuple(t.key for t in terms)
+        if key not in self.known:
+            self.known[key] = [e for fold in self.folds for e in self._fold(*fold, terms)]
+        return self.known[key]
+
+    def measured(self) -> list[Array]:
+        """Averaged force of the predicted runs."""
+        return [self.rows[run].force(()) for run in self.runs]
+
+    def relative(self, terms: Sequence[Term], *, timing: bool = False) -> float:
+        """norm(e) / norm(y) over all predicted runs [1]."""
+        error = np.concatenate(self.errors(terms, timing=timing))
+        return float(np.linalg.norm(error) / np.linalg.norm(np.concatenate(self.measured())))
+
+    def share(
+        self, terms: Sequence[Term], reference: Sequence[Term], *, timing: bool = False
+    ) -> Share:
+        """Share by which the rms of the error falls from a reference to these terms."""
+        after, before = (self.errors(t, timing=timing) for t in (terms, reference))
+        lengths = [block_bootstrap.block_length(e[None]) for e in before]
+        drawn = [
+            block_bootstrap.resampled_sums([e[None] ** 2 for e in errors], lengths)[0]
+            for errors in (after, before)
+        ]
+        low, high = np.quantile(1.0 - np.sqrt(drawn[0] / drawn[1]), [0.025, 0.975])
+        whole = [sum(float(e @ e) for e in errors) for errors in (after, before)]
+        value = 1.0 - float(np.sqrt(whole[0] / whole[1]))
+        return Share(value=value, low=float(low), high=float(high))
+
+    def _fold(
+        self, fitted: Sequence[int], predicted: Sequence[int], terms: Sequence[Term]
+    ) -> list[Array]:
+        own = replace(self.regression, rows=[self.rows[k] for k in fitted])
+        found = own.fit(terms)
+        return [
+            residual(self.rows[k], found, own.base, own.own_level(self.rows[k], found))
+            for k in predicted
+        ]

@@ -1,0 +1,192 @@
+"""The search for effects: a queue over sets of at most three, by log evidence.
+
+The evidence of a set is n/2 log(rows' variance without / with it), n the independent rows, less
+log(n)/2 for each of its constants (G. Schwarz, Annals of Statistics 6 (1978) 461), and less
+`needed` for each effect. A set with a size that physics forbids has none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.diagnosis.answer import SearchStep
+from plant_emulator.diagnosis.axis.motion import UNCERTAIN
+from plant_emulator.diagnosis.axis.regression import Term
+from plant_emulator.diagnosis.axis.settings import SETTINGS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from plant_emulator.diagnosis.axis.effects.effect import Effect, Scale
+    from plant_emulator.diagnosis.axis.regression import Fit, Regression
+
+# Steps of a refinement of one shape, and rounds over all shapes.
+STEPS, ROUNDS = 12, 2
+
+
+@dataclass
+class Search:
+    """The search in a regression; library : effects that apply to the runs."""
+
+    regression: Regression
+    library: Sequence[Effect]
+    scale: Scale
+    sets: dict[frozenset[str], Fit] = field(default_factory=dict)
+    trace: list[SearchStep] = field(default_factory=list)
+
+    def run(self) -> None:
+        """Go through the queue; `best` then gives the best set."""
+        self.sets[frozenset()] = self.regression.fit(())
+        for size in range(SETTINGS.most_effects):
+            ranked = sorted((f for f in self.sets.values() if len(f.terms) == size), key=self.value)
+            before = min(map(self.value, self.sets.values()))
+            for found in ranked[: SETTINGS.beam]:
+                self._expand(found)
+            if min(map(self.value, self.sets.values())) >= before:
+                break
+
+    @property
+    def null(self) -> Fit:
+        """The fit without effects."""
+        return self.sets[frozenset()]
+
+    @property
+    def best(self) -> Fit:
+        """The set of the largest evidence; see `preferred`."""
+        return self.preferred(list(self.sets.values()))
+
+    def preferred(self, found: Sequence[Fit]) -> Fit:
+        """The set of the largest evidence, or one as large that comes near and is more physical.
+
+        Laws of physics stand before descriptions in the library.
+        """
+        best = min(found, key=self.value)
+        order = [effect.name for effect in self.library]
+        near = {id(one) for one in self.near(best)}
+        alike = [best, *(one for one in found if id(one) in near)]
+        return min(alike, key=lambda one: sum(map(order.index, one.names)))
+
+    def near(self, found: Fit) -> list[Fit]:
+        """Other sets of the same number of effects, whose evidence is not less by the margin."""
+        least = self.value(found) + SETTINGS.margin
+        return [
+            one
+            for one in self.sets.values()
+            if one is not found and len(one.terms) == len(found.terms) and self.value(one) <= least
+        ]
+
+    def value(self, found: Fit) -> float:
+        """Negative log evidence of a fit."""
+        if any(self._forbidden(found, t) for t in found.terms):
+            return float("inf")
+        count = self.regression.independent * found.count
+        constants = sum(len(t.effect.sizes) + len(t.effect.shapes) for t in found.terms)
+        spent = 0.5 * constants * np.log(count) + SETTINGS.needed * len(found.terms)
+        return float(0.5 * count * np.log(found.cost / found.count) + spent)
+
+    @staticmethod
+    def _forbidden(found: Fit, term: Term) -> bool:
+        """Whether a size is one that physics forbids, beyond its error."""
+        sizes, errors = found.sizes(term)
+        lowest = np.array([s.lowest for s in term.effect.sizes])
+        certain = np.any(sizes + UNCERTAIN * errors < lowest)
+        return bool(len(sizes) and (certain or np.all(sizes < lowest)))
+
+    def gain(self, found: Fit) -> float:
+        """Log evidence of a set over that of none."""
+        return self.value(self.null) - self.value(found)
+
+    def rivals(self, found: Fit, name: str) -> tuple[str, ...]:
+        """Effects that do as well in the place of this one."""
+        others = frozenset(found.names) - {name}
+        near = [
+            (self.value(one), next(iter(key - others)))
+            for key, one in self.sets.items()
+            if len(key) == len(found.names) and key >= others
+        ]
+        least = min([self.value(found), *(v for v, _ in near)]) + SETTINGS.margin
+        return tuple(n for v, n in sorted(near) if n != name and v <= least)
+
+    def fit_set(self, names: Sequence[str]) -> Fit:
+        """The fit of a set, its shapes refined."""
+        key = frozenset(names)
+        if key not in self.sets:
+            found = self.null
+            for effect in self.library:
+                if effect.name in key:
+                    found = self._added(found, effect)
+            self.sets[key] = self.refined(found)
+        return self.sets[key]
+
+    def _expand(self, base: Fit) -> None:
+        """Add each effect to a set; refine what comes near the best."""
+        found = []
+        for effect in self.library:
+            key = frozenset((*base.names, effect.name))
+            if effect.name in base.names or key in self.sets:
+                continue
+            self.sets[key] = self._added(base, effect)
+            found.append(key)
+        found.sort(key=lambda k: self.value(self.sets[k]))
+        for key in found[: SETTINGS.beam]:
+            if self.value(self.sets[key]) < self.value(base):
+                self.sets[key] = self.refined(self.sets[key])
+                self.trace.append(self._step("confirmed", self.sets[key]))
+
+    def _added(self, base: Fit, effect: Effect) -> Fit:
+        """The best fit with one more effect, over the grid of its shapes."""
+        fits = [self.regression.fit((*base.terms, Term(effect, s))) for s in self._grid(effect)]
+        return min(fits, key=lambda f: f.cost)
+
+    def _grid(self, effect: Effect) -> list[tuple[float, ...]]:
+        axes = []
+        for shape in effect.shapes:
+            low, high = shape.bounds(self.scale)
+            axes.append(np.geomspace(low, high, SETTINGS.grid).tolist())
+        return list(product(*axes))
+
+    def refined(self, found: Fit) -> Fit:
+        """The fit with its shapes refined one after the other, within their bounds."""
+        for _ in range(ROUNDS):
+            for k, term in enumerate(found.terms):
+                for j in range(len(term.effect.shapes)):
+                    found = self._refined(found, k, j)
+        return found
+
+    def _refined(self, found: Fit, k: int, j: int) -> Fit:
+        """The fit with one shape refined between its neighbours on the grid."""
+        from scipy.optimize import minimize_scalar
+
+        low, high = np.log(found.terms[k].effect.shapes[j].bounds(self.scale))
+        middle, reach = np.log(found.terms[k].shapes[j]), (high - low) / (SETTINGS.grid - 1)
+
+        def fit(x: float) -> Fit:
+            return self.regression.fit(_moved(found.terms, k, j, float(np.exp(x))))
+
+        best = minimize_scalar(
+            lambda x: fit(x).cost,
+            bounds=(max(low, middle - reach), min(high, middle + reach)),
+            method="bounded",
+            options={"maxiter": STEPS},
+        )
+        return fit(best.x) if best.fun < found.cost else found
+
+    def _step(self, action: str, found: Fit) -> SearchStep:
+        return SearchStep(
+            action=action,
+            effects=found.names,
+            promised={},
+            gain=self.gain(found),
+            mean_square=found.cost / found.count,
+        )
+
+
+def _moved(terms: Sequence[Term], k: int, j: int, value: float) -> tuple[Term, ...]:
+    """Terms with one shape at another value."""
+    shapes = list(terms[k].shapes)
+    shapes[j] = value
+    return (*terms[:k], Term(terms[k].effect, tuple(shapes)), *terms[k + 1 :])

@@ -1,0 +1,96 @@
+"""From logs to a regression in the noise of its own rows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.diagnosis.axis.effects.effect import Scale
+from plant_emulator.diagnosis.axis.motion import Base, prepare, with_width
+from plant_emulator.diagnosis.axis.regression import Regression, Rows, Term, rows_of
+from plant_emulator.diagnosis.axis.settings import SETTINGS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from plant_emulator.diagnosis.axis.effects.effect import Effect
+    from plant_emulator.diagnosis.axis.motion import Run
+    from plant_emulator.signals.axis_log import AxisLog
+
+# Widths of the Coulomb friction that are tried, in the highest speed.
+WIDTHS = (0.0003, 0.1)
+# Nominal parameters before the first fit.
+NOTHING = Base(inertia=0.0, viscous=0.0, coulomb=0.0)
+
+
+def prepared(logs: Sequence[AxisLog]) -> tuple[list[Run], Scale]:
+    """The runs, and how large their axis is.
+
+    All are averaged over one time: over the longest that the noise of one of them asks for.
+    """
+    first = [prepare(log) for log in logs]
+    width = max(run.kernel.stride * run.period for run in first)
+    runs = [
+        replace(run, kernel=replace(run.kernel, stride=max(1, round(width / run.period))))
+        for run in first
+    ]
+    return runs, scale_of(runs)
+
+
+def best_width(runs: Sequence[Run], scale: Scale, terms: Sequence[Term]) -> float:
+    """Width of the Coulomb friction that leaves least of these runs beside these effects."""
+    from scipy.optimize import minimize_scalar
+
+    least = max(run.motion.deviation for run in runs)
+
+    def cost(width: float) -> float:
+        rows = [rows_of(with_width(run, width), scale) for run in runs]
+        begun = Regression(rows=rows, base=NOTHING)
+        return begun.around(begun.fit(())).fit(terms).cost
+
+    tried = [least, *(w for w in np.geomspace(*WIDTHS, SETTINGS.grid) * scale.speed if w > least)]
+    costs = [cost(w) for w in tried]
+    k = int(np.argmin(costs))
+    low, high = np.log(tried[max(0, k - 1)]), np.log(tried[min(k + 1, len(tried) - 1)])
+    found = minimize_scalar(lambda x: cost(float(np.exp(x))), bounds=(low, high), method="bounded")
+    return float(np.exp(found.x)) if found.fun < costs[k] else float(tried[k])
+
+
+def start(
+    runs: Sequence[Run], scale: Scale, fitted: int, effects: Sequence[Effect], width: float
+) -> tuple[Regression, list[Rows], list[Effect]]:
+    """Regression of the first `fitted` runs, rows of all runs, and the effects that apply.
+
+    width : of the Coulomb friction
+    """
+    rows = [rows_of(with_width(run, width), scale) for run in runs]
+    library = [e for e in effects if all(e.applies(r.motion, scale) for r in runs)]
+    begun = Regression(rows=rows[:fitted], base=NOTHING)
+    around = begun.around(begun.fit(()))
+    return around.in_noise_of(around.fit(rich_terms(library, scale))), rows, library
+
+
+def rich_terms(library: Sequence[Effect], scale: Scale) -> list[Term]:
+    """Every effect that enters linearly, its shapes in the middle of their bounds."""
+    return [
+        Term(e, tuple(float(np.sqrt(np.prod(s.bounds(scale)))) for s in e.shapes))
+        for e in library
+        if e.columns is not None
+    ]
+
+
+def scale_of(runs: Sequence[Run]) -> Scale:
+    """How large the axis is that made these runs."""
+    low = min(float(r.motion.position.min()) for r in runs)
+    high = max(float(r.motion.position.max()) for r in runs)
+    return Scale(
+        force=float(np.sqrt(np.mean(np.concatenate([r.log.force for r in runs]) ** 2))),
+        speed=max(float(np.abs(r.motion.velocity).max()) for r in runs),
+        middle=0.5 * (low + high),
+        travel=0.5 * (high - low),
+        period=max(r.period for r in runs),
+        length=max(float(r.kernel.time[-1]) for r in runs),
+        rotary=runs[0].log.rotary,
+    )

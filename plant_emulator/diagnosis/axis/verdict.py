@@ -1,0 +1,154 @@
+"""The verdict: which effects the held-out runs confirm, and what is said where there are none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.diagnosis.axis.motion import UNCERTAIN
+from plant_emulator.diagnosis.axis.settings import SETTINGS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from plant_emulator.diagnosis.answer import Kind
+    from plant_emulator.diagnosis.axis.held_out import HeldOut
+    from plant_emulator.diagnosis.axis.regression import Fit, Regression, Rows, Term
+    from plant_emulator.diagnosis.axis.search import Search
+
+# Distance from a bound of a shape, in the logarithm, within which it lies at the bound.
+AT_BOUND = 0.02
+
+
+@dataclass(frozen=True, kw_only=True)
+class Decision:
+    """Kind of the verdict, the fit behind it, and why there is no name.
+
+    inertia : of each run that has another one: number, value and standard error
+    """
+
+    kind: Kind
+    found: Fit
+    reason: str = ""
+    inertia: tuple[tuple[int, float, float], ...] = ()
+
+
+def decide(search: Search, held_out: HeldOut, floor: float) -> Decision:
+    """Decide by the held-out runs; floor : rms of the force's error that noise or repeats leave."""
+    found, reason = _confirmed(search, held_out)
+    error = held_out.relative(found.terms)
+    if found.terms and error > 1.0:
+        told = " and ".join(found.names)
+        reason = f"with {told} the error is {100.0 * error:.0f} % of the force"
+        return Decision(kind="unknown", found=search.null, reason=reason)
+    wrong = forbidden_parameter(found)
+    if found.terms and wrong:
+        return Decision(kind="unknown", found=search.null, reason=wrong)
+    if found.terms:
+        return Decision(kind="effect", found=found)
+    # Beside an effect the inertia of a single run is not certain enough to be told.
+    other = other_inertia(held_out.regression, held_out.rows)
+    if other:
+        return Decision(kind="parameter", found=found, inertia=other)
+    left = np.concatenate(held_out.errors((), timing=True))
+    small = float(np.mean(left**2)) <= SETTINGS.noisy * floor**2
+    if small or held_out.relative((), timing=True) <= SETTINGS.worth:
+        return Decision(kind="none", found=found)
+    reason = reason or "no effect of the library closes a share of it on the held-out runs"
+    return Decision(kind="unknown", found=found, reason=reason)
+
+
+def _confirmed(search: Search, held_out: HeldOut) -> tuple[Fit, str]:
+    """The best set of which the held-out runs need every effect; else why the best one fails."""
+    best = search.best
+    ranked = [best, *(f for f in sorted(search.sets.values(), key=search.value) if f is not best)]
+    confirmed: dict[frozenset[str], Fit] = {}
+    reasons = []
+    for found in ranked[: SETTINGS.beam]:
+        names, why = found, ""
+        while names.terms:
+            failing = _failing(search, held_out, names)
+            if failing is None:
+                confirmed[frozenset(names.names)] = names
+                break
+            name, why = failing
+            names = search.fit_set([n for n in names.names if n != name])
+        if not names.terms:
+            reasons.append(why)
+    if not confirmed:
+        return search.null, reasons[0] if reasons else ""
+    winner = search.preferred(list(confirmed.values()))
+    rival = search.preferred([winner, *search.near(winner)])
+    if rival is not winner and _failing(search, held_out, rival) is None:
+        return rival, ""
+    return winner, ""
+
+
+def _failing(search: Search, held_out: HeldOut, found: Fit) -> tuple[str, str] | None:
+    """The effect of a set that the held-out runs need least, and why it fails; None: none does."""
+    worst: tuple[float, str, str] | None = None
+    for term in found.terms:
+        name = term.effect.name
+        rest = search.fit_set([n for n in found.names if n != name]).terms
+        shares = [held_out.share(found.terms, rest)]
+        if term.effect.replaced is None:
+            shares.append(held_out.share(found.terms, rest, timing=True))
+        share = min(shares, key=lambda s: s.low)
+        why = implausible(search, found, term)
+        if min(s.value for s in shares) < SETTINGS.worth or share.low <= 0.0:
+            why = f"the held-out runs do not confirm {name} ({describe(share.value)} closed)"
+        if why and (worst is None or share.low < worst[0]):
+            worst = (share.low, name, why)
+    return None if worst is None else worst[1:]
+
+
+def describe(share: float) -> str:
+    """A share in percent."""
+    return f"{100.0 * share:.1f} %"
+
+
+def implausible(search: Search, found: Fit, term: Term) -> str:
+    """Why the sizes of an effect cannot be believed; empty where they can."""
+    name = term.effect.name
+    sizes, errors = found.sizes(term)
+    if len(sizes) and np.all(errors > np.abs(sizes)):
+        return f"{name} would do, but no size of it is certain"
+    for shape, value in zip(term.effect.shapes, term.shapes, strict=True):
+        low, high = np.log(shape.bounds(search.scale))
+        if not low + AT_BOUND < np.log(value) < high - AT_BOUND:
+            return f"{name} would do, but its {shape.name} lies at its bound"
+    return ""
+
+
+def forbidden_parameter(found: Fit) -> str:
+    """Which nominal parameter physics forbids, as a sentence; empty where none is."""
+    errors = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
+    inertia, error = float(found.values[0]), float(errors[0])
+    if inertia <= UNCERTAIN * error:
+        return f"no inertia is certain: {inertia:.3g} +- {error:.2g}"
+    for k, name in ((1, "viscous friction"), (2, "Coulomb friction")):
+        if found.values[k] < -UNCERTAIN * errors[k]:
+            return f"the {name} would be negative: {found.values[k]:.3g} +- {errors[k]:.2g}"
+    return ""
+
+
+def other_inertia(
+    regression: Regression, rows: Sequence[Rows]
+) -> tuple[tuple[int, float, float], ...]:
+    """Runs whose inertia differs from that of the fitted runs, each with value and error."""
+
+    def inertia(some: Sequence[Rows]) -> tuple[float, float]:
+        found = replace(regression, rows=list(some)).fit(())
+        return float(found.values[0]), float(np.sqrt(found.covariance[0, 0]))
+
+    common = inertia(regression.rows)
+    found = []
+    for k, one in enumerate(rows):
+        value, error = inertia([one])
+        apart = abs(value - common[0])
+        certain = apart > SETTINGS.sure * np.hypot(error, common[1])
+        if certain and apart > SETTINGS.friction_spread * abs(common[0]):
+            found.append((k, value, error))
+    return tuple(found)

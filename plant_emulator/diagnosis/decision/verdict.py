@@ -1,0 +1,138 @@
+"""What the hypothesis tests decide: an effect, other parameters, nothing, or unknown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from plant_emulator.diagnosis.fitting.evidence import LJUNG_BOX_LIMIT, adequate, significant
+
+if TYPE_CHECKING:
+    from plant_emulator.diagnosis.answer import Kind
+    from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.fitting.explanation import Explanation
+    from plant_emulator.diagnosis.machine import Model
+
+# A parameter deviates from its nominal value from so many of its standard errors on.
+DEVIATION_ERRORS = 3.0
+# A deviation of so many standard errors is no chance, among some ten parameters in a hundred
+# diagnoses.
+SIGNIFICANT_DEVIATION_ERRORS = 4.0
+# Share of a residual that its past predicts from which on the residual is no noise [1]. Noise that
+# is correlated over 30 ms at 100 Hz has 0.5; a wave that no effect explains has 0.95.
+MOST_PREDICTABLE = 0.7
+# Mean square up to which a fit without effects leaves nothing but noise.
+NULL_MEAN_SQUARE = 1.1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Deviation:
+    """A parameter that deviates from its nominal value [unit].
+
+    surprise : the deviation in prior standard deviations [1]
+    """
+
+    name: str
+    nominal: float
+    estimated: float
+    standard_error: float
+    unit: str
+    subsystem: str
+    surprise: float
+
+    @property
+    def significant(self) -> bool:
+        """Whether chance does not explain the deviation."""
+        limit = SIGNIFICANT_DEVIATION_ERRORS * self.standard_error
+        return abs(self.estimated - self.nominal) > limit
+
+
+@dataclass(frozen=True, kw_only=True)
+class Decision:
+    """The kind of the verdict, the accepted effects, and the parameters that deviate.
+
+    reason : why the cause is unknown; empty where it is known
+    """
+
+    kind: Kind
+    effects: tuple[str, ...]
+    deviations: tuple[Deviation, ...]
+    reason: str
+
+
+def deviations(model: Model, found: FitResult) -> tuple[Deviation, ...]:
+    """Parameters more than DEVIATION_ERRORS standard errors from nominal.
+
+    The significant ones come first, among them the most surprising one.
+    """
+    moved = []
+    for unknown in model.parameters:
+        value, error = found.values[unknown.name], found.standard_errors[unknown.name]
+        if abs(value - unknown.prior) <= DEVIATION_ERRORS * error:
+            continue
+        std = unknown.std if unknown.std is not None else abs(unknown.prior)
+        moved.append(
+            Deviation(
+                name=unknown.name,
+                nominal=unknown.prior,
+                estimated=value,
+                standard_error=error,
+                unit=model.units[unknown.name],
+                subsystem=model.subsystems[unknown.name],
+                surprise=abs(value - unknown.prior) / std,
+            )
+        )
+    return tuple(sorted(moved, key=lambda one: (not one.significant, -one.surprise)))
+
+
+def decide(model: Model, explained: Explanation) -> Decision:
+    """Decide what the hypothesis tests say of the cause."""
+    reason = _reason_against(explained)
+    if reason:
+        moved = deviations(model, explained.final)
+        return Decision(kind="unknown", effects=(), deviations=moved, reason=reason)
+    decision = _decide_by_fits(model, explained)
+    if explained.random_effects and decision.kind != "unknown":
+        return replace(decision, kind="effect", effects=explained.named)
+    return decision
+
+
+def _reason_against(explained: Explanation) -> str:
+    """Why the final fit cannot be trusted; empty where it can."""
+    null, final = explained.null, explained.final
+    if explained.unconverged:
+        return explained.unconverged
+    for channel, noise in explained.noise.items():
+        if noise.colour.predictable > MOST_PREDICTABLE:
+            return f"what is left of {channel} follows its own past as no noise of a sensor does"
+    if _is_structured(explained):
+        return "what is left is as small as the noise, but not as random"
+    if final.insignificant and not (len(final.effects) == 1 and significant(final, null)):
+        name = final.insignificant[0]
+        return f"it differs between the runs; {name} would do, but no size of it is certain"
+    return ""
+
+
+def _decide_by_fits(model: Model, explained: Explanation) -> Decision:
+    """Decide by what the fits with and without effects leave."""
+    null, final = explained.null, explained.final
+    if final.effects and adequate(final, null):
+        moved = deviations(model, final)
+        return Decision(kind="effect", effects=final.effects, deviations=moved, reason="")
+    moved = deviations(model, null)
+    if not final.effects and null.mean_square <= NULL_MEAN_SQUARE:
+        kind: Kind = "parameter" if any(one.significant for one in moved) else "none"
+        return Decision(kind=kind, effects=(), deviations=moved, reason="")
+    reason = "no effect of the library, alone or with others, brings the residual to the noise"
+    return Decision(kind="unknown", effects=(), deviations=moved, reason=reason)
+
+
+def _is_structured(explained: Explanation) -> bool:
+    """Whether a small residual has more Ljung-Box excess than was explained and than noise has.
+
+    A fit that leaves more than the noise is judged by its squares instead.
+    """
+    null, final = explained.null, explained.final
+    small = adequate(final, null) if final.effects else null.mean_square <= NULL_MEAN_SQUARE
+    gained = null.cost - final.cost + sum(one.evidence for one in explained.random_effects)
+    return small and final.ljung_box_excess > max(LJUNG_BOX_LIMIT, gained)

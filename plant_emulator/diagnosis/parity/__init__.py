@@ -1,1 +1,0 @@
-"""Which effects explain the logs: screened by parity relations, confirmed by simulation."""

@@ -1,0 +1,223 @@
+"""Screens the effects: the gain of log evidence that a linear regression predicts for each.
+
+Each effect has two scores on top of a fit, in the relations and in the simulation's residual. What
+is local is clean in the first; what is slow and faint adds up in the second. The larger counts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
+from plant_emulator.diagnosis.fitting.signature import values_at_size
+from plant_emulator.diagnosis.fitting.task import Task
+from plant_emulator.diagnosis.search.columns import best_score
+from plant_emulator.diagnosis.search.settings import SETTINGS
+from plant_emulator.diagnosis.search.simulation_columns import SimulationColumns
+from plant_emulator.estimation.robust_scan import scan_unknowns
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.diagnosis.execution.pool import TaskRunner
+    from plant_emulator.diagnosis.fidelity import Fidelity
+    from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.machine import Candidate, Model
+    from plant_emulator.diagnosis.search.columns import Score
+    from plant_emulator.estimation.unknowns import Residual, Unknown
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """Where a joint fit may begin: values by name, and the states of each run."""
+
+    values: Mapping[str, float]
+    states: tuple[Mapping[str, float], ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Promise:
+    """Predicted gain of log evidence of one more effect, by fidelity."""
+
+    effect: str
+    gains: Mapping[str, float]
+    starts: tuple[Start, ...]
+
+    @property
+    def gain(self) -> float:
+        """The larger score."""
+        return max(self.gains.values(), default=0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Visibility:
+    """How well the runs of a fit show an effect of its plausible size.
+
+    total_norm : of the change of the simulation's residual
+    orthogonal_norm : of the part that no nuisance parameter can follow
+    confounded_with : nuisance parameter that follows the change most
+    """
+
+    orthogonal_norm: float = 0.0
+    total_norm: float = 0.0
+    confounded_with: str = ""
+
+
+def visibilities(model: Model, task: Task) -> dict[str, Visibility]:
+    """How well the runs of `task.base` show each effect of the library (a step)."""
+    simulation = SimulationColumns(model, task.base, task.runs)
+    return {
+        name: Visibility() if one.stochastic else _visibility(simulation, one)
+        for name, one in model.candidates.items()
+    }
+
+
+def _visibility(simulation: SimulationColumns, candidate: Candidate) -> Visibility:
+    states = [{u.name: u.start for u in candidate.states} for _ in simulation.runs]
+    column = simulation.column(candidate.name, values_at_size(candidate, 1.0), states)
+    if column is None or not column.any():
+        return Visibility()
+    square = float(simulation.data.gram(column[:, None])[0, 0])
+    return Visibility(
+        orthogonal_norm=float(np.sqrt(max(0.0, square))),
+        total_norm=float(np.linalg.norm(column)),
+        confounded_with=simulation.confounded_with(column),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Screening:
+    """A screening of all effects on top of one fit, by one regression.
+
+    fidelity : simulation or relations; states : of each effect in each run, by effect
+    """
+
+    base: FitResult
+    runs: tuple[int, ...]
+    fidelity: str
+    states: Mapping[str, Sequence[Mapping[str, float]]]
+
+
+def promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
+    """Predicted gains of all effects on top of a fit, the largest first."""
+    (states,) = runner.map(start_states, [Task(base=base, runs=runner.runs)])
+    asked = [
+        Screening(base=base, runs=runner.runs, fidelity=fidelity, states=states)
+        for fidelity in ("relations", "simulation")
+    ]
+    found: dict[str, Promise] = {}
+    for some in runner.map(screen, asked):
+        for one in some:
+            known = found.get(one.effect, Promise(effect=one.effect, gains={}, starts=()))
+            found[one.effect] = Promise(
+                effect=one.effect,
+                gains={**known.gains, **one.gains},
+                starts=(*known.starts, *one.starts),
+            )
+    return sorted(found.values(), key=lambda p: -p.gain)
+
+
+def screen(model: Model, asked: Screening) -> list[Promise]:
+    """Predicted gains of all effects by one regression (a step).
+
+    On top of a fit with effects that leaves noise, another effect is tried at one size only.
+    """
+    from threadpoolctl import threadpool_limits
+
+    base, library = asked.base, _library(model, asked.base)
+    last = bool(base.effects) and base.mean_square <= NOISE_MEAN_SQUARE
+    sizes = SETTINGS.sizes[:1] if last else SETTINGS.sizes
+    with threadpool_limits(1):
+        fidelity: Fidelity | None = (
+            SimulationColumns(model, base, asked.runs)
+            if asked.fidelity == "simulation"
+            else model.relations(base, asked.runs)
+        )
+        if fidelity is None:
+            return []
+        return [
+            Promise(
+                effect=name,
+                gains={} if score is None else {asked.fidelity: score.gain},
+                starts=() if score is None else (_start(fidelity, score, base),),
+            )
+            for name, score in _scores(library, fidelity, sizes, asked.states).items()
+        ]
+
+
+def _library(model: Model, base: FitResult) -> dict[str, Candidate]:
+    """Effects that a fit lacks and that columns can show."""
+    return {
+        name: one
+        for name, one in model.candidates.items()
+        if name not in base.effects and not one.stochastic
+    }
+
+
+def start_states(model: Model, task: Task) -> dict[str, list[dict[str, float]]]:
+    """States of each effect in each run that its columns are taken at (a step).
+
+    A state with many narrow basins, as a frequency, is scanned on top of a fit without effects.
+    """
+    library = _library(model, task.base)
+    return {name: _start_states(model, one, task) for name, one in library.items()}
+
+
+def _start_states(model: Model, candidate: Candidate, task: Task) -> list[dict[str, float]]:
+    where, rough = task.base, model.rough()
+    plain = [{u.name: u.start for u in candidate.states} for _ in task.runs]
+    if where.effects or all(u.step is None for u in candidate.states):
+        return plain
+    values = {**where.values, **values_at_size(candidate, SETTINGS.sizes[0])}
+    return [
+        scan_states(rough.residual(k, (candidate.name,)), {**values, **fit}, candidate.states, own)
+        for k, fit, own in zip(task.runs, where.states, plain, strict=True)
+    ]
+
+
+def scan_states(
+    residual: Residual,
+    values: Mapping[str, float],
+    states: Sequence[Unknown],
+    start: Mapping[str, float],
+) -> dict[str, float]:
+    """The best value of each of these states, with all else as given."""
+    return scan_unknowns(lambda own: residual({**values, **own}), start, states)
+
+
+def _scores(
+    library: Mapping[str, Candidate],
+    fidelity: Fidelity,
+    sizes: Sequence[float],
+    states: Mapping[str, Sequence[Mapping[str, float]]],
+) -> dict[str, Score | None]:
+    """Scores of all effects at the first size, and of the best effects at the other sizes."""
+    found = {
+        name: best_score(fidelity, candidate, sizes[:1], states[name])
+        for name, candidate in library.items()
+    }
+    if len(sizes) > 1:
+        order = sorted(found, key=lambda name: -_gain(found[name]))
+        silent = [name for name, score in found.items() if score is None]
+        for name in dict.fromkeys((*order[: SETTINGS.tried_further], *silent)):
+            more = best_score(fidelity, library[name], sizes[1:], states[name])
+            found[name] = max((found[name], more), key=_gain)
+    return found
+
+
+def _gain(score: Score | None) -> float:
+    return score.gain if score is not None else float("-inf")
+
+
+def _start(fidelity: Fidelity, score: Score, where: FitResult) -> Start:
+    values, states = fidelity.values_at(score.theta)
+    return Start(
+        values={**where.values, **values, **score.values},
+        states=tuple(
+            {**fit, **own, **more}
+            for fit, own, more in zip(where.states, states, score.states, strict=True)
+        ),
+    )

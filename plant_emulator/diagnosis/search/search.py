@@ -1,0 +1,302 @@
+"""Searches the set of effects of largest log evidence: expand the best set, then drop the needless.
+
+The log evidence of a set is half the fall of its penalised cost, less the gain that each of its
+effects needs. The best set is expanded by the effects of largest predicted gain, until it leaves
+only noise or no predicted gain is large enough. An approximate law leaves a residual of its own: a
+relative error e of the law leaves e^2 of what the effect has closed. Another effect needs so much
+more gain.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from plant_emulator.diagnosis.answer import SearchStep
+from plant_emulator.diagnosis.execution.pool import build_model
+from plant_emulator.diagnosis.fitting.evidence import (
+    EVIDENCE_THRESHOLD,
+    NOISE_MEAN_SQUARE,
+    UNEXPLAINED_SHARE,
+    evidence_of,
+    excess,
+)
+from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
+from plant_emulator.diagnosis.fitting.fit_steps import refit
+from plant_emulator.diagnosis.fitting.task import Task
+from plant_emulator.diagnosis.search.confirmation import Trial, advance, confirm, look
+from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
+from plant_emulator.diagnosis.search.screening import Start, promises, visibilities
+from plant_emulator.diagnosis.search.settings import SETTINGS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+
+    from plant_emulator.diagnosis.execution.pool import TaskRunner
+    from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.machine import Model
+    from plant_emulator.diagnosis.search.logged_noise import LoggedNoise
+    from plant_emulator.diagnosis.search.screening import Promise
+
+# Sets that are fitted again where the noise is found to be another.
+KEPT = 2
+
+
+@dataclass(kw_only=True)
+class Search:
+    """The search of one diagnosis; see the module's text.
+
+    runner : in the noise that the sensors declare; null : fit without effects there
+    random_evidence : of a random effect that is part of that noise [chi squared]
+    """
+
+    runner: TaskRunner
+    null: FitResult
+    random_evidence: float = 0.0
+    noise: LoggedNoise | None = None
+    noise_at: tuple[object, ...] = ()
+    sets: dict[frozenset[str], FitResult] = field(default_factory=dict)
+    promises: dict[frozenset[str], list[Promise]] = field(default_factory=dict)
+    expanded: set[frozenset[str]] = field(default_factory=set)
+    trace: list[SearchStep] = field(default_factory=list)
+    reduced_costs: dict[str, float] = field(default_factory=dict)
+    restarted: bool = False
+
+    def explain(self) -> Explanation:
+        """Go through the queue in the logs' own noise.
+
+        The noise is estimated around the fit without effects where that is near the noise, and
+        around the best set. Where that shows another noise, the queue starts again.
+        """
+        self.declared = self.runner
+        self.sets = {frozenset(): self.null}
+        if self.null.mean_square <= SETTINGS.linear_mean_square:
+            self._estimate_noise(self.null)
+            best = self._queue(SETTINGS.most_effects)
+        else:
+            best = self._queue(1)
+            self._estimate_noise(best)
+            best = self._queue(SETTINGS.most_effects)
+        if best.effects and self._estimate_noise(best):
+            best = self._queue(SETTINGS.most_effects)
+        final = self._without_needless(best)
+        if not final.converged:
+            (final,) = self._fits(refit, [final])
+            self.null = self.sets[frozenset()]
+        return self._explanation(final)
+
+    def _estimate_noise(self, where: FitResult) -> bool:
+        """Take the noise around a fit for the logs' own; give whether it is another one now."""
+        if self.noise_at == where.key:
+            return False
+        self.noise_at = where.key
+        (noise,) = self.declared.map(estimate_noise, [self._task(where)])
+        known = self.noise
+        if (known is None and noise.plain) or (known is not None and noise.resembles(known)):
+            return False
+        self.noise = noise
+        recipe = WhitenedRecipe(self.declared.recipe, noise)
+        self.runner = replace(self.declared, recipe=recipe, model=build_model(recipe))
+        self.promises.clear()
+        self.expanded.clear()
+        kept = sorted(self.sets.values(), key=lambda p: p.cost)[:KEPT]
+        if self.null not in kept:
+            kept.append(self.null)
+        self.sets = {}
+        self._fits(advance, kept)
+        self.null = self.sets[frozenset()]
+        self.trace.append(self._step("noise estimated", where))
+        return True
+
+    def _task(self, base: FitResult) -> Task:
+        return Task(base=base, runs=self.runner.runs)
+
+    def _fits(
+        self, step: Callable[[Model, Task], FitResult], bases: Iterable[FitResult]
+    ) -> list[FitResult]:
+        """Run a step on each fit, and keep each result under its set of effects."""
+        found = list(self.runner.map(step, [self._task(base) for base in bases]))
+        self.sets |= {frozenset(one.effects): one for one in found}
+        return found
+
+    def _queue(self, most_effects: int) -> FitResult:
+        """The best set of at most so many effects."""
+        best = min(self.sets.values(), key=self._value)
+        while len(best.effects) < most_effects:
+            key = frozenset(best.effects)
+            if key in self.expanded or (best.effects and self._leaves_noise(best)):
+                break
+            self.expanded.add(key)
+            self._expand(best)
+            before, best = best, self._settled()
+            if best is before or self._foreign(best):
+                break
+        return best
+
+    def _leaves_noise(self, found: FitResult) -> bool:
+        """Whether a fit leaves only noise, and no predicted gain is large enough."""
+        promised = self._screen(found)
+        most = promised[0].gain if promised else 0.0
+        return found.mean_square <= NOISE_MEAN_SQUARE and most <= self._needed(found)
+
+    def _foreign(self, found: FitResult) -> bool:
+        """Whether a set leaves most of the gap, so that the library lacks the cause."""
+        gap = excess(self.null)
+        return gap > SETTINGS.needed and excess(found) > (1.0 - UNEXPLAINED_SHARE) * gap
+
+    def _screen(self, found: FitResult) -> list[Promise]:
+        key = frozenset(found.effects)
+        if key not in self.promises:
+            self.promises[key] = promises(self.runner, found)
+        return self.promises[key]
+
+    def _needed(self, found: FitResult) -> float:
+        """Gain of log evidence that one more effect needs on top of a fit."""
+        library = self.runner.model.candidates
+        exact = all(library[name].exact_form for name in found.effects)
+        closed = 0.0 if exact else max(0.0, self.null.cost - found.cost)
+        first = not found.effects and not self.random_evidence
+        needed = SETTINGS.needed if first else SETTINGS.needed_again
+        return needed + SETTINGS.law_error**2 * 0.5 * (closed + self.random_evidence)
+
+    def _expand(self, base: FitResult) -> None:
+        """Fit the effect of the largest predicted gain on top of a set, then its rivals."""
+        found = [p for p in self._screen(base) if p.gain > self._needed(base)]
+        if not found:
+            return
+        (best,) = self._confirm(base, found[:1])
+        leaves_noise = best.mean_square <= NOISE_MEAN_SQUARE
+        share = SETTINGS.rival_share if leaves_noise else SETTINGS.hopeless_share
+        rivals = SETTINGS.rivals_beside if base.effects else SETTINGS.rivals
+        near: dict[str, Promise] = {}
+        for score in found[0].gains:
+            order = sorted(found, key=lambda p: -p.gains.get(score, 0.0))
+            least = share * order[0].gains.get(score, 0.0)
+            rest = [p for p in order if p is not found[0]][:rivals]
+            near |= {p.effect: p for p in rest if p.gains.get(score, 0.0) > least}
+        self._confirm(base, list(near.values()))
+
+    def _confirm(self, base: FitResult, promises: Sequence[Promise]) -> list[FitResult]:
+        """Fit these effects on top of a set, each for a few iterations."""
+        trials = [
+            Trial(effects=(*base.effects, p.effect), runs=self.runner.runs, starts=p.starts)
+            for p in promises
+        ]
+        found = list(self.runner.map(confirm, trials))
+        for promise, one in zip(promises, found, strict=True):
+            self._keep(one)
+            self.trace.append(self._step("confirmed", one, promise.gains))
+        return found
+
+    def _step(
+        self, action: str, found: FitResult, promised: Mapping[str, float] | None = None
+    ) -> SearchStep:
+        """A step that ended in this fit."""
+        return SearchStep(
+            action=action,
+            effects=found.effects,
+            promised=dict(promised or {}),
+            gain=0.5 * (self.null.cost - found.cost),
+            mean_square=found.mean_square,
+        )
+
+    def _keep(self, found: FitResult) -> None:
+        """Keep a fit if it is the best one of its set."""
+        key = frozenset(found.effects)
+        if key not in self.sets or found.cost < self.sets[key].cost:
+            self.sets[key] = found
+
+    def _value(self, found: FitResult) -> float:
+        """Negative log evidence of a set, with the gain that each of its effects needs."""
+        price = 0.0
+        for count, _ in enumerate(found.effects):
+            smaller = self.sets.get(frozenset(found.effects[:count]), self.null)
+            price += self._needed(smaller)
+        return 0.5 * found.cost + price
+
+    def _settled(self) -> FitResult:
+        """Refit all sets near the best one until they converge; return the best."""
+        done: set[frozenset[str]] = set()
+        while True:
+            order = sorted(self.sets.values(), key=self._value)
+            best = order[0]
+            near = [
+                one
+                for one in order
+                if one.effects
+                and frozenset(one.effects) not in done
+                and len(one.effects) == len(best.effects)
+                and one.cost < best.cost + SETTINGS.near
+            ]
+            if not near:
+                return best
+            for one in self._fits(refit, near):
+                done.add(frozenset(one.effects))
+                self.trace.append(self._step("converged", one))
+            if not self.restarted:
+                self.restarted = True
+                self._restart_null(best)
+
+    def _restart_null(self, found: FitResult) -> None:
+        """Fit without effects once more, from the parameters of a fit with some."""
+        own = {u.name for u in self.runner.model.parameters}
+        values = {k: v for k, v in found.values.items() if k in own}
+        start = Start(values=values, states=found.states)
+        trial = Trial(effects=(), runs=self.runner.runs, starts=(start,))
+        (other,) = self.runner.map(look, [trial])
+        if other.cost < self.null.cost - SETTINGS.needed:
+            (self.null,) = self._fits(refit, [other])
+
+    def _without_needless(self, best: FitResult) -> FitResult:
+        """Drop the effect of least evidence until each effect has enough; return the set.
+
+        The queue takes the noise for known. Where a set leaves something correlated, an effect that
+        follows a little of it is needless too: its evidence among what is left is that of chance.
+        """
+        self.reduced_costs = {}
+        if len(best.effects) < 2:
+            return best
+        for name in best.effects:
+            rest = tuple(e for e in best.effects if e != name)
+            start = Start(values=best.values, states=best.states)
+            trial = Trial(effects=rest, runs=self.runner.runs, starts=(start,))
+            (found,) = self.runner.map(confirm, [trial])
+            self._keep(found)
+            self.reduced_costs[name] = self.sets[frozenset(rest)].cost
+        found = self._settled()
+        cheapest = min(self.reduced_costs, key=self.reduced_costs.__getitem__)
+        fall = self.reduced_costs[cheapest] - found.cost
+        if (
+            found.effects != best.effects
+            or evidence_of(fall, found, self.null) >= EVIDENCE_THRESHOLD
+        ):
+            return found
+        (smaller,) = self._fits(refit, [self.sets[frozenset(best.effects) - {cheapest}]])
+        return self._without_needless(smaller)
+
+    def _explanation(self, final: FitResult) -> Explanation:
+        singles = {next(iter(k)): one for k, one in self.sets.items() if len(k) == 1}
+        those = " and ".join(final.effects) or "no effect"
+        (shown,) = self.runner.map(visibilities, [self._task(self.null)])
+        return Explanation(
+            null=self.null,
+            final=final,
+            hypotheses=tuple(
+                Hypothesis(effect=name, fit=singles.get(name), **vars(visibility))
+                for name, visibility in shown.items()
+            ),
+            alternatives={name: self._alternatives(final, name) for name in final.effects},
+            unconverged="" if final.converged else f"the fit with {those} did not converge",
+            reduced_costs=self.reduced_costs if len(final.effects) > 1 else {},
+            trace=tuple(self.trace),
+            noise=self.noise.channels if self.noise else {},
+        )
+
+    def _alternatives(self, final: FitResult, name: str) -> dict[str, float]:
+        """Costs of the sets that have another effect in the place of this one."""
+        others = frozenset(final.effects) - {name}
+        return {
+            next(iter(key - others)): one.cost
+            for key, one in self.sets.items()
+            if len(key) == len(final.effects) and key >= others
+        }

@@ -1,0 +1,95 @@
+"""The residual of the free simulation around a fit, and what effects do to it."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.diagnosis.fitting.joint_fit import linearise
+from plant_emulator.estimation.regression import Regression
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from plant_emulator.diagnosis.fidelity import Values
+    from plant_emulator.diagnosis.fit_result import FitValues
+    from plant_emulator.diagnosis.machine import Model
+    from plant_emulator.estimation.unknowns import Unknown
+    from plant_emulator.signals.log import Array
+
+
+class SimulationColumns:
+    """The residual of the free simulation and its tangents; see `Fidelity`."""
+
+    def __init__(self, model: Model, where: FitValues, runs: Sequence[int]) -> None:
+        self.model, self.where, self.runs = model, where, tuple(runs)
+        self.found = linearise(model, where, runs)
+        self.base = np.concatenate([r.ravel() for r in self.found.residuals])
+        self._rough = model.rough()
+        self._plain = self._residual(where.effects, {}, [{} for _ in runs])
+
+    def _residual(
+        self,
+        effects: Sequence[str],
+        sizes: Mapping[str, float],
+        states: Sequence[Mapping[str, float]],
+    ) -> Array:
+        """Rough residual at the fit with these effects, shape (n,)."""
+        parts = [
+            self._rough.residual(k, effects)({**self.where.values, **own, **more, **sizes}).ravel()
+            for k, own, more in zip(self.runs, self.where.states, states, strict=True)
+        ]
+        return np.concatenate(parts)
+
+    @cached_property
+    def data(self) -> Regression:
+        """Data and nuisance; an unknown without a prior gets one of a deviation of 1."""
+        slopes = np.concatenate([j.reshape(-1, len(self.found.z)) for j in self.found.jacobians])
+        shift = np.array([self._prior(u, z) - z for u, z in self._pairs()])
+        return Regression.of(self.base + slopes @ shift, -slopes * self.deviations)
+
+    @cached_property
+    def deviations(self) -> Array:
+        """Prior standard deviations on the scale of the estimation."""
+        return np.array([u.scaled_std if u.std else 1.0 for u, _ in self._pairs()])
+
+    @staticmethod
+    def _prior(unknown: Unknown, z: float) -> float:
+        """Prior mean on the scale of the estimation; that of the fit where there is no prior."""
+        return unknown.scaled(unknown.prior) if unknown.std else z
+
+    def _pairs(self) -> list[tuple[Unknown, float]]:
+        return [(u, float(z)) for u, z in zip(self.found.unknowns, self.found.z, strict=True)]
+
+    @cached_property
+    def owners(self) -> NDArray[np.int_]:
+        """See `Fidelity`."""
+        return np.repeat(np.arange(len(self.runs)), [r.size for r in self.found.residuals])
+
+    def column(
+        self, effect: str, sizes: Mapping[str, float], states: Sequence[Mapping[str, float]]
+    ) -> Array | None:
+        """See `Fidelity`."""
+        return self._plain - self._residual((*self.where.effects, effect), sizes, states)
+
+    unwhitened = column
+
+    def values_at(self, theta: Array) -> Values:
+        """See `Fidelity`."""
+        values: dict[str, float] = {}
+        states: list[dict[str, float]] = [{} for _ in self.runs]
+        for (u, z), t, std in zip(self._pairs(), theta, self.deviations, strict=True):
+            scaled = self._prior(u, z) + std * float(t)
+            scaled = float(np.clip(scaled, u.scaled(u.lower), u.scaled(u.upper)))
+            (values if u.run is None else states[u.run])[u.name] = u.value(scaled)
+        return values, states
+
+    def confounded_with(self, column: Array) -> str:
+        """The unknown that follows a change of the data most."""
+        shift = self.data.follow(column)
+        lengths = np.linalg.norm(self.data.nuisance, axis=0)
+        return self.found.unknowns[int(np.argmax(np.abs(shift) * lengths))].name

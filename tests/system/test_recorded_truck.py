@@ -1,0 +1,68 @@
+"""What a recorded run of a truck tells: its error budget, and its indices of SAE J2951."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import gateway
+from gateway import config_file
+from gateway.cli import main
+from gateway.recordings import recording
+from gateway.recordings.header import map_of
+from gateway.twin.wheel_torque import wheel_torque
+from gateway.workflows.run_quality import quality_at_the_end
+from plant_emulator import logs
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory):
+    """Folder of a truck with a driver on the nominal bench, up to its cruise."""
+    out = tmp_path_factory.mktemp("demo")
+    options = ["--fast", "--load", "0", "--driver", "pi", "--duration", "15"]
+    assert CliRunner().invoke(main, ["demo", *options, "--out", str(out)]).exit_code == 0
+    return out
+
+
+def test_wheel_torque_of_the_sensors_is_that_of_the_truck(driven):
+    """The emulator knows its truck's torque; 72 N m in cruise, 390 N m while it speeds up."""
+    found = recording.read(driven / "truck_3640kg.rlrec")
+    config = config_file.load(driven / "truck_3640kg.toml")
+    told = wheel_torque(found, config, map_of(found.header))
+    true = logs.read(driven / "truck_3640kg.csv")
+    for begin, end in ((4.0, 7.0), (11.0, 14.0)):
+        inside = (true.time >= begin) & (true.time < end)
+        expected = float(np.mean(true["wheel_torque"][inside]))
+        assert np.mean(told[int(100 * begin) : int(100 * end)]) == pytest.approx(expected, rel=0.02)
+    assert np.all(np.isnan(told[:180]))
+
+
+def test_the_end_of_a_run_tells_the_indices_that_a_replay_tells(driven, tmp_path):
+    path = driven / "truck_3640kg.rlrec"
+    told = quality_at_the_end(path)
+    assert told == gateway.replay(path).figures.quality
+    assert abs(told.distance) < 0.02
+    other = tmp_path / "none.rlrec"
+    other.write_bytes(b"no recording")
+    assert quality_at_the_end(other) is None
+
+
+def test_backlash_costs_the_nominal_bench_most(driven, tmp_path):
+    answer = tmp_path / "budget.json"
+    words = ["budget", str(driven / "truck_3640kg.rlrec"), "--json", str(answer)]
+    result = CliRunner().invoke(main, words)
+    assert result.exit_code == 0, result.output
+    told = json.loads(answer.read_text())
+    assert (told["schema"], told["largest"]) == ("budget/1", "backlash")
+    parts = [*told["causes"], told["interaction"], told["left"]]
+    for column in ("force_newton", "energy_percent", "speed_km_h"):
+        assert sum(one[column] for one in parts) == pytest.approx(told["whole"][column])
+
+
+def test_a_recording_that_is_none_is_refused_in_one_line(driven):
+    result = CliRunner().invoke(main, ["budget", str(driven / "truck_3640kg.toml")])
+    assert result.exit_code == 2
+    assert "Traceback" not in result.output
