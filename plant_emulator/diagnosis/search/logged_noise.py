@@ -18,7 +18,7 @@ from plant_emulator.diagnosis.search.rich_model import rich_columns
 from plant_emulator.diagnosis.search.simulation_columns import SimulationColumns
 from plant_emulator.estimation.noise.channel_noise import NoiseSeries
 from plant_emulator.estimation.noise.disturbances import outlying
-from plant_emulator.estimation.noise.estimate import estimate_channel_noise
+from plant_emulator.estimation.noise.logged_noise import noise_of_runs
 from plant_emulator.estimation.regression import Regression
 
 if TYPE_CHECKING:
@@ -29,60 +29,18 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.task import Task
     from plant_emulator.diagnosis.machine import MeasuredRun, Model
-    from plant_emulator.estimation.noise.channel_noise import ChannelNoise, Whitener
+    from plant_emulator.estimation.noise.channel_noise import Whitener
+    from plant_emulator.estimation.noise.logged_noise import LoggedNoise
     from plant_emulator.estimation.unknowns import Residual
     from plant_emulator.signals.log import Array
 
     Whiteners = Mapping[int, Sequence[Whitener]]
 
-# Deviations up to this much off the declared one are the declared one's own error [1].
-KNOWN = 0.03
-
-
-@dataclass(frozen=True)
-class LoggedNoise:
-    """The noise of every channel by name, and the whiteners by run in the channels' order."""
-
-    channels: Mapping[str, ChannelNoise]
-    whiteners: Mapping[int, tuple[Whitener, ...]]
-
-    @property
-    def plain(self) -> bool:
-        """Whether the noise is white and as large as declared."""
-        return all(
-            c.colour.order == 0
-            and not c.lines
-            and c.outliers == 0.0
-            and abs(c.deviation - 1.0) < KNOWN
-            for c in self.channels.values()
-        )
-
-    def resembles(self, other: LoggedNoise) -> bool:
-        """Whether two models of the noise of the same channels are as good as the same."""
-        return all(
-            abs(np.log(a.colour.innovation_deviation / b.colour.innovation_deviation)) < KNOWN
-            and abs(np.log(a.deviation / b.deviation)) < 2.0 * KNOWN
-            and a.lines == b.lines
-            for a, b in ((one, other.channels[name]) for name, one in self.channels.items())
-        )
-
 
 def estimate_noise(model: Model, task: Task) -> LoggedNoise:
     """Estimate the noise around the fit `task.base` (a step)."""
     simulation = SimulationColumns(model, task.base, task.runs)
-    series: dict[str, list[tuple[int, NoiseSeries]]] = {}
-    for k, name, one in _series(model, simulation):
-        series.setdefault(name, []).append((k, one))
-    channels: dict[str, ChannelNoise] = {}
-    whiteners: dict[int, dict[str, Whitener]] = {k: {} for k in task.runs}
-    for name, pairs in series.items():
-        channels[name], found = estimate_channel_noise([one for _, one in pairs])
-        for (k, _), whitener in zip(pairs, found, strict=True):
-            whiteners[k][name] = whitener
-    ordered = {
-        k: tuple(own[name] for name in model.runs[k].channels) for k, own in whiteners.items()
-    }
-    return LoggedNoise(channels, ordered)
+    return noise_of_runs(_series(model, simulation))
 
 
 def _series(model: Model, simulation: SimulationColumns) -> Iterator[tuple[int, str, NoiseSeries]]:

@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model
-    from plant_emulator.diagnosis.search.logged_noise import LoggedNoise
     from plant_emulator.diagnosis.search.screening import Promise
+    from plant_emulator.estimation.noise.logged_noise import LoggedNoise
 
 # Sets that are fitted again where the noise is found to be another.
 KEPT = 2

@@ -1,0 +1,63 @@
+"""The noise of all channels of several runs, from what a model leaves of them (pure)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.estimation.noise.estimate import estimate_channel_noise
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from plant_emulator.estimation.noise.channel_noise import ChannelNoise, NoiseSeries, Whitener
+
+# Deviations up to this much off the declared one are the declared one's own error [1].
+KNOWN = 0.03
+
+
+@dataclass(frozen=True)
+class LoggedNoise:
+    """The noise of every channel by name, and the whiteners by run in the channels' order."""
+
+    channels: Mapping[str, ChannelNoise]
+    whiteners: Mapping[int, tuple[Whitener, ...]]
+
+    @property
+    def plain(self) -> bool:
+        """Whether the noise is white and as large as declared."""
+        return all(
+            c.colour.order == 0
+            and not c.lines
+            and c.outliers == 0.0
+            and abs(c.deviation - 1.0) < KNOWN
+            for c in self.channels.values()
+        )
+
+    def resembles(self, other: LoggedNoise) -> bool:
+        """Whether two models of the noise of the same channels are as good as the same."""
+        return all(
+            abs(np.log(a.colour.innovation_deviation / b.colour.innovation_deviation)) < KNOWN
+            and abs(np.log(a.deviation / b.deviation)) < 2.0 * KNOWN
+            and a.lines == b.lines
+            for a, b in ((one, other.channels[name]) for name, one in self.channels.items())
+        )
+
+
+def noise_of_runs(series: Iterable[tuple[int, str, NoiseSeries]]) -> LoggedNoise:
+    """Estimate the noise of each channel from its residuals in all runs together.
+
+    series : run, channel and residual, for every channel of every run, in the channels' order
+    """
+    given = list(series)
+    channels: dict[str, ChannelNoise] = {}
+    found: dict[tuple[int, str], Whitener] = {}
+    for name in dict.fromkeys(name for _, name, _ in given):
+        pairs = [(k, one) for k, other, one in given if other == name]
+        channels[name], whiteners = estimate_channel_noise([one for _, one in pairs])
+        found |= {(k, name): one for (k, _), one in zip(pairs, whiteners, strict=True)}
+    runs = dict.fromkeys(k for k, _, _ in given)
+    ordered = {k: tuple(found[k, name] for other, name, _ in given if other == k) for k in runs}
+    return LoggedNoise(channels, ordered)
