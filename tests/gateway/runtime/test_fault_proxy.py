@@ -116,7 +116,7 @@ def behind(emulator: EmulatorProcess, tmp_path: Path) -> Iterator[tuple[Run, Pro
         run = Run(emulator, tmp_path / "run.rlrec")
         port = between.listening.port
         run.loop._link = run.link = TcpLink(
-            "127.0.0.1", port, unit=1, timeout=0.1, settle=5.0, probe=MAP.measurement
+            "127.0.0.1", port, unit=1, timeout=0.4, settle=5.0, probe=MAP.measurement
         )
         yield run, between
         emulator.set_remote(on=False)
