@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
+from plant_emulator.model.array_laws import sliding_friction
 from plant_emulator.signals.log import TRUCK, WHEEL_TORQUE, Log
 from plant_emulator.signals.noise import noise
 
@@ -166,8 +167,7 @@ def _gear_side(log: Log, p: Mapping[str, float]) -> tuple[Array, Array]:
     """
     xi, step, motor_speed = p["gear_ratio"], np.diff(log.time), log["motor_speed"]
     gear_speed = motor_speed / xi
-    size = p["gear_viscous_friction"] * np.abs(gear_speed) ** p["gear_friction_exponent"]
-    friction = (p["gear_coulomb_friction"] + size) * np.clip(gear_speed / STILL, -1.0, 1.0)
+    friction = sliding_friction(gear_speed, p) * np.clip(gear_speed / STILL, -1.0, 1.0)
     gear = p["gear_inertia"] / (xi * step)
     torque = xi * log["shaft_torque"] + friction
     known = 0.5 * (torque[1:] + torque[:-1]) + gear * np.diff(motor_speed)

@@ -15,25 +15,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.localisation.linear_splines import linear_splines, time_splines
+from plant_emulator.diagnosis.localisation.measured_signals import (
+    STILL_SPEED,
+    interval_means,
+    turned_angle,
+)
 from plant_emulator.diagnosis.localisation.parity_relations import (
     ARMATURE,
     DRIVE,
     GEAR,
     MOTOR,
     ROWS,
-    STILL_SPEED,
     delayed_reference,
-    flux,
-    friction,
-    interval_means,
-    turned_angle,
 )
+from plant_emulator.model.array_laws import flux, gear_friction
 from plant_emulator.signals.smoothing import smooth
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from plant_emulator.diagnosis.localisation.parity_relations import MeasuredSignals
+    from plant_emulator.diagnosis.localisation.measured_signals import MeasuredSignals
     from plant_emulator.signals.log import Array
 
 # Smoothing window of the quantities [s].
@@ -95,7 +96,7 @@ def block_quantities(
     xi, t = p["gear_ratio"], m.time
     truck = np.concatenate([m.drum_torque[:1], m.drum_torque])
     load = p["drum_inertia"] * smooth(t, drum_speed, 0.07, 1) - truck
-    torque = -(load + friction(m.speed / xi, p)) / xi
+    torque = -(load + gear_friction(m.speed / xi, p)) / xi
     acceleration = smooth(t, m.speed, SMOOTHING_WINDOW, 1)
     current = (p["motor_inertia"] * acceleration - torque) / flux(m.speed, p)
     demand = delayed_reference(m, p["dead_time"])

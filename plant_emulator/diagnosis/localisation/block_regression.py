@@ -9,7 +9,6 @@ make all measurements.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -27,26 +26,21 @@ from plant_emulator.diagnosis.localisation.drum_subsystem import (
     is_torque_size,
     prior_means,
 )
+from plant_emulator.diagnosis.localisation.measured_signals import interval_means, measured_signals
 from plant_emulator.diagnosis.localisation.parity_covariance import whitened_relations
 from plant_emulator.diagnosis.localisation.parity_relations import (
     ARMATURE,
     DRIVE,
     GEAR,
-    base_speed,
-    interval_means,
-    measured_signals,
-    relation_residuals,
+    simulated_relations,
 )
 from plant_emulator.diagnosis.localisation.stacked_rows import StackedRows
-from plant_emulator.errors import UnsettledError
+from plant_emulator.model.array_laws import base_speed
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import voltage_errors
-from plant_emulator.simulation.simulate import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-
-    from numpy.typing import NDArray
 
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.localisation.ard_evidence import MarginalLikelihood
@@ -94,28 +88,14 @@ class BlockRegression:
         self.drum_fit = self.drum.fit_null(null.values, [s[GAP_POSITION] for s in null.states])
         self.products = Products()
         self.relations = [
-            whitened_relations(m, p, self._simulate_drive(k)) for k, m in enumerate(self.signals)
+            whitened_relations(m, p, simulated_relations(r, self.fitted, states[GAP_POSITION]))
+            for m, r, states in zip(self.signals, recordings, null.states, strict=True)
         ]
         self.blocks = tuple(
             name
             for name in (*block_basis.BLOCKS, *DRUM_SIDE_BLOCKS)
             if name != "wheel_contact" or any(m.truck for m in self.signals)
         )
-
-    def _simulate_drive(self, run: int) -> tuple[Array, NDArray[np.bool_]] | None:
-        """The relations' own error between samples, and whether the simulated drive is limited.
-
-        None: the run cannot be simulated at the fit
-        """
-        recording, gap = self.recordings[run], self.null.states[run][GAP_POSITION]
-        try:
-            log = simulate(recording.inputs, self.fitted, gap_position=gap)
-        except UnsettledError:
-            return None
-        m = measured_signals(replace(recording, log=log), self.fitted)
-        residuals, limited = relation_residuals(replace(m, speed=m.motor_speed), self.fitted)
-        residuals[DRIVE, limited] = 0.0
-        return residuals, limited
 
     def drum_values(self, run: int) -> dict[str, float]:
         """Values and states of the drum subsystem in a run, at its fit."""

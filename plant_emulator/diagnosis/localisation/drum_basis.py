@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.localisation.linear_splines import linear_splines, time_splines
-from plant_emulator.diagnosis.localisation.parity_relations import (
+from plant_emulator.diagnosis.localisation.measured_signals import (
     NOISES,
     MeasuredSignals,
     turned_angle,

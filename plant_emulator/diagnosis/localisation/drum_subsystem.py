@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.localisation.drum_simulation import compile_once, drum_speed
-from plant_emulator.diagnosis.localisation.parity_relations import NOISES, smoothed_speed
+from plant_emulator.diagnosis.localisation.measured_signals import NOISES, smoothed_speed
 from plant_emulator.estimation.initial_states import GAP
 from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE, estimate, linearise_at
 from plant_emulator.estimation.robust_scan import cauchy_loss
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from plant_emulator.diagnosis.localisation.parity_relations import MeasuredSignals
+    from plant_emulator.diagnosis.localisation.measured_signals import MeasuredSignals
     from plant_emulator.estimation.unknowns import Estimate, Residual
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording

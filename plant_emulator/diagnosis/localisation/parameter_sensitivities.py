@@ -12,19 +12,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.diagnosis.localisation.measured_signals import MeasuredSignals, interval_means
 from plant_emulator.diagnosis.localisation.parity_relations import (
     ARMATURE,
     DRIVE,
     GEAR,
     MOTOR,
     ROWS,
-    MeasuredSignals,
     delayed_reference,
-    flux,
-    interval_means,
     reconstructed_reference,
 )
 from plant_emulator.estimation.robust_scan import cauchy_loss
+from plant_emulator.model.array_laws import flux
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

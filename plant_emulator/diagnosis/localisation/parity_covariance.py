@@ -12,19 +12,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.diagnosis.localisation.measured_signals import (
+    STILL_SPEED,
+    VOID_VARIANCE,
+    MeasuredSignals,
+    jump_variance,
+)
 from plant_emulator.diagnosis.localisation.parity_relations import (
     ARMATURE,
     DRIVE,
     GEAR,
     MOTOR,
-    STILL_SPEED,
-    VOID_VARIANCE,
-    MeasuredSignals,
     WhitenedRelations,
-    flux,
-    jump_variance,
+    relation_count,
     relation_residuals,
 )
+from plant_emulator.model.array_laws import flux
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -62,7 +65,7 @@ def whitened_relations(
     if m.unknown_torque:
         variance[GEAR] += VOID_VARIANCE
     if m.missing_current:
-        variance[[MOTOR, *range(DRIVE, m.rows)]] += VOID_VARIANCE
+        variance[[MOTOR, *range(DRIVE, relation_count(m))]] += VOID_VARIANCE
     return WhitenedRelations(value, covariance_factor(m, p, variance))
 
 
@@ -75,9 +78,9 @@ def near_limit(limited: NDArray[np.bool_], m: MeasuredSignals) -> NDArray[np.boo
 
 
 def extra_variance(m: MeasuredSignals, p: Mapping[str, float], limited: NDArray[np.bool_]) -> Array:
-    """Variance of each relation beyond the sensors' noise, shape (m.rows, n - 1)."""
+    """Variance of each relation beyond the sensors' noise, shape (3 or 4, n - 1)."""
     k = flux(m.speed, p)[1:]
-    variance = np.zeros((m.rows, len(m.intervals)))
+    variance = np.zeros((relation_count(m), len(m.intervals)))
     variance[MOTOR] = jump_variance(m.torque, m.noise[3]) + k**2 * jump_variance(
         m.current, m.noise[2]
     )
@@ -100,7 +103,7 @@ def extra_variance(m: MeasuredSignals, p: Mapping[str, float], limited: NDArray[
 def noise_sensitivities(m: MeasuredSignals, p: Mapping[str, float]) -> tuple[Array, Array]:
     """Derivatives of the relations by each sensor's unit noise at begin and end of an interval.
 
-    Both have the shape (m.rows, 5, n - 1).
+    Both have the shape (3 or 4, 5, n - 1).
     """
     xi, step, n = p["gear_ratio"], m.intervals, len(m.intervals)
     k, zero, half = flux(m.speed, p), np.zeros(n), np.full(n, 0.5)
@@ -114,7 +117,9 @@ def noise_sensitivities(m: MeasuredSignals, p: Mapping[str, float]) -> tuple[Arr
         drive = [half, zero, speed_error, zero, voltage]
         current = -0.5 * p["armature_resistance"] - sign * p["armature_inductance"] / step
         armature = [-0.5 * slope, zero, current, zero, half]
-        return np.array([motor, gear, drive, armature])[: m.rows] * m.noise[None, :, None]
+        return (
+            np.array([motor, gear, drive, armature])[: relation_count(m)] * m.noise[None, :, None]
+        )
 
     return at(-1.0, k[:-1]), at(1.0, k[1:])
 
@@ -122,12 +127,12 @@ def noise_sensitivities(m: MeasuredSignals, p: Mapping[str, float]) -> tuple[Arr
 def covariance_factor(m: MeasuredSignals, p: Mapping[str, float], variance: Array) -> Array:
     """Lower banded Cholesky factor of the covariance, the relations of an interval side by side.
 
-    variance : beyond the sensors' noise, shape (m.rows, n - 1)
+    variance : beyond the sensors' noise, shape (3 or 4, n - 1)
     """
     from scipy.linalg import cholesky_banded
 
     begin, end = noise_sensitivities(m, p)
-    n, rows = len(m.intervals), m.rows
+    n, rows = len(m.intervals), relation_count(m)
     banded = np.zeros((2 * rows, rows * n))
     for r in range(rows):
         for c in range(rows):

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.localisation.locate import locate
-from plant_emulator.diagnosis.localisation.parity_relations import base_speed
 from plant_emulator.diagnosis.machine import MeasuredRun
 from plant_emulator.diagnosis.machines.bench_candidates import candidate
 from plant_emulator.diagnosis.machines.bench_programs import (
@@ -31,6 +30,7 @@ from plant_emulator.estimation.initial_states import (
     with_logged_values,
 )
 from plant_emulator.estimation.start_search import Search
+from plant_emulator.model.array_laws import base_speed
 from plant_emulator.model.parameters import UNITS
 from plant_emulator.model.stage import GAP_POSITION, split_gap_position
 from plant_emulator.recordings.input_noise import noise_directions

@@ -15,11 +15,8 @@ import numpy as np
 
 from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
 from plant_emulator.diagnosis.localisation.drum_subsystem import prior_means
-from plant_emulator.diagnosis.localisation.parity_relations import (
-    DRIVE,
-    NOISES,
-    relation_residuals,
-)
+from plant_emulator.diagnosis.localisation.measured_signals import NOISES
+from plant_emulator.diagnosis.localisation.parity_relations import DRIVE, relation_residuals
 from plant_emulator.diagnosis.machines.thinning import thin
 from plant_emulator.diagnosis.search.rich_model import rich_columns
 from plant_emulator.errors import UnsettledError

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.localisation.drum_subsystem import LAWS_OF_ANGLE, is_torque_size
-from plant_emulator.diagnosis.localisation.parity_relations import GEAR, NOISES
+from plant_emulator.diagnosis.localisation.measured_signals import NOISES
+from plant_emulator.diagnosis.localisation.parity_relations import GEAR
 from plant_emulator.diagnosis.missing_law.quantity import Quantity, in_relations, time_of
 from plant_emulator.diagnosis.missing_law.states import QUICK, State
 

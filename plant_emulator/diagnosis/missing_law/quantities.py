@@ -6,13 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.localisation.parity_relations import (
-    ARMATURE,
-    DRIVE,
-    GEAR,
-    MOTOR,
-    friction,
-)
+from plant_emulator.diagnosis.localisation.parity_relations import ARMATURE, DRIVE, GEAR, MOTOR
 from plant_emulator.diagnosis.missing_law.drum_quantities import (
     drum_friction,
     drum_weight,
@@ -20,6 +14,7 @@ from plant_emulator.diagnosis.missing_law.drum_quantities import (
 )
 from plant_emulator.diagnosis.missing_law.quantity import Quantity, acting, time_of
 from plant_emulator.diagnosis.missing_law.states import QUICK, SLOW, State
+from plant_emulator.model.array_laws import gear_friction
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -124,7 +119,7 @@ def _flux(r: BlockRegression, q: Sequence[BlockQuantities]) -> Quantity:
 def _torque_sensor(r: BlockRegression, q: Sequence[BlockQuantities]) -> Quantity:
     xi = r.values["gear_ratio"]
     torque = State(
-        values=[-(one.load + friction(one.speed / xi, r.values)) / xi for one in q],
+        values=[-(one.load + gear_friction(one.speed / xi, r.values)) / xi for one in q],
         time=[one.time for one in q],
         name="shaft torque", symbol="T", unit="N m", code="value", kind="signed", lags=QUICK,
     )  # fmt: skip

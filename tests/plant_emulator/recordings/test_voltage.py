@@ -11,6 +11,7 @@ from plant_emulator.diagnosis.fitting.evidence import LJUNG_BOX_LIMIT
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.localisation.block_basis import block_quantities
 from plant_emulator.diagnosis.localisation.locate import WORTHWHILE_BLOCK_GAIN, locate
+from plant_emulator.diagnosis.localisation.measured_signals import measured_signals
 from plant_emulator.diagnosis.localisation.parameter_sensitivities import sensitivities
 from plant_emulator.diagnosis.localisation.parity_covariance import whitened_relations
 from plant_emulator.diagnosis.localisation.parity_relations import (
@@ -18,7 +19,6 @@ from plant_emulator.diagnosis.localisation.parity_relations import (
     DRIVE,
     GEAR,
     MOTOR,
-    measured_signals,
     relation_residuals,
 )
 from plant_emulator.diagnosis.machines.bench import BenchModel

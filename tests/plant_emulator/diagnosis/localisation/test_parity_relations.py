@@ -6,14 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from plant_emulator.diagnosis.localisation.measured_signals import measured_signals, smoothed_speed
 from plant_emulator.diagnosis.localisation.parity_covariance import whitened_relations
 from plant_emulator.diagnosis.localisation.parity_relations import (
     DRIVE,
     GEAR,
     MOTOR,
-    measured_signals,
     relation_residuals,
-    smoothed_speed,
 )
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import Recording, recording
