@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING
 
@@ -18,22 +17,15 @@ from plant_emulator.diagnosis.answer import (
     Undetectable,
     Verdict,
 )
+from plant_emulator.diagnosis.axis.findings import remainder
 from plant_emulator.diagnosis.axis.quantities import UNITS, quantities
-from plant_emulator.diagnosis.prediction.remainder import Remainder, describe_band, describe_fall
-from plant_emulator.diagnosis.prediction.trace import Trace
-from plant_emulator.diagnosis.report.details import Step
+from plant_emulator.diagnosis.prediction.remainder import describe_band, describe_fall
 from plant_emulator.diagnosis.wording import number
-from plant_emulator.signals.frequency_bands import BANDS, power
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from plant_emulator.diagnosis.axis.effects.effect import Effect
-    from plant_emulator.diagnosis.axis.held_out import HeldOut
+    from plant_emulator.diagnosis.axis.findings import AxisFindings
     from plant_emulator.diagnosis.axis.regression import Fit, Term
     from plant_emulator.diagnosis.axis.search import Search
-    from plant_emulator.diagnosis.axis.verdict import Decision
-    from plant_emulator.signals.log import Array
 
 # Effects of a ranking that are predicted and shown.
 SHOWN = 6
@@ -41,35 +33,7 @@ SHOWN = 6
 OPEN_GAP = 1.1
 
 
-@dataclass(frozen=True, kw_only=True)
-class Findings:
-    """What the answer is made of; floor : rms of the force's error [N or N m]; see `floor`."""
-
-    search: Search
-    held_out: HeldOut
-    decision: Decision
-    floor: float
-    sources: tuple[str, ...]
-    fitted: tuple[int, ...]
-    library: Sequence[Effect]
-
-    @property
-    def rotary(self) -> bool:
-        """Whether the axis turns."""
-        return self.search.scale.rotary
-
-    @property
-    def channel(self) -> str:
-        """Name of the force's channel."""
-        return "torque" if self.rotary else "force"
-
-    @property
-    def terms(self) -> tuple[Term, ...]:
-        """The named effects."""
-        return self.decision.found.terms if self.decision.kind == "effect" else ()
-
-
-def answer(f: Findings) -> Answer:
+def answer(f: AxisFindings) -> Answer:
     """The whole answer."""
     gap = _gap(f)
     return Answer(
@@ -86,65 +50,7 @@ def answer(f: Findings) -> Answer:
     )
 
 
-def traces(f: Findings) -> tuple[Trace, ...]:
-    """The predicted runs, measured and predicted."""
-    before, after = f.held_out.errors(()), f.held_out.errors(f.terms)
-    return tuple(
-        Trace(
-            source=f.sources[run],
-            channel=f.channel,
-            unit=UNITS[f.rotary]["offset"],
-            time=f.held_out.rows[run].time,
-            measured=y,
-            recalibrated=y - first,
-            explained=y - second,
-            noise=f.floor,
-        )
-        for run, y, first, second in zip(
-            f.held_out.runs, f.held_out.measured(), before, after, strict=True
-        )
-    )
-
-
-def remainder(f: Findings) -> Remainder:
-    """What the named effects leave, by frequency."""
-    regression, found = f.search.regression, f.decision.found
-    fitted = set(f.fitted).isdisjoint(f.held_out.runs)
-    own = [(regression.residual(found, k), r.time) for k, r in enumerate(regression.rows)]
-    after = f.held_out.errors(f.terms)
-    times = [f.held_out.rows[k].time for k in f.held_out.runs]
-    return Remainder(
-        channel=f.channel,
-        unit=UNITS[f.rotary]["offset"],
-        before=f.held_out.relative(()),
-        after=f.held_out.relative(f.terms),
-        held_out=_power(list(zip(after, times, strict=True))),
-        fitted=_power(own) if fitted else None,
-    )
-
-
-def steps(f: Findings) -> tuple[Step, ...]:
-    """The waterfall of the held-out gap, in multiples of the floor."""
-    found = []
-    names = [t.effect.name for t in f.terms]
-    for k in range(len(f.terms) + 1):
-        label = (
-            "recalibrated" if k == 0 else f"with {names[0]}" if k == 1 else f"and {names[k - 1]}"
-        )
-        e = np.concatenate(f.held_out.errors(f.terms[:k]))
-        gap = float(np.sqrt(np.mean(e**2))) / f.floor
-        found.append(Step(label=label, gap=gap, low=gap, high=gap))
-    return (*found, Step(label="floor", gap=1.0, low=1.0, high=1.0))
-
-
-def _power(residuals: Sequence[tuple[Array, Array]]) -> Array:
-    """Mean power of residuals in each of BANDS, weighted by their lengths [unit^2]."""
-    widths = np.array([high - low for low, high in BANDS])
-    each = [widths * power(e, float(np.median(np.diff(time)))) for e, time in residuals]
-    return np.average(each, axis=0, weights=[len(e) for e, _ in residuals])
-
-
-def _verdict(f: Findings) -> Verdict:
+def _verdict(f: AxisFindings) -> Verdict:
     d = f.decision
     return Verdict(
         kind=d.kind,
@@ -157,7 +63,7 @@ def _verdict(f: Findings) -> Verdict:
     )
 
 
-def _next(f: Findings) -> str | None:
+def _next(f: AxisFindings) -> str | None:
     """The channel that an unknown cause asks for first."""
     if f.decision.kind != "unknown" or f.search.regression.rows[0].run.log.load is not None:
         return None
@@ -165,7 +71,7 @@ def _next(f: Findings) -> str | None:
     return f"log the external load ({column}): a load that is missing in the logs looks like this"
 
 
-def _deviations(f: Findings) -> tuple[ParameterDeviation, ...]:
+def _deviations(f: AxisFindings) -> tuple[ParameterDeviation, ...]:
     """Inertias of single runs that differ from that of the fitted runs."""
     unit = UNITS[f.rotary]["inertia"]
     return tuple(
@@ -180,7 +86,7 @@ def _deviations(f: Findings) -> tuple[ParameterDeviation, ...]:
     )
 
 
-def _statement(f: Findings) -> str:
+def _statement(f: AxisFindings) -> str:
     d, rest = f.decision, remainder(f)
     match d.kind:
         case "effect":
@@ -208,7 +114,7 @@ def _statement(f: Findings) -> str:
     )
 
 
-def _named(f: Findings, term: Term) -> str:
+def _named(f: AxisFindings, term: Term) -> str:
     """An effect, what it is, and its values."""
     told = quantities(f.search.regression, f.decision.found, term)
     ways = [q for q in told if q.name in ("forwards", "backwards")]
@@ -218,7 +124,7 @@ def _named(f: Findings, term: Term) -> str:
     return f"{term.effect.name} ({term.effect.title})"
 
 
-def _location(f: Findings) -> Location:
+def _location(f: AxisFindings) -> Location:
     """Where the evidence lies: what the best effect of each subsystem closes."""
     falls: dict[str, float] = {}
     for found in _singles(f.search):
@@ -244,7 +150,7 @@ def _singles(search: Search) -> list[Fit]:
     return sorted(found, key=search.value)
 
 
-def _gap(f: Findings) -> HeldOutGap:
+def _gap(f: AxisFindings) -> HeldOutGap:
     """NRMSD of the force, and the share that the named effects close."""
     span = float(np.ptp(np.concatenate(f.held_out.measured())))
     before, after = (
@@ -272,7 +178,7 @@ def _closed(before: float, after: float, floor: float) -> float:
     return 1.0 - max(0.0, (after / floor) ** 2 - 1.0) / ((before / floor) ** 2 - 1.0)
 
 
-def _ranking(f: Findings) -> tuple[RankedEffect, ...]:
+def _ranking(f: AxisFindings) -> tuple[RankedEffect, ...]:
     """The named effects, and the best others alone."""
     singles = {found.names[0]: found for found in _singles(f.search)}
     shown = [*dict.fromkeys([*(t.effect.name for t in f.terms), *list(singles)[:SHOWN]])]
@@ -299,13 +205,13 @@ def _ranking(f: Findings) -> tuple[RankedEffect, ...]:
     return tuple(entries)
 
 
-def _evidence(f: Findings, found: Fit, name: str) -> float:
+def _evidence(f: AxisFindings, found: Fit, name: str) -> float:
     """Log evidence of an effect beside the others of a fit."""
     rest = f.search.sets.get(frozenset(found.names) - {name}, f.search.null)
     return f.search.value(rest) - f.search.value(found)
 
 
-def _undetectable(f: Findings) -> tuple[Undetectable, ...]:
+def _undetectable(f: AxisFindings) -> tuple[Undetectable, ...]:
     """Effects that need what these runs do not have."""
     there = {e.name for e in f.search.library}
     missing = {e.name: e.needs for e in f.library if e.name not in there}
@@ -313,11 +219,3 @@ def _undetectable(f: Findings) -> tuple[Undetectable, ...]:
         Undetectable(effect=name, reason=f"needs {needs}" if needs else "not in these runs")
         for name, needs in missing.items()
     )
-
-
-def describe_floor(rms: float, repeats: float | None, unit: str) -> str:
-    """A note on what the floor is."""
-    if repeats is None:
-        told = f"the logs hold no repeats: the floor is the sensors' noise, {number(rms)} {unit}"
-        return f"{told}; what a repeat would leave is not known"
-    return f"repeats of a run leave {number(repeats)} {unit} of each other: the floor of the gap"

@@ -3,7 +3,7 @@
 1. The motion is smoothed, the force averaged with the kernel of the motion (`start`).
 2. A queue over sets of effects ranks them by evidence (`search`).
 3. The held-out runs confirm what is named (`held_out`, `verdict`).
-4. The answer and the details of the report are put together (`answer`).
+4. The answer and the details of the report are put together (`answer`, `findings`).
 """
 
 from __future__ import annotations
@@ -11,9 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.axis import answer as told
+from plant_emulator.diagnosis.axis import findings
+from plant_emulator.diagnosis.axis.answer import answer
 from plant_emulator.diagnosis.axis.effects import LIBRARY
-from plant_emulator.diagnosis.axis.floor import repeat_floor, sensor_floor
+from plant_emulator.diagnosis.axis.floor import describe_floor, repeat_floor, sensor_floor
 from plant_emulator.diagnosis.axis.held_out import HeldOut
 from plant_emulator.diagnosis.axis.quantities import UNITS
 from plant_emulator.diagnosis.axis.regression import NAMES
@@ -90,7 +91,7 @@ def diagnose_axis(
     repeats = repeat_floor(held_out)
     floor = max(sensor_floor(rows, regression.base.inertia), repeats or 0.0)
     decision = decide(search, held_out, floor)
-    found = told.Findings(
+    found = findings.AxisFindings(
         search=search,
         held_out=held_out,
         decision=decision,
@@ -99,16 +100,16 @@ def diagnose_axis(
         fitted=plan.fitted,
         library=effects,
     )
-    answer = told.answer(found)
+    told = answer(found)
     tell("done", 1.0)
     return Findings(
-        answer=answer,
+        answer=told,
         details=Details(
-            traces=told.traces(found),
-            waterfall=told.steps(found),
+            traces=findings.traces(found),
+            waterfall=findings.waterfall(found),
             settings={**settings, **THRESHOLDS},
-            notes=(*notes, told.describe_floor(floor, repeats, UNITS[scale.rotary]["offset"])),
-            remainder=told.remainder(found),
+            notes=(*notes, describe_floor(floor, repeats, UNITS[scale.rotary]["offset"])),
+            remainder=findings.remainder(found),
         ),
         final=_final(found),
         fixed={},
@@ -126,7 +127,7 @@ def check_alike(logs: Sequence[AxisLog]) -> None:
             )
 
 
-def _final(found: told.Findings) -> FitResult:
+def _final(found: findings.AxisFindings) -> FitResult:
     """The fit behind the answer, as every diagnosis has one."""
     fit, regression = found.decision.found, found.search.regression
     errors = fit.covariance.diagonal() ** 0.5

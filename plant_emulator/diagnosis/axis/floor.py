@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.axis.regression import residual
+from plant_emulator.diagnosis.wording import number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -84,3 +85,11 @@ def _force(rows: Rows) -> Array:
 
     log = rows.run.log
     return np.asarray(smooth(rows.run.kernel.time, log.force).curve(rows.run.kernel.rows))
+
+
+def describe_floor(rms: float, repeats: float | None, unit: str) -> str:
+    """Describe the floor in a note of the answer; rms, repeats : in the unit."""
+    if repeats is None:
+        told = f"the logs hold no repeats: the floor is the sensors' noise, {number(rms)} {unit}"
+        return f"{told}; what a repeat would leave is not known"
+    return f"repeats of a run leave {number(repeats)} {unit} of each other: the floor of the gap"
