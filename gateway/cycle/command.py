@@ -25,7 +25,7 @@ NOT_BY_WAITING = LINK_IS_DOWN | {Reason.NOT_ENCODABLE}
 """Faults that the next write will meet again."""
 RECENT, JITTER = 0.25, 0.1
 """[s] Greatest age of a command that some master still writes; the slowest gateway writes every 0.2
-s. The second number is by how much such a command must be younger than our last one."""
+s. The second number is the time in which a PLC takes up a block that has arrived."""
 MICRO, NUMBERS = 1e6, 30011
 """Parts of a second, and the count of possible first numbers. The count is a prime, so that two
 gateways with periodic starts still get different numbers."""
@@ -37,7 +37,9 @@ class Command:
 
     number : number of the last block, None: no block has been written
     speed, written : last setpoint [rad/s] and its time; a tick without a block counts as setpoint 0
-    sent : time of the last block
+    sent : time of the tick that made the last block
+    ticked, heard : times of the last tick, and of the last tick with a good reading
+    asked, arrived : before that reading was asked for; after the last block has arrived
     enabled : enable of the last block
     unanswered : count of blocks after the block that was echoed last
     echo, echo_moved : the last echo, and the time of its last change or of the start of the run
@@ -51,6 +53,10 @@ class Command:
     speed: float = 0.0
     written: float = 0.0
     sent: float = -inf
+    ticked: float = -inf
+    heard: float = -inf
+    asked: float = -inf
+    arrived: float = -inf
     enabled: bool = False
     unanswered: int = 0
     echo: int | None = None
@@ -61,13 +67,28 @@ class Command:
     down: bool = False
 
 
+def note_tick(command: Command, now: float, latency: float) -> Command:
+    """Note a tick, and when the tick before read and wrote; `latency` is that of the tick before.
+
+    A computer under load may stop a tick between its reading, its time and its write. The tick
+    began no earlier than its latency before its time, and ended no later than that after it.
+    """
+    before = command.ticked
+    return replace(
+        command,
+        ticked=now,
+        asked=before - latency if command.heard == before else command.asked,
+        arrived=before + latency if command.sent == before else command.arrived,
+    )
+
+
 def note_echo(
     register_map: RegisterMap, command: Command, sample: Measurement | None, now: float
 ) -> Command:
     """Note which command the PLC accepted up to a new sample, and whether this gateway sent it."""
     if sample is None:
         return command
-    if _other_master_wrote(command, sample.command_age, now):
+    if _other_master_wrote(command, sample.command_age):
         command = replace(command, other_wrote=now)
     echo, before = sample.command_sequence_echo, command.echo
     if echo is None or echo == before:
@@ -79,9 +100,12 @@ def note_echo(
     return moved if before is None else replace(moved, other_wrote=now)
 
 
-def _other_master_wrote(command: Command, age: float | None, now: float) -> bool:
-    """Whether the PLC accepted a command after our last one; `age` is that of its command [s]."""
-    return age is not None and age < RECENT and now - command.sent > age + JITTER
+def _other_master_wrote(command: Command, age: float | None) -> bool:
+    """Whether the PLC accepted a command after our last one; `age` is that of its command [s].
+
+    The PLC took a new sample after the reading before it was asked for: that reading lacks it.
+    """
+    return age is not None and age < RECENT and command.asked - command.arrived > age + JITTER
 
 
 def _blocks_since(register_map: RegisterMap, command: Command, echo: int) -> int | None:
@@ -98,12 +122,16 @@ def note_reply(command: Command, measurement: Measurement | None, fault: Reason 
     """Note what became of the last block. A fault beside a good reading is a fault of the write.
 
     Without a reading, the fault belongs to the reading and says nothing about the write before it.
+    A block whose write failed may have arrived at any time before this reading.
     """
     if measurement is None:
         return command
+    if measurement.sequence_start == measurement.sequence_end:
+        command = replace(command, heard=command.ticked)
     if fault is None:
         return replace(command, got_through=command.written, fault=None, down=False)
-    return replace(command, fault=command.fault or fault, down=fault in NOT_BY_WAITING)
+    first, down = command.fault or fault, fault in NOT_BY_WAITING
+    return replace(command, arrived=command.ticked, fault=first, down=down)
 
 
 def fault(command: Command, now: float, stale: float) -> Reason | None:

@@ -136,7 +136,8 @@ def step(
     now = observation.now
     read = samples.take(state.samples, observation.measurement, observation.fault, now)
     read = samples.with_window(config, register_map, read)
-    sent = command.note_reply(state.command, observation.measurement, observation.fault)
+    sent = command.note_tick(state.command, now, observation.latency)
+    sent = command.note_reply(sent, observation.measurement, observation.fault)
     sent = command.note_echo(register_map, sent, read.newest if read.is_new else None, now)
     writes = state.supervisor.state in command.WRITING and not observation.shadow
     watched = surveillance.note_latency(config, state.watched, observation.latency, writes=writes)

@@ -183,7 +183,7 @@ def test_an_echo_that_moves_before_anything_was_written_is_another_masters():
 
 
 @pytest.mark.parametrize(
-    ("sent", "age", "seen"),
+    ("arrived", "age", "seen"),
     [
         (-inf, 0.0, True),
         (-inf, 0.24, True),
@@ -194,16 +194,44 @@ def test_an_echo_that_moves_before_anything_was_written_is_another_masters():
         (9.75, 0.2, False),
     ],
 )
-def test_a_command_younger_than_our_last_one_is_another_masters(sent, age, seen):
-    """Its age by the PLC; ours was written at `sent`, 10 s is now; 0.1 s may lie between."""
+def test_a_command_younger_than_our_last_one_is_another_masters(arrived, age, seen):
+    """Its age by the PLC, whose sample is of 10 s or later; 0.1 s may lie between."""
     reading = replace(READING, command_age=age)
-    after = command.note_echo(MAP, Command(echo=41, sent=sent), reading, 10.0)
-    assert after.other_wrote == (10.0 if seen else -inf)
+    before = Command(echo=41, asked=10.0, arrived=arrived)
+    after = command.note_echo(MAP, before, reading, 10.02)
+    assert after.other_wrote == (10.02 if seen else -inf)
 
 
 def test_a_command_exactly_as_late_as_may_be_is_ours():
     reading = replace(READING, command_age=0.0)
-    assert command.note_echo(MAP, Command(echo=41, sent=0.0), reading, 0.1).other_wrote == -inf
+    before = Command(echo=41, asked=0.1, arrived=0.0)
+    assert command.note_echo(MAP, before, reading, 0.12).other_wrote == -inf
+
+
+def test_a_tick_that_took_long_read_earlier_and_wrote_later_than_its_time():
+    """The tick of 5 s took 0.125 s: it may have begun at 4.875 s, or have ended at 5.125 s."""
+    before = Command(ticked=5.0, heard=5.0, sent=5.0, asked=4.5, arrived=4.5)
+    after = command.note_tick(before, 5.25, 0.125)
+    assert (after.ticked, after.asked, after.arrived) == (5.25, 4.875, 5.125)
+
+
+def test_a_tick_that_heard_and_wrote_nothing_tells_nothing():
+    before = Command(ticked=5.0, heard=4.75, sent=4.75, asked=4.5, arrived=4.5)
+    after = command.note_tick(before, 5.25, 0.125)
+    assert (after.ticked, after.asked, after.arrived) == (5.25, 4.5, 4.5)
+
+
+def test_a_block_whose_write_failed_may_have_arrived_until_the_next_good_reading():
+    failed = replace(SENT, ticked=5.25, arrived=5.0)
+    assert command.note_reply(failed, READING, Reason.TIMEOUT).arrived == 5.25
+    assert command.note_reply(failed, READING, None).arrived == 5.0
+    assert command.note_reply(failed, None, Reason.TIMEOUT).arrived == 5.0
+
+
+def test_a_torn_image_says_nothing_of_the_time_of_a_sample():
+    before = replace(SENT, ticked=5.25)
+    assert command.note_reply(before, READING, None).heard == 5.25
+    assert command.note_reply(before, replace(READING, sequence_end=8), None).heard == -inf
 
 
 SENT = Command(number=3, written=5.0, got_through=4.99)

@@ -215,6 +215,49 @@ def test_fault_of_a_write_is_not_forgotten_over_a_tick_without_a_reading(run: Ru
     assert run.output.reason is Reason.EXCEPTION_2
 
 
+class Delaying(TcpLink):
+    """A link that stands still before a write or after a reading, while the PLC scans on."""
+
+    bench: Bench
+    stops_at, stop = "", 0.0
+
+    def read(self, address: int, count: int, function: int = 3) -> tuple[int, ...]:
+        words = super().read(address, count, function)
+        self._wait("after the reading")
+        return words
+
+    def write(self, address: int, words: Sequence[int]) -> None:
+        self._wait("before the write")
+        super().write(address, words)
+        self._wait("after the write")
+
+    def _wait(self, place: str) -> None:
+        if place == self.stops_at:
+            self.stops_at = ""
+            self.bench.sleep_until(self.bench.time + self.stop)
+
+
+@pytest.mark.parametrize(
+    ("place", "stop"),
+    [("after the reading", 0.09), ("before the write", 0.13), ("after the write", 0.13)],
+)
+def test_gateway_that_stood_still_takes_its_own_command_for_no_others(
+    run: Run, place: str, stop: float
+) -> None:
+    """As on a busy computer. Stale data end a run after 0.1 s, the watchdog after 0.2 s."""
+    link = Delaying("127.0.0.1", run.bench.emulator.port, unit=1, timeout=1.0)
+    link.bench, link.stop = run.bench, stop
+    run.link = run.loop._link = link
+    running(run)
+    link.stops_at = place
+    reasons = set()
+    for _ in range(30):
+        reasons.add(run.for_ticks(1).output.reason)
+        run.ticks = max(run.ticks, round((run.bench.time - 1000.0) / SCAN) + 1)
+    assert link.stops_at == ""
+    assert reasons == {None}
+
+
 def test_shadow_writes_nothing(emulator: EmulatorProcess, tmp_path: Path) -> None:
     run = Run(emulator, tmp_path / "run.rlrec", shadow=True)
     emulator.set_remote(on=True)
