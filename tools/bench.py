@@ -23,8 +23,8 @@ import sys
 from dataclasses import asdict
 
 import click
-from comparisons import GROUPS, Row
-from study import Study
+from benchmark.comparisons import GROUPS, Row
+from benchmark.study import Study
 
 SCHEMA = "bench/1"
 

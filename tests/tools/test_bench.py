@@ -73,7 +73,7 @@ def test_scipy_on_the_thesis_equations_agrees_with_the_simulation(style: str) ->
     time, reference = program.reference()
     values = parameter_sets.load().values()
     ours = simulate(inputs_of(Log(time, {"speed_reference": reference})), values)
-    peers = runpy.run_path(str(ROOT / "tools" / "peers.py"))
+    peers = runpy.run_path(str(ROOT / "tools/benchmark/peers.py"))
     corners = ((0.0, 0.0), *program.corners, (program.duration, 0.0))
     theirs = peers["Lsoda"](time, peers[style](corners, values), values)(1e-5)
     for k, channel in enumerate(peers["CHANNELS"]):

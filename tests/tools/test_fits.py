@@ -22,7 +22,7 @@ def fits() -> Any:
     """The log of the comparison, prepared for both ways."""
     sys.path.insert(0, TOOLS)
     try:
-        from fits import Fits
+        from benchmark.fits import Fits
     finally:
         sys.path.remove(TOOLS)
     return Fits()

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import peers
 
+from benchmark import peers
 from plant_emulator import logs, parameter_sets
 from plant_emulator.estimation.free_parameters import free_parameters
 from plant_emulator.identification.identify import identify
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from plant_emulator.identification.identify import Identification
     from plant_emulator.signals.log import Array
 
-LOG = Path(__file__).resolve().parent.parent / "tests/data/bench_practice/practice_008"
+LOG = Path(__file__).resolve().parents[2] / "tests/data/bench_practice/practice_008"
 PROGRAM = "program1"
 # At this tolerance the solver's error is far below the noise. The step of lmfit's differences has
 # to be larger than that error. lmfit's epsfcn is the square of the step.

@@ -16,7 +16,7 @@ import click
 
 from plant_emulator import effects
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 CASE, CAUSE = ROOT / "tests/data/bench_practice/practice_003", "torque_sensor_lag"
 SMALL = 10
 LOGS = [str(CASE / f"program{k}.csv.gz") for k in (1, 2, 3)]

@@ -14,15 +14,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-import clients
-import diagnoses
 import numpy as np
-import peers
-import ticks
-from fits import Fits, Fitted
-from study import ERROR_BOUND, LONG_STEP, PROGRAM, Study
-from timing import alone, duration, side_by_side
 
+from benchmark import clients, diagnoses, peers, ticks
+from benchmark.fits import Fits, Fitted
+from benchmark.study import ERROR_BOUND, LONG_STEP, PROGRAM, Study
+from benchmark.timing import alone, duration, side_by_side
 from plant_emulator import parameter_sets
 from plant_emulator.effects import names as effect_names
 from plant_emulator.simulation.running_bench import Bench
@@ -198,7 +195,7 @@ def first_result(study: Study) -> Rows:
         for name in ("first_result_cold", "first_result_warm"):
             before = resource.getrusage(resource.RUSAGE_CHILDREN)
             environment = {**os.environ, "ROADLOAD_CACHE": folder}
-            root = Path(__file__).resolve().parent.parent
+            root = Path(__file__).resolve().parents[2]
             subprocess.run(
                 [sys.executable, "-c", FIRST_RESULT, PROGRAM], env=environment, cwd=root, check=True
             )

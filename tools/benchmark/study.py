@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 import numpy as np
-import peers
-from timing import Action, alone
 
+from benchmark import peers
+from benchmark.timing import Action, alone
 from plant_emulator import parameter_sets
 from plant_emulator.signals.log import Array, Log
 from plant_emulator.simulation import programs

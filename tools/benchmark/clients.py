@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from gateway.link.plc import TcpLink
 
 MAP = load("bench_int16")
-SOURCES = Path(__file__).resolve().parents[1] / "tests/system"
+SOURCES = Path(__file__).resolve().parents[2] / "tests/system"
 ROUNDS, CYCLES = 15, 1000
 PLC_PRIORITY = 20
 
