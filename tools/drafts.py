@@ -22,6 +22,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import click
+from practice import cases_of
 from threadpoolctl import threadpool_limits
 
 from plant_emulator import effects, parameter_sets
@@ -40,7 +41,6 @@ from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
 from plant_emulator.solver.kernel import kernel, use_own_effects
 from plant_emulator.workflows.diagnosis.drafting import draft
 from plant_emulator.workflows.diagnosis.runs import bench_runs
-from tools.practice import cases_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
