@@ -12,7 +12,7 @@ import pytest
 from plant_emulator import effects
 
 # Logs of the independent bench with a torque sensor that lags by 0.1 s (tests/data/README.md).
-CASE = Path(__file__).parents[1] / "data" / "bench_practice" / "practice_003"
+CASE = Path(__file__).parents[2] / "data" / "bench_practice" / "practice_003"
 FITTED = [str(CASE / f"program{k}.csv.gz") for k in (1, 2)]
 PREDICTED = str(CASE / "program3.csv.gz")
 # A small library: what each further effect costs is measured elsewhere.

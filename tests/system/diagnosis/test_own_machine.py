@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from plant_emulator.cli import main
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 PAGE = ROOT / "plant_emulator" / "diagnosis" / "OWN_MACHINE.md"
 COMMAND = re.compile(r"    \.venv/bin/plant-emulator (.*)")
 

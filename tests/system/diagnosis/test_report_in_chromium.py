@@ -13,7 +13,7 @@ from matplotlib.image import imread
 from plant_emulator.diagnosis.report.document import from_json
 from plant_emulator.diagnosis.report.html.page import html
 from tests.plant_emulator.diagnosis import answers
-from tests.system.conftest import FITTED, PREDICTED, Diagnosed
+from tests.system.diagnosis.conftest import FITTED, PREDICTED, Diagnosed
 
 pytestmark = [pytest.mark.peer, pytest.mark.slow]
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.system.conftest import (
+from tests.system.diagnosis.conftest import (
     FITTED,
     LEFT_OUT,
     LIBRARY,
@@ -138,7 +138,7 @@ def test_single_log_is_predicted_on_its_later_part_and_its_cause_withheld_is_unk
 
 @pytest.mark.slow
 def test_own_effect_of_the_readme_is_found_in_the_place_of_the_one_left_out(tmp_path: Path) -> None:
-    page = Path(__file__).parents[2] / "plant_emulator" / "diagnosis" / "README.md"
+    page = Path(__file__).parents[3] / "plant_emulator" / "diagnosis" / "README.md"
     readme = page.read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?amplifier.*?)```", readme, re.DOTALL)
     own, saved = tmp_path / "amplifier_filter.py", tmp_path / "bench.toml"

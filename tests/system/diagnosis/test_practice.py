@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.system.conftest import plant_emulator
+from tests.system.diagnosis.conftest import plant_emulator
 
-CASES = Path(__file__).parents[1] / "data" / "bench_practice"
+CASES = Path(__file__).parents[2] / "data" / "bench_practice"
 
 
 @pytest.mark.slow
