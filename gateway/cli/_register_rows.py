@@ -7,7 +7,7 @@ import click
 
 from gateway.link.device import Device
 from gateway.link.inspection import (
-    Row,
+    RegisterRow,
     Words,
     constant_words,
     swap_words,
@@ -88,7 +88,7 @@ FOUND: Final = (
 )
 
 
-def comparison_row(row: Row, device: Device) -> tuple[str, ...]:
+def comparison_row(row: RegisterRow, device: Device) -> tuple[str, ...]:
     """Row of a register on a device, with the finding of the comparison."""
     line = live_row(row.register, row.words or row.finding, 0.0, device)
     return (*line[:6], ("" if row.holds else "! ") + row.finding, line[7])

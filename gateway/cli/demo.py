@@ -112,13 +112,13 @@ def command(
     """
     from rich.console import Console
 
-    from gateway.demo.options import LOADS, Options
+    from gateway.demo.options import LOADS, DemoOptions
     from gateway.demo.run import demo
     from gateway.errors import GatewayError
 
     console = Console(stderr=json_file == "-")
     shown = demo(
-        Options(
+        DemoOptions(
             loads=LOADS if load_mass is None else (load_mass,),
             driver=driver,
             regulator=regulator,

@@ -12,7 +12,7 @@ from gateway.configuration.config import Config
 from gateway.configuration.program import Step
 from gateway.cycle.cycle import Observation, initial, step
 from gateway.cycle.supervisor import State
-from gateway.losses.sections import Trace
+from gateway.losses.sections import SweepTrace
 from register_maps.register_map import RegisterMap
 
 OUTSIDE = -1
@@ -31,7 +31,7 @@ class StepRun:
     """
 
     config: Config
-    trace: Trace
+    trace: SweepTrace
     current: Array
     own_time: Array
     heartbeat: Array

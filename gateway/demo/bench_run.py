@@ -6,12 +6,12 @@ import numpy as np
 
 from gateway.arrays import Array
 from gateway.cycle.supervisor import State
-from gateway.demo.options import Options
+from gateway.demo.options import DemoOptions
 from gateway.demo.plot import Curves
 from gateway.offline.drive_quality import drive_quality
 from gateway.offline.evaluation import Agreement, agreement, traction_energy
 from gateway.offline.figures import Latency, RunFigures, TractionEnergy, cruise_force
-from gateway.recordings.recording import Recording
+from gateway.recordings.recording import GatewayRecording
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation import truck
 
@@ -28,7 +28,7 @@ class BenchRun:
 
     truck: truck.Forklift
     log: Log
-    recording: Recording
+    recording: GatewayRecording
     exit_code: int
     road_speed: Array
     road_force: Array
@@ -44,7 +44,7 @@ class BenchRun:
         return self.log["wheel_torque"] / self.truck.wheel_radius
 
 
-def drive_on_road(options: Options, forklift: truck.Forklift, log: Log) -> tuple[Array, Array]:
+def drive_on_road(options: DemoOptions, forklift: truck.Forklift, log: Log) -> tuple[Array, Array]:
     """Speed [m/s] and drive force [N] of the truck of a log on the road.
 
     Without a driver, the truck has the torque that acted on the bench. A driver asks for other
@@ -58,7 +58,7 @@ def drive_on_road(options: Options, forklift: truck.Forklift, log: Log) -> tuple
     return speed, torque / forklift.wheel_radius
 
 
-def figures_of(options: Options, run: BenchRun) -> RunFigures:
+def figures_of(options: DemoOptions, run: BenchRun) -> RunFigures:
     """Key figures of one run. The latency is not measured where no clock ran."""
     ticks = run.recording.records[run.recording.records["state"] == State.RUN]
     return RunFigures(

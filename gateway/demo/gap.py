@@ -23,7 +23,7 @@ from gateway.cycle.supervisor import State
 from gateway.demo import plot
 from gateway.demo.bench_run import BenchRun, curves_of
 from gateway.demo.operator import Follower, Session, wait_for
-from gateway.demo.options import Options
+from gateway.demo.options import DemoOptions
 from gateway.demo.run import drive as drive_truck
 from gateway.demo.run import failure_of
 from gateway.demo.seal import Truth, draw
@@ -190,7 +190,7 @@ def diagnose(logs: list[Path], out: Path, console: Console) -> dict[str, Any]:
 
 def _truck(bench: Path, friction: Path | None, out: Path, console: Console) -> BenchRun:
     """A truck with a driver on the bench, with the nominal friction or that of a set."""
-    options = Options(
+    options = DemoOptions(
         loads=(0.0,),
         driver="pi",
         bench_parameters=str(bench),

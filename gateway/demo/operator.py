@@ -36,7 +36,7 @@ CHANGE_WITHIN: Final = 30.0
 """[s] Longest wait for each state, besides the cycle itself."""
 
 
-class Emulator(Protocol):
+class EmulatorSwitches(Protocol):
     """Switches of the emulated bench."""
 
     def set_remote(self, *, on: bool) -> None:
@@ -52,7 +52,7 @@ class Session:
 
     config: Config
     file: Path
-    emulator: Emulator
+    emulator: EmulatorSwitches
     screen: Screen
     duration: float
 
@@ -163,7 +163,7 @@ def moment(tick: np.void, cycle_time: float, config: Config) -> Moment:
 class _ScanClock:
     """Clock of an emulator that scans on request: to sleep is to scan."""
 
-    def __init__(self, emulator: Emulator) -> None:
+    def __init__(self, emulator: EmulatorSwitches) -> None:
         self._emulator, self._scans = emulator, 0
 
     def now(self) -> float:

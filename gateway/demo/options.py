@@ -10,7 +10,7 @@ LOADS: Final = (0.0, 1600.0)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options:
+class DemoOptions:
     """Options of a demo.
 
     loads : of the trucks [kg], one run each; period : of the loop [s]; duration : of the cycle [s]

@@ -16,7 +16,7 @@ from gateway.config_file import load
 from gateway.demo import plot
 from gateway.demo.bench_run import BenchRun, curves_of, drive_on_road, figures_of
 from gateway.demo.operator import Session, operate_fast, operate_in_real_time
-from gateway.demo.options import UNLOADED, Options
+from gateway.demo.options import UNLOADED, DemoOptions
 from gateway.demo.view import Screen
 from gateway.errors import GatewayError
 from gateway.offline.figures import RunFigures
@@ -40,7 +40,7 @@ class DemoResult:
         return {"schema": "demo/1", "runs": [one.to_json() for one in self.figures]}
 
 
-def demo(options: Options, console: Console) -> DemoResult:
+def demo(options: DemoOptions, console: Console) -> DemoResult:
     """Drive every truck, and write picture and summary beside the logs."""
     options.out.mkdir(parents=True, exist_ok=True)
     runs = [drive(options, load_mass, console) for load_mass in options.loads]
@@ -71,7 +71,7 @@ def failure_of(run: BenchRun) -> str:
     )
 
 
-def drive(options: Options, load_mass: float, console: Console) -> BenchRun:
+def drive(options: DemoOptions, load_mass: float, console: Console) -> BenchRun:
     """Drive one truck with this load [kg] through its cycle."""
     forklift = Forklift(mass=UNLOADED + load_mass)
     title = (
@@ -98,7 +98,7 @@ def drive(options: Options, load_mass: float, console: Console) -> BenchRun:
     )
 
 
-def _emulator(options: Options, forklift: Forklift) -> EmulatorProcess:
+def _emulator(options: DemoOptions, forklift: Forklift) -> EmulatorProcess:
     return EmulatorProcess(
         truck_mass=forklift.mass,
         driver=options.driver,
@@ -109,7 +109,7 @@ def _emulator(options: Options, forklift: Forklift) -> EmulatorProcess:
 
 
 def _session(
-    options: Options,
+    options: DemoOptions,
     forklift: Forklift,
     load_mass: float,
     emulator: EmulatorProcess,

@@ -26,7 +26,7 @@ Reading = Mapping[str, Words | str]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Row:
+class RegisterRow:
     """One register as the device shows it.
 
     words : empty where the register cannot be read
@@ -53,10 +53,10 @@ class Row:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Verification:
+class MapVerification:
     """Comparison of a register map with a device, register by register."""
 
-    rows: tuple[Row, ...]
+    rows: tuple[RegisterRow, ...]
 
     @property
     def holds(self) -> bool:
@@ -125,9 +125,9 @@ def mbpoll(
     )
 
 
-def verify(register_map: RegisterMap, readings: Sequence[Reading]) -> Verification:
+def verify(register_map: RegisterMap, readings: Sequence[Reading]) -> MapVerification:
     """Compare a map with two or more readings of a device that are some tens of ms apart."""
-    return Verification(
+    return MapVerification(
         rows=tuple(
             _row(register, [reading[register.name] for reading in readings])
             for register in register_map.registers
@@ -136,15 +136,15 @@ def verify(register_map: RegisterMap, readings: Sequence[Reading]) -> Verificati
     )
 
 
-def _row(register: Register, seen: Sequence[Words | str]) -> Row:
+def _row(register: Register, seen: Sequence[Words | str]) -> RegisterRow:
     words = [found for found in seen if not isinstance(found, str)]
     if len(words) < len(seen):
         why = next(found for found in seen if isinstance(found, str))
-        return Row(
+        return RegisterRow(
             register=register, words=(), value=None, finding=f"unreadable: {why}", holds=False
         )
     finding = "" if register.access == "write" else _finding(register, words)
-    return Row(
+    return RegisterRow(
         register=register,
         words=words[-1],
         value=_value(register, words[-1]),

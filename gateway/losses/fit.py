@@ -34,7 +34,7 @@ GRID: Final = np.linspace(*RANGES["exponent"], 196)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fit:
+class FrictionFit:
     """The fitted friction law.
 
     covariance : of coulomb, viscous, exponent [their units], shape (3, 3); zero for a held one
@@ -68,7 +68,7 @@ class Fit:
         return error
 
 
-def fit(sections: Sequence[Section]) -> Fit:
+def fit(sections: Sequence[Section]) -> FrictionFit:
     """Fit the friction law. Raises LossesError where these sections do not determine it."""
     omega = np.array([one.gear_speed for one in sections])
     torque = np.array([one.friction for one in sections])
@@ -86,7 +86,7 @@ def fit(sections: Sequence[Section]) -> Fit:
             f"of {error:.2f} from {_range(omega)}; expected at most {EXPONENT_ERROR:g}: longer "
             "stretches, or slower and faster ones"
         )
-    return Fit(
+    return FrictionFit(
         friction=Friction(coulomb=coulomb, viscous=viscous, exponent=exponent),
         covariance=covariance,
         residuals=residuals,

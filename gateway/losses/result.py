@@ -12,7 +12,7 @@ import numpy as np
 
 from gateway.configuration.config import BenchConfig
 from gateway.friction.law import Friction
-from gateway.losses.fit import Fit
+from gateway.losses.fit import FrictionFit
 from gateway.losses.sections import LeftOut, Section
 from register_maps.units import RPM, ZERO_CELSIUS
 
@@ -63,7 +63,7 @@ class Losses:
     bench : of the last run
     """
 
-    fit: Fit
+    fit: FrictionFit
     sections: Sequence[Section]
     left_out: Sequence[LeftOut]
     sources: Sequence[Source]

@@ -61,7 +61,7 @@ class SignError(LossesError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Trace:
+class SweepTrace:
     """Signals of a run in SI, shape (n,) each; shaft_torque : mean up to each sample, if known."""
 
     name: str
@@ -115,7 +115,7 @@ class Steady:
     left_out: tuple[LeftOut, ...]
 
 
-def steady(trace: Trace, bench: BenchConfig, sensor: RegulatorConfig = PLAIN) -> Steady:
+def steady(trace: SweepTrace, bench: BenchConfig, sensor: RegulatorConfig = PLAIN) -> Steady:
     """Steady stretches of a run with the friction in each.
 
     sensor : knows the errors of the torque sensor
@@ -140,7 +140,7 @@ def steady(trace: Trace, bench: BenchConfig, sensor: RegulatorConfig = PLAIN) ->
     return Steady(sections=_pool_noise(sections), left_out=tuple(left_out))
 
 
-def _stretches(trace: Trace) -> Iterator[slice]:
+def _stretches(trace: SweepTrace) -> Iterator[slice]:
     """Samples in which the motor turns at a constant speed, stretch by stretch."""
     still = np.abs(_slope(trace.time, trace.motor_speed)) < STEADY
     turning = still & (np.abs(trace.motor_speed) > STANDSTILL_SPEED)
@@ -174,7 +174,7 @@ def _moving_mean(values: Array, count: int) -> Array:
     return mean
 
 
-def _rejection(trace: Trace, part: slice, gear_ratio: float) -> str:
+def _rejection(trace: SweepTrace, part: slice, gear_ratio: float) -> str:
     """Reason for which a stretch cannot be used; empty: it can."""
     time, speed, torque = trace.time[part], trace.motor_speed[part], trace.shaft_torque[part]
     if speed.mean() < 0.0:
@@ -197,14 +197,16 @@ def _batch_means(values: Array) -> Array:
     return np.array([batch.mean() for batch in np.array_split(values, BATCHES)])
 
 
-def _left_out(trace: Trace, part: slice, why: str) -> LeftOut:
+def _left_out(trace: SweepTrace, part: slice, why: str) -> LeftOut:
     time = trace.time[part]
     speed = float(trace.motor_speed[part].mean())
     start, end = float(time[0]), float(time[-1])
     return LeftOut(run=trace.name, start=start, end=end, motor_speed=speed, why=why)
 
 
-def _section(trace: Trace, part: slice, bench: BenchConfig, sensor: RegulatorConfig) -> Section:
+def _section(
+    trace: SweepTrace, part: slice, bench: BenchConfig, sensor: RegulatorConfig
+) -> Section:
     """Friction in one steady stretch, with the standard error of its batches."""
     xi, inertia = bench.gear_ratio, bench.gear_inertia + bench.drum_inertia
     time, torque = trace.time[part], sensor.shaft_torque(trace.shaft_torque[part])

@@ -13,7 +13,7 @@ from gateway.offline.evaluation import Agreement, agreement
 
 
 @dataclass(frozen=True, kw_only=True)
-class Comparison:
+class SetpointComparison:
     """Two setpoints of the motor speed, one value a tick; NaN: no setpoint. Shape (n,) each.
 
     title : which two setpoints these are
@@ -52,9 +52,11 @@ class Comparison:
         return agreement(wanted, self.found[self.both])
 
 
-def compare(title: str, time: Array, wanted: Array, outputs: Sequence[Output]) -> Comparison:
+def compare(
+    title: str, time: Array, wanted: Array, outputs: Sequence[Output]
+) -> SetpointComparison:
     """Compare the setpoints of a run with the outputs of its replay, tick by tick."""
-    return Comparison(
+    return SetpointComparison(
         title=title,
         time=np.asarray(time, dtype=float),
         wanted=np.asarray(wanted, dtype=float),

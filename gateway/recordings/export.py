@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from gateway.arrays import Array
 from gateway.cycle.record import READ, WRITTEN
 from gateway.recordings.header import map_of
-from gateway.recordings.recording import Recording, Stream, reason_name, state_name
+from gateway.recordings.recording import GatewayRecording, Stream, reason_name, state_name
 from register_maps.logs.poll_quality import PollQuality
 from register_maps.signals import LOG_COLUMNS, SIGNALS, Status
 from register_maps.timing import SCAN
@@ -293,6 +293,6 @@ def unwrap_time(time: Array, modulus: float | None) -> Array:
     return np.cumsum(steps if modulus is None else np.mod(steps, modulus))
 
 
-def of_recording(recording: Recording) -> NDArray[np.intp]:
+def of_recording(recording: GatewayRecording) -> NDArray[np.intp]:
     """Indices of the ticks of a recording that read a new sample."""
     return new_samples(recording.records)[0]

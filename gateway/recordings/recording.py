@@ -42,7 +42,7 @@ class DamageError(RecordingError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Recording:
+class GatewayRecording:
     """A recording in memory.
 
     records : structured NumPy array, fields as gateway.cycle.record.Layout.formats
@@ -95,7 +95,7 @@ def encode_header(header: dict[str, Any]) -> bytes:
     return MAGIC + len(text).to_bytes(4, "little") + text
 
 
-def read(path: Path) -> Recording:
+def read(path: Path) -> GatewayRecording:
     """Recording in a file; the file of its first part stands for the whole run.
 
     Raises RecordingError, and DamageError for a damaged record.
@@ -110,7 +110,7 @@ def read(path: Path) -> Recording:
     )
 
 
-def _read_part(path: Path) -> Recording:
+def _read_part(path: Path) -> GatewayRecording:
     try:
         with open_plain_or_compressed(path) as file:
             content = file.read()
@@ -124,7 +124,7 @@ def _read_part(path: Path) -> Recording:
     records = np.frombuffer(body, dtype=np.dtype(layout.formats), count=whole)
     _check(path, body, records)
     note = f"{path}: {left} bytes of an unfinished last record left out" if left else ""
-    return Recording(path=path, header=header, layout=layout, records=records, note=note)
+    return GatewayRecording(path=path, header=header, layout=layout, records=records, note=note)
 
 
 @dataclass(frozen=True, kw_only=True)

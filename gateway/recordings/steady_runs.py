@@ -10,7 +10,7 @@ import numpy as np
 
 from gateway.arrays import Array
 from gateway.configuration.config import Config
-from gateway.losses.sections import LossesError, Trace
+from gateway.losses.sections import LossesError, SweepTrace
 from gateway.recordings import log, recording
 from gateway.recordings.export import of_recording, unwrap_time
 from gateway.recordings.header import config_of, map_of
@@ -34,7 +34,7 @@ class SteadyRun:
     path: Path
     date: datetime
     sha256: str
-    trace: Trace
+    trace: SweepTrace
     config: Config | None = None
 
 
@@ -58,7 +58,7 @@ def read(path: Path) -> SteadyRun:
     )
 
 
-def _of_log(found: log.Log) -> Trace:
+def _of_log(found: log.Log) -> SweepTrace:
     columns = found.columns
     wheel = columns.get("wheel_torque")
     if wheel is not None and float(np.abs(wheel).max()) > TRUCK:
@@ -69,7 +69,7 @@ def _of_log(found: log.Log) -> Trace:
             value=float(wheel[np.argmax(np.abs(wheel))]),
             expected="a run without a truck, whose torque is no loss of the bench",
         )
-    return Trace(
+    return SweepTrace(
         name=found.path.name,
         time=found.time,
         motor_speed=columns["motor_speed"],
@@ -79,7 +79,7 @@ def _of_log(found: log.Log) -> Trace:
     )
 
 
-def trace_of(found: recording.Recording, register_map: RegisterMap) -> Trace:
+def trace_of(found: recording.GatewayRecording, register_map: RegisterMap) -> SweepTrace:
     """Signals of a recording at its samples. Raises LossesError where a truck was driven."""
     rows = found.records[of_recording(found)]
     if len(rows) < 2:
@@ -90,7 +90,7 @@ def trace_of(found: recording.Recording, register_map: RegisterMap) -> Trace:
             "no loss of the bench; expected a sweep of steady speeds (gateway losses -c CONFIG)"
         )
     time = unwrap_time(rows["measured_plc_time"], register_map.modulus("plc_time"))
-    return Trace(
+    return SweepTrace(
         name=found.path.name,
         time=time,
         motor_speed=rows["measured_motor_speed"],

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gateway.offline.comparison import Comparison
+from gateway.offline.comparison import SetpointComparison
 from gateway.offline.recording_replay import Difference
 from register_maps.units import RPM
 
@@ -27,7 +27,7 @@ def describe_differences(path: Path, differences: Sequence[Difference], ticks: i
     )
 
 
-def describe_comparison(comparison: Comparison) -> str:
+def describe_comparison(comparison: SetpointComparison) -> str:
     """Lines that say how far two setpoints are apart, in rpm."""
     error, close = comparison.error, comparison.agreement()
     if not len(error):
@@ -43,7 +43,7 @@ def describe_comparison(comparison: Comparison) -> str:
     )
 
 
-def write_csv(path: Path, comparison: Comparison) -> None:
+def write_csv(path: Path, comparison: SetpointComparison) -> None:
     """Write both setpoints sample by sample; a value that does not exist stays empty."""
     columns = {
         "time_s": comparison.time,
@@ -59,7 +59,7 @@ def write_csv(path: Path, comparison: Comparison) -> None:
             writer.writerow([*("" if np.isnan(one) else one for one in row), state, reason])
 
 
-def draw(path: Path, comparison: Comparison) -> None:
+def draw(path: Path, comparison: SetpointComparison) -> None:
     """Draw both setpoints and their difference."""
     from matplotlib.figure import Figure
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from gateway.configuration.config import Config
 from gateway.review.finding import Finding
-from gateway.review.stability import Loop, smallest_mass, spectral_radius
+from gateway.review.stability import SpeedLoop, smallest_mass, spectral_radius
 from register_maps.timing import SCAN
 
 RHO_REFUSED, RHO_WARNED = 0.9, 0.5
@@ -26,10 +26,10 @@ def rho_of(config: Config) -> float:
     return inertia / (config.truck.total_mass * bench.drum_radius**2)
 
 
-def loop_of(config: Config) -> Loop:
+def loop_of(config: Config) -> SpeedLoop:
     """Sampled loop of a configuration, without its lead."""
     compensated = config.regulator.name != "thesis"
-    return Loop(
+    return SpeedLoop(
         period=config.loop.period,
         dead_time=config.bench.dead_time,
         averaged=_same_window(config),

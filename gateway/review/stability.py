@@ -32,7 +32,7 @@ LIGHTEST, HEAVIEST = 60.0, 20000.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Loop:
+class SpeedLoop:
     """Properties of the loop that decide on its stability. Times [s].
 
     averaged : the torque is the mean over the window of the speed difference, otherwise at its end
@@ -51,18 +51,18 @@ class Loop:
     inertia_error: float = 0.0
 
 
-def spectral_radius(loop: Loop, rho: float) -> float:
+def spectral_radius(loop: SpeedLoop, rho: float) -> float:
     """Largest modulus of the eigenvalues from poll to poll; above 1 the loop is unstable."""
     period_map = _one_period(loop, rho, np.eye(_size(loop)))
     return float(np.abs(np.linalg.eigvals(period_map)).max())
 
 
-def is_stable(loop: Loop, rho: float) -> bool:
+def is_stable(loop: SpeedLoop, rho: float) -> bool:
     """Whether the loop is stable."""
     return spectral_radius(loop, rho) <= 1.0 + MARGIN
 
 
-def smallest_mass(loop: Loop, inertia: float) -> float:
+def smallest_mass(loop: SpeedLoop, inertia: float) -> float:
     """Mass above which every truck is stable [kg]; 0: the lightest tried, 60 kg, is stable, too.
 
     inertia : J_d / r_d^2, the mass at which rho is 1 [kg]
@@ -76,7 +76,7 @@ def smallest_mass(loop: Loop, inertia: float) -> float:
     return 0.0
 
 
-def _bisect(loop: Loop, inertia: float, unstable: float, stable: float) -> float:
+def _bisect(loop: SpeedLoop, inertia: float, unstable: float, stable: float) -> float:
     while stable - unstable > 1.0:
         middle = 0.5 * (stable + unstable)
         if is_stable(loop, inertia / middle):
@@ -86,12 +86,12 @@ def _bisect(loop: Loop, inertia: float, unstable: float, stable: float) -> float
     return stable
 
 
-def _size(loop: Loop) -> int:
+def _size(loop: SpeedLoop) -> int:
     """Size of the state: seven values and the references in the dead time."""
     return 7 + round(loop.dead_time / STEP)
 
 
-def _one_period(loop: Loop, rho: float, states: Array) -> Array:
+def _one_period(loop: SpeedLoop, rho: float, states: Array) -> Array:
     """States one poll later, a column each. The torque is in units of the drum's inertia: T = -w'.
 
     g, w : speed of gear and drum; tau, y : filtered torque and speed; before : y at the last poll

@@ -16,7 +16,7 @@ from gateway.cycle.cycle import initial, step
 from gateway.cycle.supervisor import State
 from gateway.errors import GatewayError
 from gateway.offline.recording_replay import observations
-from gateway.recordings.recording import Recording
+from gateway.recordings.recording import GatewayRecording
 from gateway.regulators import compensated
 from gateway.regulators.window import Window
 from plant_emulator.simulation.truck import PARKED_TORQUE
@@ -45,7 +45,7 @@ class RecordedTorque:
         return max(float(value), 0.0), max(-float(value), 0.0)
 
 
-def wheel_torque(found: Recording, config: Config, register_map: RegisterMap) -> Array:
+def wheel_torque(found: GatewayRecording, config: Config, register_map: RegisterMap) -> Array:
     """Torque of the truck at its wheel in each scan since it set off [N m]; NaN: it stands.
 
     config : that of the run, with the friction of the parameter set

@@ -83,7 +83,7 @@ def compare_with_device(plc: PlcConfig, register_map: RegisterMap) -> list[Findi
     ]
 
 
-def _value(row: inspection.Row) -> float | str:
+def _value(row: inspection.RegisterRow) -> float | str:
     return " ".join(f"0x{word:04x}" for word in row.words) if row.value is None else row.value
 
 

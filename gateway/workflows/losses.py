@@ -5,7 +5,7 @@ from pathlib import Path
 
 from gateway.configuration.config import Config
 from gateway.errors import GatewayError
-from gateway.losses.fit import Fit, fit
+from gateway.losses.fit import FrictionFit, fit
 from gateway.losses.live import sweep_config
 from gateway.losses.result import Losses, Source
 from gateway.losses.sections import LeftOut, LossesError, Section, steady
@@ -42,7 +42,7 @@ def measure_losses(files: Sequence[Path], config: Config | None = None) -> Losse
     )
 
 
-def _fit(files: Sequence[Path], sections: list[Section], left_out: list[LeftOut]) -> Fit:
+def _fit(files: Sequence[Path], sections: list[Section], left_out: list[LeftOut]) -> FrictionFit:
     """The friction law; its error names the files, and why stretches were left out."""
     try:
         return fit(sections)

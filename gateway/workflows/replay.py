@@ -16,7 +16,7 @@ from gateway import config_file
 from gateway.configuration.config import Config
 from gateway.losses import sections
 from gateway.offline import log_replay, recording_replay
-from gateway.offline.comparison import Comparison, compare
+from gateway.offline.comparison import SetpointComparison, compare
 from gateway.offline.drive_quality import drive_quality
 from gateway.offline.evaluation import road_speed, traction_energy
 from gateway.offline.figures import Latency, RunFigures, TractionEnergy, cruise_force
@@ -24,7 +24,7 @@ from gateway.offline.recording_replay import Difference
 from gateway.physics.road_load import road_load
 from gateway.recordings import log, recording, steady_runs
 from gateway.recordings.header import config_of, map_of
-from gateway.recordings.recording import Recording, RecordingError
+from gateway.recordings.recording import GatewayRecording, RecordingError
 from gateway.reports.replay import describe_comparison, describe_differences
 from gateway.workflows.run_quality import quality_of
 
@@ -44,7 +44,7 @@ class Replay:
 
     path: Path
     config: Config
-    comparison: Comparison
+    comparison: SetpointComparison
     figures: RunFigures
     differences: tuple[Difference, ...] | None = None
     is_exact: bool = False
@@ -106,7 +106,7 @@ def replay(
     return _replay_log(log.read(path), settings)
 
 
-def _from_its_start(found: Recording) -> Recording:
+def _from_its_start(found: GatewayRecording) -> GatewayRecording:
     """The recording, if it has the first tick of its run. Raises RecordingError."""
     if len(found) and found.records["tick"][0]:
         raise RecordingError(
@@ -118,7 +118,7 @@ def _from_its_start(found: Recording) -> Recording:
     return found
 
 
-def _replay_recording(found: Recording, config: Config, *, is_exact: bool) -> Replay:
+def _replay_recording(found: GatewayRecording, config: Config, *, is_exact: bool) -> Replay:
     register_map, started = map_of(found.header), found.header["started"]
     seen = recording_replay.observations(found.rows(), register_map)
     outputs = list(recording_replay.outputs(config, register_map, seen))
@@ -168,7 +168,7 @@ def _replay_log(found: log.Log, config: Config) -> Replay:
     )
 
 
-def _figures(config: Config, comparison: Comparison, driver: str) -> RunFigures:
+def _figures(config: Config, comparison: SetpointComparison, driver: str) -> RunFigures:
     """Key figures that any replay shows."""
     return RunFigures(
         truck_mass=config.truck.total_mass,
@@ -205,7 +205,7 @@ def _wrong_sign(found: log.Log, config: Config) -> str:
     columns = found.columns
     if np.any(np.abs(columns.get("wheel_torque", 0.0)) > steady_runs.TRUCK):
         return ""
-    trace = sections.Trace(
+    trace = sections.SweepTrace(
         name=found.path.name,
         time=found.time,
         motor_speed=columns["motor_speed"],

@@ -12,10 +12,10 @@ from gateway.physics.road_load import road_load
 from gateway.recordings import recording
 from gateway.recordings.header import config_of
 from gateway.recordings.parts import following
-from gateway.recordings.recording import Recording
+from gateway.recordings.recording import GatewayRecording
 
 
-def quality_of(found: Recording, config: Config) -> DriveQuality | None:
+def quality_of(found: GatewayRecording, config: Config) -> DriveQuality | None:
     """Indices of the drum over the speed that the regulator wanted; None without a run."""
     bench, rows = config.bench, found.records[found.records["state"] == State.RUN]
     rows = rows[np.isfinite(rows["demand"]) & np.isfinite(rows["measured_drum_speed"])]

@@ -26,7 +26,7 @@ def clopper_pearson(hits: int, of: int, tail: float = TAIL) -> tuple[float, floa
 
 
 @dataclass(frozen=True)
-class Share:
+class HitRate:
     """A count of hits among `of` cases."""
 
     hits: int
@@ -49,6 +49,6 @@ class Share:
         return f"{text:10} {share:5.1f} %   above {100 * lower:5.1f} %, below {100 * upper:5.1f} %"
 
 
-def share_of(flags: Sequence[bool]) -> Share:
+def share_of(flags: Sequence[bool]) -> HitRate:
     """Share of the flags that are true."""
-    return Share(sum(flags), len(flags))
+    return HitRate(sum(flags), len(flags))

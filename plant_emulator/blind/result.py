@@ -23,7 +23,7 @@ class HiddenEffect:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Size:
+class ScoredSize:
     """True and estimated value of an effect's parameter [SI].
 
     covered : whether the 95 % interval of the estimate holds the true value
@@ -71,7 +71,7 @@ class CaseResult:
     closed_fraction: float | None
     closed_fraction_ci95: tuple[float, float] | None
     closed_fraction_true: float | None
-    sizes: tuple[Size, ...]
+    sizes: tuple[ScoredSize, ...]
     seconds: float = 0.0
     error: str = ""
     dirt: str = ""
@@ -90,6 +90,6 @@ def result_from(data: Mapping[str, Any]) -> CaseResult:
         "effects": tuple(data["effects"]),
         "classes": tuple(tuple(names) for names in data["class"]),
         "closed_fraction_ci95": None if interval is None else (interval[0], interval[1]),
-        "sizes": tuple(Size(**one) for one in data["sizes"]),
+        "sizes": tuple(ScoredSize(**one) for one in data["sizes"]),
     }
     return CaseResult(**{key: one for key, one in data.items() if key != "class"} | read)

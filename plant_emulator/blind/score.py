@@ -7,7 +7,7 @@ from itertools import permutations
 from typing import TYPE_CHECKING
 
 from plant_emulator.blind.orthogonal_norm import DETECTABLE
-from plant_emulator.blind.result import CaseResult, HiddenEffect, Size
+from plant_emulator.blind.result import CaseResult, HiddenEffect, ScoredSize
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -129,7 +129,7 @@ def sizes(
     named: Sequence[str],
     estimates: Mapping[str, Sequence[Quantity]],
     effects: Mapping[str, Effect],
-) -> tuple[Size, ...]:
+) -> tuple[ScoredSize, ...]:
     """True and estimated sizes of the hidden effects that are named.
 
     A size is compared if hidden law and library declare it by the same name.
@@ -149,12 +149,12 @@ def _is_shared(name: str, hidden: Hidden, effects: Mapping[str, Effect]) -> bool
     return declared is not None and declared.neutral != declared.plausible
 
 
-def _size(hidden: Hidden, estimated: Quantity) -> Size:
+def _size(hidden: Hidden, estimated: Quantity) -> ScoredSize:
     """True and estimated size; of an amplitude with a phase the magnitudes are compared."""
     true, value = hidden.values[estimated.name], estimated.value
     if any("phase" in state for state in hidden.states):
         true, value = abs(true), abs(value)
-    return Size(
+    return ScoredSize(
         effect=hidden.effect,
         parameter=estimated.name,
         true=true,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from plant_emulator.blind.bounds import Share, share_of
+from plant_emulator.blind.bounds import HitRate, share_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -68,10 +68,10 @@ class TrialAnswer:
         return "\n".join([*text, *(f"  {line(one)}" for one in wrong)])
 
 
-def shares(results: Results) -> dict[str, Share]:
+def shares(results: Results) -> dict[str, HitRate]:
     """Shares of the cases by the names of their table lines."""
 
-    def count(flag: str, chosen: Callable[[CaseResult], bool]) -> Share:
+    def count(flag: str, chosen: Callable[[CaseResult], bool]) -> HitRate:
         return share_of([bool(getattr(one, flag)) for one in results if chosen(one)])
 
     def is_inside(one: CaseResult) -> bool:

@@ -44,10 +44,10 @@ def command(cases: int, seed: int, out: str | None, workers: int, json_file: str
     before the first diagnosis: its hash is in DIR/manifest.json.
     """
     from plant_emulator.cli._progress import progress
-    from plant_emulator.workflows.blind_trial.trial import Trial
+    from plant_emulator.workflows.blind_trial.trial import BlindTrial
 
     path = Path(out or f"blind_trial_seed_{seed}")
-    trial = Trial(path, seed, cases)
+    trial = BlindTrial(path, seed, cases)
     manifest = trial.seal()
     click.echo(f"{path}: {cases} answers sealed, SHA-256 of the manifest {manifest}", err=True)
     # SIGTERM becomes an interrupt, because the diagnoses must end with the trial.

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
         Undetectable,
         Verdict,
     )
-    from plant_emulator.diagnosis.calibration.confidence import Case
+    from plant_emulator.diagnosis.calibration.confidence import TrialVerdict
     from plant_emulator.diagnosis.decision.verdict import Decision
     from plant_emulator.diagnosis.execution.pool import Pool, Recipe
     from plant_emulator.diagnosis.execution.progress import Progress
@@ -136,7 +136,7 @@ class Diagnose:
         plan: Plan,
         *,
         settings: Mapping[str, str],
-        cases: Sequence[Case] | None = None,
+        cases: Sequence[TrialVerdict] | None = None,
         model_form_errors: Mapping[str, float] | None = None,
         notes: Sequence[str] = (),
         progress: Progress | None = None,

@@ -14,7 +14,7 @@ import numpy as np
 from plant_emulator.estimation.least_squares import estimate
 from plant_emulator.estimation.residuals import residual_function
 from plant_emulator.estimation.robust_scan import scan_unknowns
-from plant_emulator.estimation.start_search import Search
+from plant_emulator.estimation.start_search import StartSearch
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.solver.kernel import kernel
@@ -107,7 +107,7 @@ def scan_states(
     residual : of the run, as a function of its states
     """
     starts = {u.name: u.start for group in groups for u in group}
-    search = Search([recording], {**values, **starts}, ())
+    search = StartSearch([recording], {**values, **starts}, ())
     search.scan_gaps(GAP_SCAN_POINTS)
     found = {GAP_POSITION: search.gaps[0], **starts}
     for group in groups:

@@ -38,7 +38,7 @@ FINE_SCANS = SCANS[-3:]
 SCAN_TOLERANCE, SCAN_STEP = 1e-4, 0.1
 
 
-class Search:
+class StartSearch:
     """Search from a parameter set for start values in the basin of the optimum.
 
     values : parameters [SI], scanned where free; gaps : start in the gap of every run, -1 to 1

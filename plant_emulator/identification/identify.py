@@ -25,7 +25,7 @@ from plant_emulator.estimation.equation_error import start_values
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
 from plant_emulator.estimation.initial_states import GAP, states_of, with_logged_values
 from plant_emulator.estimation.residuals import residual_functions, whitened_functions
-from plant_emulator.estimation.start_search import FINE_SCANS, Search
+from plant_emulator.estimation.start_search import FINE_SCANS, StartSearch
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.signals.log import VOLTAGE
 from plant_emulator.simulation.simulate import TOLERANCE, values_of
@@ -117,7 +117,7 @@ def identify(
     states = states_of(effects or {})
     recordings = [with_logged_values(r, effects or {}) for r in recordings]
     values = values_of(parameters, effects)
-    search = Search(recordings, values, free, progress)
+    search = StartSearch(recordings, values, free, progress)
     logs = [r.log for r in recordings]
     search.values |= start_values(logs, values, free)
     search.scan()
@@ -139,7 +139,7 @@ def fit_from(
     recordings: Sequence[Recording],
     parameters: ParameterSet,
     free: Sequence[str],
-    search: Search,
+    search: StartSearch,
     states: Sequence[Unknown] = (GAP,),
     progress: Progress | None = None,
 ) -> Estimate:
@@ -203,9 +203,9 @@ def _next_search(
     free: Sequence[str],
     best: Estimate,
     retry: int,
-) -> Search:
+) -> StartSearch:
     """Search for another basin, from the fit with gap and dead time moved off its minimum."""
-    search = Search(recordings, {**values, **best.parameters()}, free)
+    search = StartSearch(recordings, {**values, **best.parameters()}, free)
     search.gaps = [best.states(k)[GAP_POSITION] for k in range(len(recordings))]
     if retry:
         search.values |= {

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from plant_emulator.identification.experiment_design import Experiment
     from plant_emulator.identification.identify import EstimatedParameter, Identification
     from plant_emulator.model.parameters import ParameterSet
-    from plant_emulator.simulation.fit_metrics import Comparison, Fit
+    from plant_emulator.simulation.fit_metrics import ChannelFit, LogComparison
 
 # Correlation from which on a pair of parameters is reported as hardly separable.
 CORRELATED = 0.95
@@ -23,8 +23,8 @@ BEYOND = 1e15
 
 def to_json(
     found: Identification,
-    fitted: Sequence[Comparison],
-    held_out: Sequence[Comparison],
+    fitted: Sequence[LogComparison],
+    held_out: Sequence[LogComparison],
     *,
     experiments: Sequence[Experiment],
     notes: Sequence[str],
@@ -71,7 +71,7 @@ def finite(value: float) -> float | None:
     return value if value < BEYOND else None
 
 
-def fits_to_json(comparisons: Sequence[Comparison]) -> dict[str, dict[str, dict[str, float]]]:
+def fits_to_json(comparisons: Sequence[LogComparison]) -> dict[str, dict[str, dict[str, float]]]:
     """Val1, Val2 and NRMSD by log and channel, as in the documents of both commands."""
     return {
         source: {
@@ -104,8 +104,8 @@ def correlated_pairs(found: Identification) -> list[tuple[str, str, float]]:
 
 def lines(
     found: Identification,
-    fitted: Sequence[Comparison],
-    held_out: Sequence[Comparison],
+    fitted: Sequence[LogComparison],
+    held_out: Sequence[LogComparison],
     experiments: Sequence[Experiment],
 ) -> list[str]:
     """The answer for the terminal."""
@@ -142,7 +142,7 @@ def _advice(e: Experiment) -> str:
     )
 
 
-def fit_rows(fits: Mapping[str, Fit]) -> list[str]:
+def fit_rows(fits: Mapping[str, ChannelFit]) -> list[str]:
     """Val1, Val2, NRMSD and rms of every channel of a log, for the terminal."""
     rows = [f"  {'channel':18}{'Val1 %':>9}{'Val2 %':>9}{'NRMSD %':>10}{'rms':>11}"]
     return rows + [
@@ -151,7 +151,7 @@ def fit_rows(fits: Mapping[str, Fit]) -> list[str]:
     ]
 
 
-def fit_table(comparisons: Sequence[Comparison]) -> str:
+def fit_table(comparisons: Sequence[LogComparison]) -> str:
     """The measures as CSV text, a row a channel of a log."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")

@@ -16,7 +16,7 @@ from plant_emulator.estimation.covariance import NORMAL_95
 from plant_emulator.road_load.covariance import covariance_of, residual_variance
 from plant_emulator.road_load.fit import LOWER, UPPER
 from plant_emulator.road_load.prior import NAMES, OFFSET, vector
-from plant_emulator.simulation.fit_metrics import Fit
+from plant_emulator.simulation.fit_metrics import ChannelFit
 from plant_emulator.simulation.fit_metrics import fit as measures
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ UNITS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Estimate:
+class TruckEstimate:
     """An estimated value with its standard error."""
 
     value: float
@@ -76,8 +76,8 @@ class RoadAnswer:
     starts : number of starts that reached this optimum, number of all starts
     """
 
-    estimates: dict[str, Estimate]
-    velocity: Fit
+    estimates: dict[str, TruckEstimate]
+    velocity: ChannelFit
     not_separable: tuple[str, ...]
     problems: tuple[str, ...]
     starts: tuple[int, int]
@@ -139,7 +139,7 @@ def answer_of(fit: RoadFit) -> RoadAnswer:
     )
 
 
-def velocity_fit(fit: RoadFit) -> Fit:
+def velocity_fit(fit: RoadFit) -> ChannelFit:
     """Val1 and Val2 of the velocity, over all measured samples that both logs cover."""
     run = fit.run
     covered = (run.velocity.time >= run.time[0]) & (run.velocity.time <= run.time[-1])
@@ -148,15 +148,15 @@ def velocity_fit(fit: RoadFit) -> Fit:
     return measures(run.velocity.values[covered], simulated, run.velocity.source)
 
 
-def estimates_of(fit: RoadFit, errors: dict[str, Any]) -> dict[str, Estimate]:
+def estimates_of(fit: RoadFit, errors: dict[str, Any]) -> dict[str, TruckEstimate]:
     """Estimates by the names and in the units of the answer.
 
     F0 = m g C_rr    F1 = m g C_rr,v / r_d
     """
     truck, values = fit.run.truck, fit.values
 
-    def estimate(name: str, factor: float = 1.0) -> Estimate:
-        return Estimate(
+    def estimate(name: str, factor: float = 1.0) -> TruckEstimate:
+        return TruckEstimate(
             value=factor * float(getattr(values, name)), standard_error=factor * float(errors[name])
         )
 
@@ -174,7 +174,7 @@ def estimates_of(fit: RoadFit, errors: dict[str, Any]) -> dict[str, Estimate]:
 
 
 def not_separable(
-    fit: RoadFit, covariance: Array, estimates: dict[str, Estimate]
+    fit: RoadFit, covariance: Array, estimates: dict[str, TruckEstimate]
 ) -> tuple[str, ...]:
     """What the logs cannot separate, one sentence each."""
     found = [MASS]
@@ -201,7 +201,7 @@ def not_separable(
 ZERO_MOVED = 0.1
 
 
-def problems(fit: RoadFit, quality: Fit) -> list[str]:
+def problems(fit: RoadFit, quality: ChannelFit) -> list[str]:
     """Reasons against a use of the estimates."""
     found = [] if fit.settled else ["the search ended before it converged"]
     values = vector(fit.values)

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from plant_emulator.errors import LogError
-from plant_emulator.road_load.answer import Estimate
+from plant_emulator.road_load.answer import TruckEstimate
 from plant_emulator.simulation.truck import GRAVITY
 
 if TYPE_CHECKING:
@@ -66,9 +66,9 @@ class CoastDown:
     """
 
     mass: float
-    f0: Estimate
-    f1: Estimate
-    grade: Estimate
+    f0: TruckEstimate
+    f1: TruckEstimate
+    grade: TruckEstimate
     force_error: float
     forward: int
     backward: int
@@ -116,7 +116,7 @@ class CoastDown:
         )
 
 
-def _scaled(estimate: Estimate, factor: float) -> dict[str, float]:
+def _scaled(estimate: TruckEstimate, factor: float) -> dict[str, float]:
     return {
         "value": factor * estimate.value,
         "standard_error": factor * estimate.standard_error,
@@ -164,7 +164,7 @@ def fit(runs: Sequence[Run], mass: float) -> CoastDown:
     residuals = values - columns @ solution
     covariance = _variance(residuals, runs, len(solution)) * np.linalg.inv(columns.T @ columns)
     f0, f1, grade = (
-        Estimate(value=float(solution[k]), standard_error=float(np.sqrt(covariance[k, k])))
+        TruckEstimate(value=float(solution[k]), standard_error=float(np.sqrt(covariance[k, k])))
         for k in range(3)
     )
     middle = np.array([1.0, float(values.mean())])

@@ -25,7 +25,7 @@ from plant_emulator.road_load.prior import (
     starts,
     vector,
 )
-from plant_emulator.road_load.random_walk_filter import Whitener, whitener
+from plant_emulator.road_load.random_walk_filter import RandomWalkFilter, whitener
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -59,7 +59,7 @@ class RoadFit:
     values: RoadParameters
     free: Indices
     prior: Prior
-    whitener: Whitener
+    whitener: RandomWalkFilter
     residual: Array
     jacobian: Array
     cost: float
@@ -105,7 +105,7 @@ def likeliest_walk(run: RoadRun, values: RoadParameters) -> float:
     return float(min(WALKS.tolist(), key=misfit))
 
 
-def filter_of(run: RoadRun, values: RoadParameters, walk: float) -> Whitener:
+def filter_of(run: RoadRun, values: RoadParameters, walk: float) -> RandomWalkFilter:
     """Whitener of this run.
 
     walk : step of the random walk, over the step that the load cell's noise makes [1]
@@ -123,7 +123,7 @@ def noises(run: RoadRun, values: RoadParameters) -> tuple[float, float]:
 
 
 def fit_from(
-    run: RoadRun, start: RoadParameters, free: Indices, prior: Prior, filters: Whitener
+    run: RoadRun, start: RoadParameters, free: Indices, prior: Prior, filters: RandomWalkFilter
 ) -> RoadFit:
     """Fit the free parameters from one start."""
     base = vector(start)

@@ -27,7 +27,7 @@ UNKNOWN_WALK = 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
-class Whitener:
+class RandomWalkFilter:
     """A Kalman filter, fixed before the fit.
 
     gain : Kalman gain [1], shape (m,)
@@ -55,7 +55,7 @@ class Whitener:
         return float(np.sum(white**2) + 2.0 * np.sum(np.log(self.deviation[self.valid])))
 
 
-def whitener(white: float, step: float, valid: Mask, rests: Mask, moves: Mask) -> Whitener:
+def whitener(white: float, step: float, valid: Mask, rests: Mask, moves: Mask) -> RandomWalkFilter:
     """Filter for a white part and a random walk.
 
     white, step : standard deviations of the white part and of the walk's step, same unit
@@ -74,4 +74,4 @@ def whitener(white: float, step: float, valid: Mask, rests: Mask, moves: Mask) -
         if valid[k]:
             gain[k] = variance / total
         variance = (1.0 - gain[k]) * variance + step**2
-    return Whitener(gain=gain, deviation=deviation, valid=valid, rests=rests)
+    return RandomWalkFilter(gain=gain, deviation=deviation, valid=valid, rests=rests)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Fit:
+class ChannelFit:
     """Measures of one channel: val1 and val2 [%], nrmsd [1], rms of the residual [its unit]."""
 
     val1: float
@@ -31,7 +31,7 @@ class Fit:
     rms: float
 
 
-def fit(measured: Array, simulated: Array, place: str = "channel") -> Fit:
+def fit(measured: Array, simulated: Array, place: str = "channel") -> ChannelFit:
     """Measures of a simulated channel against the measured one, shape (n,) each.
 
     place : name of the channel in an error
@@ -43,16 +43,16 @@ def fit(measured: Array, simulated: Array, place: str = "channel") -> Fit:
         raise LogError(f"{place}: it does not move; a run that excites it is needed")
     rms = float(np.sqrt(np.mean(residual**2)))
     val2 = 100.0 * (1.0 - float(np.abs(residual).sum()) / total)
-    return Fit(100.0 * (1.0 - rms / span), val2, rms / span, rms)
+    return ChannelFit(100.0 * (1.0 - rms / span), val2, rms / span, rms)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Comparison:
+class LogComparison:
     """A log beside its simulation; fits : measures by channel."""
 
     measured: Log
     simulated: Log
-    fits: Mapping[str, Fit]
+    fits: Mapping[str, ChannelFit]
 
     @property
     def source(self) -> str:
@@ -60,12 +60,12 @@ class Comparison:
         return self.measured.source
 
 
-def compare(measured: Log, simulated: Log) -> Comparison:
+def compare(measured: Log, simulated: Log) -> LogComparison:
     """Measure how well a simulation follows a log; errors as those of `fit`."""
-    return Comparison(measured=measured, simulated=simulated, fits=validate(measured, simulated))
+    return LogComparison(measured=measured, simulated=simulated, fits=validate(measured, simulated))
 
 
-def validate(measured: Log, simulated: Log) -> dict[str, Fit]:
+def validate(measured: Log, simulated: Log) -> dict[str, ChannelFit]:
     """Measures of every channel on which the logs are compared, by its name."""
     return {
         name: fit(measured[name], simulated[name], f"{measured.source}: {name}")

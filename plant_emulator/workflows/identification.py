@@ -12,7 +12,7 @@ from plant_emulator.identification.experiment_design import experiments
 from plant_emulator.identification.identify import identify as identify_bench
 from plant_emulator.model.stage import split_gap_position
 from plant_emulator.parameter_sets import DEFAULT
-from plant_emulator.simulation.fit_metrics import Comparison, compare
+from plant_emulator.simulation.fit_metrics import LogComparison, compare
 from plant_emulator.simulation.simulate import simulate, values_of
 from plant_emulator.workflows.arguments import check_reference, list_logs, list_names, list_sources
 from plant_emulator.workflows.loading import load_recordings
@@ -46,8 +46,8 @@ class IdentificationResult:
     """
 
     fit: Identification
-    fitted: tuple[Comparison, ...]
-    held_out: tuple[Comparison, ...]
+    fitted: tuple[LogComparison, ...]
+    held_out: tuple[LogComparison, ...]
     experiments: tuple[Experiment, ...]
     hashes: Mapping[str, str]
     notes: tuple[str, ...]
@@ -158,7 +158,7 @@ def identify(
 
 def _compare(
     recording: Recording, values: Mapping[str, float], states: Mapping[str, float]
-) -> Comparison:
+) -> LogComparison:
     """A log beside its simulation; states : initial states of the run, by name."""
     own, gap = split_gap_position({**values, **recording.logged_values, **states})
     return compare(recording.log, simulate(recording.inputs, own, gap_position=gap))

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from plant_emulator.road_load.answer import Estimate, RoadAnswer
+    from plant_emulator.road_load.answer import RoadAnswer, TruckEstimate
     from plant_emulator.road_load.coast_down import CoastDown
     from plant_emulator.road_load.fit import RoadFit
 
@@ -36,7 +36,7 @@ class TruckIdentification:
     origin: tuple[str, ...]
 
     @property
-    def estimates(self) -> Mapping[str, Estimate]:
+    def estimates(self) -> Mapping[str, TruckEstimate]:
         """Estimates by their names in the answer file, with standard errors."""
         return self.answer.estimates
 

@@ -9,7 +9,7 @@ from plant_emulator import logs as log_files
 from plant_emulator.identification.report import fit_rows, fit_table, fits_to_json
 from plant_emulator.parameter_sets import DEFAULT
 from plant_emulator.signals.log import Log
-from plant_emulator.simulation.fit_metrics import Comparison, compare, zero_phase
+from plant_emulator.simulation.fit_metrics import LogComparison, compare, zero_phase
 from plant_emulator.workflows.arguments import check_reference, check_start, list_logs
 from plant_emulator.workflows.simulation import effect_values, parameter_set, simulate_log
 
@@ -33,7 +33,7 @@ class ValidationResult:
     parameter_set : the set that was validated
     """
 
-    comparisons: tuple[Comparison, ...]
+    comparisons: tuple[LogComparison, ...]
     parameter_set: ParameterSet
 
     def to_json(self) -> dict[str, Any]:

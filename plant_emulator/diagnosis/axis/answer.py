@@ -25,7 +25,7 @@ from plant_emulator.diagnosis.wording import number
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.axis.findings import AxisFindings
     from plant_emulator.diagnosis.axis.regression import Fit, Term
-    from plant_emulator.diagnosis.axis.search import Search
+    from plant_emulator.diagnosis.axis.search import AxisSearch
 
 # Effects of a ranking that are predicted and shown.
 SHOWN = 6
@@ -144,7 +144,7 @@ def _location(f: AxisFindings) -> Location:
     return Location(subsystem=subsystem, channel=None, phase=None, shares=shares, cells=())
 
 
-def _singles(search: Search) -> list[Fit]:
+def _singles(search: AxisSearch) -> list[Fit]:
     """Fits with one effect that physics allows, the best first."""
     found = [f for f in search.sets.values() if len(f.terms) == 1 and isfinite(search.value(f))]
     return sorted(found, key=search.value)

@@ -18,7 +18,7 @@ from plant_emulator.diagnosis.axis.floor import describe_floor, repeat_floor, se
 from plant_emulator.diagnosis.axis.held_out import HeldOut
 from plant_emulator.diagnosis.axis.quantities import UNITS
 from plant_emulator.diagnosis.axis.regression import NAMES
-from plant_emulator.diagnosis.axis.search import Search
+from plant_emulator.diagnosis.axis.search import AxisSearch
 from plant_emulator.diagnosis.axis.settings import SETTINGS
 from plant_emulator.diagnosis.axis.start import best_width, prepared, start
 from plant_emulator.diagnosis.axis.verdict import decide
@@ -83,7 +83,7 @@ def diagnose_axis(
             break
         scale = replace(scale, width=width)
         regression, rows, library = start(prepared_runs, scale, len(own), effects, width)
-        search = Search(regression=regression, library=library, scale=scale)
+        search = AxisSearch(regression=regression, library=library, scale=scale)
         search.run()
         terms = search.best.terms
     tell("predicting held-out runs", 0.8)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.axis.effects.effect import Effect
     from plant_emulator.diagnosis.axis.held_out import HeldOut
     from plant_emulator.diagnosis.axis.regression import Term
-    from plant_emulator.diagnosis.axis.search import Search
+    from plant_emulator.diagnosis.axis.search import AxisSearch
     from plant_emulator.diagnosis.axis.verdict import Decision
     from plant_emulator.signals.log import Array
 
@@ -31,7 +31,7 @@ class AxisFindings:
     floor : rms of the force's error [N or N m]; see `floor`
     """
 
-    search: Search
+    search: AxisSearch
     held_out: HeldOut
     decision: Decision
     floor: float

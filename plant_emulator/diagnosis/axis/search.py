@@ -29,7 +29,7 @@ STEPS, ROUNDS = 12, 2
 
 
 @dataclass
-class Search:
+class AxisSearch:
     """The search in a regression; library : effects that apply to the runs."""
 
     regression: Regression

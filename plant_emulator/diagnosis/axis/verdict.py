@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.answer import Kind
     from plant_emulator.diagnosis.axis.held_out import HeldOut
     from plant_emulator.diagnosis.axis.regression import Fit, Regression, Rows, Term
-    from plant_emulator.diagnosis.axis.search import Search
+    from plant_emulator.diagnosis.axis.search import AxisSearch
 
 # Distance from a bound of a shape, in the logarithm, within which it lies at the bound.
 AT_BOUND = 0.02
@@ -35,7 +35,7 @@ class Decision:
     inertia: tuple[tuple[int, float, float], ...] = ()
 
 
-def decide(search: Search, held_out: HeldOut, floor: float) -> Decision:
+def decide(search: AxisSearch, held_out: HeldOut, floor: float) -> Decision:
     """Decide by the held-out runs; floor : rms of the force's error that noise or repeats leave."""
     found, reason = _confirmed(search, held_out)
     error = held_out.relative(found.terms)
@@ -60,7 +60,7 @@ def decide(search: Search, held_out: HeldOut, floor: float) -> Decision:
     return Decision(kind="unknown", found=found, reason=reason)
 
 
-def _confirmed(search: Search, held_out: HeldOut) -> tuple[Fit, str]:
+def _confirmed(search: AxisSearch, held_out: HeldOut) -> tuple[Fit, str]:
     """The best set of which the held-out runs need every effect; else why the best one fails."""
     best = search.best
     ranked = [best, *(f for f in sorted(search.sets.values(), key=search.value) if f is not best)]
@@ -86,7 +86,7 @@ def _confirmed(search: Search, held_out: HeldOut) -> tuple[Fit, str]:
     return winner, ""
 
 
-def _failing(search: Search, held_out: HeldOut, found: Fit) -> tuple[str, str] | None:
+def _failing(search: AxisSearch, held_out: HeldOut, found: Fit) -> tuple[str, str] | None:
     """The effect of a set that the held-out runs need least, and why it fails; None: none does."""
     worst: tuple[float, str, str] | None = None
     for term in found.terms:
@@ -109,7 +109,7 @@ def describe(share: float) -> str:
     return f"{100.0 * share:.1f} %"
 
 
-def implausible(search: Search, found: Fit, term: Term) -> str:
+def implausible(search: AxisSearch, found: Fit, term: Term) -> str:
     """Why the sizes of an effect cannot be believed; empty where they can."""
     name = term.effect.name
     sizes, errors = found.sizes(term)

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Case:
+class TrialVerdict:
     """A verdict of a blind trial: its kind, its evidence, and whether it was right."""
 
     kind: str
@@ -22,7 +22,7 @@ class Case:
 FEWEST_CASES = 20
 
 
-def confidence(cases: Sequence[Case], kind: str, evidence: float) -> float | None:
+def confidence(cases: Sequence[TrialVerdict], kind: str, evidence: float) -> float | None:
     """Share of right verdicts of this kind with at least this evidence [1].
 
     (right + 1) / (cases + 2)                                    (Laplace's rule of succession)

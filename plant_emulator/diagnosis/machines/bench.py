@@ -29,7 +29,7 @@ from plant_emulator.estimation.initial_states import (
     states_of,
     with_logged_values,
 )
-from plant_emulator.estimation.start_search import Search
+from plant_emulator.estimation.start_search import StartSearch
 from plant_emulator.model.array_laws import base_speed
 from plant_emulator.model.parameters import UNITS
 from plant_emulator.model.stage import GAP_POSITION, split_gap_position
@@ -211,7 +211,7 @@ class BenchModel:
     def start_values(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
         """See `Model`."""
         recordings = [self._recordings[k] for k in runs]
-        search = Search(recordings, self._values, self._free)
+        search = StartSearch(recordings, self._values, self._free)
         search.values |= start_values([r.log for r in recordings], self._values, self._free)
         search.scan()
         found = {name: search.values[name] for name in self._free}

@@ -51,7 +51,7 @@ FIELDS = {
 WITHIN = 5.0
 
 
-class Bench(Protocol):
+class DiagnosedBench(Protocol):
     """The interface of a bench that `BenchRelations` uses."""
 
     nominal_set: ParameterSet
@@ -77,7 +77,7 @@ class BenchRelations:
 
     def __init__(
         self,
-        model: Bench,
+        model: DiagnosedBench,
         where: FitResult,
         runs: Sequence[int],
         whiteners: Mapping[int, Sequence[Whitener]] | None = None,

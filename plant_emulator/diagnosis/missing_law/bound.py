@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
-    from plant_emulator.diagnosis.missing_law.law_search import Search
-    from plant_emulator.diagnosis.missing_law.quantity import Quantity
-    from plant_emulator.diagnosis.missing_law.reduced import Products, RunRows
-    from plant_emulator.diagnosis.missing_law.states import State
+    from plant_emulator.diagnosis.missing_law.law_search import LawSearch
+    from plant_emulator.diagnosis.missing_law.quantity import LawQuantity
+    from plant_emulator.diagnosis.missing_law.reduced import NuisanceProducts, RunRows
+    from plant_emulator.diagnosis.missing_law.states import LawState
     from plant_emulator.signals.log import Array
 
 # Prior standard deviations of a curve's coefficients, whose columns have the length 1 in the noise.
@@ -52,7 +52,7 @@ class Bound:
     interval: tuple[float, float]
 
 
-def bound(regression: BlockRegression, searches: Sequence[Search]) -> Bound | None:
+def bound(regression: BlockRegression, searches: Sequence[LawSearch]) -> Bound | None:
     """The bound over all quantities; None: the runs show no gap beyond chance in the relations."""
     rows = run_rows(regression, regression.model)
     none = [np.zeros((len(own.y), 0)) for own in rows]
@@ -79,7 +79,7 @@ def bound(regression: BlockRegression, searches: Sequence[Search]) -> Bound | No
     return Bound(share=share, interval=(float(low), float(high)))
 
 
-def _candidates(regression: BlockRegression, one: Search) -> Iterator[list[Array]]:
+def _candidates(regression: BlockRegression, one: LawSearch) -> Iterator[list[Array]]:
     """Squares that each candidate of a quantity leaves in the held-out runs."""
     quantity = one.quantity
     rows = run_rows(regression, quantity.model)
@@ -105,7 +105,7 @@ def _candidates(regression: BlockRegression, one: Search) -> Iterator[list[Array
 
 
 def _curves(
-    regression: BlockRegression, quantity: Quantity
+    regression: BlockRegression, quantity: LawQuantity
 ) -> tuple[list[Array], list[bool], list[int]]:
     """Columns of the curves over all states, which are of a run's own, and each state's end."""
     runs = range(len(regression.signals))
@@ -122,7 +122,7 @@ def _curves(
     return columns, own, np.cumsum([basis[0].shape[1] for basis in bases]).tolist()
 
 
-def _basis(state: State, run: int) -> Array:
+def _basis(state: LawState, run: int) -> Array:
     """Basis of the curves over a state: splines, and its lags; of an angle its harmonics."""
     parts = [
         factor.values(run)
@@ -138,7 +138,7 @@ def _squares(
     regression: BlockRegression,
     rows: Sequence[RunRows],
     columns: Sequence[Array],
-    p: Products,
+    p: NuisanceProducts,
     chosen: Sequence[int],
 ) -> list[Array]:
     """Squares that a fit to the other runs leaves in each interval, shape (1, n - 1) a run."""

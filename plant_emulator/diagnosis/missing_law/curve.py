@@ -16,8 +16,8 @@ from plant_emulator.diagnosis.missing_law.reduced import columns_of, products, r
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
-    from plant_emulator.diagnosis.missing_law.quantity import Quantity
-    from plant_emulator.diagnosis.missing_law.states import State
+    from plant_emulator.diagnosis.missing_law.quantity import LawQuantity
+    from plant_emulator.diagnosis.missing_law.states import LawState
     from plant_emulator.signals.log import Array
 
 # Knots of a curve, at quantiles of its state; between the first and the last one all runs lie.
@@ -26,7 +26,7 @@ KNOTS = 9
 HALF_INTERVAL = 1.96
 
 
-def curve(regression: BlockRegression, quantity: Quantity, state: State) -> Curve:
+def curve(regression: BlockRegression, quantity: LawQuantity, state: LawState) -> Curve:
     """The curve of a quantity over a state, fitted to all runs."""
     knots = knots_of(state)
     columns = [
@@ -50,7 +50,7 @@ def curve(regression: BlockRegression, quantity: Quantity, state: State) -> Curv
     )
 
 
-def knots_of(state: State) -> Array:
+def knots_of(state: LawState) -> Array:
     """Knots at quantiles of the state's values, the ends included, each one once."""
     values = np.concatenate(list(state.values))
     return np.unique(np.quantile(values, np.linspace(0.0, 1.0, KNOTS)))

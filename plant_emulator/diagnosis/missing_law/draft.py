@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.answer import Curve
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.missing_law.bound import Bound
-    from plant_emulator.diagnosis.missing_law.law_search import Law, Search
+    from plant_emulator.diagnosis.missing_law.law_search import Law, LawSearch
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
 
@@ -70,7 +70,7 @@ def sketch(
         return Sketchbook(sketches=found, bound=bound(regression, searches))
 
 
-def _contenders(searches: Sequence[Search]) -> list[tuple[Search, Law]]:
+def _contenders(searches: Sequence[LawSearch]) -> list[tuple[LawSearch, Law]]:
     """The best law, its shorter or longer form, and rivals, of all quantities.
 
     A short law and a long one that resemble each other both enter: a simulation decides whether the
@@ -82,7 +82,7 @@ def _contenders(searches: Sequence[Search]) -> list[tuple[Search, Law]]:
         every += [(one, chosen) for chosen in {nested[0], nested[-1], *one.singles()}]
     every = [pair for pair in every if pair[0].gain(pair[1]) >= DRAFTED_GAIN]
     every.sort(key=lambda pair: -pair[0].score(pair[1]))
-    found: list[tuple[Search, Law]] = []
+    found: list[tuple[LawSearch, Law]] = []
     for one, chosen in every:
         if one.score(chosen) < RIVAL_SHARE * every[0][0].score(every[0][1]):
             break
@@ -95,7 +95,7 @@ def _contenders(searches: Sequence[Search]) -> list[tuple[Search, Law]]:
     return found
 
 
-def _sketch(regression: BlockRegression, one: Search, law: Law) -> Sketch:
+def _sketch(regression: BlockRegression, one: LawSearch, law: Law) -> Sketch:
     smooth = [state for term in law.terms for state in term.states if state.kind != "angle"]
     state = smooth[0] if smooth else one.quantity.states[0]
     return Sketch(law=law, curve=curve(regression, one.quantity, state))

@@ -10,8 +10,8 @@ import numpy as np
 from plant_emulator.diagnosis.localisation.drum_subsystem import LAWS_OF_ANGLE, is_torque_size
 from plant_emulator.diagnosis.localisation.measured_signals import NOISES
 from plant_emulator.diagnosis.localisation.parity_relations import GEAR
-from plant_emulator.diagnosis.missing_law.quantity import Quantity, in_relations, time_of
-from plant_emulator.diagnosis.missing_law.states import QUICK, State
+from plant_emulator.diagnosis.missing_law.quantity import LawQuantity, in_relations, time_of
+from plant_emulator.diagnosis.missing_law.states import QUICK, LawState
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,14 +25,14 @@ if TYPE_CHECKING:
 SMALL_TORQUE = 5.0
 
 
-def drum_friction(r: BlockRegression, q: Sequence[BlockQuantities]) -> Quantity:
+def drum_friction(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
     """Friction on the drum.
 
     The drum's flight through its gap is far from linear in such a torque. The response is therefore
     that of the fit with an unknown torque, to the splines of which a law is fitted.
     """
     xi, fitted = r.values["gear_ratio"], r.torque_fits[-1]
-    speed = State(
+    speed = LawState(
         values=[np.abs(one.speed) / xi for one in q], time=[one.time for one in q],
         name="drum speed", symbol="w", unit="rad/s", code="abs(s.drum_speed)", kind="level",
     )  # fmt: skip
@@ -44,7 +44,7 @@ def drum_friction(r: BlockRegression, q: Sequence[BlockQuantities]) -> Quantity:
         slopes = fitted.jacobians[run][0][:, is_torque_size(fitted)][:, :-LAWS_OF_ANGLE]
         return in_relations({GEAR: 1.0 / xi}, torque), -slopes @ sizes
 
-    return Quantity(
+    return LawQuantity(
         place="drum",
         name="friction on the drum",
         unit="N m",
@@ -55,10 +55,10 @@ def drum_friction(r: BlockRegression, q: Sequence[BlockQuantities]) -> Quantity:
     )
 
 
-def drum_weight(r: BlockRegression, q: Sequence[BlockQuantities]) -> Quantity:
+def drum_weight(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
     """Torque on the drum that does not follow the direction of the motion, as a weight's."""
     xi = r.values["gear_ratio"]
-    angle = State(
+    angle = LawState(
         values=[one.angle for one in q], time=[one.time for one in q],
         name="angle of the drum", symbol="theta", unit="rad", code="s.drum_speed", kind="angle",
     )  # fmt: skip
@@ -66,7 +66,7 @@ def drum_weight(r: BlockRegression, q: Sequence[BlockQuantities]) -> Quantity:
     def rows(run: int, values: Array) -> tuple[Array, Array]:
         return in_relations({GEAR: 1.0 / xi}, values), _drum_response(r, r.drum_fit, run, values)
 
-    return Quantity(
+    return LawQuantity(
         place="drum",
         name="torque on the drum",
         unit="N m",
@@ -96,15 +96,15 @@ def _drum_response(r: BlockRegression, fitted: Estimate, run: int, torque: Array
     return np.stack(columns, axis=-1)
 
 
-def speed_sensor(r: BlockRegression, q: Sequence[BlockQuantities]) -> Quantity:
+def speed_sensor(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
     """Error of the drum's speed sensor, which also shows in the gear's relation."""
     xi, inertia = r.values["gear_ratio"], r.values["drum_inertia"]
-    speed = State(
+    speed = LawState(
         values=[one.speed / xi for one in q], time=[one.time for one in q],
         name="drum speed", symbol="w", unit="rad/s", code="value", kind="signed", lags=QUICK,
     )  # fmt: skip
 
-    angle = State(
+    angle = LawState(
         values=[one.angle for one in q], time=[one.time for one in q],
         name="angle of the drum", symbol="theta", unit="rad", code="s.drum_speed", kind="angle",
     )  # fmt: skip
@@ -116,7 +116,7 @@ def speed_sensor(r: BlockRegression, q: Sequence[BlockQuantities]) -> Quantity:
         level = m.noise[NOISES.index("drum_speed")]
         return in_relations({GEAR: inertia / xi}, slope), samples / level
 
-    return Quantity(
+    return LawQuantity(
         place="speed_sensor",
         name="error of the drum's speed sensor",
         unit="rad/s",

@@ -20,7 +20,7 @@ from plant_emulator.diagnosis.missing_law.states import lagged
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from plant_emulator.diagnosis.missing_law.states import State
+    from plant_emulator.diagnosis.missing_law.states import LawState
     from plant_emulator.signals.log import Array
 
     Function = Literal["linear", "size", "square", "root", "sign", "bell", "delay", "lag", "turn"]
@@ -58,7 +58,7 @@ class Factor:
     """
 
     function: Function
-    state: State
+    state: LawState
     scale: float = 0.0
 
     def values(self, run: int) -> Array:
@@ -124,12 +124,12 @@ class Term:
         return " ".join(factor.text for factor in self.factors)
 
     @property
-    def states(self) -> tuple[State, ...]:
+    def states(self) -> tuple[LawState, ...]:
         """The states of the term."""
         return tuple(factor.state for factor in self.factors)
 
 
-def terms(states: Sequence[State]) -> list[Term]:
+def terms(states: Sequence[LawState]) -> list[Term]:
     """All terms of these states: a constant, single factors, and products of two of them."""
     single = [Term((factor,)) for state in states for factor in factors(state)]
     products = [
@@ -141,7 +141,7 @@ def terms(states: Sequence[State]) -> list[Term]:
     return [Term(()), *single, *products]
 
 
-def factors(state: State) -> Iterator[Factor]:
+def factors(state: LawState) -> Iterator[Factor]:
     """All factors of a state."""
     for function in FUNCTIONS[state.kind]:
         if function == "bell":
@@ -154,7 +154,7 @@ def factors(state: State) -> Iterator[Factor]:
     yield from (Factor("delay" if follows else "lag", state, tau) for tau in state.lags)
 
 
-def _simple(state: State) -> Iterator[Factor]:
+def _simple(state: LawState) -> Iterator[Factor]:
     """Factors that a product may have: of first order, a root, a wide bell, a lag, a slow turn."""
     for factor in factors(state):
         wide = factor.function == "bell" and factor.scale >= WIDTHS[2] * state.largest

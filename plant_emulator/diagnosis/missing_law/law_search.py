@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
-    from plant_emulator.diagnosis.missing_law.quantity import Quantity
-    from plant_emulator.diagnosis.missing_law.reduced import Products
+    from plant_emulator.diagnosis.missing_law.quantity import LawQuantity
+    from plant_emulator.diagnosis.missing_law.reduced import NuisanceProducts
     from plant_emulator.signals.log import Array
 
 # Most terms of a law.
@@ -47,7 +47,7 @@ class Law:
     parameters : what the regression with the law says of the free parameters [SI]
     """
 
-    quantity: Quantity
+    quantity: LawQuantity
     terms: tuple[Term, ...]
     coefficients: tuple[float, ...]
     errors: tuple[float, ...]
@@ -139,13 +139,13 @@ class Law:
 
 
 @dataclass(frozen=True, eq=False)
-class Search:
+class LawSearch:
     """The search in one quantity; null : sum of the held-out losses of all runs without a law."""
 
     regression: BlockRegression
-    quantity: Quantity
+    quantity: LawQuantity
     terms: Sequence[Term]
-    products: Products
+    products: NuisanceProducts
     null: float
 
     def score(self, chosen: Sequence[int]) -> float:
@@ -222,8 +222,8 @@ class Search:
         }
 
 
-def search(regression: BlockRegression, quantity: Quantity, null: float) -> Search:
-    """Prepare the search in a quantity; null : see `Search`."""
+def search(regression: BlockRegression, quantity: LawQuantity, null: float) -> LawSearch:
+    """Prepare the search in a quantity; null : see `LawSearch`."""
     every = terms(quantity.states)
     counts = [len(q.time) for q in regression.quantities]
     columns = [
@@ -235,7 +235,7 @@ def search(regression: BlockRegression, quantity: Quantity, null: float) -> Sear
         )
         for k, count in enumerate(counts)
     ]
-    return Search(
+    return LawSearch(
         regression,
         quantity,
         every,

@@ -12,8 +12,8 @@ from plant_emulator.diagnosis.missing_law.drum_quantities import (
     drum_weight,
     speed_sensor,
 )
-from plant_emulator.diagnosis.missing_law.quantity import Quantity, acting, time_of
-from plant_emulator.diagnosis.missing_law.states import QUICK, SLOW, State
+from plant_emulator.diagnosis.missing_law.quantity import LawQuantity, acting, time_of
+from plant_emulator.diagnosis.missing_law.states import QUICK, SLOW, LawState
 from plant_emulator.model.array_laws import gear_friction
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
 
 
-def quantities(regression: BlockRegression) -> list[Quantity]:
+def quantities(regression: BlockRegression) -> list[LawQuantity]:
     """All quantities of the bench that its logs can tell of."""
     q = regression.quantities
     found = [
@@ -41,28 +41,28 @@ def quantities(regression: BlockRegression) -> list[Quantity]:
     return found
 
 
-def _gear(r: BlockRegression, q: Sequence[BlockQuantities]) -> Quantity:
+def _gear(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
     xi = r.values["gear_ratio"]
-    speed = State(
+    speed = LawState(
         values=[np.abs(one.speed) / xi for one in q], time=[one.time for one in q],
         name="gear speed", symbol="w", unit="rad/s", code="abs(s.gear_speed)", kind="level",
         lags=SLOW,
     )  # fmt: skip
-    load = State(
+    load = LawState(
         values=[one.load * one.moving for one in q], time=[one.time for one in q],
         name="torque to the drum along the motion", symbol="T", unit="N m",
         code="s.drum_shaft_torque * s.gear_direction", kind="signed",
     )  # fmt: skip
-    angle = State(
+    angle = LawState(
         values=[one.angle for one in q], time=[one.time for one in q],
         name="angle of the gear's output", symbol="theta", unit="rad", code="s.gear_speed",
         kind="angle",
     )  # fmt: skip
-    direction = State(
+    direction = LawState(
         values=[one.moving for one in q], time=[one.time for one in q],
         name="direction", symbol="d", unit="", code="s.gear_direction", kind="direction",
     )  # fmt: skip
-    return Quantity(
+    return LawQuantity(
         place="gear",
         name="friction of the gear at its output",
         unit="N m",
@@ -73,12 +73,12 @@ def _gear(r: BlockRegression, q: Sequence[BlockQuantities]) -> Quantity:
     )
 
 
-def _motor(r: BlockRegression, q: Sequence[BlockQuantities]) -> Quantity:
-    speed = State(
+def _motor(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
+    speed = LawState(
         values=[np.abs(one.speed) for one in q], time=[one.time for one in q],
         name="motor speed", symbol="w", unit="rad/s", code="abs(s.motor_speed)", kind="level",
     )  # fmt: skip
-    return Quantity(
+    return LawQuantity(
         place="motor",
         name="friction of the motor",
         unit="N m",
@@ -89,23 +89,23 @@ def _motor(r: BlockRegression, q: Sequence[BlockQuantities]) -> Quantity:
     )
 
 
-def _flux(r: BlockRegression, q: Sequence[BlockQuantities]) -> Quantity:
-    current = State(
+def _flux(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
+    current = LawState(
         values=[np.abs(one.current) for one in q], time=[one.time for one in q],
         name="size of the armature current", symbol="i", unit="A", code="abs(s.armature_current)",
         kind="level",
     )  # fmt: skip
-    speed = State(
+    speed = LawState(
         values=[np.abs(one.speed) for one in q], time=[one.time for one in q],
         name="motor speed", symbol="w", unit="rad/s", code="abs(s.motor_speed)", kind="level",
     )  # fmt: skip
-    flux = State(
+    flux = LawState(
         values=[one.flux for one in q], time=[one.time for one in q],
         name="flux", symbol="kPhi", unit="N m/A", code="value", kind="followed", lags=QUICK,
         start="p.flux_constant",
     )  # fmt: skip
     weights = {MOTOR: [one.current for one in q], ARMATURE: [one.speed for one in q]}
-    return Quantity(
+    return LawQuantity(
         place="motor",
         name="flux of the motor",
         unit="N m/A",
@@ -116,14 +116,14 @@ def _flux(r: BlockRegression, q: Sequence[BlockQuantities]) -> Quantity:
     )
 
 
-def _torque_sensor(r: BlockRegression, q: Sequence[BlockQuantities]) -> Quantity:
+def _torque_sensor(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
     xi = r.values["gear_ratio"]
-    torque = State(
+    torque = LawState(
         values=[-(one.load + gear_friction(one.speed / xi, r.values)) / xi for one in q],
         time=[one.time for one in q],
         name="shaft torque", symbol="T", unit="N m", code="value", kind="signed", lags=QUICK,
     )  # fmt: skip
-    return Quantity(
+    return LawQuantity(
         place="torque_sensor",
         name="error of the torque sensor",
         unit="N m",
@@ -134,16 +134,16 @@ def _torque_sensor(r: BlockRegression, q: Sequence[BlockQuantities]) -> Quantity
     )
 
 
-def _reference(r: BlockRegression, q: Sequence[BlockQuantities]) -> Quantity:
-    reference = State(
+def _reference(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
+    reference = LawState(
         values=[one.demand for one in q], time=[one.time for one in q],
         name="speed reference", symbol="r", unit="rad/s", code="value", kind="signed", lags=QUICK,
     )  # fmt: skip
-    current = State(
+    current = LawState(
         values=[one.current for one in q], time=[one.time for one in q],
         name="armature current", symbol="i", unit="A", code="s.armature_current", kind="smooth",
     )  # fmt: skip
-    return Quantity(
+    return LawQuantity(
         place="drive",
         name="speed reference inside the drive",
         unit="rad/s",
@@ -154,12 +154,12 @@ def _reference(r: BlockRegression, q: Sequence[BlockQuantities]) -> Quantity:
     )
 
 
-def _voltage(r: BlockRegression, q: Sequence[BlockQuantities]) -> Quantity:
-    current = State(
+def _voltage(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
+    current = LawState(
         values=[one.current for one in q], time=[one.time for one in q],
         name="armature current", symbol="i", unit="A", code="s.armature_current", kind="smooth",
     )  # fmt: skip
-    return Quantity(
+    return LawQuantity(
         place="drive",
         name="voltage between drive and armature",
         unit="V",

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.localisation.parity_relations import ROWS
-from plant_emulator.diagnosis.missing_law.states import State
+from plant_emulator.diagnosis.missing_law.states import LawState
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Quantity:
+class LawQuantity:
     """A quantity that a law may be missing of.
 
     place : subsystem; name : in words; unit : of the law
@@ -39,7 +39,7 @@ class Quantity:
     name: str
     unit: str
     hook: str
-    states: tuple[State, ...]
+    states: tuple[LawState, ...]
     rows: Callable[[int, Array], tuple[Array, Array | None]]
     model: LinearModel
 
@@ -68,9 +68,9 @@ def in_relations(weights: Mapping[int, Array | float], values: Array) -> Array:
     return rows
 
 
-def time_of(q: Sequence[BlockQuantities]) -> State:
+def time_of(q: Sequence[BlockQuantities]) -> LawState:
     """Time since the start of every run as a state."""
-    return State(
+    return LawState(
         name="time",
         symbol="t",
         unit="s",

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.localisation.ard_evidence import LinearModel
     from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
-    from plant_emulator.diagnosis.missing_law.quantity import Quantity
+    from plant_emulator.diagnosis.missing_law.quantity import LawQuantity
     from plant_emulator.signals.log import Array
 
 # Prior standard deviation of a coefficient whose column was scaled to the length 1: none to speak
@@ -94,7 +94,9 @@ def run_slices(regression: BlockRegression) -> list[Array]:
     return [np.concatenate([parts[k], parts[runs + k]]) for k in range(runs)]
 
 
-def columns_of(regression: BlockRegression, quantity: Quantity, run: int, values: Array) -> Array:
+def columns_of(
+    regression: BlockRegression, quantity: LawQuantity, run: int, values: Array
+) -> Array:
     """Rows of laws of a quantity in a run; values : of the laws, shape (n - 1, k)."""
     relation, speed = quantity.rows(run, values)
     above = regression.relations[run].whiten(relation)
@@ -105,7 +107,7 @@ def columns_of(regression: BlockRegression, quantity: Quantity, run: int, values
 
 
 @dataclass(frozen=True, eq=False)
-class Products:
+class NuisanceProducts:
     """Products of the runs' nuisance columns and of terms.
 
     grams, products : X' P X and X' P y of each run; losses : half of y' P y
@@ -187,12 +189,12 @@ class Products:
 
 def products(
     rows: Sequence[RunRows], columns: Sequence[Array], own: Sequence[bool] | None = None
-) -> Products:
-    """Products of terms; columns : of every run, shape (rows, k); own : see `Products`."""
+) -> NuisanceProducts:
+    """Products of terms; columns : of every run, shape (rows, k); own : see `NuisanceProducts`."""
     length = np.sqrt(sum((one**2).sum(axis=0) for one in columns))
     scale = np.where(length > 0.0, length, 1.0)
     pairs = [one.projected(part / scale) for one, part in zip(rows, columns, strict=True)]
-    return Products(
+    return NuisanceProducts(
         grams=[gram for gram, _ in pairs],
         products=[product for _, product in pairs],
         losses=[one.loss for one in rows],

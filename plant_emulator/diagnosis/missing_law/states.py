@@ -20,7 +20,7 @@ SLOW = (10.0, 30.0, 100.0, 300.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class State:
+class LawState:
     """A state that a missing law may depend on.
 
     symbol : letter in a formula; unit : of the state, empty for a pure number

@@ -17,7 +17,7 @@ from plant_emulator.emulator.plc import reference
 from plant_emulator.emulator.plc.command import Inbox
 from plant_emulator.emulator.plc.fast_task import FastTask
 from plant_emulator.emulator.plc.state import RUNNING, TRANSITIONS, Event
-from plant_emulator.emulator.plc.surroundings import CLOSED, Backlash, Bench, Switches, Truck
+from plant_emulator.emulator.plc.surroundings import CLOSED, Backlash, SteppedBench, Switches, Truck
 from plant_emulator.simulation.running_bench import BenchSamples
 from register_maps.register_map import RegisterMap
 from register_maps.signals import Alarm, Control, Interlock, Measurement, Mode, PlcState, Status
@@ -45,7 +45,7 @@ class Plc:
 
     def __init__(
         self,
-        bench: Bench,
+        bench: SteppedBench,
         register_map: RegisterMap,
         *,
         backlash: Backlash,

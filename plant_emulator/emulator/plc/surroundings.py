@@ -14,7 +14,7 @@ CLOSED = reduce(or_, Interlock)
 PARKING_DRUM_SPEED = 0.05  # [rad/s]
 
 
-class Bench(Protocol):
+class SteppedBench(Protocol):
     """A bench that can be simulated in steps of 1 ms."""
 
     @property

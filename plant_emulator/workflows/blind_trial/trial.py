@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     Progress = Callable[[str, float], None]
 
 
-class Trial:
+class BlindTrial:
     """A trial of `count` cases in its folder, which may already hold a part of it."""
 
     def __init__(self, path: Path, seed: int, count: int) -> None:

@@ -7,16 +7,18 @@ from pathlib import Path
 
 from plant_emulator import effects
 from plant_emulator.diagnosis import calibration
-from plant_emulator.diagnosis.calibration.confidence import Case
+from plant_emulator.diagnosis.calibration.confidence import TrialVerdict
 from plant_emulator.diagnosis.calibration.model_form_error import EstimatedSize, model_form_errors
 
 FOLDER = Path(calibration.__file__).parent
 
 
-def trial_cases() -> list[Case]:
+def trial_cases() -> list[TrialVerdict]:
     """The cases of the blind trial that this version was calibrated with."""
     return [
-        Case(kind=row["kind"], evidence=float(row["evidence"]), right=row["right"] == "True")
+        TrialVerdict(
+            kind=row["kind"], evidence=float(row["evidence"]), right=row["right"] == "True"
+        )
         for row in _rows("calibration.csv")
     ]
 

@@ -13,7 +13,7 @@ import pytest
 from gateway.cycle.cycle import Output
 from gateway.cycle.supervisor import State
 from gateway.reasons import Reason
-from gateway.recordings.recording import Recording, read
+from gateway.recordings.recording import GatewayRecording, read
 from gateway.runtime.daemon import fault_of
 from plant_emulator.emulator.process import EmulatorProcess
 
@@ -47,7 +47,7 @@ class Gateway:
         return self.process.returncode, output
 
     @property
-    def recording(self) -> Recording:
+    def recording(self) -> GatewayRecording:
         (path,) = self.recordings.glob("*.rlrec")
         return read(path)
 

@@ -8,7 +8,7 @@ import numpy as np
 from gateway.commissioning.step_run import OUTSIDE, StepRun
 from gateway.configuration.config import Config
 from gateway.cycle.supervisor import State
-from gateway.losses.sections import Trace
+from gateway.losses.sections import SweepTrace
 from plant_emulator import effects
 from plant_emulator.emulator.plc.plc import Plc
 from plant_emulator.emulator.plc.surroundings import Backlash
@@ -62,7 +62,7 @@ def step_run(config: Config, samples: Sequence[Measurement], steps: Sequence[int
     }
     time, integral = columns["plc_time"], columns["shaft_torque_integral"]
     mean = np.diff(integral) / np.diff(time)
-    trace = Trace(
+    trace = SweepTrace(
         name="fast bench",
         time=time,
         motor_speed=columns["motor_speed"],

@@ -13,7 +13,7 @@ from gateway.configuration.config import Config, from_document
 from gateway.configuration.program import Emulation, Program, Ramp
 from gateway.errors import ConfigError
 from gateway.friction.law import friction_torque
-from gateway.losses.sections import Trace
+from gateway.losses.sections import SweepTrace
 
 RADIUS, RATIO = 0.645, 62.6
 PERIOD = 0.01
@@ -42,7 +42,7 @@ def run_of(parts: list[tuple[Emulation, np.ndarray]], torque=None) -> StepRun:  
     program = Program(name="test", steps=tuple(step for step, _ in parts))
     return StepRun(
         config=Config().with_program(program),
-        trace=Trace(
+        trace=SweepTrace(
             name="test",
             time=time,
             motor_speed=drum * RATIO,
@@ -185,7 +185,7 @@ def slow_turn(*, torque: float = -4.0, ratio: float = RATIO, drift: float = 0.0)
     time = np.arange(len(motor)) * PERIOD
     return StepRun(
         config=Config().with_program(program),
-        trace=Trace(
+        trace=SweepTrace(
             name="test",
             time=time,
             motor_speed=motor,

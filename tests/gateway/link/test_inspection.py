@@ -5,7 +5,14 @@ import pytest
 import register_maps
 from gateway.errors import ConfigError
 from gateway.link.device import encode_scaled, writable
-from gateway.link.inspection import Reading, Row, mbpoll, value_in_other_order, value_text, verify
+from gateway.link.inspection import (
+    Reading,
+    RegisterRow,
+    mbpoll,
+    value_in_other_order,
+    value_text,
+    verify,
+)
 from register_maps.codec import encode_measurement
 from register_maps.register_map import RegisterMap
 from register_maps.signals import SIGNALS, Measurement, Status
@@ -37,7 +44,7 @@ def reading(heartbeat: int, **changed: float) -> dict[str, tuple[int, ...]]:
     return found | {one.name: (0,) * one.raw.words for one in MAP.registers if one.address >= 64}
 
 
-def rows(*readings: Reading, register_map: RegisterMap = MAP) -> dict[str, Row]:
+def rows(*readings: Reading, register_map: RegisterMap = MAP) -> dict[str, RegisterRow]:
     return {row.register.name: row for row in verify(register_map, readings).rows}
 
 

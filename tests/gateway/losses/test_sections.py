@@ -8,7 +8,7 @@ import pytest
 
 from gateway.configuration.sections import BenchConfig, RegulatorConfig
 from gateway.errors import ConfigError
-from gateway.losses.sections import LossesError, Trace, steady
+from gateway.losses.sections import LossesError, SweepTrace, steady
 from gateway.recordings.steady_runs import _mean_torque, read
 
 DATA = Path(__file__).parents[2] / "data"
@@ -25,7 +25,7 @@ def trace(motor_speed, shaft_torque, *, seconds=10.0):
     time = np.arange(0.0, seconds, 0.01)
     speed = np.broadcast_to(motor_speed(time), time.shape).astype(float)
     torque = np.broadcast_to(shaft_torque(time), time.shape).astype(float)
-    return Trace(
+    return SweepTrace(
         name="run", time=time, motor_speed=speed, drum_speed=speed / 62.6, shaft_torque=torque
     )
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from gateway.review.stability import Loop, is_stable, smallest_mass, spectral_radius
+from gateway.review.stability import SpeedLoop, is_stable, smallest_mass, spectral_radius
 
 INERTIA = 312.71242 / 0.645**2
-LOOP = Loop(period=0.01, dead_time=0.064, averaged=True)
+LOOP = SpeedLoop(period=0.01, dead_time=0.064, averaged=True)
 INSTANT = replace(LOOP, averaged=False)
 
 

@@ -17,7 +17,7 @@ from gateway.reasons import Reason
 from gateway.recordings import log, log_writer
 from gateway.recordings.export import Export, Extent
 from gateway.recordings.header import config_of, header, map_of
-from gateway.recordings.recording import Recording, encode_header, read, stream
+from gateway.recordings.recording import GatewayRecording, encode_header, read, stream
 from gateway.runtime.loop import Loop
 from plant_emulator.emulator.process import EmulatorProcess
 from register_maps.register_map import RegisterMap
@@ -105,7 +105,7 @@ class Run:
         raise AssertionError(f"{self.output.state.name} {self.output.reason} after {within} ticks")
 
     @property
-    def recording(self) -> Recording:
+    def recording(self) -> GatewayRecording:
         return read(self.sink.path)
 
 

@@ -3,7 +3,7 @@
 import pytest
 from scipy.stats import binom
 
-from plant_emulator.blind.bounds import Share, clopper_pearson, share_of
+from plant_emulator.blind.bounds import HitRate, clopper_pearson, share_of
 
 
 def test_no_error_in_sixty_leaves_less_than_5_percent() -> None:
@@ -27,8 +27,8 @@ def test_bounds_are_where_the_tails_hold_5_percent(hits: int, of: int) -> None:
 
 def test_nothing_counted_says_nothing() -> None:
     assert clopper_pearson(0, 0) == (0.0, 1.0)
-    assert Share(0, 0).to_json()["share"] is None
+    assert HitRate(0, 0).to_json()["share"] is None
 
 
 def test_share_counts_what_is_true() -> None:
-    assert share_of([True, False, True]) == Share(2, 3)
+    assert share_of([True, False, True]) == HitRate(2, 3)

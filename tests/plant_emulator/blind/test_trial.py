@@ -17,7 +17,7 @@ from plant_emulator.simulation.sensor_noise import add_noise
 from plant_emulator.simulation.simulate import inputs_of, simulate
 from plant_emulator.workflows.blind_trial.examiner import Examiner
 from plant_emulator.workflows.blind_trial.folder import ROOT, program_hash
-from plant_emulator.workflows.blind_trial.trial import Trial
+from plant_emulator.workflows.blind_trial.trial import BlindTrial
 from tests.plant_emulator.blind.conftest import finished
 from tests.plant_emulator.runs import linear
 
@@ -49,7 +49,7 @@ def short_log(tmp_path: Path, nominal: ParameterSet) -> Path:
 def test_diagnosis_opens_no_answer_and_imports_no_law_of_the_trial(
     tmp_path: Path, short_log: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    trial = Trial(folder, 1, 2)
+    trial = BlindTrial(folder, 1, 2)
     trial.seal()
     witness = tmp_path / "witness"
     witness.mkdir()
@@ -69,7 +69,7 @@ def test_diagnosis_opens_no_answer_and_imports_no_law_of_the_trial(
 
 
 def test_witness_would_record_an_opened_answer(tmp_path: Path, folder: Path) -> None:
-    Trial(folder, 1, 1).seal()
+    BlindTrial(folder, 1, 1).seal()
     record = tmp_path / "record.txt"
     answer = folder / "sealed" / "case_001.json"
     program = f"{WITNESS.format(out=str(record))}\nopen({str(answer)!r})"
@@ -92,9 +92,9 @@ def test_stopped_examiner_starts_nothing(short_log: Path) -> None:
     assert examiner.diagnose([short_log]).error == "stopped"
 
 
-def done(folder: Path, *right: bool) -> Trial:
+def done(folder: Path, *right: bool) -> BlindTrial:
     """A trial with finished cases only."""
-    trial = Trial(folder, 1, len(right))
+    trial = BlindTrial(folder, 1, len(right))
     trial.seal()
     for number, one in enumerate(right):
         trial.folder.write_result(number, finished(number, right=one), None)
@@ -103,7 +103,7 @@ def done(folder: Path, *right: bool) -> Trial:
 
 def test_a_finished_case_is_not_repeated(folder: Path) -> None:
     done(folder, True, False)
-    again = Trial(folder, 1, 2)
+    again = BlindTrial(folder, 1, 2)
     again.seal()
     found = again.run(1).to_json()
     assert (found["cases"], found["correct"], found["false_alarms"]) == (2, 1, 1)
@@ -114,14 +114,14 @@ def test_a_finished_case_is_not_repeated(folder: Path) -> None:
 
 
 def test_cases_of_many_logs_come_first(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    trial, order = Trial(folder, 5, 30), []
+    trial, order = BlindTrial(folder, 5, 30), []
     trial.seal()
 
-    def do(self: Trial, number: int) -> None:
+    def do(self: BlindTrial, number: int) -> None:
         order.append(len(self.folder.unseal(number).programs))
         self.folder.write_result(number, finished(number, right=True), None)
 
-    monkeypatch.setattr(Trial, "_run_case", do)
+    monkeypatch.setattr(BlindTrial, "_run_case", do)
     trial.run(1)
     assert order == sorted(order, reverse=True)
     assert len(set(order)) > 1
@@ -197,7 +197,7 @@ def test_a_bench_without_effect_is_diagnosed_unsealed_and_scored(
     folder: Path, nominal: ParameterSet
 ) -> None:
     """One whole case, the first of its seed without an effect."""
-    trial = Trial(folder, 2, 20)
+    trial = BlindTrial(folder, 2, 20)
     trial.seal()
     [number] = [k for k in range(20) if trial.folder.unseal(k).kind == "none"][:1]
     for other in set(range(20)) - {number}:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from plant_emulator.estimation.free_parameters import free_parameters
-from plant_emulator.estimation.start_search import Search
+from plant_emulator.estimation.start_search import StartSearch
 from plant_emulator.identification.experiment_design import (
     experiments,
     promised_errors,
@@ -73,7 +73,7 @@ class Bench:
         made = self.run(*PROGRAMS[program].reference(), seed, gap)  # type: ignore[union-attr]
         both: list[Recording] = [self.recording, recording(made)]
         free = free_parameters(self.nominal)
-        search = Search(both, self.true, free)
+        search = StartSearch(both, self.true, free)
         search.gaps = [self.found.gap_positions[0], gap]
         return identification_of(fit_from(both, self.nominal, free, search), self.nominal, free, 2)
 

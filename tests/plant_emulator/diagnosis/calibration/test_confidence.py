@@ -2,13 +2,14 @@
 
 import pytest
 
-from plant_emulator.diagnosis.calibration.confidence import FEWEST_CASES, Case, confidence
+from plant_emulator.diagnosis.calibration.confidence import FEWEST_CASES, TrialVerdict, confidence
 
 
-def cases(kind: str, *rights: bool) -> list[Case]:
+def cases(kind: str, *rights: bool) -> list[TrialVerdict]:
     """Cases of rising evidence 100, 200, ..."""
     return [
-        Case(kind=kind, evidence=100.0 * (k + 1), right=right) for k, right in enumerate(rights)
+        TrialVerdict(kind=kind, evidence=100.0 * (k + 1), right=right)
+        for k, right in enumerate(rights)
     ]
 
 

@@ -12,14 +12,14 @@ from plant_emulator import effects
 from plant_emulator.diagnosis.missing_law.effect_text import effect_text
 from plant_emulator.diagnosis.missing_law.grammar import Factor, Term
 from plant_emulator.diagnosis.missing_law.law_search import Law
-from plant_emulator.diagnosis.missing_law.quantity import Quantity
-from plant_emulator.diagnosis.missing_law.states import State
+from plant_emulator.diagnosis.missing_law.quantity import LawQuantity
+from plant_emulator.diagnosis.missing_law.states import LawState
 from plant_emulator.effects import Effect
 
 
-def state(**known: Any) -> State:
+def state(**known: Any) -> LawState:
     common = {"name": "speed", "symbol": "w", "unit": "rad/s", "values": [np.ones(2)]}
-    return State(**{**common, "time": [np.arange(2.0)], **known})
+    return LawState(**{**common, "time": [np.arange(2.0)], **known})
 
 
 SPEED = state(code="abs(s.gear_speed)", kind="level")
@@ -29,7 +29,7 @@ ANGLE = state(code="s.drum_speed", kind="angle", name="angle", symbol="theta", u
 
 
 def written(folder: Path, hook: str, *terms: tuple[float, Term]) -> Effect:
-    quantity = Quantity(
+    quantity = LawQuantity(
         place="gear",
         name="friction",
         unit="N m",

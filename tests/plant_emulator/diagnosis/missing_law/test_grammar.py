@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.missing_law.grammar import Factor, Term, terms
-from plant_emulator.diagnosis.missing_law.states import State, lagged
+from plant_emulator.diagnosis.missing_law.states import LawState, lagged
 
 TIME = np.arange(0.005, 3.0, 0.01)
 
 
-def state(kind: str, values: list[float], lags: tuple[float, ...] = ()) -> State:
-    return State(
+def state(kind: str, values: list[float], lags: tuple[float, ...] = ()) -> LawState:
+    return LawState(
         name="gear speed",
         symbol="w",
         unit="rad/s",

@@ -5,10 +5,10 @@ import pytest
 
 from plant_emulator.diagnosis.missing_law.grammar import Factor, Term
 from plant_emulator.diagnosis.missing_law.law_search import Law
-from plant_emulator.diagnosis.missing_law.quantity import Quantity
-from plant_emulator.diagnosis.missing_law.states import State
+from plant_emulator.diagnosis.missing_law.quantity import LawQuantity
+from plant_emulator.diagnosis.missing_law.states import LawState
 
-SPEED = State(
+SPEED = LawState(
     name="gear speed",
     symbol="w",
     unit="rad/s",
@@ -22,7 +22,7 @@ WIDE, NARROW = Term((Factor("bell", SPEED, 3.0),)), Term((Factor("bell", SPEED, 
 
 
 def law(*terms: tuple[float, Term], name: str = "friction") -> Law:
-    quantity = Quantity(
+    quantity = LawQuantity(
         place="gear",
         name=name,
         unit="N m",
