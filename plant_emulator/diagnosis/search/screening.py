@@ -2,11 +2,13 @@
 
 Each effect has two scores on top of a fit, in the relations and in the simulation's residual. What
 is local is clean in the first; what is slow and faint adds up in the second. The larger counts.
+A large gap bends the parameters of the fit without effects, and slopes there mislead. The relations
+at the nominal parameters give a third score then.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -40,7 +42,7 @@ class Start:
 
 @dataclass(frozen=True, kw_only=True)
 class Promise:
-    """Predicted gain of log evidence of one more effect, by fidelity."""
+    """Predicted gain of log evidence of one more effect, by regression."""
 
     effect: str
     gains: Mapping[str, float]
@@ -93,12 +95,19 @@ class Screening:
     """A screening of all effects on top of one fit, by one regression.
 
     fidelity : simulation or relations; states : of each effect in each run, by effect
+    nominal : whether the slopes are those at the nominal parameters
     """
 
     base: FitResult
     runs: tuple[int, ...]
     fidelity: str
     states: Mapping[str, Sequence[Mapping[str, float]]]
+    nominal: bool = False
+
+    @property
+    def name(self) -> str:
+        """The regression's name in the trace."""
+        return f"{self.fidelity} at nominal parameters" if self.nominal else self.fidelity
 
 
 def promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
@@ -108,6 +117,8 @@ def promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
         Screening(base=base, runs=runner.runs, fidelity=fidelity, states=states)
         for fidelity in ("relations", "simulation")
     ]
+    if not base.effects and base.mean_square > SETTINGS.linear_mean_square:
+        asked.append(replace(asked[0], nominal=True))
     found: dict[str, Promise] = {}
     for some in runner.map(screen, asked):
         for one in some:
@@ -128,6 +139,8 @@ def screen(model: Model, asked: Screening) -> list[Promise]:
     from threadpoolctl import threadpool_limits
 
     base, library = asked.base, _library(model, asked.base)
+    if asked.nominal:
+        base = _at_nominal(model, asked)
     last = bool(base.effects) and base.mean_square <= NOISE_MEAN_SQUARE
     sizes = SETTINGS.sizes[:1] if last else SETTINGS.sizes
     with threadpool_limits(1):
@@ -141,11 +154,18 @@ def screen(model: Model, asked: Screening) -> list[Promise]:
         return [
             Promise(
                 effect=name,
-                gains={} if score is None else {asked.fidelity: score.gain},
+                gains={} if score is None else {asked.name: score.gain},
                 starts=() if score is None else (_start(fidelity, score, base),),
             )
             for name, score in _scores(library, fidelity, sizes, asked.states).items()
         ]
+
+
+def _at_nominal(model: Model, asked: Screening) -> FitResult:
+    """The base of a screening with the nominal parameters, and the states that suit them."""
+    values = model.nominal(asked.runs)
+    states = tuple(model.initial_states(k, asked.base.effects, values) for k in asked.runs)
+    return replace(asked.base, values={**asked.base.values, **values}, states=states)
 
 
 def _library(model: Model, base: FitResult) -> dict[str, Candidate]:
