@@ -5,7 +5,7 @@
 
 `labelled` takes the cases of labels.tsv (see `practice.py`). The drafts know no effect of the
 library, so that every effect is a missing law; `true effect` is what the true effect closes in the
-same contest. A case without an effect should get no draft. `outside` draws cases of
+same test. A case without an effect should get no draft. `outside` draws cases of
 the blind trial whose effect is in no library.
 
 Where there are two drafts, the emulated bench drives the next run that the diagnosis proposes, with
@@ -31,7 +31,7 @@ from plant_emulator.blind.generate import measure, simulate_truth
 from plant_emulator.diagnosis.execution.pool import InProcess, TaskRunner, build_model
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
 from plant_emulator.diagnosis.machines.bench import BenchModel, BenchRecipe
-from plant_emulator.diagnosis.missing_law.contest import Entry, hold
+from plant_emulator.diagnosis.missing_law.hypothesis_test import DraftedLaw, compare_laws
 from plant_emulator.diagnosis.wording import percent
 from plant_emulator.model.stage import split_gap_position
 from plant_emulator.recordings.recording import recording
@@ -50,7 +50,17 @@ if TYPE_CHECKING:
     from plant_emulator.workflows.diagnosis.runs import Runs
 
 NOMINAL = parameter_sets.load()
-HEAD = ("case", "hidden", "place", "draft", "closes", "bound", "true effect", "ln ratio", "rivals")
+HEAD = (
+    "case",
+    "hidden",
+    "place",
+    "draft",
+    "closes",
+    "bound",
+    "true effect",
+    "ln ratio",
+    "alternatives",
+)
 # Seed of the noise of the run that separates two drafts.
 NOISE_SEED = 1
 # Kinds of the first cases of a seed that are looked through for effects outside the library.
@@ -90,8 +100,8 @@ def closed_by(effect: str, runs: Runs, null: FitResult) -> str:
         model=build_model(runs.recipe),
         runs=runs.plan.fitted,
     )
-    entry = Entry(effect=effect, values={}, null=null, runs=runs.plan.fitted)
-    (result,) = hold(runner, runs.plan, [entry])
+    law = DraftedLaw(effect=effect, values={}, null=null, runs=runs.plan.fitted)
+    (result,) = compare_laws(runner, runs.plan, [law])
     return percent(result.gain or 0.0)
 
 

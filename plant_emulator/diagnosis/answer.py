@@ -228,7 +228,7 @@ class Draft:
     held_out_gain : share of the held-out gap that the draft closes [1]; None: there is none
     bound_ci95 : of the largest share that any curve or law that was tried closes held out [1], see
         `missing_law/bound.py`; bound : its upper end; None: the relations of the runs show no gap
-    rivals : other laws that come near
+    rivals : alternatives, other laws that come near
     """
 
     place: str

@@ -55,7 +55,9 @@ def _verdict(f: AxisFindings) -> Verdict:
     return Verdict(
         kind=d.kind,
         effects=tuple(t.effect.name for t in f.terms),
-        classes=tuple((t.effect.name, *f.search.rivals(d.found, t.effect.name)) for t in f.terms),
+        classes=tuple(
+            (t.effect.name, *f.search.alternatives(d.found, t.effect.name)) for t in f.terms
+        ),
         parameters=_deviations(f),
         confidence=None,
         statement=_statement(f),

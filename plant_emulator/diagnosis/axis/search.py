@@ -100,7 +100,7 @@ class AxisSearch:
         """Log evidence of a set over that of none."""
         return self.value(self.null) - self.value(found)
 
-    def rivals(self, found: Fit, name: str) -> tuple[str, ...]:
+    def alternatives(self, found: Fit, name: str) -> tuple[str, ...]:
         """Effects that do as well in the place of this one."""
         others = frozenset(found.names) - {name}
         near = [

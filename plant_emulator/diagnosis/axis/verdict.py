@@ -80,9 +80,9 @@ def _confirmed(search: AxisSearch, held_out: HeldOut) -> tuple[Fit, str]:
     if not confirmed:
         return search.null, reasons[0] if reasons else ""
     winner = search.preferred(list(confirmed.values()))
-    rival = search.preferred([winner, *search.near(winner)])
-    if rival is not winner and _failing(search, held_out, rival) is None:
-        return rival, ""
+    alternative = search.preferred([winner, *search.near(winner)])
+    if alternative is not winner and _failing(search, held_out, alternative) is None:
+        return alternative, ""
     return winner, ""
 
 

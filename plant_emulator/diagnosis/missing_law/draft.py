@@ -1,7 +1,7 @@
-"""From the runs and the fit without effects to the laws that are worth a contest.
+"""From the runs and the fit without effects to the laws that are worth a test by simulation.
 
 The regression tells of every quantity which laws close the gap of runs that they were not fitted
-to. The contest by simulation then decides among few of them (`contest`).
+to. A test by simulation then decides among few of them (`hypothesis_test`).
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ if TYPE_CHECKING:
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
 
-# At most so many laws meet in a contest: each takes a fit a fold.
+# At most so many laws are tested by simulation: each takes a fit a fold.
 MOST_LAWS = 3
-# Share of the best law's held-out gain from which on another law is a rival.
-RIVAL_SHARE = 0.8
+# Share of the best law's held-out gain from which on another law is an alternative.
+ALTERNATIVE_SHARE = 0.8
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sketch:
-    """A law that is worth a contest.
+    """A law that is worth a test by simulation.
 
     curve : the same quantity over the law's first state, without a formula
     """
@@ -44,7 +44,7 @@ class Sketch:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sketchbook:
-    """Laws that are worth a contest, the best one first; empty where no law closes a gap.
+    """Laws that are worth a test, the best one first; empty where no law closes a gap.
 
     bound : how much of the gap any law could close; None: the relations show no gap
     """
@@ -56,7 +56,7 @@ class Sketchbook:
 def sketch(
     recordings: Sequence[Recording], parameters: ParameterSet, null: FitResult
 ) -> Sketchbook:
-    """Sketch the laws that are worth a contest, and bound what any law could close.
+    """Sketch the laws that are worth a test, and bound what any law could close.
 
     null : converged fit without effects; at least two recordings, because other runs judge
     """
@@ -66,15 +66,15 @@ def sketch(
         regression = BlockRegression(recordings, parameters, null)
         before = null_loss(regression)
         searches = [search(regression, one, before) for one in quantities(regression)]
-        found = tuple(_sketch(regression, *pair) for pair in _contenders(searches))
+        found = tuple(_sketch(regression, *pair) for pair in _best_laws(searches))
         return Sketchbook(sketches=found, bound=bound(regression, searches))
 
 
-def _contenders(searches: Sequence[LawSearch]) -> list[tuple[LawSearch, Law]]:
-    """The best law, its shorter or longer form, and rivals, of all quantities.
+def _best_laws(searches: Sequence[LawSearch]) -> list[tuple[LawSearch, Law]]:
+    """The best law, its shorter or longer form, and its alternatives, of all quantities.
 
-    A short law and a long one that resemble each other both enter: a simulation decides whether the
-    further terms are worth it.
+    A short law and a long one that resemble each other are both tested: a simulation decides
+    whether the further terms are worth it.
     """
     every = []
     for one in searches:
@@ -84,7 +84,7 @@ def _contenders(searches: Sequence[LawSearch]) -> list[tuple[LawSearch, Law]]:
     every.sort(key=lambda pair: -pair[0].score(pair[1]))
     found: list[tuple[LawSearch, Law]] = []
     for one, chosen in every:
-        if one.score(chosen) < RIVAL_SHARE * every[0][0].score(every[0][1]):
+        if one.score(chosen) < ALTERNATIVE_SHARE * every[0][0].score(every[0][1]):
             break
         law = one.law(chosen)
         alike = [other for _, other in found if law.resembles(other)]

@@ -223,7 +223,7 @@ def _drafted(found: Sequence[Draft] | None, width: int) -> list[str]:
     best, *others = found
     told = [f"{best.quantity}: {best.form}", describe_draft_gain(best), f"file {best.file}"]
     if others:
-        told[-1] = f"rivals {'; '.join(one.form for one in others)}; {told[-1]}"
+        told[-1] = f"alternatives {'; '.join(one.form for one in others)}; {told[-1]}"
     first, *rest = [row for words in told for row in _paragraph(words, width - 9, 1)]
     return [f"{'draft':9}{first}", *(f"{'':9}{row}" for row in rest)]
 

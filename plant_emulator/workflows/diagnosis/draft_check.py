@@ -12,7 +12,7 @@ from plant_emulator import effects
 from plant_emulator.diagnosis.answer import Quantity
 from plant_emulator.diagnosis.execution.pool import InProcess, TaskRunner, build_model
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
-from plant_emulator.diagnosis.missing_law.contest import Entry, hold
+from plant_emulator.diagnosis.missing_law.hypothesis_test import DraftedLaw, compare_laws
 from plant_emulator.diagnosis.wording import percent, size
 from plant_emulator.parameter_sets import DEFAULT, with_effects
 from plant_emulator.workflows.diagnosis.runs import bench_runs
@@ -76,8 +76,8 @@ def draft_check(
     runner = TaskRunner(pool=InProcess(), recipe=runs.recipe, model=model, runs=runs.plan.fitted)
     with threadpool_limits(1):
         null = fit_null(model, runs.plan.fitted)
-        entry = Entry(effect=own.name, values={}, null=null, runs=runs.plan.fitted)
-        (found,) = hold(runner, runs.plan, [entry])
+        draft = DraftedLaw(effect=own.name, values={}, null=null, runs=runs.plan.fitted)
+        (found,) = compare_laws(runner, runs.plan, [draft])
     candidate = model.candidates[own.name]
     return DraftCheck(
         effect=own.name,

@@ -13,9 +13,13 @@ from plant_emulator.diagnosis.execution.pool import TaskRunner, build_model
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.machines.bench import BenchModel, BenchRecipe
 from plant_emulator.diagnosis.missing_law.bound import Bound
-from plant_emulator.diagnosis.missing_law.contest import WORTH_A_TERM, Entry, hold
 from plant_emulator.diagnosis.missing_law.draft import sketch
 from plant_emulator.diagnosis.missing_law.effect_text import effect_text
+from plant_emulator.diagnosis.missing_law.hypothesis_test import (
+    WORTH_A_TERM,
+    DraftedLaw,
+    compare_laws,
+)
 from plant_emulator.diagnosis.missing_law.next_run import best_separation
 from plant_emulator.errors import report_unwritable
 from plant_emulator.simulation.simulate import values_of
@@ -26,8 +30,8 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.execution.pool import Pool
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.missing_law.contest import Result
     from plant_emulator.diagnosis.missing_law.draft import Sketch, Sketchbook
+    from plant_emulator.diagnosis.missing_law.hypothesis_test import LawResult
     from plant_emulator.diagnosis.missing_law.law_search import Law
     from plant_emulator.diagnosis.prediction.trace import Trace
     from plant_emulator.recordings.recording import Recording
@@ -72,11 +76,11 @@ def draft(runs: Runs[Any], null: FitResult | None, pool: Pool, folder: Path) -> 
     files = _write(found, folder)
     own = replace(recipe, without=_library(recipe), own=(*recipe.own, *files))
     runner = TaskRunner(pool=pool, recipe=own, model=build_model(own), runs=runs.plan.fitted)
-    entries = [
-        Entry(effect=file.stem, values=one.law.parameters, null=null, runs=runs.plan.fitted)
+    alternatives = [
+        DraftedLaw(effect=file.stem, values=one.law.parameters, null=null, runs=runs.plan.fitted)
         for one, file in zip(found, files, strict=True)
     ]
-    drafted = _ranked(book, files, hold(runner, runs.plan, entries))
+    drafted = _ranked(book, files, compare_laws(runner, runs.plan, alternatives))
     return replace(drafted, next_program=_next_program(runs.fitted, recipe, drafted.fits))
 
 
@@ -109,7 +113,7 @@ def _write(found: Sequence[Sketch], folder: Path) -> list[Path]:
     return files
 
 
-def _ranked(book: Sketchbook, files: Sequence[Path], results: Sequence[Result]) -> Drafted:
+def _ranked(book: Sketchbook, files: Sequence[Path], results: Sequence[LawResult]) -> Drafted:
     """The drafts that certainly close a part of the held-out gap worth their terms, best first.
 
     Of two laws that the fit has made alike, the better one stays.
@@ -120,7 +124,7 @@ def _ranked(book: Sketchbook, files: Sequence[Path], results: Sequence[Result]) 
         if result.is_draft(len(one.law.terms))
     ]
     rows.sort(key=lambda row: WORTH_A_TERM * len(row[1].terms) - (row[3].gain or 0.0))
-    kept: list[tuple[Sketch, Law, Path, Result]] = []
+    kept: list[tuple[Sketch, Law, Path, LawResult]] = []
     for row in rows:
         if not any(row[1].resembles(other[1]) for other in kept):
             kept.append(row)
@@ -136,7 +140,7 @@ def _ranked(book: Sketchbook, files: Sequence[Path], results: Sequence[Result]) 
     )
 
 
-def _with_drafts(found: Bound | None, results: Sequence[Result]) -> Bound | None:
+def _with_drafts(found: Bound | None, results: Sequence[LawResult]) -> Bound | None:
     """The bound, or what the drafts close by simulation where that is more."""
     closed = [
         Bound(share=result.gain, interval=result.interval)
@@ -150,7 +154,7 @@ def _with_drafts(found: Bound | None, results: Sequence[Result]) -> Bound | None
     return Bound(share=max(one.share for one in every), interval=(low, high))
 
 
-def _fitted(one: Sketch, result: Result) -> Law:
+def _fitted(one: Sketch, result: LawResult) -> Law:
     """The law with the values of its fit."""
     name = f"{result.effect}_"
     own = {k.removeprefix(name): v for k, v in result.fit.values.items() if k.startswith(name)}
@@ -158,7 +162,7 @@ def _fitted(one: Sketch, result: Result) -> Law:
 
 
 def _draft(
-    row: tuple[Sketch, Law, Path, Result], bound: Bound | None, rivals: tuple[str, ...]
+    row: tuple[Sketch, Law, Path, LawResult], bound: Bound | None, rivals: tuple[str, ...]
 ) -> Draft:
     one, law, file, result = row
     drawn = law.over_state(one.curve.over, np.array(one.curve.knots))

@@ -341,12 +341,12 @@ def test_search_and_noise_stand_in_tables() -> None:
 TITLE = "The missing law, drafted"
 
 
-def test_draft_is_drawn_with_its_curve_band_law_and_rivals():
+def test_draft_is_drawn_with_its_curve_band_law_and_alternatives():
     found = section(page("drafted"), TITLE)
     best, other = found.findall("figure")
     assert [p.get("class") for p in best.iter("path")] == ["after", "edge", "edge", "before"]
     assert [p.get("class") for p in other.iter("path")] == ["after", "edge", "edge"]
-    assert "rivals: -8.2 sqrt(w) N m" in words(found)
+    assert "alternatives: -8.2 sqrt(w) N m" in words(found)
     assert "drafts/draft_gear_1.py" in words(found)
 
 

@@ -209,7 +209,7 @@ def test_share_near_the_ends_shows_a_decimal(share, text):
     assert percent(share) == text
 
 
-def test_advice_for_two_rivals_is_told_whole():
+def test_advice_for_two_alternatives_is_told_whole():
     answer = answers.two_effects()
     answer["verdict"]["next_experiment"] = (
         "Drive program4 (60 s, to 350 rad/s, with sweeps): there drum_speed_scale differs from "
@@ -219,13 +219,13 @@ def test_advice_for_two_rivals_is_told_whole():
     assert answer["verdict"]["next_experiment"] in told
 
 
-def test_draft_says_its_law_what_it_closes_and_the_rival():
+def test_draft_says_its_law_what_it_closes_and_the_alternative():
     rows = lines(answers.drafted())
     k = next(k for k, row in enumerate(rows) if row.startswith("draft "))
     told = " ".join(" ".join(rows[k : k + 3]).split())
     assert "friction of the gear at its output: -31.4 exp(-(w/0.5)^2) N m" in told
     assert "closes 81 % (77 % to 84 %) of the held-out gap; at most 93 %" in told
-    assert "rivals -8.2 sqrt(w) N m; file drafts/draft_gear_1.py" in told
+    assert "alternatives -8.2 sqrt(w) N m; file drafts/draft_gear_1.py" in told
 
 
 def test_no_draft_is_told_only_where_one_was_asked_for():

@@ -1,4 +1,4 @@
-"""The drafts of a missing law in a report: the curve over its state, the law on top, the rivals."""
+"""The drafts of a missing law in a report: curve over its state, law, alternatives."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def drafts(found: Sequence[Draft], traces: Sequence[Trace]) -> Markup:
     """
     if not found:
         return tag("p", "No law over the measured states closes a part of the gap for certain.")
-    best, *rivals = found
-    return join(_draft(best), _change(traces), *(_draft(one) for one in rivals))
+    best, *others = found
+    return join(_draft(best), _change(traces), *(_draft(one) for one in others))
 
 
 def _change(traces: Sequence[Trace]) -> Markup:
@@ -63,7 +63,7 @@ def _fall(trace: Trace) -> float:
 def _draft(one: Draft) -> Markup:
     facts = [f"{one.quantity}, over {one.over}", describe_draft_gain(one)]
     if one.rivals:
-        facts.append(f"rivals: {'; '.join(one.rivals)}")
+        facts.append(f"alternatives: {'; '.join(one.rivals)}")
     caption = (
         f"{one.curve.quantity} [{one.curve.unit}] over {one.curve.over}"
         f"{f' [{one.curve.over_unit}]' if one.curve.over_unit else ''}: curve without a formula, "

@@ -1,4 +1,4 @@
-"""The noise of fed inputs in a contest, on a line one direction of which is fed with noise."""
+"""A hypothesis test with noise of fed inputs, on a line with one direction fed with noise."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -52,7 +52,7 @@ def test_procedure_with_input_noise_finds_no_gap_in_their_noise() -> None:
     assert procedure.with_input_noise().run()[1].kind == "parameter"
 
 
-def test_contest_starts_from_the_fit_that_told_the_noise() -> None:
+def test_fit_starts_from_the_fit_that_told_the_noise() -> None:
     """A line that is searched for once only: the second time would be a fault."""
 
     class Once(Fed):

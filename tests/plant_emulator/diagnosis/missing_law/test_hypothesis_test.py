@@ -1,8 +1,8 @@
-"""Which laws of a contest become drafts."""
+"""Which tested laws become drafts."""
 
 import pytest
 
-from plant_emulator.diagnosis.missing_law.contest import Result
+from plant_emulator.diagnosis.missing_law.hypothesis_test import LawResult
 
 
 @pytest.mark.parametrize(
@@ -19,7 +19,7 @@ from plant_emulator.diagnosis.missing_law.contest import Result
 def test_draft_closes_a_certain_part_of_the_gap_worth_its_terms(
     gain: float | None, interval: tuple[float, float] | None, terms: int, expected: bool
 ) -> None:
-    result = Result(
+    result = LawResult(
         effect="draft",
         fit=None,  # type: ignore[arg-type]  # no fit here
         gain=gain,

@@ -1,4 +1,4 @@
-"""The contest of drafted laws by simulation: joint fits, and predictions of held-out runs.
+"""The hypothesis test of drafted laws: joint fits, and predictions of held-out runs.
 
 Every draft is an effect of the model by now. A fit starts where the regression with the law lies,
 and from the nominal parameters: the fit without effects has bent the parameters to the gap.
@@ -35,8 +35,8 @@ WORTH_A_TERM = 0.02
 
 
 @dataclass(frozen=True, kw_only=True)
-class Entry:
-    """A draft that enters the contest.
+class DraftedLaw:
+    """A drafted law that is tested against the others.
 
     effect : name of the effect; values : parameters that the regression with the law tells [SI]
     null : fit without effects; runs : that it was fitted to
@@ -49,8 +49,8 @@ class Entry:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Result:
-    """What the contest found of a draft.
+class LawResult:
+    """A drafted law after the test.
 
     fit : joint fit; gain : share of the held-out gap that the draft closes [1], None: there is none
     interval : 95 % interval of the gain
@@ -70,29 +70,29 @@ class Result:
         return self.interval[0] > 0.0 and self.gain > WORTH_A_TERM * terms
 
 
-def enter(model: Model, entry: Entry) -> FitResult:
-    """Fit a draft to all runs from its starts (a step)."""
-    nominal = model.nominal(entry.runs)
-    starts = [{**entry.null.values, **entry.values}, {**entry.null.values, **nominal}]
-    trials = [_trial(model, entry, start) for start in starts]
+def fit_law(model: Model, law: DraftedLaw) -> FitResult:
+    """Fit a draft to all runs from its starts (a task)."""
+    nominal = model.nominal(law.runs)
+    starts = [{**law.null.values, **law.values}, {**law.null.values, **nominal}]
+    trials = [_fit_from_start(model, law, start) for start in starts]
     best = min(trials, key=lambda found: found.cost)
-    return best if best.converged else fit_from(model, (entry.effect,), entry.runs, best)
+    return best if best.converged else fit_from(model, (law.effect,), law.runs, best)
 
 
-def _trial(model: Model, entry: Entry, start: Mapping[str, float]) -> FitResult:
-    candidate = model.candidates[entry.effect]
+def _fit_from_start(model: Model, law: DraftedLaw, start: Mapping[str, float]) -> FitResult:
+    candidate = model.candidates[law.effect]
     own = {u.name: u.start for u in (*candidate.sizes, *candidate.shapes)}
-    known = {name: value for name, value in start.items() if name in entry.null.values}
+    known = {name: value for name, value in start.items() if name in law.null.values}
     values = {**known, **own}
-    effects = (entry.effect,)
-    states = [model.initial_states(run, effects, values) for run in entry.runs]
-    return fit(model, effects, entry.runs, values, states, TRIAL_ITERATIONS)
+    effects = (law.effect,)
+    states = [model.initial_states(run, effects, values) for run in law.runs]
+    return fit(model, effects, law.runs, values, states, TRIAL_ITERATIONS)
 
 
-def hold(runner: TaskRunner, plan: Plan, entries: Sequence[Entry]) -> list[Result]:
-    """Hold the contest: fit every draft, and predict the held-out runs with and without it."""
-    fits = list(runner.map(enter, entries))
-    null = entries[0].null
+def compare_laws(runner: TaskRunner, plan: Plan, laws: Sequence[DraftedLaw]) -> list[LawResult]:
+    """Fit every draft, and predict the held-out runs with and without it."""
+    fits = list(runner.map(fit_law, laws))
+    null = laws[0].null
     folds = [
         _fold(plan, start, fitted, predicted)
         for start in (null, *fits)
@@ -105,14 +105,14 @@ def hold(runner: TaskRunner, plan: Plan, entries: Sequence[Entry]) -> list[Resul
     lengths = block_lengths(parts[0])
     gaps = [measure_gap(held_out, part, lengths) for part in parts]
     return [
-        Result(
-            effect=entry.effect,
+        LawResult(
+            effect=law.effect,
             fit=one,
             gain=closed_fraction(gaps[0], gap),
             interval=closed_fraction_interval(gaps[0], gap),
             traces=traces(held_out, parts[0], part),
         )
-        for entry, one, gap, part in zip(entries, fits, gaps[1:], parts[1:], strict=True)
+        for law, one, gap, part in zip(laws, fits, gaps[1:], parts[1:], strict=True)
     ]
 
 
