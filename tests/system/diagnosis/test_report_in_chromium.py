@@ -192,4 +192,5 @@ def test_report_of_a_real_diagnosis_prints_on_a_few_pages(chromium, tmp_path, di
     pdf = tmp_path / "report.pdf"
     chromium(diagnosed.report, f"--print-to-pdf={pdf}", "--no-pdf-header-footer")
     boxes = re.findall(rb"/MediaBox ?\[ ?0 0 ([\d.]+) ([\d.]+) ?\]", pdf.read_bytes())
+    # Six pages and a half; another machine's fonts and longer paths may take one more.
     assert 3 <= len(boxes) <= 8

@@ -35,9 +35,9 @@ code, .hash { font: .875em/1.45 ui-monospace, "DejaVu Sans Mono", Consolas, mono
 .verdict .statement { font-size: 1.35rem; line-height: 1.35; font-weight: 600;
   margin: .25rem 0 0; }
 .next { border-left: .4rem solid var(--line); padding: .25rem 1rem; }
-dl { display: grid; grid-template-columns: minmax(8rem, max-content) 1fr; gap: .3rem 1.25rem;
+dl { display: grid; grid-template-columns: fit-content(18rem) 1fr; gap: .3rem 1.25rem;
   margin: .5rem 0; }
-dt { color: var(--soft); overflow-wrap: anywhere; max-width: 18rem; }
+dt { color: var(--soft); overflow-wrap: anywhere; }
 dd { margin: 0; min-width: 0; overflow-wrap: anywhere; }
 ul { margin: .5rem 0; padding-left: 1.25rem; max-width: 48rem; }
 .wide { overflow-x: auto; }
@@ -91,13 +91,18 @@ svg path { fill: none; stroke-linejoin: round; }
   .verdict .statement { font-size: 1.15rem; }
   dl { grid-template-columns: 1fr; gap: 0; } dd { margin-bottom: .5rem; }
   th, td { padding: .3rem .5rem; } }
-@page { size: A4; margin: 15mm; }
+@page { size: A4; margin: 12mm 15mm; }
 @media print {
   html { font-size: 10.5pt; -webkit-print-color-adjust: exact; print-color-adjust: exact; }
   body { max-width: none; padding: 0; }
-  h2, h3, caption { break-after: avoid; } h2 { margin-top: 1.5rem; }
-  figure, tr, .map, .verdict, .keep { break-inside: avoid; }
+  h2, h3, caption, thead { break-after: avoid; } h2 { margin-top: 1rem; }
+  figure, tr, caption, .map, .short, .verdict, .keep { break-inside: avoid; }
   thead { display: table-header-group; }
-  figure svg { min-width: 0; } .wide { overflow: visible; }
-  table { font-size: 9pt; } th, td { padding: .25rem .4rem; } }
+  figure { margin: .5rem 0; } figure svg { min-width: 0; } .wide { overflow: visible; }
+  table { font-size: 9pt; } th, td { padding: .2rem .35rem; } dl { font-size: 9pt; }
+  .wide:has(.map, .short) { float: left; margin-right: .75rem; } h2 { clear: both; }
+  .map, .short { font-size: 8.5pt; line-height: 1.25; min-width: 0; }
+  .map td { min-width: 4rem; } .map .small { font-size: inherit; }
+  .short caption { max-width: 13rem; } .verdict { padding: .6rem 1rem; }
+  .verdict .statement { font-size: 1.15rem; } }
 """

@@ -108,7 +108,10 @@ def subsystems(location: Location) -> Markup:
         EXPLAINED: "in what its best effect explains alone",
     }
     return table(
-        f"Share of each subsystem {told[whole]}.", ["subsystem", right(f"share {whole}")], rows
+        f"Share of each subsystem {told[whole]}.",
+        ["subsystem", right(f"share {whole}")],
+        rows,
+        "short",
     )
 
 
