@@ -17,7 +17,7 @@ from gateway.review.limits import delay_of
 from register_maps.logs.drive_programs import interpolate
 from register_maps.units import RPM
 
-SLACK: Final = 1.0 + 1e-9
+ROUNDING_SLACK: Final = 1.0 + 1e-9
 """Room for rounding in the conversion of units."""
 
 
@@ -96,19 +96,19 @@ def configured(config: Config, program: Program) -> Config:
 def _refuse_clipped(config: Config, name: str, step: Profile) -> None:
     most, delay = config.limits, delay_of(config)
     for time, speed in zip(step.times, step.speeds, strict=True):
-        if not 0.0 <= speed <= most.speed_max * SLACK:
+        if not 0.0 <= speed <= most.speed_max * ROUNDING_SLACK:
             raise _clipped(name, time, "speed", speed, "rpm", "speed_max_rpm", most.speed_max)
     for (since, before), (time, speed) in pairwise(zip(step.times, step.speeds, strict=True)):
         slope = (speed - before) / (time - since)
-        if slope > most.rate_up * SLACK:
+        if slope > most.rate_up * ROUNDING_SLACK:
             raise _clipped(name, since, "slope", slope, "rpm/s", "rate_up_rpm_s", most.rate_up)
-        if -slope > most.rate_down * SLACK:
+        if -slope > most.rate_down * ROUNDING_SLACK:
             raise _clipped(name, since, "slope", slope, "rpm/s", "rate_down_rpm_s", most.rate_down)
     for time in step.times:
         for moment in (time, time + delay):
             before = interpolate(step.times, step.speeds, moment - delay)
             lag = interpolate(step.times, step.speeds, moment) - before
-            if lag > most.deviation * SLACK:
+            if lag > most.deviation * ROUNDING_SLACK:
                 raise _clipped(
                     name, moment, "lag of the bench", lag, "rpm", "deviation_rpm", most.deviation
                 )

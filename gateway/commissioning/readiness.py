@@ -23,9 +23,9 @@ WARM_SPEED: Final = 2000.0 * RPM
 """[rad/s] Near the speed of a travelling truck."""
 FLAT_OVER: Final = 300.0
 """[s] Time over which the friction may change by its limit; a shorter warm-up tells less."""
-SETTLE: Final = 1.5
+REST_SETTLING: Final = 1.5
 """[s] First part of a held speed, which does not count."""
-FEWEST: Final = 10
+FEWEST_TICKS: Final = 10
 """Samples at rest that a tare needs."""
 TARE, ZERO_MOTOR, ZERO_DRUM = 0.5, 0.5, 0.01
 """[N m], [rad/s], [rad/s]: what is left of the friction at rest holds the shaft twisted by 0.6 N m
@@ -60,7 +60,7 @@ def _check(name: str, what: str, value: float, unit: str, limit: float) -> Check
 def _rest(run: StepRun) -> list[Check]:
     """Tare of the torque and zeros of the speeds."""
     rest = next((part for _, part in run.parts(REST)), slice(0, 0))
-    if rest.stop - rest.start < FEWEST:
+    if rest.stop - rest.start < FEWEST_TICKS:
         return [missing("tare", "the bench did not stand before the turn", "Nm", TARE, OWN)]
     trace, known = run.trace, run.config.regulator.torque_offset
     torque = float(trace.shaft_torque[rest].mean())
@@ -79,7 +79,7 @@ def _held(run: StepRun, label: str, speed: float) -> NDArray[np.intp]:
         inside = part.start + np.flatnonzero(near)
         time = run.trace.time[inside]
         if len(inside):
-            settled: NDArray[np.intp] = inside[time >= time[0] + SETTLE]
+            settled: NDArray[np.intp] = inside[time >= time[0] + REST_SETTLING]
             return settled
     return np.zeros(0, dtype=np.intp)
 
@@ -105,7 +105,7 @@ def _warm_up(run: StepRun) -> list[Check]:
     """Change of the friction at one speed, over the last five minutes or the time that there is."""
     held = _held(run, WARM_UP, WARM_SPEED)
     what = f"change of friction at {WARM_SPEED / RPM:.0f} rpm"
-    if len(held) < FEWEST:
+    if len(held) < FEWEST_TICKS:
         return [missing("warm-up", what, "%", FLAT, OWN)]
     time, torque = run.trace.time[held], run.trace.shaft_torque[held]
     last = time >= time[-1] - FLAT_OVER

@@ -23,7 +23,7 @@ from register_maps.signals import Control, Measurement, Mode, Setpoint, Status
 WRITING = frozenset({State.ARMED, State.RUN, State.RAMPDOWN, State.SAFE})
 NOT_BY_WAITING = LINK_IS_DOWN | {Reason.NOT_ENCODABLE}
 """Faults that the next write will meet again."""
-RECENT, JITTER = 0.25, 0.1
+RECENT, ARRIVAL_JITTER = 0.25, 0.1
 """[s] Greatest age of a command that some master still writes; the slowest gateway writes every 0.2
 s. The second number is the time in which a PLC takes up a block that has arrived."""
 MICRO, NUMBERS = 1e6, 30011
@@ -105,7 +105,9 @@ def _other_master_wrote(command: Command, age: float | None) -> bool:
 
     The PLC took a new sample after the reading before it was asked for: that reading lacks it.
     """
-    return age is not None and age < RECENT and command.asked - command.arrived > age + JITTER
+    return (
+        age is not None and age < RECENT and command.asked - command.arrived > age + ARRIVAL_JITTER
+    )
 
 
 def _blocks_since(register_map: RegisterMap, command: Command, echo: int) -> int | None:

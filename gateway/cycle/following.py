@@ -12,9 +12,9 @@ from register_maps.signals import Measurement
 
 REFERENCE_WITHIN, MOTOR_WITHIN = 0.3, 0.5
 """[s] Time for which the reference may be away from the setpoint, the motor from its reference."""
-NEAR, LATE = 2.0, 0.04
+NEAR, REFERENCE_DELAY = 2.0, 0.04
 """[rad/s], [s] The reference is near within the first, and what it may move in the second."""
-SHARE = 0.75
+FOLLOWED_SHARE = 0.75
 """Share of the allowed deviation of the setpoint that the motor may be away for long."""
 
 
@@ -34,9 +34,9 @@ def note(
         return state
     steepest = max(config.limits.rate_up, config.limits.rate_down)
     reference = setpoint if sample.speed_reference is None else sample.speed_reference
-    if abs(reference - setpoint) <= NEAR + LATE * steepest:
+    if abs(reference - setpoint) <= NEAR + REFERENCE_DELAY * steepest:
         state = replace(state, reference=now)
-    if abs(sample.motor_speed - reference) <= SHARE * config.limits.deviation:
+    if abs(sample.motor_speed - reference) <= FOLLOWED_SHARE * config.limits.deviation:
         state = replace(state, motor=now)
     return state
 

@@ -35,7 +35,7 @@ from gateway.reasons import Reason
 from register_maps.signals import Measurement, Status
 from register_maps.timing import SCAN
 
-SMOOTH, ENVELOPE, RISE = 0.05, 0.3, 0.1
+SMOOTHING_TIME, ENVELOPE, RISE = 0.05, 0.3, 0.1
 """[s] The tolerance follows the mean torque over the first time, because a wrong gain cancels in a
 ripple. It remembers a large mean for the second time, because shafts ring and fluxes lag. The third
 time smoothes the acceleration."""
@@ -44,10 +44,10 @@ PULSES = 0.08
 in steps drives pulses of current, of which a poll sees only one moment."""
 REACTION = 0.25
 """Further share of the motor's torque at the full torque, where the current weakens the field."""
-COARSE = 4.0
+COARSE_STEP = 4.0
 """[N m] Further tolerance of the motor's torque for each scan between two polls, at which alone the
 current is known."""
-MOST = 1.02
+CUSUM_CEILING = 1.02
 """Alarm levels at which a sum stays, so that it falls soon when the fault is gone."""
 TARE_TIME, AT_REST = 0.5, 0.8
 """[s], [rad/s] Time constant of the tare, and motor speed up to which the motor stands."""
@@ -94,7 +94,7 @@ def judge(
     first, last = motor_torque(p, before), motor_torque(p, now)
     gear_speed = now.motor_speed / p.gear_ratio
     middle = (before.motor_speed / p.gear_ratio + gear_speed) / 2.0
-    mean = last + (state.mean - last) * exp(-duration / SMOOTH)
+    mean = last + (state.mean - last) * exp(-duration / SMOOTHING_TIME)
     envelope = max(state.envelope * exp(-duration / ENVELOPE), abs(mean))
     rise = (now.motor_speed - before.motor_speed) / duration
     acceleration = rise + (state.acceleration - rise) * exp(-duration / RISE)
@@ -166,13 +166,13 @@ def motor_torque(p: Params, sample: Measurement) -> float:
 def motor_tolerance(p: Params, envelope: float, acceleration: float, scans: float) -> float:
     """Tolerance of the motor's torque balance over a window of so many scans [N m]."""
     share = p.torque_share + REACTION * envelope / p.full_torque
-    coarse = COARSE * max(scans - 1.0, 0.0) + p.stairs * scans + PULSES * abs(acceleration)
+    coarse = COARSE_STEP * max(scans - 1.0, 0.0) + p.stairs * scans + PULSES * abs(acceleration)
     return p.torque + share * envelope + coarse
 
 
 def _sum(before: float, growth: float, level: float) -> float:
-    """CUSUM after one more window, held at MOST levels."""
-    return min(max(before + growth, 0.0), MOST * level)
+    """CUSUM after one more window, held at CUSUM_CEILING levels."""
+    return min(max(before + growth, 0.0), CUSUM_CEILING * level)
 
 
 def _tare(

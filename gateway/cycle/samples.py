@@ -28,7 +28,7 @@ from register_maps.timing import SCAN
 
 LINK_IS_DOWN = frozenset({Reason.NOT_CONNECTED, Reason.CONNECTION_LOST})
 """Faults that waiting for the next poll does not cure."""
-OUT_OF_STEP, JITTER = 0.5, 0.05
+OUT_OF_STEP, CLOCK_JITTER = 0.5, 0.05
 """Allowed difference of two clocks over a window: a share of the window, and an addition [s]."""
 FASTEST, LEAP = 1e-3, 100
 """[s] Shortest period of a PLC, and samples to spare. A sample number that leads by more than the
@@ -37,7 +37,7 @@ FORGOTTEN = 1.0
 """[s] Age of the newest sample from which its first fault is history."""
 RESTARTING = 1.0
 """[s] Time after a restart during which no sample counts as fresh."""
-MEMORY = 0.5
+CLOCK_MEMORY = 0.5
 """[s] Time over which a clock that is always too fast or too slow is noticed."""
 TORQUE_MISMATCH, TORQUE_SWING = 20.0, 200.0
 """[N m] Allowed difference of a window's mean torque from the PLC's mean over its last scan. The
@@ -58,7 +58,7 @@ class Samples:
     used : time of the last usable window [s]
     window_fault : why a later window is impossible
     oil : temperature of the gear's oil after the last window [K], None: unknown
-    ahead : lead of the PLC's clock over ours within the last MEMORY [s]
+    ahead : lead of the PLC's clock over ours within the last CLOCK_MEMORY [s]
     restarted : time at which the PLC was last found to have restarted [s]
     """
 
@@ -143,8 +143,8 @@ def with_window(config: Config, register_map: RegisterMap, samples: Samples) -> 
         return replace(samples, restarted=moved, window_fault=Reason.PLC_RESTARTED)
     if not _in_step(duration, own):
         return replace(samples, window_fault=Reason.PLC_CLOCK)
-    samples = replace(samples, ahead=samples.ahead * exp(-own / MEMORY) + duration - own)
-    if abs(samples.ahead) > OUT_OF_STEP * MEMORY:
+    samples = replace(samples, ahead=samples.ahead * exp(-own / CLOCK_MEMORY) + duration - own)
+    if abs(samples.ahead) > OUT_OF_STEP * CLOCK_MEMORY:
         return replace(samples, window_fault=Reason.PLC_CLOCK)
     torque = torque_of(config.regulator.torque, register_map, now, before, duration)
     if not _is_possible(register_map, torque, now.shaft_torque_mean, duration):
@@ -172,7 +172,7 @@ def _follows(register_map: RegisterMap, now: Measurement, before: Measurement, o
 
 def _in_step(duration: float, own: float) -> bool:
     """Whether a window took about as long by the PLC's clock as by ours [s]."""
-    allowed = OUT_OF_STEP * max(duration, own) + JITTER
+    allowed = OUT_OF_STEP * max(duration, own) + CLOCK_JITTER
     return duration > 0.0 and abs(duration - own) <= allowed
 
 

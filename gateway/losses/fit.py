@@ -19,7 +19,7 @@ from gateway.friction.document import RANGES
 from gateway.friction.law import Friction
 from gateway.losses.sections import LossesError, Section
 
-FEWEST: Final = 4
+FEWEST_SECTIONS: Final = 4
 """Least count of speeds: one more than the law has parameters, so that residuals remain."""
 SAME_SPEED_RATIO: Final = 1.05
 """Ratio from which two speeds count as two."""
@@ -107,10 +107,10 @@ def count_speeds(speeds: Iterable[float]) -> int:
 
 def _refuse_too_few(omega: Array) -> None:
     speeds = count_speeds(omega)
-    if speeds < FEWEST:
+    if speeds < FEWEST_SECTIONS:
         raise LossesError(
-            f"too few steady speeds, found {speeds}; expected at least {FEWEST}, each held for a "
-            "few seconds without a truck"
+            f"too few steady speeds, found {speeds}; expected at least {FEWEST_SECTIONS}, "
+            "each held for a few seconds without a truck"
         )
     if omega.max() < SPREAD * omega.min():
         raise LossesError(

@@ -6,7 +6,7 @@ from gateway.configuration import sweep_speeds
 from gateway.configuration.config import Config, from_document
 from gateway.configuration.sweep_speeds import HOLD_S, RATE_RPM_S
 from gateway.errors import ConfigError
-from gateway.losses.fit import FEWEST, SPREAD, count_speeds
+from gateway.losses.fit import FEWEST_SECTIONS, SPREAD, count_speeds
 from register_maps.units import RPM
 
 
@@ -31,12 +31,13 @@ def sweep_config(config: Config, speeds: Sequence[float] | None, hold: float | N
 def _refuse(speeds: Sequence[float], highest: float) -> None:
     """Refuse speeds that cannot determine the law, before anything turns."""
     ordered = sorted(speeds)
-    if count_speeds(speeds) < FEWEST or ordered[-1] < SPREAD * ordered[0]:
+    if count_speeds(speeds) < FEWEST_SECTIONS or ordered[-1] < SPREAD * ordered[0]:
         raise ConfigError(
             "speeds that do not determine the friction",
             place="--speeds",
             value=ordered,
-            expected=f"at least {FEWEST}, the fastest at least {SPREAD:g} times the slowest",
+            expected=f"at least {FEWEST_SECTIONS}, "
+            f"the fastest at least {SPREAD:g} times the slowest",
         )
     if ordered[-1] > highest * (1.0 + 1e-9):
         raise ConfigError(

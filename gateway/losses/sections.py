@@ -30,16 +30,16 @@ PLAIN: Final = RegulatorConfig()
 """A torque sensor without known errors."""
 HALF: Final = 0.5
 """[s] Time before and after a moment over which its slope is taken."""
-LONGEST: Final = 2.4 * HALF
+LONGEST_SECTION: Final = 2.4 * HALF
 """[s] Longest span of the samples of both halves; a longer span has a hole."""
 STEADY: Final = 0.5
 """[rad/s^2] Slope of the motor speed; the drum's inertia takes 2.5 N m, under 1 % of the
 friction."""
 STANDSTILL_SPEED: Final = 5.0
 """[rad/s] Motor speed below which the bench stands."""
-SHORTEST, WORTH_NAMING = 1.0, 0.2
+SHORTEST_SECTION, WORTH_NAMING = 1.0, 0.2
 """[s] Least duration of a stretch that is used, and of a stretch that is named as left out."""
-COARSEST: Final = 0.5 * HALF
+COARSEST_SAMPLING: Final = 0.5 * HALF
 """[s] Longest time between two samples."""
 SPEED_MISMATCH: Final = 0.1
 """Relative difference of drum and gear that shows a wrong ratio, scale or a frozen channel."""
@@ -124,9 +124,9 @@ def steady(trace: SweepTrace, bench: BenchConfig, sensor: RegulatorConfig = PLAI
     sign. Raises LossesError where the samples are too far apart.
     """
     every = float(np.median(np.diff(trace.time)))
-    if every > COARSEST:
+    if every > COARSEST_SAMPLING:
         raise LossesError(
-            f"a sample every {every:g} s; expected one every {COARSEST:g} s or faster"
+            f"a sample every {every:g} s; expected one every {COARSEST_SAMPLING:g} s or faster"
         )
     sections: list[Section] = []
     left_out: list[LeftOut] = []
@@ -163,7 +163,7 @@ def _slope(time: Array, values: Array) -> Array:
     inside = slice(count, len(values) - count + 1)
     span = mean_time[count:] - mean_time[:-count]
     slope[inside] = (mean_value[count:] - mean_value[:-count]) / span
-    over_a_gap = time[2 * count - 1 :] - time[: len(time) - 2 * count + 1] > LONGEST
+    over_a_gap = time[2 * count - 1 :] - time[: len(time) - 2 * count + 1] > LONGEST_SECTION
     slope[inside][over_a_gap] = np.inf
     return slope
 
@@ -179,8 +179,8 @@ def _rejection(trace: SweepTrace, part: slice, gear_ratio: float) -> str:
     time, speed, torque = trace.time[part], trace.motor_speed[part], trace.shaft_torque[part]
     if speed.mean() < 0.0:
         return "turns backwards; the bench is rated for 0..4830 rpm, forward only"
-    if time[-1] - time[0] < SHORTEST:
-        return f"only {time[-1] - time[0]:.2f} s steady; expected {SHORTEST:g} s"
+    if time[-1] - time[0] < SHORTEST_SECTION:
+        return f"only {time[-1] - time[0]:.2f} s steady; expected {SHORTEST_SECTION:g} s"
     change = abs(float(np.polyfit(time - time[0], speed, 1)[0])) * (time[-1] - time[0])
     if change > DRIFT * speed.mean():
         return f"speed drifts by {100.0 * change / speed.mean():.1f} %; expected {DRIFT:.0%}"

@@ -22,9 +22,9 @@ from register_maps.units import KMH
 
 PERIOD: Final = 0.1
 POINTS: Final = 5
-STANDSTILL: Final = 0.03
+RIM_STANDSTILL: Final = 0.03
 """[m/s]"""
-SHORTEST: Final = 1.0
+SHORTEST_TRACE: Final = 1.0
 """[s] A shorter run has no indices."""
 
 
@@ -78,7 +78,7 @@ def drive_quality(
     time [s], speeds [m/s], shape (n,) each; mass : of the truck [kg]
     road_load : of the road at a speed [N]
     """
-    if len(time) < 2 or time[-1] - time[0] < SHORTEST:
+    if len(time) < 2 or time[-1] - time[0] < SHORTEST_TRACE:
         return None
     moments = np.arange(time[0], time[-1], PERIOD)
     road, bench = (smooth(np.interp(moments, time, one)) for one in (road_speed, bench_speed))
@@ -91,7 +91,7 @@ def smooth(speed: Array) -> Array:
     count = np.convolve(np.ones_like(speed), window, mode="same")
     for _ in range(2):
         speed = np.convolve(speed, window, mode="same") / count
-    return np.where(np.abs(speed) <= STANDSTILL, 0.0, speed)
+    return np.where(np.abs(speed) <= RIM_STANDSTILL, 0.0, speed)
 
 
 def indices(

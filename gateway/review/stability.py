@@ -19,15 +19,15 @@ import numpy as np
 
 from gateway.arrays import Array
 
-STEP = 1e-3
+SIMULATION_STEP = 1e-3
 DRIVE = 105.0
 """[rad/s] Bandwidth of the speed loop. It is 133 below base speed and 70 at 14 km/h. With this
 value and without lead, the smallest stable masses are those of the tests within about 10 %."""
 CONTACT = 385.0
 """[1/s] Damping of the backlash shaft in contact over the drum's inertia (thesis, Table 3.1)."""
-MARGIN = 1e-7
+ROOT_MARGIN = 1e-7
 """Excess of an eigenvalue over 1 that counts as rounding."""
-LIGHTEST, HEAVIEST = 60.0, 20000.0
+LIGHTEST_TRIED, HEAVIEST_TRIED = 60.0, 20000.0
 """[kg] Range of masses that is searched for the smallest stable one."""
 
 
@@ -59,7 +59,7 @@ def spectral_radius(loop: SpeedLoop, rho: float) -> float:
 
 def is_stable(loop: SpeedLoop, rho: float) -> bool:
     """Whether the loop is stable."""
-    return spectral_radius(loop, rho) <= 1.0 + MARGIN
+    return spectral_radius(loop, rho) <= 1.0 + ROOT_MARGIN
 
 
 def smallest_mass(loop: SpeedLoop, inertia: float) -> float:
@@ -67,8 +67,8 @@ def smallest_mass(loop: SpeedLoop, inertia: float) -> float:
 
     inertia : J_d / r_d^2, the mass at which rho is 1 [kg]
     """
-    masses = np.geomspace(HEAVIEST, LIGHTEST, 60)
-    stable = HEAVIEST
+    masses = np.geomspace(HEAVIEST_TRIED, LIGHTEST_TRIED, 60)
+    stable = HEAVIEST_TRIED
     for mass in masses:
         if not is_stable(loop, inertia / mass):
             return _bisect(loop, inertia, float(mass), stable)
@@ -88,7 +88,7 @@ def _bisect(loop: SpeedLoop, inertia: float, unstable: float, stable: float) -> 
 
 def _size(loop: SpeedLoop) -> int:
     """Size of the state: seven values and the references in the dead time."""
-    return 7 + round(loop.dead_time / STEP)
+    return 7 + round(loop.dead_time / SIMULATION_STEP)
 
 
 def _one_period(loop: SpeedLoop, rho: float, states: Array) -> Array:
@@ -99,10 +99,10 @@ def _one_period(loop: SpeedLoop, rho: float, states: Array) -> Array:
     """
     g, w, tau, y, before, v, reference = states[:7]
     delayed = list(states[7:])
-    steps = round(loop.period / STEP)
+    steps = round(loop.period / SIMULATION_STEP)
     follow, meet, smooth_torque, smooth_speed = (
-        1.0 - exp(-DRIVE * STEP),
-        1.0 - exp(-CONTACT * STEP),
+        1.0 - exp(-DRIVE * SIMULATION_STEP),
+        1.0 - exp(-CONTACT * SIMULATION_STEP),
         _share(loop.torque_filter),
         _share(loop.speed_filter),
     )
@@ -112,9 +112,9 @@ def _one_period(loop: SpeedLoop, rho: float, states: Array) -> Array:
         g = g + follow * (delayed.pop(0) - g)
         change = meet * (g - w)
         w = w + change
-        tau = tau + smooth_torque * (-change / STEP - tau)
+        tau = tau + smooth_torque * (-change / SIMULATION_STEP - tau)
         y = y + smooth_speed * (w - y)
-        impulse = impulse + tau * STEP
+        impulse = impulse + tau * SIMULATION_STEP
     torque = impulse / loop.period if loop.averaged else tau
     gain = rho * (1.0 + loop.inertia_error)
     growth = gain * (y - before) + rho * torque * loop.period
@@ -125,4 +125,4 @@ def _one_period(loop: SpeedLoop, rho: float, states: Array) -> Array:
 
 def _share(time_constant: float) -> float:
     """Share of the step response of a first-order filter after one step; 1 without a filter."""
-    return 1.0 - exp(-STEP / time_constant) if time_constant > 0.0 else 1.0
+    return 1.0 - exp(-SIMULATION_STEP / time_constant) if time_constant > 0.0 else 1.0

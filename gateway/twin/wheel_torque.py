@@ -24,7 +24,7 @@ from register_maps.register_map import RegisterMap
 from register_maps.signals import PlcState
 from register_maps.timing import SCAN
 
-SMOOTH: Final = 11
+SMOOTHING_SAMPLES: Final = 11
 """Scans of the centred mean: the drum's acceleration is noisy, its integral is not."""
 STANDING_DRUM, STANDING_GEAR = 0.02, 0.005
 """[rad/s] Speeds of drum and gear output below which the truck stands."""
@@ -68,11 +68,13 @@ def wheel_torque(found: GatewayRecording, config: Config, register_map: Register
         ends.append(ends[-1] + window.duration)
         torques.append(lever * compensated.truck_torque(params, window))
         standing.append(_stands(window, config.bench.gear_ratio))
-    if len(ends) < SMOOTH:
+    if len(ends) < SMOOTHING_SAMPLES:
         raise GatewayError("no run in road load: there is no truck whose torque could be known")
     middles = np.arange(round(ends[-1] / SCAN)) * SCAN + SCAN / 2
     at = np.minimum(np.searchsorted(ends, middles), len(ends) - 1)
-    smooth = np.convolve(np.array(torques)[at], np.full(SMOOTH, 1.0 / SMOOTH), mode="same")
+    smooth = np.convolve(
+        np.array(torques)[at], np.full(SMOOTHING_SAMPLES, 1.0 / SMOOTHING_SAMPLES), mode="same"
+    )
     return np.where(np.array(standing)[at], np.nan, smooth)
 
 

@@ -19,7 +19,7 @@ from gateway.workflows.live_program import Ended, run_program
 from register_maps.logs.drive_programs import DRIVE_PROGRAMS
 from register_maps.timing import SCAN
 
-REST: Final = 1.0
+REST_AFTER: Final = 1.0
 """[s] Rest before the run that the log shows: the bench has to stand at its first sample."""
 
 
@@ -82,7 +82,7 @@ def drive(
 
 def write_log(path: Path, target: Path) -> int:
     """Write the log of a run, from a moment of rest before it; return the count of its samples."""
-    export = Export(recording.stream(path), Extent(begin=_start(path) - REST))
+    export = Export(recording.stream(path), Extent(begin=_start(path) - REST_AFTER))
     log_writer.write(target, export)
     return export.survey.samples
 

@@ -9,10 +9,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 # Probability that a bound does not hold.
-TAIL = 0.05
+TAIL_PROBABILITY = 0.05
 
 
-def clopper_pearson(hits: int, of: int, tail: float = TAIL) -> tuple[float, float]:
+def clopper_pearson(hits: int, of: int, tail: float = TAIL_PROBABILITY) -> tuple[float, float]:
     """Lower and upper bound of a probability after `hits` of `of` trials [1].
 
     Each bound fails with probability `tail` at most. The bounds are quantiles of beta

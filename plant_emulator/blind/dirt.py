@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 DirtKind = Literal["colour", "hum", "spikes", "held", "coarse", "jitter", "lost"]
 # Share of the cases with dirt.
-SHARE = 0.5
+DIRTY_SHARE = 0.5
 # Range that the size of each kind is drawn from: time constant [s], amplitude [noise], share of the
 # samples [1], period [samples], quantum [noise], half width [s], share of the rows [1].
 RANGES: dict[DirtKind, tuple[float, float]] = {
@@ -34,9 +34,9 @@ RANGES: dict[DirtKind, tuple[float, float]] = {
     "lost": (5e-3, 3e-2),
 }
 # Height of spikes [noise], mains [Hz] and how far off they are, longest hole [s].
-SPIKE, MAINS, MAINS_OFF, HOLE = (15.0, 40.0), 50.0, 0.05, 0.5
+SPIKE, MAINS, MAINS_OFF, DIRT_HOLE = (15.0, 40.0), 50.0, 0.05, 0.5
 # Channels that hum and are held.
-HUMMING, HELD = ("armature_current", "shaft_torque"), ("drum_speed", "shaft_torque")
+HUMMING, HELD_CHANNELS = ("armature_current", "shaft_torque"), ("drum_speed", "shaft_torque")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +52,7 @@ def draw_dirt(seed: int, number: int) -> Dirt | None:
     random = np.random.default_rng([seed, 4, number])
     kind: DirtKind = get_args(DirtKind)[int(random.integers(len(RANGES)))]
     size = float(random.uniform(*RANGES[kind]))
-    return Dirt(kind=kind, size=size) if random.random() < SHARE else None
+    return Dirt(kind=kind, size=size) if random.random() < DIRTY_SHARE else None
 
 
 def soil(log: Log, dirt: Dirt, seed: int) -> Log:
@@ -102,7 +102,7 @@ def _spikes(log: Log, share: float, random: np.random.Generator) -> Log:
 def _held(log: Log, period: float, _: np.random.Generator) -> Log:
     """Renew some channels every few samples only."""
     fresh = np.arange(len(log.time)) // round(period) * round(period)
-    return _changed(log, {name: log[name][fresh] for name in HELD})
+    return _changed(log, {name: log[name][fresh] for name in HELD_CHANNELS})
 
 
 def _coarse(log: Log, quantum: float, _: np.random.Generator) -> Log:
@@ -122,7 +122,7 @@ def _lost(log: Log, share: float, random: np.random.Generator) -> Log:
     """Leave out this share of the rows, and a hole."""
     kept = random.random(len(log.time)) >= share
     start = random.uniform(0.2, 0.8) * log.time[-1]
-    kept &= (log.time < start) | (log.time > start + random.uniform(0.1, HOLE))
+    kept &= (log.time < start) | (log.time > start + random.uniform(0.1, DIRT_HOLE))
     kept[:10] = kept[-1] = True
     signals = {name: values[kept] for name, values in log.signals.items()}
     return replace(log, time=log.time[kept], signals=signals)

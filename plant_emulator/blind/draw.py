@@ -26,7 +26,7 @@ DECK: dict[Kind, int] = {"none": 2, "drift": 3, "effect": 10, "two": 2, "outside
 KINDS = [kind for kind in get_args(Kind) for _ in range(DECK[kind])]
 # Ranges of a size and of a shape constant, each over its plausible value.
 SIZE_RANGE = (0.5, 2.0)
-SHAPE_RANGE = (0.75, 1.25)
+DRAWN_SHAPES = (0.75, 1.25)
 # Largest parameter deviation [prior standard deviations].
 FURTHEST = 2.5
 PROGRAMS = ("program1", "program2", "program3")
@@ -140,7 +140,7 @@ def _draw_value(
     if given is not None:
         drawn = random.uniform(*given)
     elif declared.neutral == declared.plausible:
-        drawn = declared.plausible * random.uniform(*SHAPE_RANGE)
+        drawn = declared.plausible * random.uniform(*DRAWN_SHAPES)
     else:
         factor = float(np.exp(random.uniform(*np.log(SIZE_RANGE))))
         sign = 1.0 if declared.lower >= 0.0 or random.random() < 0.5 else -1.0

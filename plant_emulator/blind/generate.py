@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 # [s] A fiftieth of a sample. The diagnosis uses adaptive steps of up to a whole sample. The step is
 # halved at most HALVINGS times if the solver does not converge.
-STEP, HALVINGS = 2e-4, 3
+TRUTH_STEP, HALVINGS = 2e-4, 3
 # The bench of the thesis does not log the armature voltage.
 NOT_LOGGED = "armature_voltage"
 
@@ -54,8 +54,10 @@ def _simulate_converged(inputs: RunInputs, values: Mapping[str, float], gap_posi
     """Simulate with the largest step with which the solver converges."""
     for halvings in range(HALVINGS):
         with suppress(UnsettledError):
-            return simulate(inputs, values, gap_position=gap_position, step=STEP / 2**halvings)
-    return simulate(inputs, values, gap_position=gap_position, step=STEP / 2**HALVINGS)
+            return simulate(
+                inputs, values, gap_position=gap_position, step=TRUTH_STEP / 2**halvings
+            )
+    return simulate(inputs, values, gap_position=gap_position, step=TRUTH_STEP / 2**HALVINGS)
 
 
 def measure(case: Case, log: Log, run: int) -> Log:

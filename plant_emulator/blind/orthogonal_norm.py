@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 DETECTABLE = 7.0
 # The nuisance fit: relative fall of the cost that ends it, number of iterations, and norm of the
 # change over which the first derivatives are taken.
-SETTLED, FEW, COARSE = 1e-4, 10, 10.0
+SETTLED_COST, FIT_ITERATIONS, COARSE_CHANGE = 1e-4, 10, 10.0
 
 
 def noise_levels(channels: Sequence[str]) -> Array:
@@ -80,12 +80,14 @@ def _norm_after_fit(wanted: Sequence[Unknown], residuals: Sequence[Residual]) ->
 
     The first fit takes its derivatives over large differences, which smooths small local minima.
     """
-    coarse = estimate(wanted, residuals, settled=SETTLED, iterations=FEW, difference=COARSE)
+    coarse = estimate(
+        wanted, residuals, settled=SETTLED_COST, iterations=FIT_ITERATIONS, difference=COARSE_CHANGE
+    )
     starts = [
         replace(u, start=float(np.clip(u.value(float(z)), u.lower, u.upper)))
         for u, z in zip(coarse.unknowns, coarse.z, strict=True)
     ]
-    found = estimate(starts, residuals, settled=SETTLED, iterations=FEW)
+    found = estimate(starts, residuals, settled=SETTLED_COST, iterations=FIT_ITERATIONS)
     return float(np.sqrt(min(one.cost for one in (coarse, found))))
 
 

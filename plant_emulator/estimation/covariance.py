@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 # Eigenvalue of an information matrix of unit diagonal that is 0 but for rounding [the largest], and
 # the part that an unknown has in such a direction.
-ROUNDING, PART = 1e-14, 1e-6
+EIGENVALUE_ROUNDING, LEAST_PART = 1e-14, 1e-6
 # Half width of a 95 % confidence interval of a normal distribution [standard errors].
 NORMAL_95 = 1.959964
 
@@ -37,7 +37,7 @@ def data_errors(information: Array) -> Array:
     scale = np.sqrt(np.diag(information))
     safe = np.where(scale > 0.0, scale, 1.0)
     values, vectors = np.linalg.eigh(information / np.outer(safe, safe))
-    weight = np.where(values > ROUNDING * values[-1], values, 1e-300)
+    weight = np.where(values > EIGENVALUE_ROUNDING * values[-1], values, 1e-300)
     variance = (vectors**2 / weight).sum(axis=1) / safe**2
     return np.where(scale > 0.0, np.sqrt(variance), np.inf)
 
@@ -61,7 +61,7 @@ def sandwich(
     hessian = information + precision
     scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
     values, vectors = np.linalg.eigh(hessian / np.outer(scale, scale))
-    known = values > ROUNDING * values[-1]
+    known = values > EIGENVALUE_ROUNDING * values[-1]
     inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(scale, scale)
     covariance = inverse @ middle @ inverse
     covariance = 0.5 * (covariance + covariance.T)
@@ -69,7 +69,7 @@ def sandwich(
     # may be negative; a variance that comes out so is that of white residuals.
     for k in np.flatnonzero(np.diag(covariance) <= 0.0):
         covariance[k], covariance[:, k] = inverse[k], inverse[k]
-    unknown = np.flatnonzero(np.any(np.abs(vectors[:, ~known]) > PART, axis=1))
+    unknown = np.flatnonzero(np.any(np.abs(vectors[:, ~known]) > LEAST_PART, axis=1))
     covariance[unknown, unknown] = np.inf
     return np.asarray(covariance)
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array, Log
 
 # Smoothing before the derivative [s]; longer than the sensors' noise, shorter than a ramp.
-WINDOW = 0.25
+DERIVATIVE_WINDOW = 0.25
 # What counts as driven: current, drum speed, and how far the flux lies below its constant value.
 LEAST_CURRENT = 4.0
 LEAST_DRUM_SPEED = 0.2
@@ -40,7 +40,7 @@ EXPONENTS = np.linspace(0.1, 1.5, 29)
 LEAST_SAMPLES = 30
 REWEIGHTINGS = 30
 # Relative change that ends the reweighting: a start needs no more.
-SETTLED = 1e-3
+SETTLED_CHANGE = 1e-3
 
 FLUX = ("flux_constant_1", "flux_constant_2")
 FRICTION = ("gear_coulomb_friction", "gear_viscous_friction", "gear_friction_exponent")
@@ -64,7 +64,7 @@ def start_values(
 def _table(log: Log) -> dict[str, Array]:
     """Smoothed signals and derivatives of a log [SI], sampled four times per smoothing window."""
     interval = float(np.median(np.diff(log.time)))
-    length = max(5, 2 * round(WINDOW / interval / 2) + 1)
+    length = max(5, 2 * round(DERIVATIVE_WINDOW / interval / 2) + 1)
     length = min(length, len(log.time) - (1 - len(log.time) % 2))
 
     def smooth(name: str, order: int = 0) -> Array:
@@ -155,7 +155,7 @@ def least_absolute(matrix: Array | None, target: Array) -> tuple[Array, float]:
         columns = matrix * weight[:, None]
         renewed = np.asarray(np.linalg.lstsq(columns, target * weight, rcond=None)[0], float)
         deviation = np.abs(target - matrix @ renewed)
-        settled = bool(np.max(np.abs(renewed - solution) - SETTLED * np.abs(renewed)) <= 0.0)
+        settled = bool(np.max(np.abs(renewed - solution) - SETTLED_CHANGE * np.abs(renewed)) <= 0.0)
         solution = renewed
         if settled:
             break

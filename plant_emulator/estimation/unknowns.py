@@ -13,7 +13,7 @@ from plant_emulator.signals.log import Array
 # From the values by name to one run's whitened residual, shape (channels, samples).
 Residual = Callable[[Mapping[str, float]], Array]
 # Values that the start of a state is looked for among.
-STARTS = 9
+STATE_STARTS = 9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,7 +24,7 @@ class Unknown:
     scale : of what is not: a change that matters [its unit]
     prior, std : mean and standard deviation of what is known beforehand; std None: nothing
     run : the run whose state it is; None: a parameter of all runs
-    step : between the starts that it is looked for among; None: of a state there are STARTS
+    step : between the starts that it is looked for among; None: of a state there are STATE_STARTS
     angle : whether it is an angle, of which a small effect is a cosine
     """
 
@@ -46,7 +46,7 @@ class Unknown:
         if self.std is not None:
             reach = np.sqrt(3.0) * self.std  # of an even spread
             low, high = max(low, self.prior - reach), min(high, self.prior + reach)
-        count = STARTS if self.step is None else 1 + int(np.ceil((high - low) / self.step))
+        count = STATE_STARTS if self.step is None else 1 + int(np.ceil((high - low) / self.step))
         return [float(value) for value in np.linspace(low, high, count)]
 
     def scaled(self, value: float) -> float:

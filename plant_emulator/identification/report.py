@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 # Correlation from which on a pair of parameters is reported as hardly separable.
 CORRELATED = 0.95
 # A standard error or condition number that says nothing but "not at all".
-BEYOND = 1e15
+NOT_AT_ALL = 1e15
 
 
 def to_json(
@@ -68,7 +68,7 @@ def to_json(
 
 def finite(value: float) -> float | None:
     """The number, or null where it is no information: JSON knows no infinity."""
-    return value if value < BEYOND else None
+    return value if value < NOT_AT_ALL else None
 
 
 def fits_to_json(comparisons: Sequence[LogComparison]) -> dict[str, dict[str, dict[str, float]]]:

@@ -70,7 +70,7 @@ KINDS = {
 }
 TURN = 2.0 * np.pi
 # Speed and power are means over this share of the run, and so many samples at least.
-SHARE, FEWEST = 1.0 / 500.0, 5
+MEAN_SHARE, FEWEST_MEAN_SAMPLES = 1.0 / 500.0, 5
 # Counts a revolution of encoders.
 COUNTS = (
     *(2**k for k in range(6, 25)),
@@ -134,7 +134,7 @@ def _way_out(quantity: str, column: str, other: str, own: str) -> str:
 
 def _largest(log: AxisLog) -> tuple[float, float]:
     """Largest speed and power [SI] of spans that are too long for the noise of single samples."""
-    span = max(FEWEST, round(SHARE * len(log.time)))
+    span = max(FEWEST_MEAN_SAMPLES, round(MEAN_SHARE * len(log.time)))
     ends = np.arange(0, len(log.time), span)
     if len(ends) < 2:
         return 0.0, 0.0

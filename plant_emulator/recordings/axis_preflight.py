@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 # Half widths of the weights, in samples; each is used while so many weights fit into the run.
-WIDTHS, FEWEST_WEIGHTS = (8, 16, 32, 64, 128, 256, 512, 1024), 40
+HALF_WIDTHS, FEWEST_WEIGHTS = (8, 16, 32, 64, 128, 256, 512, 1024), 40
 # Parts of a run, each left out once: they give the standard error of the regression.
 PARTS = 20
 # The sign counts from so many standard errors on, and from this share of the largest power on.
@@ -36,7 +36,7 @@ FROZEN_SAMPLES, FROZEN_SPEED, STOP = 20, 0.3, 4
 # A channel is held if most of its values stay for about the same number of samples.
 HELD_CHANGES, HELD_SHARE = 50, 0.7
 # A step between samples that is so much longer than the usual one is a hole.
-HOLE = 5.0
+HOLE_INTERVALS = 5.0
 
 
 def axis_notes(logs: Sequence[AxisLog]) -> list[str]:
@@ -152,11 +152,11 @@ def _weighted(log: AxisLog) -> Iterator[tuple[Array, Array]]:
     net = log.force if log.load is None else log.force - log.load
     time = np.arange(log.time[0], log.time[-1], step)
     position = np.interp(time, log.time, log.position - log.position.mean())
-    known = np.diff(log.time) < HOLE * step
+    known = np.diff(log.time) < HOLE_INTERVALS * step
     known = known[np.searchsorted(log.time, time, side="right") - 1]
     values = np.interp(time, log.time, net)
     angles = (np.sin(position), np.cos(position)) if log.rotary else (position,)
-    for width in WIDTHS:
+    for width in HALF_WIDTHS:
         if len(time) < FEWEST_WEIGHTS * width // 2 + 2 * width:
             return
         s = np.arange(1 - width, width) / width

@@ -42,18 +42,18 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 # Shorter than a gap takes to close [s]; its noise changes nothing within it.
-WINDOW = 0.25
+NOISE_WINDOW = 0.25
 # A log is taken in stretches. Their noise comes from the input within them and shortly before, so
 # that a log twice as long takes twice as long, not four times [s].
-STRETCH, MEMORY = 10.0, 5.0
+STRETCH, INPUT_MEMORY = 10.0, 5.0
 # Change of an unknown torque to which the simulation responds linearly [N m at the wheel].
 ERROR_STEP = 10.0
 # Time over which the error of an unknown torque may be the same [s].
-SLOW = 1.0
+TORQUE_ERROR_TIME = 1.0
 # Standard deviation along a direction from which on it counts, in the noise of the sensors.
 COUNTED_DEVIATION = 1.0
 # Of the simulations: a direction need not be known better.
-TOLERANCE = 1e-4
+DIRECTION_TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,17 +89,17 @@ def noise_directions(
 
     The slopes are differences over one standard deviation, because contact makes them uneven.
     Windows that are too far apart to meet in a stretch are simulated together. The response to one
-    window must end within MEMORY; a rest of it would add to the response to the next window.
+    window must end within INPUT_MEMORY; a rest of it would add to the response to the next window.
     """
     if not recording.inputs.truck:
         return None
     try:
-        base = recording.strict_residual(values, gap_position, TOLERANCE)
+        base = recording.strict_residual(values, gap_position, DIRECTION_TOLERANCE)
     except UnsettledError:
         return None
     length, step, deviation = _window(recording)
     window = length * recording.inputs.interval
-    stretch, memory = (length * round(span / window) for span in (STRETCH, MEMORY))
+    stretch, memory = (length * round(span / window) for span in (STRETCH, INPUT_MEMORY))
     answers = [
         deviation / step * _answer(recording.with_wheel_torque(torque), values, gap_position, base)
         for torque in _disturbed_torques(recording, length, step, stretch + memory)
@@ -126,7 +126,7 @@ def _slow_answers(answers: Sequence[Array]) -> list[Array]:
     A wrong friction makes such an error. Independent windows would hardly have one together.
     answers : responses to the windows in their order, each of shape (channels, samples)
     """
-    size = round(SLOW / ERROR_WINDOW)
+    size = round(TORQUE_ERROR_TIME / ERROR_WINDOW)
     seconds = [np.sum(answers[k : k + size], axis=0) for k in range(0, len(answers), size)]
     return [*seconds, np.sum(answers, axis=0)]
 
@@ -137,7 +137,7 @@ def _window(recording: Recording) -> tuple[int, float, float]:
     An unknown torque may be off by far more than what the response is linear in.
     """
     measured = not recording.estimated_torque
-    span = WINDOW if measured else ERROR_WINDOW
+    span = NOISE_WINDOW if measured else ERROR_WINDOW
     length = max(1, round(span / recording.inputs.interval))
     if measured:
         deviation = noise(recording.log[WHEEL_TORQUE]) / np.sqrt(length)
@@ -153,7 +153,7 @@ def _answer(
     It is 0 where the simulation does not settle: nothing is known of these windows then.
     """
     try:
-        return recording.strict_residual(values, gap_position, TOLERANCE) - base
+        return recording.strict_residual(values, gap_position, DIRECTION_TOLERANCE) - base
     except UnsettledError:
         return np.zeros_like(base)
 

@@ -53,9 +53,9 @@ USELESS_SHARE = 0.5
 LONGEST_HOLE = 2.0
 # Sampling interval that still shows the backlash's spikes [s]: at 50 Hz fits find what they find at
 # 100 Hz, at 25 Hz they misplace friction and gap by several standard errors.
-SLOWEST = 0.025
+LONGEST_INTERVAL = 0.025
 # At rest [rad/s, motor]; moving enough to be worth a fit [rad/s, motor].
-AT_REST, LEAST_MOTION = 3.0, 20.0
+REST_SPEED, LEAST_MOTION = 3.0, 20.0
 # Steady forward: motor speed [rad/s], acceleration [rad/s^2], shortest stretch [s].
 STEADY_SPEED, STEADY_RATE, STEADY_TIME = 30.0, 10.0, 0.5
 # The torque there is negative by some N m, the current positive by some A; what is not [N m, A].
@@ -109,10 +109,10 @@ def preflight(measured: Log, gear_ratio: float) -> Preflight:
 
 def _interval(measured: Log) -> float:
     interval = float(np.median(np.diff(measured.time)))
-    if interval > SLOWEST:
+    if interval > LONGEST_INTERVAL:
         raise LogError(
             f"{measured.source}: a sample every {interval:g} s; the spikes of the backlash need "
-            f"one every {SLOWEST:g} s or faster"
+            f"one every {LONGEST_INTERVAL:g} s or faster"
         )
     return interval
 
@@ -136,7 +136,7 @@ def _holes(measured: Log, interval: float) -> list[str]:
 
 def _starts_at_rest(measured: Log) -> None:
     first = float(np.median(measured["motor_speed"][:5]))
-    if abs(first) > AT_REST:
+    if abs(first) > REST_SPEED:
         raise LogError(
             f"{measured.source}: {NAMES['motor_speed']} starts at {first:.1f}; a run must start "
             "at rest, because current, integrators and shaft twist are taken as zero there"

@@ -40,15 +40,15 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array, Log
 
 # Smoothing before the derivative, and time of contact around a sample that counts [s].
-WINDOW, SETTLED = 0.2, 0.2
+SPEED_SMOOTHING, CONTACT_TIME = 0.2, 0.2
 # Acceleration of the drum from which on the gear drives it, and from which on the gear brakes it
 # [rad/s^2]. The first is above the noise. The second is above what bearings do to a drum that
 # floats in the gap.
-DRIVEN, BRAKED = 0.25, 0.75
+DRIVEN_ACCELERATION, BRAKED_ACCELERATION = 0.25, 0.75
 # In contact, gear and drum differ by less than this [rad/s] plus this share of their speed.
-TOGETHER, SHARE = 0.03, 0.02
+CONTACT_SPEED, CONTACT_SHARE = 0.03, 0.02
 # Time between the samples that are taken [s], and the least number of such samples.
-SPACING, LEAST_SAMPLES = 0.05, 20
+SPACING, LEAST_CONTACT_SAMPLES = 0.05, 20
 # Error of delta that smoothing leaves, beside the noise of the speeds [rad].
 SMOOTHING_ERROR = 3e-4
 # Prior standard deviations of s, tau [s], k [s^2/rad] and alpha [rad]: wide.
@@ -92,13 +92,15 @@ def scale_of(log: Log, values: Mapping[str, float]) -> Scale | None:
         return None
     gear_speed, drum_speed = log["motor_speed"] / values["gear_ratio"], log["drum_speed"]
     period = float(np.median(np.diff(log.time)))
-    speed, driven = (smooth(log.time, drum_speed, WINDOW, order) for order in (0, 1))
+    speed, driven = (smooth(log.time, drum_speed, SPEED_SMOOTHING, order) for order in (0, 1))
     faster = driven * np.sign(speed)
-    flank = np.sign(driven) * ((faster > DRIVEN) | (faster < -BRAKED))
-    apart = np.abs(smooth(log.time, gear_speed - drum_speed, WINDOW))
-    counts = _steady(flank, SETTLED / period) & (apart < TOGETHER + SHARE * np.abs(speed))
+    flank = np.sign(driven) * ((faster > DRIVEN_ACCELERATION) | (faster < -BRAKED_ACCELERATION))
+    apart = np.abs(smooth(log.time, gear_speed - drum_speed, SPEED_SMOOTHING))
+    counts = _steady(flank, CONTACT_TIME / period) & (
+        apart < CONTACT_SPEED + CONTACT_SHARE * np.abs(speed)
+    )
     index = np.flatnonzero(counts)[:: max(1, round(SPACING / period))]
-    if len(index) < LEAST_SAMPLES:
+    if len(index) < LEAST_CONTACT_SAMPLES:
         return None
     delta = _sum(gear_speed - drum_speed, log.time)
     delta = delta - values["drum_inertia"] * driven / values["drum_shaft_stiffness"]

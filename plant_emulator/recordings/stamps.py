@@ -36,11 +36,11 @@ WINDOWS = (
 # A window's departures over those of the best one, up to which it is as good.
 AS_GOOD = 1.3
 # A slope that tells a row's time [rad/s^2], and the least jitter worth correcting [s].
-SLOPE, LEAST = 10.0, 2e-4
+TELLING_SLOPE, LEAST_JITTER = 10.0, 2e-4
 # Rows that tell nothing of a jitter.
-FEW = 60
+FEW_ROWS = 60
 # A departure from the usual interval that no jitter makes [intervals].
-MOST = 0.4
+LARGEST_DEPARTURE = 0.4
 
 
 def restamped(log: Log) -> tuple[Log, float]:
@@ -49,14 +49,14 @@ def restamped(log: Log) -> tuple[Log, float]:
     A staircase (a log with a truck) tells nothing and stays as it is. So does one with knees
     between its samples, which bears the stamps of the PLC itself.
     """
-    if "wheel_torque" in log or KNEE_TIME in log or len(log.time) < FEW:
+    if "wheel_torque" in log or KNEE_TIME in log or len(log.time) < FEW_ROWS:
         return log, 0.0
     late, told = lateness(log.time, log["speed_reference"])
-    if told.sum() < FEW:
+    if told.sum() < FEW_ROWS:
         return log, 0.0
     # The median: at corners that a window does not miss a line departs, jittered or not.
     deviation = 1.4826 * float(np.median(np.abs(late[told])))
-    if deviation < LEAST:
+    if deviation < LEAST_JITTER:
         return log, 0.0
     return replace(log, time=log.time + np.where(told, late, 0.0)), deviation
 
@@ -81,9 +81,9 @@ def lateness(time: Array, reference: Array) -> tuple[Array, Array]:
             power * found[:, power : power + 1] * offsets ** (power - 1)
             for power in range(2, degree + 1)
         )
-        steep = np.min(np.abs(rate), axis=1) > SLOPE * interval
+        steep = np.min(np.abs(rate), axis=1) > TELLING_SLOPE * interval
         moved = interval * left / np.where(rate == 0.0, np.inf, rate)
-        regular = steep & (np.max(np.abs(moved), axis=1) < MOST * interval)
+        regular = steep & (np.max(np.abs(moved), axis=1) < LARGEST_DEPARTURE * interval)
         freedom = len(offsets) - degree - 1
         spread = np.sqrt(np.sum(moved**2, axis=1) / freedom)
         spreads[k, rows[regular]] = spread[regular]

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 # torque drifts, and jumps where a driver steps on a pedal; so many reweightings find the jumps.
 WALK, ITERATIONS = 300.0, 12
 # Speed of the gear's output below which the direction of its friction is open [rad/s].
-STILL = 0.02
+STICKING_SPEED = 0.02
 # What is not known of the torque: standard deviation of its mean over a window [N m at the wheel].
 # At the drum it is 560 N m, half of the gear's friction at full speed. The window [s] is shorter
 # than the estimate is smooth, so that its errors lie in the windows.
@@ -50,13 +50,13 @@ TAKEN = (
     "gear_friction_exponent",
     "drum_inertia",
 )
-GAIN_ERROR = 0.01
+SENSOR_GAIN_ERROR = 0.01
 # Samples to either side over which the torque of the gear is averaged.
 REACH = 5
 # Torque that keeps gear and drum in contact for certain [N m at the drum]: a sixth of the gear's
 # friction at full speed, which the friction may be off by. After a flight through the gap the drive
 # settles so long, and before it as much of the estimate is uncertain [s].
-LOOSE, BEFORE, AFTER = 150.0, 0.1, 1.0
+LOOSE, LOOSE_BEFORE, LOOSE_AFTER = 150.0, 0.1, 1.0
 # Drum speed below which the gear may stick [rad/s]: a thirtieth of its speed in use.
 CREEPING = 0.2
 # Change of the torque within a window that is a jump [N m at the wheel]: two amperes' worth.
@@ -93,7 +93,7 @@ def deviation(log: Log, parameters: ParameterSet) -> Array:
         for name in TAKEN
         if (std := parameters[name].std) is not None
     ]
-    signals = {**log.signals, "shaft_torque": (1.0 + GAIN_ERROR) * log["shaft_torque"]}
+    signals = {**log.signals, "shaft_torque": (1.0 + SENSOR_GAIN_ERROR) * log["shaft_torque"]}
     changed.append(drum_torque(replace(log, signals=signals), p))
     return np.asarray(share * np.sqrt(sum((other - base) ** 2 for other in changed)))
 
@@ -109,7 +109,7 @@ def telling(log: Log, p: Mapping[str, float]) -> NDArray[np.bool_]:
     known, _ = _gear_side(log, p)
     passed = uniform_filter1d(np.append(known, known[-1]), 2 * REACH + 1)
     interval = float(np.median(np.diff(log.time)))
-    before, after = (round(span / interval) for span in (BEFORE, AFTER))
+    before, after = (round(span / interval) for span in (LOOSE_BEFORE, LOOSE_AFTER))
     window = max(1, round(ERROR_WINDOW / interval))
     jump = np.abs(log[WHEEL_TORQUE][window:] - log[WHEEL_TORQUE][:-window]) > JUMP
     unsure = (np.abs(passed) < LOOSE) | np.append(jump, np.zeros(window, bool))
@@ -167,7 +167,7 @@ def _gear_side(log: Log, p: Mapping[str, float]) -> tuple[Array, Array]:
     """
     xi, step, motor_speed = p["gear_ratio"], np.diff(log.time), log["motor_speed"]
     gear_speed = motor_speed / xi
-    friction = sliding_friction(gear_speed, p) * np.clip(gear_speed / STILL, -1.0, 1.0)
+    friction = sliding_friction(gear_speed, p) * np.clip(gear_speed / STICKING_SPEED, -1.0, 1.0)
     gear = p["gear_inertia"] / (xi * step)
     torque = xi * log["shaft_torque"] + friction
     known = 0.5 * (torque[1:] + torque[:-1]) + gear * np.diff(motor_speed)
@@ -180,7 +180,7 @@ def first_motion(smooth: Array, speed: Array) -> int:
 
     smooth, speed : smoothed and measured speed of the drum [rad/s], shape (n,)
     """
-    moving = np.abs(speed) > max(STILL, 6.0 * noise(speed))
+    moving = np.abs(speed) > max(STICKING_SPEED, 6.0 * noise(speed))
     certain = int(np.argmax(moving)) if moving.any() else len(moving)
     still = np.flatnonzero(smooth[:certain] * np.sign(smooth[certain - 1]) <= 0.0)
     return int(still[-1]) if len(still) else 0

@@ -15,7 +15,7 @@ import numpy as np
 from plant_emulator.estimation.covariance import NORMAL_95
 from plant_emulator.road_load.covariance import covariance_of, residual_variance
 from plant_emulator.road_load.fit import LOWER, UPPER
-from plant_emulator.road_load.prior import NAMES, OFFSET, vector
+from plant_emulator.road_load.prior import NAMES, OFFSET_STD, vector
 from plant_emulator.simulation.fit_metrics import ChannelFit
 from plant_emulator.simulation.fit_metrics import fit as measures
 
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 COLLINEAR = 0.95
 CONTRADICTION = 4.0
 """Distance of the gain from its prior [standard deviations] that a wrong mass or ratio explains."""
-EXPLAINED = 98.0
+EXPLAINED_VAL1 = 98.0
 """Val1 of the velocity [percent] below which the model does not describe the run."""
-EXCELLENT, NOISE = 99.8, 3.5
+EXCELLENT, NOISE_FACTOR = 99.8, 3.5
 """Below this Val1 [percent] the whitened residual must be noise, with at most this long-run
 variance."""
 MASS = (
@@ -209,18 +209,18 @@ def problems(fit: RoadFit, quality: ChannelFit) -> list[str]:
         edge = 1e-6 * (UPPER[index] - LOWER[index])
         if not LOWER[index] + edge < values[index] < UPPER[index] - edge:
             found.append(f"{NAMES[index]} ended at its bound {values[index]:g}")
-    if quality.val1 < EXPLAINED:
+    if quality.val1 < EXPLAINED_VAL1:
         found.append(
             f"the truck's velocity is not explained: Val1 {quality.val1:.1f} %, at least "
-            f"{EXPLAINED:g} expected; level road, no foot brake, both logs of one run?"
+            f"{EXPLAINED_VAL1:g} expected; level road, no foot brake, both logs of one run?"
         )
-    elif quality.val1 < EXCELLENT and (variance := residual_variance(fit)) > NOISE:
+    elif quality.val1 < EXCELLENT and (variance := residual_variance(fit)) > NOISE_FACTOR:
         found.append(
             f"the residual is not noise, its long-run variance is {variance:.1f} times that of "
             "noise: level road, no foot brake, both logs of one run?"
         )
     spread = float(fit.prior.deviation[NAMES.index("torque_offset")])
-    if ZERO_MOVED < spread < OFFSET:
+    if ZERO_MOVED < spread < OFFSET_STD:
         found.append(
             f"the load cell's zero moves from standstill to standstill, by {spread:.2f} N m "
             "(standard deviation): cut the log where it moved"

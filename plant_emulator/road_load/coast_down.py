@@ -33,15 +33,15 @@ if TYPE_CHECKING:
 
 ROTATING, DRIVER = 0.03, 25.0
 """Share of rotating mass, and the mass [kg] that counts with the truck for it."""
-LOWEST = 0.3
+LOWEST_SPEED = 0.3
 """[m/s] Speed at which a run ends: below it, a truck stops by its brake or its stiction."""
 BEGUN = 0.2
 """[m/s] Fall of the speed that shows that the truck rolls out: what it drove before is over."""
-SPAN = 1.0
+LEAST_FALL = 1.0
 """[m/s] Least change of the speed of a run."""
 SMOOTHING = 0.5
 """[s] Time over which the speed is smoothed to find where the truck begins to roll out."""
-COARSEST = 0.1
+LONGEST_SAMPLE_STEP = 0.1
 """[s] Longest time between samples: 10 Hz."""
 PRECISION = 0.03
 """Relative error of the mean force that is usual at most (from memory, for comparison)."""
@@ -130,18 +130,23 @@ def roll_out(name: str, time: Array, velocity: Array) -> Run:
     Raises LogError for a log that shows no roll-out.
     """
     step = float(np.median(np.diff(time)))
-    if step > COARSEST * 1.001:
+    if step > LONGEST_SAMPLE_STEP * 1.001:
         raise LogError(f"{name}: a sample every {step:g} s; at least 10 a second are needed")
     direction = 1 if velocity[np.argmax(np.abs(velocity))] > 0.0 else -1
     speed = direction * velocity
     count = max(1, round(SMOOTHING / step))
     smooth = np.convolve(speed, np.ones(count) / count, mode="same")
     first = int(np.flatnonzero(smooth >= smooth.max() - BEGUN)[-1]) + 1
-    below = np.flatnonzero(smooth[first:] < LOWEST)
+    below = np.flatnonzero(smooth[first:] < LOWEST_SPEED)
     last = first + int(below[0]) if len(below) else len(speed)
     rest = slice(first, last - count)
-    if rest.stop - rest.start < 2 * count or smooth[rest.start] - smooth[rest.stop - 1] < SPAN:
-        raise LogError(f"{name}: shows no roll-out; a fall of the speed by {SPAN:g} m/s is needed")
+    if (
+        rest.stop - rest.start < 2 * count
+        or smooth[rest.start] - smooth[rest.stop - 1] < LEAST_FALL
+    ):
+        raise LogError(
+            f"{name}: shows no roll-out; a fall of the speed by {LEAST_FALL:g} m/s is needed"
+        )
     return Run(name=name, time=time[rest], speed=speed[rest], direction=direction)
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from plant_emulator.road_load.fit import RoadFit
     from plant_emulator.signals.log import Array
 
-LAGS = 1.5
+LONGEST_LAG = 1.5
 """Longest lag of the long-run variance [s]."""
 
 
@@ -35,7 +35,7 @@ def covariance_of(fit: RoadFit) -> Array:
 
 def residual_variance(fit: RoadFit) -> float:
     """Long-run variance of the whitened residual [1]."""
-    return long_run_variance(fit.residual, round(LAGS / fit.run.spacing))
+    return long_run_variance(fit.residual, round(LONGEST_LAG / fit.run.spacing))
 
 
 def long_run_variance(white: Array, lags: int) -> float:

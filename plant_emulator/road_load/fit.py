@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from plant_emulator.road_load.truck_model import RoadParameters
     from plant_emulator.signals.log import Array
 
-STEPS = np.array([1e-5, 5e-5, 1e-3, 1e-3, 0.02, 1e-3, 2e-5, 1e-3])
+PARAMETER_SCALES = np.array([1e-5, 5e-5, 1e-3, 1e-3, 0.02, 1e-3, 2e-5, 1e-3])
 """Scale of each parameter in the search, in order of NAMES."""
 LOWER = np.array([0.0, -0.01, 0.3, 0.5, -30.0, -20.0, -0.01, -10.0])
 UPPER = np.array([0.2, 0.01, 1.0, 2.0, 30.0, 20.0, 0.01, 10.0])
@@ -144,7 +144,7 @@ def fit_from(
         prior=prior,
         whitener=filters,
         residual=found.residuals[0][0],
-        jacobian=found.jacobians[0][0] / STEPS[free],
+        jacobian=found.jacobians[0][0] / PARAMETER_SCALES[free],
         cost=found.cost + found.penalty,
         settled=found.converged,
     )
@@ -159,7 +159,7 @@ def unknowns(start: Array, free: Indices, prior: Prior) -> list[Unknown]:
             lower=float(LOWER[index]),
             upper=float(UPPER[index]),
             logarithmic=False,
-            scale=float(STEPS[index]),
+            scale=float(PARAMETER_SCALES[index]),
             prior=float(prior.mean[index]),
             std=float(deviation) if np.isfinite(deviation := prior.deviation[index]) else None,
         )

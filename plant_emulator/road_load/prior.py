@@ -29,7 +29,7 @@ CLOCK_SKEW = 100e-6
 """Prior standard deviation of the relative rate of two free-running clocks [1]."""
 CRR_V = 1e-3
 """Prior standard deviation of C_rr,v [s]; at 14 km/h it is half of C_rr."""
-OFFSET = 1.0
+OFFSET_STD = 1.0
 """Prior standard deviation of the load cell's offset without a standstill [N m]."""
 LEAST_STANDSTILL = 0.3
 """Shortest standstill that shows the load cell's offset [s]."""
@@ -83,7 +83,7 @@ def standstill_offset(run: RoadRun) -> tuple[float, float]:
     rests = [run.torque.values[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True)]
     count = np.array([len(rest) for rest in rests])
     if count.sum() * run.torque.period < LEAST_STANDSTILL:
-        return 0.0, OFFSET
+        return 0.0, OFFSET_STD
     shown = np.concatenate(rests)
     means = np.array([rest.mean() for rest in rests])
     mean = float(shown.mean())

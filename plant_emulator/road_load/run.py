@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from plant_emulator.road_load.truck_model import RoadParameters, Truck
     from plant_emulator.signals.log import Array
 
-RATE = 100.0
+USED_RATE = 100.0
 """Largest rate of the compared samples [1/s]."""
 EDGE = 0.2
 """Time at both ends that is not compared, because the low pass has one side only [s]."""
@@ -39,7 +39,7 @@ UNSURE = (0.3, 0.5)
 """Time after a stop and before a start in which the motor's torque may not be 0 [s]."""
 LEAST_REST = 0.3
 """Shortest standstill that is used, without the times of UNSURE [s]."""
-BRIDGED = 0.05
+BRIDGED_GAP = 0.05
 """Longest hole in the torque that is interpolated [s], because its impulse moves the truck."""
 
 
@@ -121,7 +121,7 @@ def prepare(torque: Signal, velocity: Signal, truck: Truck) -> RoadRun:
     """Prepare the two logs of a run. Raises LogError if they cannot be compared."""
     _check_holes(torque)
     ahead = clock_ahead(torque, velocity)
-    step = max(1, round(1.0 / (velocity.period * RATE)))
+    step = max(1, round(1.0 / (velocity.period * USED_RATE)))
     period = step * velocity.period
     cutoff = 0.4 / max(period, torque.period)
     smooth = low_pass(velocity.values, velocity.period, cutoff)
@@ -172,9 +172,9 @@ def _check_amount(valid: Mask, period: float, torque: Signal, velocity: Signal) 
 
 def _check_holes(torque: Signal) -> None:
     for start, length in torque.holes():
-        if length > BRIDGED:
+        if length > BRIDGED_GAP:
             raise LogError(
                 f"{torque.source}: no torque (missing, held or saturated) for {length:.3g} s from "
-                f"{start:.4g} s on; the speed after it is unknown, at most {BRIDGED:g} s can be "
-                "bridged: use the part before or after it"
+                f"{start:.4g} s on; the speed after it is unknown, at most {BRIDGED_GAP:g} s "
+                "can be bridged: use the part before or after it"
             )

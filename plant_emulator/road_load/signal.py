@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 
 Mask = NDArray[np.bool_]
 
-SLOWEST = 20.0
+LEAST_RATE = 20.0
 """Lowest sample rate that resolves starts and stops of a truck [1/s]."""
-HELD = 0.05
+HELD_SPAN = 0.05
 """Shortest constant stretch of a noisy signal that the logger held instead of measured [s]."""
-ORDER = 2
+FILTER_ORDER = 2
 """Order of the Butterworth low pass, per direction."""
 
 
@@ -109,8 +109,8 @@ def find_spikes(values: Array) -> Mask:
 
 def _check_rate(time: Array, values: Array, source: str) -> None:
     rate = 1.0 / float(np.median(np.diff(time)))
-    if rate < SLOWEST:
-        raise LogError(f"{source}: {rate:.3g} samples a second; at least {SLOWEST:g} are needed")
+    if rate < LEAST_RATE:
+        raise LogError(f"{source}: {rate:.3g} samples a second; at least {LEAST_RATE:g} are needed")
     lengths = np.diff(np.flatnonzero(np.r_[True, np.diff(values) != 0.0, True]))
     usual = int(np.median(lengths))
     if len(lengths) > 50 and usual > 1 and np.mean(lengths == usual) > 0.8:
@@ -132,7 +132,7 @@ def find_held(time: Array, values: Array, rest: float | None) -> Mask:
     if np.median(per_sample) > 5:
         return np.zeros(len(values), dtype=np.bool_)
     lasts = firsts + lengths - 1
-    frozen = (lengths > 10) & (time[lasts] - time[firsts] >= HELD)
+    frozen = (lengths > 10) & (time[lasts] - time[firsts] >= HELD_SPAN)
     if rest is not None:
         frozen &= values[firsts] != rest
     repeats = np.repeat(frozen, lengths)
@@ -172,7 +172,7 @@ def _sections(cutoff: float, rate: float) -> Array:
     """Sections of the low pass; a fit asks for the same ones hundreds of times."""
     from scipy.signal import butter
 
-    found: Array = butter(ORDER, cutoff, fs=rate, output="sos")
+    found: Array = butter(FILTER_ORDER, cutoff, fs=rate, output="sos")
     return found
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 BANDS = ((0.2, 2.0), (2.0, 5.0), (5.0, 10.0), (10.0, 20.0), (20.0, 35.0), (35.0, 45.0))
 """Frequency bands [Hz]."""
-SEGMENT = 5.0
+SEGMENT_TIME = 5.0
 """Length of the segments that the spectra are averaged over [s]."""
 
 
@@ -30,7 +30,7 @@ def power(residual: Array, period: float, bands: Sequence[tuple[float, float]] =
     """
     from scipy.signal import welch
 
-    length = min(len(residual), round(SEGMENT / period))
+    length = min(len(residual), round(SEGMENT_TIME / period))
     frequency, density = welch(residual, 1.0 / period, nperseg=length)
     inside = [(frequency >= low) & (frequency < high) for low, high in bands]
     return np.array([density[some].mean() if some.any() else 0.0 for some in inside])

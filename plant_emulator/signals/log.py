@@ -26,7 +26,7 @@ WHEEL_TORQUE, TRUCK = "wheel_torque", "truck_on_drum"
 # Knee of the speed reference after each sample: seconds after it, and value.
 KNEE_TIME, KNEE = "reference_knee_time", "reference_knee"
 # A channel that moves by less than this share of its largest value shows rounding only [1].
-STILL = 1e-9
+CONSTANT_WITHIN = 1e-9
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def compared_channels(log: Log) -> tuple[str, ...]:
     given = tuple(name for name in COMPARED if name in log)
     if VOLTAGE not in log:
         return given
-    moves = np.ptp(log[VOLTAGE]) > STILL * np.max(np.abs(log[VOLTAGE]))
+    moves = np.ptp(log[VOLTAGE]) > CONSTANT_WITHIN * np.max(np.abs(log[VOLTAGE]))
     return (*given, VOLTAGE) if moves else given
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 CLIP = 3.0
 # Standard deviation of a standard normal distribution that is truncated at 3 deviations.
-LEFT = 0.986578
+TRUNCATED_DEVIATION = 0.986578
 # Least noise as a share of the channel's range: a log without noise still has rounding.
 FLOOR = 2e-4
 
@@ -43,7 +43,7 @@ def noise(channel: Array, use: NDArray[np.bool_] | None = None) -> float:
     deviation = 1.4826 * float(np.median(np.abs(differences)))
     for _ in range(50):
         inner = differences[np.abs(differences) <= CLIP * deviation]
-        renewed = float(np.sqrt(np.mean(inner**2))) / LEFT if len(inner) else 0.0
+        renewed = float(np.sqrt(np.mean(inner**2))) / TRUNCATED_DEVIATION if len(inner) else 0.0
         if abs(renewed - deviation) <= 1e-6 * deviation:
             break
         deviation = renewed

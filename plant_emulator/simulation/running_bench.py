@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.signals.log import Array
 
-STEP = 1e-3
+BENCH_STEP = 1e-3
 # How much longer than nominal effects may make the dead time [s]: the history reaches that far.
 LONGER_DEAD_TIME = 0.5
 (
@@ -73,7 +73,7 @@ class Bench:
         *,
         gap_position: float = 0.0,
         truck: bool = False,
-        step: float = STEP,
+        step: float = BENCH_STEP,
         seed: int | None = None,
         kernel: Kernel | None = None,
     ) -> None:

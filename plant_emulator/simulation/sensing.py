@@ -5,9 +5,9 @@ A lag is discretised exactly for a quantity u that is linear between its samples
     y(t + h) = e y(t) + (1 - e - c) u(t) + c u(t + h),   e = exp(-h / tau),  c = 1 - (1 - e) tau / h
 
 (first-order hold; K. J. Astrom, B. Wittenmark, Computer-Controlled Systems, chapter 2). A run is
-simulated at samples at most STEP apart for this, because the torque may change within a sample of
-its log. The task of a PLC then reads the lagged value every period and holds it. The log does not
-say when; the phase follows from the samples at which its values change.
+simulated at samples at most LAG_STEP apart for this, because the torque may change within a sample
+of its log. The task of a PLC then reads the lagged value every period and holds it. The log does
+not say when; the phase follows from the samples at which its values change.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array, Log
 
 # Longest distance of the samples that a lag follows [s], the step of the running bench.
-STEP = 1e-3
+LAG_STEP = 1e-3
 # A sample this share of a period before a reading counts as the reading itself: times are rounded.
 # The same is the shortest time between two samples [s].
-ROUNDING = 1e-6
+TIME_ROUNDING = 1e-6
 # Phases of a task that are tried, at most.
 PHASES = 64
 
@@ -71,7 +71,7 @@ def lagged(values: Array, intervals: Array, time_constant: float, start: float) 
 
 def reading(time: Array, period: float, phase: float) -> Array:
     """Number of the task's last reading at each time [1]; the reading 0 is at the phase [s]."""
-    return np.asarray(np.floor((time - phase) / period + ROUNDING))
+    return np.asarray(np.floor((time - phase) / period + TIME_ROUNDING))
 
 
 def follow(
@@ -151,15 +151,15 @@ def reference_nodes(log: Log) -> tuple[Array, Array]:
         return time, reference
     after, value = log[KNEE_TIME][:-1], log[KNEE][:-1]
     # A knee in the rounding of a sample is the sample.
-    inside = (after > ROUNDING) & (after < np.diff(time) - ROUNDING)
+    inside = (after > TIME_ROUNDING) & (after < np.diff(time) - TIME_ROUNDING)
     times = np.concatenate([time, (time[:-1] + after)[inside]])
     order = np.argsort(times, kind="stable")
     return times[order], np.concatenate([reference, value[inside]])[order]
 
 
 def finer(time: Array) -> Array:
-    """Samples at most STEP apart, those of `time` among them."""
-    pieces = np.maximum(1, np.ceil(np.diff(time) / STEP - ROUNDING)).astype(int)
+    """Samples at most LAG_STEP apart, those of `time` among them."""
+    pieces = np.maximum(1, np.ceil(np.diff(time) / LAG_STEP - TIME_ROUNDING)).astype(int)
     rows = np.concatenate([[0], np.cumsum(pieces)])
     found = np.interp(np.arange(rows[-1] + 1), rows, time)
     found[rows] = time

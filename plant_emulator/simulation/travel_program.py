@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 # Step of the bench [s]. The bench takes the reference as linear within a step, a log takes it as a
 # staircase: with this step the difference is below the noise.
-STEP = 1e-5
+TRAVEL_STEP = 1e-5
 
 
 @dataclass
@@ -80,12 +80,12 @@ def simulate_travel(
     """
     truck = Forklift(mass=program.mass)
     who = driver or ReplayedTorque(truck)
-    bench = Bench(parameters, effects, gap_position=gap_position, truck=True, step=STEP)
+    bench = Bench(parameters, effects, gap_position=gap_position, truck=True, step=TRAVEL_STEP)
     regulator = ThesisReference(parameters, truck)
     time = sample_times(program.duration)
     rows = np.zeros((len(time), 7))
     rows[:, 6] = NOMINAL_SHELL_TEMPERATURE
-    steps = round(SAMPLE_PERIOD / STEP)
+    steps = round(SAMPLE_PERIOD / TRAVEL_STEP)
     drum_speed, reference = 0.0, 0.0
     for k in range(1, len(time)):
         drive, brake = who.torques(float(time[k - 1]), drum_speed * truck.drum_radius)

@@ -39,7 +39,7 @@ NEEDED = {
     "force": "force=COLUMN:Nm",
 }
 # A jump is told from a motion where most steps between samples are shorter [rad].
-SLOW = 0.5
+JUMP_ANGLE = 0.5
 MECHANICAL = ("position", "velocity", "force", "load")
 
 
@@ -182,5 +182,5 @@ def _integral(time: Array, velocity: Array) -> Array:
 def _unwrapped(position: Array) -> Array:
     """Angles without the jumps of an encoder that begins anew each revolution; shape (n,)."""
     within = np.ptp(position) <= 2.0 * np.pi
-    slow = np.median(np.abs(np.diff(position))) < SLOW
+    slow = np.median(np.abs(np.diff(position))) < JUMP_ANGLE
     return np.unwrap(position) if within and slow else position

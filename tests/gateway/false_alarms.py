@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gateway.cycle.plausibility import ENVELOPE, PULSES, REACTION, RISE, SMOOTH
+from gateway.cycle.plausibility import ENVELOPE, PULSES, REACTION, RISE, SMOOTHING_TIME
 from gateway.cycle.supervisor import State
 from gateway.cycle.tolerances import Params
 from gateway.friction.law import friction_torque
@@ -81,7 +81,7 @@ def shares(p: Params, found: Drive, draws: int, seed: int) -> np.ndarray:
         last = flux * current
         if before is not None:
             motor_0, drum_0, last_0 = before
-            mean = last + (mean - last) * np.exp(-SCAN / SMOOTH)
+            mean = last + (mean - last) * np.exp(-SCAN / SMOOTHING_TIME)
             envelope = np.maximum(envelope * np.exp(-SCAN / ENVELOPE), abs(mean))
             rise = (motor - motor_0) / SCAN
             acceleration = rise + (acceleration - rise) * np.exp(-SCAN / RISE)

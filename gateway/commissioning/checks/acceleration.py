@@ -21,40 +21,43 @@ RATES = (0.25, 0.5, 0.75)
 """[m/s^2] Steps of 0.25: those of a road car are too fast for the bench."""
 LOWEST, HIGHEST = 3.0 * KMH, 15.0 * KMH
 """[m/s] Speeds between which a run counts."""
-MARGIN = 1.0 * KMH
+SPEED_MARGIN = 1.0 * KMH
 """[m/s] Speed before and after, so that the drum passes all of them."""
-SETTLE = 1.0
+UNLOADED_TIME = 1.0
 """[s] Time without force before every change of direction, and time after it that does not count:
 the step in force takes the drum through a part of the backlash."""
 PASSED = 0.75
 """Share of the speeds that a run has to pass; the fastest is at 5 km/h when it has settled."""
-SLACK = 3.0
+TIME_SLACK = 3.0
 """Share of the expected duration after which a run that does not get there ends."""
 
 
 def steps(config: Config, repeats: int) -> list[Step]:
     """Push the truck up and down, at every rate, several times."""
     bench, mass = config.bench, config.truck.total_mass
-    start = (LOWEST - MARGIN) / bench.drum_radius * bench.gear_ratio
+    start = (LOWEST - SPEED_MARGIN) / bench.drum_radius * bench.gear_ratio
     found: list[Step] = [Ramp(speed=start, rate=RPM * RATE_RPM_S, hold=2.0)]
     for rate in RATES * repeats:
         for sign in (1.0, -1.0):
-            found += [_push(mass, 0.0, SETTLE, ""), _push(mass, sign * mass * rate, rate, LABEL)]
+            found += [
+                _push(mass, 0.0, UNLOADED_TIME, ""),
+                _push(mass, sign * mass * rate, rate, LABEL),
+            ]
     return found
 
 
 def _push(mass: float, force: float, scale: float, label: str) -> Step:
     """Push a truck without road load; scale : its time [s] without, its rate with a force."""
-    way = HIGHEST - LOWEST + 2.0 * MARGIN
+    way = HIGHEST - LOWEST + 2.0 * SPEED_MARGIN
     return Emulation(
         mass=mass,
         f0=0.0,
         f1=0.0,
         f2=0.0,
         force=force,
-        slowest=LOWEST - MARGIN if force < 0.0 else 0.0,
-        fastest=HIGHEST + MARGIN if force > 0.0 else 10.0 * HIGHEST,
-        longest=SLACK * way / scale if force else scale,
+        slowest=LOWEST - SPEED_MARGIN if force < 0.0 else 0.0,
+        fastest=HIGHEST + SPEED_MARGIN if force > 0.0 else 10.0 * HIGHEST,
+        longest=TIME_SLACK * way / scale if force else scale,
         label=label,
     )
 

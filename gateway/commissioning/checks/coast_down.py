@@ -17,16 +17,16 @@ from register_maps.units import KMH, RPM
 
 NAME = LABEL = "coast-down"
 SOURCE = "for comparison: 40 CFR 1066.270, from memory"
-BOUNDS: Array = np.arange(16.0, 3.0, -2.0) * KMH
+SPEED_BOUNDS: Array = np.arange(16.0, 3.0, -2.0) * KMH
 """[m/s] Speeds between which a mean force is taken."""
-MARGIN = 1.0 * KMH
-LONGEST = 180.0
+SPEED_MARGIN = 1.0 * KMH
+LONGEST_COAST = 180.0
 
 
 def start(config: Config) -> Step:
     """Ramp to the speed from which a truck rolls out."""
     bench = config.bench
-    speed = (float(BOUNDS[0]) + MARGIN) / bench.drum_radius * bench.gear_ratio
+    speed = (float(SPEED_BOUNDS[0]) + SPEED_MARGIN) / bench.drum_radius * bench.gear_ratio
     return Ramp(speed=speed, rate=RPM * RATE_RPM_S, hold=3.0)
 
 
@@ -47,9 +47,9 @@ def roll_out(config: Config, mass: float) -> Emulation:
         f1=own.crr_v * weight / config.bench.drum_radius if rolls else share * (own.f1 or 0.0),
         f2=0.0 if rolls else share * (own.f2 or 0.0),
         force=0.0,
-        slowest=float(BOUNDS[-1]) - 0.5 * MARGIN,
-        fastest=2.0 * float(BOUNDS[0]),
-        longest=LONGEST,
+        slowest=float(SPEED_BOUNDS[-1]) - 0.5 * SPEED_MARGIN,
+        fastest=2.0 * float(SPEED_BOUNDS[0]),
+        longest=LONGEST_COAST,
         label=LABEL,
     )
 
@@ -80,16 +80,16 @@ def evaluate(run: StepRun) -> list[Check]:
 
 def _judge(run: StepRun, step: Emulation, part: slice) -> Check:
     limit = run.config.verification.coast_down
-    found = mean_forces(run.trace.time[part], run.rim_speed[part], step.mass, BOUNDS)
-    errors = found - targets(step, BOUNDS)
+    found = mean_forces(run.trace.time[part], run.rim_speed[part], step.mass, SPEED_BOUNDS)
+    errors = found - targets(step, SPEED_BOUNDS)
     if not np.isfinite(errors).all():
         what = f"{step.mass:.0f} kg: did not roll from 16 to 4 km/h"
         return missing(NAME, what, "N", limit, SOURCE)
     worst = int(np.argmax(np.abs(errors)))
-    target = float(targets(step, BOUNDS)[worst])
+    target = float(targets(step, SPEED_BOUNDS)[worst])
     what = (
         f"{step.mass:.0f} kg, {100.0 * errors[worst] / target:+.1f} % of {target:.0f} N at "
-        f"{BOUNDS[worst] / KMH:.0f} .. {BOUNDS[worst + 1] / KMH:.0f} km/h"
+        f"{SPEED_BOUNDS[worst] / KMH:.0f} .. {SPEED_BOUNDS[worst + 1] / KMH:.0f} km/h"
     )
     value = float(errors[worst])
     return Check(name=NAME, what=what, value=value, unit="N", limit=limit, source=SOURCE)

@@ -20,13 +20,13 @@ from register_maps.units import KMH, RPM
 
 NAME = LABEL = "response"
 SOURCE = "own limit; 40 CFR 1066.245: settled in 100 ms"
-RATE = 0.5
+PUSH_RATE = 0.5
 """[m/s^2] Acceleration of the step."""
 START = 6.0 * KMH
 """[m/s] Speed at which the force begins."""
-REST, PUSH = 2.0, 2.0
-WITHIN = 0.1
-SPAN = 0.05
+REST_TIME, PUSH = 2.0, 2.0
+SETTLING_LIMIT = 0.1
+AVERAGING_TIME = 0.05
 """[s] Time over which an acceleration is taken; the speed has digits of 0.02 rad/s."""
 
 
@@ -40,8 +40,8 @@ def steps(config: Config, repeats: int) -> list[Step]:  # noqa: ARG001 - all che
         )
         found += [
             Ramp(speed=speed, rate=RPM * RATE_RPM_S, hold=2.0),
-            replace(free, longest=REST),
-            replace(free, force=mass * RATE, longest=PUSH, label=LABEL),
+            replace(free, longest=REST_TIME),
+            replace(free, force=mass * PUSH_RATE, longest=PUSH, label=LABEL),
         ]
     return found
 
@@ -52,13 +52,13 @@ def rise_and_settling(run: StepRun, step: Emulation, part: slice) -> tuple[float
     NaN where that does not happen. The force acts in the window that ends at the first sample.
     """
     bench = run.config.bench
-    count = max(1, round(SPAN / float(np.median(np.diff(run.trace.time[part])))))
+    count = max(1, round(AVERAGING_TIME / float(np.median(np.diff(run.trace.time[part])))))
     time, speed = run.trace.time[part], run.trace.motor_speed[part]
     since = 0.5 * (time[count:] + time[:-count]) - run.trace.time[max(part.start - 1, 0)]
     rate = (speed[count:] - speed[:-count]) / (time[count:] - time[:-count])
     share = rate / (step.force / step.mass / bench.drum_radius * bench.gear_ratio)
-    risen = np.flatnonzero(share >= 1.0 - WITHIN)
-    outside = np.flatnonzero(np.abs(share - 1.0) > WITHIN)
+    risen = np.flatnonzero(share >= 1.0 - SETTLING_LIMIT)
+    outside = np.flatnonzero(np.abs(share - 1.0) > SETTLING_LIMIT)
     last = int(outside[-1]) + 1 if len(outside) else 0
     return (
         float(since[risen[0]]) if len(risen) else nan,

@@ -19,6 +19,7 @@ from plant_emulator.diagnosis.answer import (
 )
 from plant_emulator.diagnosis.axis.findings import remainder
 from plant_emulator.diagnosis.axis.quantities import UNITS, quantities
+from plant_emulator.diagnosis.prediction.gap import OPEN_GAP
 from plant_emulator.diagnosis.prediction.remainder import describe_band, describe_fall
 from plant_emulator.diagnosis.wording import number
 
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
 
 # Effects of a ranking that are predicted and shown.
 SHOWN = 6
-# A gap is open from this multiple of its floor on, as for the bench.
-OPEN_GAP = 1.1
 
 
 def answer(f: AxisFindings) -> Answer:

@@ -5,7 +5,7 @@ parameters for a run that is only planned. An effect is detectable from the size
 norm of its signature, orthogonal to the nuisance parameters, reaches DETECTABLE_NORM. Two effects
 are in one class where
 
-    |cos(s_1, s_2)| > ALIKE   or   |s_1|^2 (1 - cos^2) < CLASS_MARGIN
+    |cos(s_1, s_2)| > ALIKE_SIGNATURES   or   |s_1|^2 (1 - cos^2) < CLASS_MARGIN
 
 s_1, s_2 : their orthogonal signatures at the plausible sizes, in the noise
 A random effect has no signature that a fit could find again.
@@ -22,7 +22,7 @@ import numpy as np
 from plant_emulator.diagnosis.fitting.evidence import CLASS_MARGIN, DETECTABLE_NORM
 from plant_emulator.diagnosis.fitting.joint_fit import linearise
 from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
-from plant_emulator.diagnosis.fitting.signature import SIZES, bounded_size, signature
+from plant_emulator.diagnosis.fitting.signature import SIGNATURE_SIZES, bounded_size, signature
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 Value = TypeVar("Value")
 
-ALIKE = 0.95
+ALIKE_SIGNATURES = 0.95
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,7 +161,7 @@ def alike(name: str, seen: Mapping[str, Signature]) -> tuple[str, ...]:
     near = [
         other
         for other, cosine in cosines.items()
-        if cosine > ALIKE or own.orthogonal_norm**2 * (1.0 - cosine**2) < CLASS_MARGIN
+        if cosine > ALIKE_SIGNATURES or own.orthogonal_norm**2 * (1.0 - cosine**2) < CLASS_MARGIN
     ]
     return (name, *sorted(near, key=lambda other: -cosines[other]))
 
@@ -192,7 +192,10 @@ def _own_names(values: Mapping[str, Value], candidate: Candidate) -> dict[str, V
 
 def _hidden_up_to(found: DetectionLimit, candidate: Candidate) -> dict[str, float]:
     """The largest sizes that were tried of an effect that acts, where its bounds allow more."""
-    tried = {u.name: bounded_size(u, candidate.neutral[u.name], SIZES[-1]) for u in candidate.sizes}
+    tried = {
+        u.name: bounded_size(u, candidate.neutral[u.name], SIGNATURE_SIZES[-1])
+        for u in candidate.sizes
+    }
     ends = {u.name: bounded_size(u, candidate.neutral[u.name], inf) for u in candidate.sizes}
     return {
         name: value

@@ -44,7 +44,7 @@ REALISATIONS = 24
 SHOWN_VARIANCE, LEVELS = 0.05, (0.0, 0.25, 0.5, 0.75, 1.0)
 # Mean square that may be left at a level. The bounds are wide: the courses are few, and the
 # machine's scans differ from the model's.
-LEAST_LEFT, MOST_LEFT = 0.5, 2.0
+LEAST_MEAN_SQUARE, MOST_MEAN_SQUARE = 0.5, 2.0
 # Ljung-Box excess that may be left, as a share of the evidence: 0.0002 to 0.009 after random
 # courses, 0.035 to 0.13 after coarse references.
 WHITE_SHARE = 0.01
@@ -172,7 +172,7 @@ def _is_homoscedastic(squares: Array, added: Array) -> bool:
     edges = np.quantile(level, LEVELS)
     bins = np.clip(np.searchsorted(edges, level, side="right") - 1, 0, len(edges) - 2)
     means = [left[bins == k].mean() for k in range(len(edges) - 1) if (bins == k).any()]
-    return bool(min(means) > LEAST_LEFT and max(means) < MOST_LEFT)
+    return bool(min(means) > LEAST_MEAN_SQUARE and max(means) < MOST_MEAN_SQUARE)
 
 
 class _WeightedModel:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 # Sizes that an effect is tried at [plausible sizes].
-SIZES = (0.03, 0.1, 0.3, 0.6, 1.0, 2.0)
+SIGNATURE_SIZES = (0.03, 0.1, 0.3, 0.6, 1.0, 2.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +54,8 @@ def signature(
     nuisance : of the fit
     """
     changes = {
-        size: _residual(model, name, found, runs, size) - nuisance.residual for size in SIZES
+        size: _residual(model, name, found, runs, size) - nuisance.residual
+        for size in SIGNATURE_SIZES
     }
     parts = {size: nuisance.orthogonal(change) for size, change in changes.items()}
     norms = {size: float(np.linalg.norm(part)) for size, part in parts.items()}

@@ -29,7 +29,7 @@ GROUP_SIZES = np.geomspace(1e-2, 30.0, 9)
 # The sizes of all groups are chosen again at most so many times.
 MOST_SWEEPS = 3
 # Another group, or another sweep, is worth this gain of log probability.
-WORTHWHILE_GAIN = 0.5
+LEAST_LOG_GAIN = 0.5
 
 
 @dataclass(frozen=True)
@@ -149,14 +149,14 @@ class _SizeSearch:
                 ((value, group, size),) = self._trials([int(k)], np.append(0.0, GROUP_SIZES))
                 if value > self.best:
                     self.best, self.sizes[group] = value, size
-            if self.best - before < WORTHWHILE_GAIN:
+            if self.best - before < LEAST_LOG_GAIN:
                 break
 
     def _take_groups(self) -> None:
         """Take the group of the largest gain, until none is worth it."""
         while absent := [int(k) for k in np.flatnonzero(self.sizes == 0.0)]:
             value, group, size = max(self._trials(absent, GROUP_SIZES))
-            if value <= self.best + WORTHWHILE_GAIN:
+            if value <= self.best + LEAST_LOG_GAIN:
                 break
             self.best, self.sizes[group] = value, size
 

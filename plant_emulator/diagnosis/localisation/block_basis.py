@@ -40,10 +40,10 @@ if TYPE_CHECKING:
 # Smoothing window of the quantities [s].
 SMOOTHING_WINDOW = 0.15
 # Steps between the knots of laws of time [s].
-SLOW, FAST = 2.0, 0.5
+SLOW_KNOTS, FAST_KNOTS = 2.0, 0.5
 # Units of the quantities: current [A], torque [N m], acceleration [rad/s^2]. In these units a
 # coefficient of 1 is of the order of the noise.
-CURRENT, TORQUE, ACCELERATION = 5.0, 5.0, 10.0
+CURRENT_UNIT, TORQUE_UNIT, ACCELERATION_UNIT = 5.0, 5.0, 10.0
 # Knots near standstill, where friction may rise or fall [rad/s at the motor].
 NEAR_STANDSTILL = np.array([0.0, 1.25, 3.0, 6.0, 12.5, 25.0, 50.0])
 
@@ -162,10 +162,13 @@ def motor(q: BlockQuantities, top: Mapping[str, float]) -> list[UnknownLaw]:
     A torque by speed, current, flux and current, acceleration, time. Where the voltage is logged,
     also an electromotive force by speed, and a resistance by current and time.
     """
-    speed, current = linear_splines(np.abs(q.speed), _knots(top["speed"], 9)), q.current / CURRENT
+    speed, current = (
+        linear_splines(np.abs(q.speed), _knots(top["speed"], 9)),
+        q.current / CURRENT_UNIT,
+    )
     rates = np.stack([q.acceleration, q.acceleration * current, current * np.abs(q.current)], -1)
     flowing = np.tanh(q.current**2)
-    slow = time_splines(q.time, SLOW)
+    slow = time_splines(q.time, SLOW_KNOTS)
     lost = _times(linear_splines(np.abs(q.current), _knots(top["current"], 7)), flowing * q.flux)
     return [
         UnknownLaw(acting_in({MOTOR: 1.0}, _times(speed, q.moving))),
@@ -176,7 +179,7 @@ def motor(q: BlockQuantities, top: Mapping[str, float]) -> list[UnknownLaw]:
             )
         ),
         UnknownLaw(acting_in({MOTOR: 1.0}, _times(speed, current))),
-        UnknownLaw(acting_in({MOTOR: 1.0}, rates / ACCELERATION)),
+        UnknownLaw(acting_in({MOTOR: 1.0}, rates / ACCELERATION_UNIT)),
         UnknownLaw(acting_in({MOTOR: 1.0}, _times(slow, current)), own=True),
         UnknownLaw(acting_in({MOTOR: 1.0}, _times(slow, q.moving)), own=True),
         UnknownLaw(acting_in({ARMATURE: 1.0}, _times(speed, q.moving))),
@@ -195,17 +198,21 @@ def torque_sensor(q: BlockQuantities, top: Mapping[str, float]) -> list[UnknownL
     """
     where = {MOTOR: -1.0, GEAR: 1.0}
     seconds = (q.time - q.time[0]) / 20.0
-    slow = time_splines(q.time, SLOW)
-    rates = np.stack([q.torque_rate / ACCELERATION, q.torque_curvature / ACCELERATION**2], -1)
+    slow = time_splines(q.time, SLOW_KNOTS)
+    rates = np.stack(
+        [q.torque_rate / ACCELERATION_UNIT, q.torque_curvature / ACCELERATION_UNIT**2], -1
+    )
     return [
         UnknownLaw(acting_in(where, np.stack([np.ones_like(seconds), seconds], -1))),
         UnknownLaw(acting_in(where, linear_splines(q.torque, _both(top["torque"], 10)))),
         UnknownLaw(
-            acting_in(where, np.stack([q.torque / TORQUE, seconds * q.torque / TORQUE], -1))
+            acting_in(
+                where, np.stack([q.torque / TORQUE_UNIT, seconds * q.torque / TORQUE_UNIT], -1)
+            )
         ),
         UnknownLaw(acting_in(where, rates)),
         UnknownLaw(acting_in(where, slow), own=True),
-        UnknownLaw(acting_in(where, _times(slow, q.torque / TORQUE)), own=True),
+        UnknownLaw(acting_in(where, _times(slow, q.torque / TORQUE_UNIT)), own=True),
     ]
 
 
@@ -225,7 +232,7 @@ def gear(q: BlockQuantities, top: Mapping[str, float]) -> list[UnknownLaw]:
         UnknownLaw(
             acting_in(where, _times(linear_splines(q.load, _both(top["load"], 10)), q.moving))
         ),
-        UnknownLaw(acting_in(where, _times(time_splines(q.time, SLOW), q.moving)), own=True),
+        UnknownLaw(acting_in(where, _times(time_splines(q.time, SLOW_KNOTS), q.moving)), own=True),
         UnknownLaw(acting_in(where, np.stack(turns, -1))),
         UnknownLaw(acting_in(where, _times(minutes, warm))),
     ]
@@ -241,7 +248,9 @@ def drive(q: BlockQuantities, top: Mapping[str, float]) -> list[UnknownLaw]:
     directions. A fault of the flux changes its sign with the current.
     """
     where = {DRIVE: 1.0}
-    rates = np.stack([q.demand_rate / ACCELERATION, q.demand_curvature / ACCELERATION**2], -1)
+    rates = np.stack(
+        [q.demand_rate / ACCELERATION_UNIT, q.demand_curvature / ACCELERATION_UNIT**2], -1
+    )
     ramping = np.tanh((q.demand_rate / 3.0) ** 2)
     ripple = (
         linear_splines(np.abs(q.current), _knots(top["current"], 7))
@@ -256,12 +265,12 @@ def drive(q: BlockQuantities, top: Mapping[str, float]) -> list[UnknownLaw]:
         UnknownLaw(acting_in(where, rates)),
         UnknownLaw(acting_in({MOTOR: -1.0}, _times(ripple, q.flux))),
         UnknownLaw(acting_in(where, linear_splines(q.current, _both(top["current"], 12)))),
-        UnknownLaw(acting_in(where, time_splines(q.time, SLOW)), own=True),
-        UnknownLaw(acting_in(where, time_splines(q.time, FAST, 40)), own=True),
+        UnknownLaw(acting_in(where, time_splines(q.time, SLOW_KNOTS)), own=True),
+        UnknownLaw(acting_in(where, time_splines(q.time, FAST_KNOTS, 40)), own=True),
         UnknownLaw(
             acting_in({ARMATURE: 1.0}, linear_splines(q.current, _both(top["current"], 12)))
         ),
-        UnknownLaw(acting_in({ARMATURE: 1.0}, time_splines(q.time, SLOW)), own=True),
+        UnknownLaw(acting_in({ARMATURE: 1.0}, time_splines(q.time, SLOW_KNOTS)), own=True),
     ]
 
 
@@ -274,7 +283,7 @@ def wheel_contact(q: BlockQuantities, top: Mapping[str, float]) -> list[UnknownL
         UnknownLaw(
             acting_in(where, linear_splines(q.wheel_torque, _both(top["wheel_torque"], 10)))
         ),
-        UnknownLaw(acting_in(where, _times(time_splines(q.time, SLOW), q.moving)), own=True),
+        UnknownLaw(acting_in(where, _times(time_splines(q.time, SLOW_KNOTS), q.moving)), own=True),
     ]
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 # Smoothing window of the speed that laws depend on, and step of laws of time [s].
 SPEED_WINDOW, TIME_STEP = 0.3, 2.0
 # Unit of the unknown torque [N m], and of the sensor's error [its noise].
-TORQUE_UNIT, ERROR_UNIT = 10.0, 0.1
+DRUM_TORQUE_UNIT, ERROR_UNIT = 10.0, 0.1
 # Speed at which friction counts as one of motion [rad/s at the drum].
 FRICTION_SPEED = 0.05
 
@@ -33,7 +33,7 @@ def torque(m: MeasuredSignals, ratio: float, largest: float) -> Array:
     speed, angle = smooth(m.time, m.speed, SPEED_WINDOW) / ratio, turned_angle(m.time, m.drum_speed)
     moving = np.tanh(speed / FRICTION_SPEED)[:, None]
     by_speed = -moving * linear_splines(np.abs(speed), np.linspace(0.0, largest / ratio, 4))
-    return np.asarray(TORQUE_UNIT * np.column_stack([by_speed, np.sin(angle), np.cos(angle)]))
+    return np.asarray(DRUM_TORQUE_UNIT * np.column_stack([by_speed, np.sin(angle), np.cos(angle)]))
 
 
 def speed_sensor(m: MeasuredSignals, ratio: float) -> tuple[Array, Array, Array]:

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 FREE = ("backlash_half_gap", "drum_shaft_damping")
 # Positions in the gap that a scan tries, and draws of the speed's noise.
 SCANNED_POSITIONS = 17
-DRAWS = 10
+NOISE_DRAWS = 10
 # Relative fall of the cost that ends a fit.
 DRUM_COST_TOLERANCE = 1e-4
 # Prior standard deviation of the sizes of an unknown torque on the drum [10 N m].
@@ -174,14 +174,14 @@ class DrumSubsystem:
         return self.fit(best, self.scan(best))
 
     def speed_noise(self, run: int, found: Mapping[str, float], seed: int = 0) -> Array:
-        """Sample the noise of the smoothed motor speed in the residual [1], shape (n, DRAWS).
+        """Sample the noise of the smoothed motor speed in the residual [1], shape (n, NOISE_DRAWS).
 
         The sum of squares of a row is the variance of its sample.
         """
         random, m = np.random.default_rng((seed, run)), self.signals[run]
         base = self.residual(run, found)
         columns = []
-        for _ in range(DRAWS):
+        for _ in range(NOISE_DRAWS):
             w, i, torque = (
                 signal + level * random.standard_normal(len(m.time))
                 for signal, level in zip(
@@ -192,7 +192,7 @@ class DrumSubsystem:
                 m.time, w, i, torque, m.noise, self.values, use_current=not m.missing_current
             )
             columns.append(self.residual(run, found, speed) - base)
-        return np.asarray(np.stack(columns, axis=-1) / np.sqrt(DRAWS))
+        return np.asarray(np.stack(columns, axis=-1) / np.sqrt(NOISE_DRAWS))
 
 
 def is_torque_size(fitted: Estimate) -> NDArray[np.bool_]:

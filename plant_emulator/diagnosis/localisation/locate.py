@@ -45,7 +45,7 @@ WORTHWHILE_BLOCK_GAIN = 15.0
 # The unknown laws are approximate: a difference of this share of the gain is no difference.
 APPROXIMATION = 0.02
 # At most so many blocks hold the gap.
-MOST_BLOCKS = 3
+MOST_FAULTY_BLOCKS = 3
 # No signal shows this subsystem.
 SILENT_BLOCK = "motor_shaft"
 
@@ -84,7 +84,7 @@ def divide_gain(regression: BlockRegression) -> tuple[dict[str, float], float]:
     before = regression.log_marginal_likelihood(taken)
     credit = dict.fromkeys((*regression.blocks, SILENT_BLOCK), 0.0)
     total = 0.0
-    for _ in range(MOST_BLOCKS):
+    for _ in range(MOST_FAULTY_BLOCKS):
         rest = [name for name in regression.blocks if name not in taken]
         gains = {name: regression.log_marginal_likelihood((*taken, name)) - before for name in rest}
         best = max(gains, key=gains.__getitem__)

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 # Edges of the bins: frequency [Hz], as far as the sampling goes.
 FREQUENCY_EDGES = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
-SPEEDS = (0.0, 25.0, 50.0, 100.0, 200.0, 300.0, 400.0)  # [rad/s at the motor]
-TIMES = (0.0, 5.0, 10.0, 20.0, 40.0, 80.0)  # [s since the start]
+SPEED_BINS = (0.0, 25.0, 50.0, 100.0, 200.0, 300.0, 400.0)  # [rad/s at the motor]
+TIME_BINS = (0.0, 5.0, 10.0, 20.0, 40.0, 80.0)  # [s since the start]
 # There is a load from this torque at the sensor on [N m]: four deviations of its noise.
 LOADED = 1.0
 
@@ -59,13 +59,13 @@ def bins(recording: Recording, base_speed: float) -> dict[tuple[str, str], NDArr
     phase = phases(time, log["speed_reference"], log["motor_speed"])
     found = {("phase", name): phase == k for k, name in enumerate(PHASES[:-1])}
     found["phase", PHASES[-1]] = field_weakened(speed, base_speed)
-    found |= {("speed", n): m for n, m in _ranges(np.abs(speed), SPEEDS, "rad/s")}
+    found |= {("speed", n): m for n, m in _ranges(np.abs(speed), SPEED_BINS, "rad/s")}
     found["load", "driving"] = torque * speed < -LOADED * np.abs(speed)
     found["load", "braking"] = torque * speed > LOADED * np.abs(speed)
     found["load", "none"] = np.abs(torque) <= LOADED
     found["direction", "forward"] = speed > MOVING_SPEED
     found["direction", "backward"] = speed < -MOVING_SPEED
-    return found | {("time", n): m for n, m in _ranges(time - time[0], TIMES, "s")}
+    return found | {("time", n): m for n, m in _ranges(time - time[0], TIME_BINS, "s")}
 
 
 def _ranges(

@@ -48,7 +48,7 @@ FIELDS = {
     "armature_voltage": "voltage",
 }
 # A parameter is started within this factor of its nominal value.
-WITHIN = 5.0
+START_FACTOR = 5.0
 
 
 class DiagnosedBench(Protocol):
@@ -269,7 +269,9 @@ class BenchRelations:
         site, values = self.site, dict(self.where.values)
         for (name, std), t in zip(site.stds.items(), theta, strict=False):
             nominal = self.model.nominal_set.value(name)
-            values[name] = float(np.clip(nominal + std * t, nominal / WITHIN, nominal * WITHIN))
+            values[name] = float(
+                np.clip(nominal + std * t, nominal / START_FACTOR, nominal * START_FACTOR)
+            )
         states = [dict(s) for s in self.where.states]
         drum = site.drum_fit
         scales = [min(u.scaled_std, 1.0) for u in drum.unknowns]

@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from plant_emulator.recordings.recording import Recording
 
 # Share of a channel's samples that are new, below which it is sampled and held.
-HELD = 0.6
+NEW_SHARE = 0.6
 # Least share of the samples that a thinned recording has.
-LEAST_LEFT = 0.1
+LEAST_KEPT_SHARE = 0.1
 # A step of time over the usual one that hides what happens in it.
-HOLE = 2.5
+HIDING_STEP = 2.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,15 +38,17 @@ class Thinned:
     def usable_intervals(self) -> NDArray[np.bool_]:
         """Intervals whose relations count, shape (n - 1,)."""
         step = np.diff(self.recording.log.time)
-        return np.asarray(~(self.void[1:] | self.void[:-1] | (step > HOLE * np.median(step))))
+        return np.asarray(
+            ~(self.void[1:] | self.void[:-1] | (step > HIDING_STEP * np.median(step)))
+        )
 
 
 def thin(recording: Recording, use: NDArray[np.bool_]) -> Thinned:
     """Thin a recording; use : samples that count, shape (channels, n)."""
     log = recording.log
-    held = [k for k, own in enumerate(use) if np.mean(own) < HELD]
+    held = [k for k, own in enumerate(use) if np.mean(own) < NEW_SHARE]
     kept = np.all(use[held], axis=0) if held else np.ones(len(log.time), bool)
-    if np.mean(kept) < LEAST_LEFT:
+    if np.mean(kept) < LEAST_KEPT_SHARE:
         kept = np.ones(len(log.time), bool)
     use = use[:, kept]
     void = np.asarray(~use.all(axis=0))

@@ -22,7 +22,7 @@ import numpy as np
 from plant_emulator.diagnosis.localisation.linear_splines import linear_splines
 from plant_emulator.diagnosis.missing_law.curve import knots_of
 from plant_emulator.diagnosis.missing_law.grammar import factors
-from plant_emulator.diagnosis.missing_law.reduced import WIDE, columns_of, products, run_rows
+from plant_emulator.diagnosis.missing_law.reduced import WIDE_PRIOR, columns_of, products, run_rows
 from plant_emulator.diagnosis.prediction import block_bootstrap
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 # Prior standard deviations of a curve's coefficients, whose columns have the length 1 in the noise.
-PENALTIES = (10.0, 100.0, WIDE)
+PENALTIES = (10.0, 100.0, WIDE_PRIOR)
 # There is a gap from so many standard deviations of the noise's sum of squares on.
 SURPRISING = 3.0
 

@@ -11,7 +11,7 @@ from plant_emulator.diagnosis.localisation.drum_subsystem import LAWS_OF_ANGLE, 
 from plant_emulator.diagnosis.localisation.measured_signals import NOISES
 from plant_emulator.diagnosis.localisation.parity_relations import GEAR
 from plant_emulator.diagnosis.missing_law.quantity import LawQuantity, in_relations, time_of
-from plant_emulator.diagnosis.missing_law.states import QUICK, LawState
+from plant_emulator.diagnosis.missing_law.states import FILTER_TIMES, LawState
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -101,7 +101,7 @@ def speed_sensor(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantit
     xi, inertia = r.values["gear_ratio"], r.values["drum_inertia"]
     speed = LawState(
         values=[one.speed / xi for one in q], time=[one.time for one in q],
-        name="drum speed", symbol="w", unit="rad/s", code="value", kind="signed", lags=QUICK,
+        name="drum speed", symbol="w", unit="rad/s", code="value", kind="signed", lags=FILTER_TIMES,
     )  # fmt: skip
 
     angle = LawState(

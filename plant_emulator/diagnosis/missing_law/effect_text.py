@@ -9,16 +9,16 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.missing_law.law_search import Law
 
 # Largest size of a coefficient [that of the draft].
-LARGEST = 5.0
+LARGEST_SIZE = 5.0
 # Prior standard deviation of a width or a time constant, and its bounds [that of the draft].
-SHAPE_STD, SHAPE_RANGE = 0.5, 10.0
+SHAPE_STD, SHAPE_FACTOR = 0.5, 10.0
 # Laws against the motion that have a Coulomb and a viscous part, by the law of the Coulomb part.
 VISCOUS = {
     "drum_coulomb_friction": "drum_viscous_friction",
     "motor_coulomb_friction": "motor_viscous_friction",
 }
 # Speed below which a viscous coefficient stays that of this speed [rad/s].
-SLOWEST = 1e-3
+SLOWEST_SPEED = 1e-3
 
 TEXT = '''"""A drafted law of the {name}: {states}.
 
@@ -72,7 +72,7 @@ def _formula(law: Law) -> str:
 def _parameters(law: Law) -> list[str]:
     found = []
     for k, (term, size) in enumerate(zip(law.terms, law.coefficients, strict=True), 1):
-        bound = LARGEST * abs(size)
+        bound = LARGEST_SIZE * abs(size)
         found.append(
             f'    "a{k}": EffectParameter(\n'
             f"        neutral=0.0, lower={-bound:.4g}, upper={bound:.4g}, plausible={size:.4g},\n"
@@ -103,7 +103,7 @@ def _shape(k: int, j: int, factor: Factor) -> str:
     b = factor.scale
     return (
         f'    "b{k}{j}": EffectParameter(\n'
-        f"        neutral={b:.4g}, lower={b / SHAPE_RANGE:.4g}, upper={b * SHAPE_RANGE:.4g},\n"
+        f"        neutral={b:.4g}, lower={b / SHAPE_FACTOR:.4g}, upper={b * SHAPE_FACTOR:.4g},\n"
         f'        plausible={b:.4g}, unit="{unit}", meaning="b{k}{j}", std={SHAPE_STD * b:.4g},\n'
         "    ),\n"
     )
@@ -161,7 +161,9 @@ def _laws(name: str, law: Law) -> list[str]:
     if moving:
         total = " + ".join(_product(name, k, term) for k, term in moving)
         found.append(
-            _function(VISCOUS[hook], absent, f"value + ({total}) / max({speed.code}, {SLOWEST})")
+            _function(
+                VISCOUS[hook], absent, f"value + ({total}) / max({speed.code}, {SLOWEST_SPEED})"
+            )
         )
     return found
 

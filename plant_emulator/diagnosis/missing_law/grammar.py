@@ -34,7 +34,7 @@ PLAIN: dict[str, Callable[[Array], Array]] = {
     "sign": np.sign,
 }
 # Widths of a bell [largest value of the state].
-WIDTHS = (0.02, 0.05, 0.1, 0.2, 0.5)
+BELL_WIDTHS = (0.02, 0.05, 0.1, 0.2, 0.5)
 # Harmonics of an angle.
 HARMONICS = (1.0, 2.0, 3.0, 4.0)
 
@@ -145,7 +145,7 @@ def factors(state: LawState) -> Iterator[Factor]:
     """All factors of a state."""
     for function in FUNCTIONS[state.kind]:
         if function == "bell":
-            yield from (Factor("bell", state, w * state.largest) for w in WIDTHS)
+            yield from (Factor("bell", state, w * state.largest) for w in BELL_WIDTHS)
         elif function == "turn":
             yield from (Factor("turn", state, k) for k in HARMONICS)
         else:
@@ -157,7 +157,7 @@ def factors(state: LawState) -> Iterator[Factor]:
 def _simple(state: LawState) -> Iterator[Factor]:
     """Factors that a product may have: of first order, a root, a wide bell, a lag, a slow turn."""
     for factor in factors(state):
-        wide = factor.function == "bell" and factor.scale >= WIDTHS[2] * state.largest
+        wide = factor.function == "bell" and factor.scale >= BELL_WIDTHS[2] * state.largest
         slow = factor.function == "turn" and factor.scale <= HARMONICS[1]
         if factor.function in {"linear", "size", "root", "lag"} or wide or slow:
             yield factor

@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 # Most terms of a law.
 MOST_TERMS = 3
 # Laws of one term that further terms are tried with.
-STARTS = 6
+EXTENDED_LAWS = 6
 # Another term must raise the held-out gain by this [twice the log of the odds].
-WORTHWHILE_GAIN = 25.0
+LEAST_TERM_GAIN = 25.0
 # A law is drafted from this held-out gain on [twice the log of the odds]. Runs without any gap gave
 # up to 60, because the drum's flight through the gap is linearised.
 DRAFTED_GAIN = 100.0
@@ -169,14 +169,14 @@ class LawSearch:
 
     def nested(self) -> list[tuple[int, ...]]:
         """The best law of one term, and longer ones as long as another term counts."""
-        starts = self.singles()[:STARTS]
+        starts = self.singles()[:EXTENDED_LAWS]
         found = [starts[0]]
         while len(found) < MOST_TERMS:
             longer = [
                 (*start, j) for start in starts for j in range(len(self.terms)) if j not in start
             ]
             best = max(longer, key=self.score)
-            if self.score(best) <= self.score(found[-1]) + WORTHWHILE_GAIN:
+            if self.score(best) <= self.score(found[-1]) + LEAST_TERM_GAIN:
                 break
             found.append(best)
             starts = [best]

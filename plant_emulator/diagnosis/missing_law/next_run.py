@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from plant_emulator.recordings.recording import Recording
 
 # Speeds and slopes [largest of the runs], lengths of a cruise [s], amplitudes [speed].
-SPEEDS, SLOPES = (0.1, 0.3, 0.6, 1.0), (0.25, 1.0)
+CRUISE_SPEEDS, RAMP_SLOPES = (0.1, 0.3, 0.6, 1.0), (0.25, 1.0)
 CRUISES = (2.0, 8.0)
 AMPLITUDES = (0.0, 0.1)
 # Standstill before and after [s]; duration that no program passes [s].
-REST, LONGEST = 0.5, 60.0
+STANDSTILL_TIME, LONGEST_PROGRAM = 0.5, 60.0
 # Frequencies of a sweep [Hz]. Its largest slope must keep within that of the runs.
 FREQUENCIES = (0.2, 1.0)
 
@@ -72,20 +72,24 @@ def programs(fastest: float, steepest: float, *, backwards: bool) -> Iterator[Sp
     backwards : whether the reference may change its direction
     """
     ways = (1.0, -1.0) if backwards else (1.0,)
-    choices = product(SPEEDS, SLOPES, CRUISES, AMPLITUDES, ways)
+    choices = product(CRUISE_SPEEDS, RAMP_SLOPES, CRUISES, AMPLITUDES, ways)
     for share, part, cruise, amplitude, way in choices:
         speed = share * fastest
         ramp = speed / (part * steepest)
         size = min(amplitude * speed, 0.5 * steepest / (2.0 * np.pi * FREQUENCIES[1]))
-        begin = REST + ramp
+        begin = STANDSTILL_TIME + ramp
         end = begin + cruise
-        corners = [(REST, 0.0), (begin, speed * (1.0 - amplitude)), (end, speed * (1 - amplitude))]
+        corners = [
+            (STANDSTILL_TIME, 0.0),
+            (begin, speed * (1.0 - amplitude)),
+            (end, speed * (1 - amplitude)),
+        ]
         corners.append((end + ramp, 0.0))
         if way < 0.0:
             back = end + 2.0 * ramp
             corners[-1:] = [(back, -speed), (back + cruise, -speed), (back + cruise + ramp, 0.0)]
-        duration = corners[-1][0] + REST
-        if duration > LONGEST:
+        duration = corners[-1][0] + STANDSTILL_TIME
+        if duration > LONGEST_PROGRAM:
             continue
         sweep = Sweep(
             start=begin,

@@ -13,7 +13,7 @@ from plant_emulator.diagnosis.missing_law.drum_quantities import (
     speed_sensor,
 )
 from plant_emulator.diagnosis.missing_law.quantity import LawQuantity, acting, time_of
-from plant_emulator.diagnosis.missing_law.states import QUICK, SLOW, LawState
+from plant_emulator.diagnosis.missing_law.states import FILTER_TIMES, WARMING_TIMES, LawState
 from plant_emulator.model.array_laws import gear_friction
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def _gear(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
     speed = LawState(
         values=[np.abs(one.speed) / xi for one in q], time=[one.time for one in q],
         name="gear speed", symbol="w", unit="rad/s", code="abs(s.gear_speed)", kind="level",
-        lags=SLOW,
+        lags=WARMING_TIMES,
     )  # fmt: skip
     load = LawState(
         values=[one.load * one.moving for one in q], time=[one.time for one in q],
@@ -101,7 +101,7 @@ def _flux(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
     )  # fmt: skip
     flux = LawState(
         values=[one.flux for one in q], time=[one.time for one in q],
-        name="flux", symbol="kPhi", unit="N m/A", code="value", kind="followed", lags=QUICK,
+        name="flux", symbol="kPhi", unit="N m/A", code="value", kind="followed", lags=FILTER_TIMES,
         start="p.flux_constant",
     )  # fmt: skip
     weights = {MOTOR: [one.current for one in q], ARMATURE: [one.speed for one in q]}
@@ -121,7 +121,7 @@ def _torque_sensor(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuant
     torque = LawState(
         values=[-(one.load + gear_friction(one.speed / xi, r.values)) / xi for one in q],
         time=[one.time for one in q],
-        name="shaft torque", symbol="T", unit="N m", code="value", kind="signed", lags=QUICK,
+        name="shaft torque", symbol="T", unit="N m", code="value", kind="signed", lags=FILTER_TIMES,
     )  # fmt: skip
     return LawQuantity(
         place="torque_sensor",
@@ -137,7 +137,8 @@ def _torque_sensor(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuant
 def _reference(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
     reference = LawState(
         values=[one.demand for one in q], time=[one.time for one in q],
-        name="speed reference", symbol="r", unit="rad/s", code="value", kind="signed", lags=QUICK,
+        name="speed reference", symbol="r", unit="rad/s", code="value", kind="signed",
+        lags=FILTER_TIMES,
     )  # fmt: skip
     current = LawState(
         values=[one.current for one in q], time=[one.time for one in q],

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 # Prior standard deviation of a coefficient whose column was scaled to the length 1: none to speak
 # of. It keeps a column solvable that a run does not show.
-WIDE = 1e4
+WIDE_PRIOR = 1e4
 # Loss that a coefficient of a run's own must save: half of the logarithm of some thousand samples.
 PRICE_OF_OWN = 4.0
 
@@ -123,7 +123,7 @@ class NuisanceProducts:
     shared: int
     scale: Array
     own: NDArray[np.bool_]
-    width: float = WIDE
+    width: float = WIDE_PRIOR
 
     def coefficients(self, chosen: Sequence[int], runs: Sequence[int]) -> Array:
         """Nuisance and shared coefficients of the chosen columns, fitted to some runs (scaled)."""

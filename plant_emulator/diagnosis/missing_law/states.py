@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     Kind = Literal["signed", "smooth", "level", "direction", "time", "angle", "followed"]
 
 # Time constants of a lag that a law may have [s]: of a filter, and of something that warms up.
-QUICK = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
-SLOW = (10.0, 30.0, 100.0, 300.0)
+FILTER_TIMES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+WARMING_TIMES = (10.0, 30.0, 100.0, 300.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 CORRELATION_TIMES = 3.0
 # Blocks of a run.
 FEWEST_BLOCKS, MOST_BLOCKS = 10, 500
-DRAWS = 400
+BOOTSTRAP_DRAWS = 400
 SEED = 1
 
 
@@ -52,7 +52,7 @@ def _squares(channel: Array) -> Array:
 
 
 def resampled_sums(runs: Sequence[Array], lengths: Sequence[int]) -> Array:
-    """Sums over time of DRAWS draws of all runs together, shape (channels, DRAWS).
+    """Sums over time of draws of all runs together, shape (channels, BOOTSTRAP_DRAWS).
 
     runs : shape (channels, samples) each; lengths : samples of a block of each run
     Runs of equal length and blocks are drawn alike, so that two hypotheses can be compared.
@@ -67,6 +67,6 @@ def _sums(run: Array, length: int, random: np.random.Generator) -> Array:
     samples = run.shape[1]
     begins = np.arange(0, samples, length)
     sizes = np.minimum(length, samples - begins)
-    starts = random.integers(0, samples, size=(DRAWS, len(begins)))
+    starts = random.integers(0, samples, size=(BOOTSTRAP_DRAWS, len(begins)))
     until = np.cumsum(np.concatenate([np.zeros((len(run), 1)), run, run], axis=1), axis=1)
     return np.asarray((until[:, starts + sizes] - until[:, starts]).sum(axis=2))

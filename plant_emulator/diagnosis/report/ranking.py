@@ -18,17 +18,17 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.machine import Candidate
 
 # Effects that a ranking shows at least, whatever their evidence is.
-SHOWN = 5
+SHOWN_EFFECTS = 5
 
 
 def hypotheses_to_rank(explained: Explanation) -> list[Hypothesis]:
-    """The effects to show, the best first: at least SHOWN, and all that count or are accepted.
+    """The effects to show, the best first: SHOWN_EFFECTS, and all that count or are accepted.
 
     An effect that is accepted beside another one may have little evidence alone.
     """
     order = sorted(explained.hypotheses, key=explained.evidence, reverse=True)
     counting = [c for c in order if explained.evidence(c) > EVIDENCE_THRESHOLD]
-    shown = max(SHOWN, len(counting))
+    shown = max(SHOWN_EFFECTS, len(counting))
     accepted = [c for c in order[shown:] if c.effect in explained.named]
     return [*order[:shown], *accepted]
 

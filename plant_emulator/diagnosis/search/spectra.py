@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 # Samples of a segment, whose spectra are averaged.
-SEGMENT = 256
+SEGMENT_SAMPLES = 256
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +49,7 @@ def spectra(
         left = model.unwhitened_residual(k, found.effects)({**found.values, **states})
         for row, name, unit, level in zip(left, run.channels, run.units, run.noise, strict=True):
             counted = row != 0.0
-            if np.count_nonzero(counted) >= SEGMENT:
+            if np.count_nonzero(counted) >= SEGMENT_SAMPLES:
                 interval = float(np.median(np.diff(run.time[counted])))
                 one = (interval, float(level), row[counted])
                 series.setdefault((name, unit), []).append(one)
@@ -64,7 +64,7 @@ def _spectrum(
 ) -> Spectrum:
     interval = float(np.median([interval for interval, _, _ in runs]))
     level = float(np.sqrt(np.mean([level**2 for _, level, _ in runs])))
-    frequency = np.asarray(np.fft.rfftfreq(SEGMENT, interval)[1:], float)
+    frequency = np.asarray(np.fft.rfftfreq(SEGMENT_SAMPLES, interval)[1:], float)
     density = np.mean([welch(level * row, interval) for _, level, row in runs], axis=0)
     declared = (level / noise.total_deviation) ** 2
     return Spectrum(
@@ -78,15 +78,15 @@ def _spectrum(
 
 
 def welch(series: Array, interval: float) -> Array:
-    """One-sided power spectral density [unit^2/Hz], shape (SEGMENT / 2 + 1,).
+    """One-sided power spectral density [unit^2/Hz], shape (SEGMENT_SAMPLES / 2 + 1,).
 
     The mean over half overlapping segments under a Hann window (P. D. Welch, IEEE Trans. Audio
     Electroacoust. 15 (1967) 70).
     interval : between samples [s]
     """
-    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(SEGMENT) / SEGMENT)
-    starts = range(0, len(series) - SEGMENT + 1, SEGMENT // 2)
-    segments = np.stack([series[k : k + SEGMENT] for k in starts])
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(SEGMENT_SAMPLES) / SEGMENT_SAMPLES)
+    starts = range(0, len(series) - SEGMENT_SAMPLES + 1, SEGMENT_SAMPLES // 2)
+    segments = np.stack([series[k : k + SEGMENT_SAMPLES] for k in starts])
     segments = (segments - segments.mean(axis=1, keepdims=True)) * window
     power = np.mean(np.abs(np.fft.rfft(segments, axis=1)) ** 2, axis=0)
     power[1:-1] *= 2.0

@@ -26,7 +26,7 @@ from register_maps.timing import SCAN
 STEPS = 10
 STEP = SCAN / STEPS
 
-STANDSTILL = 1.0  # motor speed [rad/s], 0.016 rad/s at the drum
+MOTOR_STANDSTILL = 1.0  # motor speed [rad/s], 0.016 rad/s at the drum
 # 5 % above the largest reference, because the drive overshoots a ramp by less than 1 %.
 OVERSPEED = 1.05 * reference.SPEED_MAX
 # [K] The gear counts as cold below 30 degC; its nominal friction belongs to about 32 degC.
@@ -132,7 +132,7 @@ class Plc:
         runs = wanted and remote and self.inbox.watchdog_ok(self.time)
         starts = runs and Control.ENABLE in self.inbox.edges
         tripped = self.switches.interlock != CLOSED or Alarm.OVERSPEED in self.alarm
-        stands = abs(float(self.samples.motor_speed[-1])) < STANDSTILL
+        stands = abs(float(self.samples.motor_speed[-1])) < MOTOR_STANDSTILL
         road_load = command.mode is Mode.ROAD_LOAD
         happens = {
             Event.TRIPPED: tripped,

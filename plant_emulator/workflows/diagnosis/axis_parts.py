@@ -18,6 +18,7 @@ import numpy as np
 from plant_emulator.errors import LogError
 from plant_emulator.signals.axis_log import AxisLog
 from plant_emulator.workflows import axis_reader
+from plant_emulator.workflows.diagnosis.plan import FITTED_SHARE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -28,11 +29,9 @@ if TYPE_CHECKING:
 NUMBER = r"[-+]?[0-9]*\.?[0-9]*(?:[eE][-+]?[0-9]+)?"
 PART = re.compile(rf"(?P<file>.+)@(?P<start>{NUMBER}):(?P<end>{NUMBER})")
 # A step between samples that is so much longer than the usual one is a hole.
-HOLE = 20.0
+PART_HOLE = 20.0
 # A rest of a log with fewer samples is no run.
-FEWEST = 100
-# Share of a single run that is fitted; the rest is predicted.
-FITTED_SHARE = 0.6
+FEWEST_SAMPLES = 100
 
 QUANTITIES = ("time", "position", "force", "velocity", "load", "temperature")
 
@@ -81,7 +80,7 @@ def _in_time(logs: Sequence[AxisLog]) -> tuple[list[AxisLog], list[AxisLog]]:
     if not first or not rest:
         raise LogError(
             f"{logs[0].source}: too short to be fitted on its first part and predicted on the "
-            f"rest; {FEWEST} samples are needed in either, or another log"
+            f"rest; {FEWEST_SAMPLES} samples are needed in either, or another log"
         )
     return first, rest
 
@@ -154,15 +153,15 @@ def cut(log: AxisLog, part: Part) -> AxisLog:
 def without_holes(log: AxisLog) -> list[AxisLog]:
     """The parts of a log between its holes; LogError where none is long enough."""
     steps = np.diff(log.time)
-    edges = log.time[1:][steps > HOLE * np.median(steps)].tolist()
+    edges = log.time[1:][steps > PART_HOLE * np.median(steps)].tolist()
     if not edges:
         return [log]
     spans = zip((-inf, *edges), (*edges, inf), strict=True)
     parts = [part for part in (_samples(log, span) for span in spans) if part is not None]
     if not parts:
         raise LogError(
-            f"{log.source}: holes in time leave no part of {FEWEST} samples; a hole is a step of "
-            f"more than {HOLE:g} times the usual one"
+            f"{log.source}: holes in time leave no part of {FEWEST_SAMPLES} samples; a hole "
+            f"is a step of more than {PART_HOLE:g} times the usual one"
         )
     return parts
 
@@ -170,4 +169,4 @@ def without_holes(log: AxisLog) -> list[AxisLog]:
 def _samples(log: AxisLog, part: Part) -> AxisLog | None:
     """The part of a log if it is long enough to be a run."""
     inside = (log.time >= part[0]) & (log.time < part[1])
-    return cut(log, part) if inside.sum() >= FEWEST else None
+    return cut(log, part) if inside.sum() >= FEWEST_SAMPLES else None

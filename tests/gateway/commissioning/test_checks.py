@@ -64,7 +64,7 @@ def falling(start: float, end: float, rate: float) -> np.ndarray:
 def test_a_coast_down_at_constant_deceleration_has_the_force_m_a_in_every_interval():
     speed = falling(5.0, 0.9, 0.1)
     time = np.arange(len(speed)) * PERIOD
-    forces = coast_down.mean_forces(time, speed, 4000.0, coast_down.BOUNDS)
+    forces = coast_down.mean_forces(time, speed, 4000.0, coast_down.SPEED_BOUNDS)
     assert forces == pytest.approx([400.0] * 6, rel=1e-6)
 
 

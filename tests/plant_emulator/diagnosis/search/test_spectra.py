@@ -12,14 +12,14 @@ from scipy.signal import welch as welch_by_scipy
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.report.document import from_json
 from plant_emulator.diagnosis.report.html.page import html
-from plant_emulator.diagnosis.search.spectra import SEGMENT, spectra, welch
+from plant_emulator.diagnosis.search.spectra import SEGMENT_SAMPLES, spectra, welch
 from tests.plant_emulator.diagnosis import answers
 from tests.plant_emulator.diagnosis.line import TIME, Line, noisy
 
 
 def test_density_is_that_of_scipy() -> None:
     series = np.random.default_rng(0).standard_normal(1000)
-    _, expected = welch_by_scipy(series, 100.0, nperseg=SEGMENT, detrend="constant")
+    _, expected = welch_by_scipy(series, 100.0, nperseg=SEGMENT_SAMPLES, detrend="constant")
     assert np.allclose(welch(series, 0.01), expected)
 
 
