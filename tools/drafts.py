@@ -93,7 +93,7 @@ def row(name: str, hidden: str, logs: Sequence[str | Log], folder: Path, true: s
 
 
 def closed_by(effect: str, runs: Runs, null: FitResult) -> str:
-    """What an effect of the library closes of the held-out gap, as the drafts do."""
+    """Share of the held-out gap that an effect of the library closes."""
     runner = TaskRunner(
         pool=InProcess(),
         recipe=runs.recipe,

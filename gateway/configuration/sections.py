@@ -166,7 +166,7 @@ class LimitsConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class PlausibilityConfig:
-    """What the sensors may show beside the model of the bench (gateway.cycle.plausibility).
+    """Allowed deviations of the sensors from the model of the bench (gateway.cycle.plausibility).
 
     false_alarms : rate that is allowed by noise [1/s, in the file an hour]
     torque, torque_share : tolerance of the motor's torque balance [N m], and its share of the

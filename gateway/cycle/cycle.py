@@ -39,7 +39,7 @@ BRIDGED = 2.0
 
 @dataclass(frozen=True, kw_only=True)
 class Observation:
-    """What one tick has seen.
+    """The inputs of one tick.
 
     now : monotonic time of the reading [s]
     measurement : the decoded block, None: no good block, `fault` says why
@@ -60,7 +60,7 @@ class Observation:
 
 @dataclass(frozen=True, kw_only=True)
 class Output:
-    """What one tick decided.
+    """The decision of one tick.
 
     setpoint : the command block to write, None: write nothing
     demand : motor speed that the regulator wants, before the limits [rad/s]; None: no sample yet

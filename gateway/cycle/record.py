@@ -49,7 +49,7 @@ COMMANDED: Final = tuple(field.name for field in fields(Setpoint))
 
 @dataclass(frozen=True, kw_only=True)
 class Tick:
-    """What one tick of the loop did.
+    """The record of one tick of the loop.
 
     now, period : monotonic time of the reading, and time since the tick before [s]
     lateness : from deadline to wake-up [s]

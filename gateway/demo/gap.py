@@ -51,7 +51,7 @@ BEGINS_WITHIN: Final = 60.0
 
 @dataclass(frozen=True, kw_only=True)
 class GapResult:
-    """What the loop has shown.
+    """The result of the closed loop.
 
     answer : of the diagnosis, as its document; before, after : force of the truck in cruise with
         the nominal friction and with the diagnosed set, None: the truck did not come to cruise

@@ -78,7 +78,7 @@ def status_rows(values: Values, age: float) -> list[Row]:
 
 
 def problem_text(values: Values) -> str:
-    """What the link says of its last fault; empty where the last reading was good."""
+    """Text of the link's last fault; empty where the last reading was good."""
     return values.problem.rstrip(b"\0").decode(errors="replace")
 
 

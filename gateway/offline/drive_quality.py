@@ -1,4 +1,4 @@
-"""How like the road a run is: the indices of SAE J2951, of the bench over the road (pure).
+"""The indices of SAE J2951 of a run: the bench over the road (pure).
 
 Both speeds are taken at 10 Hz and smoothed by two means of five points; a speed up to 0.03 m/s is
 standstill. The filter belongs to the definition: without it the inertia work is several percent

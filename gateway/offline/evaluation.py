@@ -1,4 +1,4 @@
-"""How closely the drum feels like the road: agreement of speeds, force in cruise, energy.
+"""Error of the emulated road: agreement of speeds, force in cruise, energy.
 
 A driver holds his speed even against a wrong road load, so that the speed alone does not show it.
 Force and energy do.

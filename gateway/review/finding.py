@@ -1,4 +1,4 @@
-"""What a review has found, and whether a bench may be started with it."""
+"""The findings of a review, and whether a bench may be started with them."""
 
 from dataclasses import asdict, dataclass
 from typing import Any

@@ -45,7 +45,7 @@ SECOND_SIGNAL_AFTER: Final = 1.0
 
 @dataclass(frozen=True, kw_only=True)
 class RunResult:
-    """How a run went. Times in seconds; reason : why it ended, None: the operator ended it."""
+    """The result of a run. Times in seconds; reason : of its end, None: the operator ended it."""
 
     recording: Path
     reason: Reason | None
@@ -172,7 +172,7 @@ def _keeping(recording: RecordingConfig) -> Keeping:
 
 
 def _identity(job: Job) -> dict[str, Any]:
-    """What the status tells about this daemon besides the values of its ticks."""
+    """Fields of the status that identify this daemon."""
     return {
         "pid": os.getpid(),
         "title": job.header["title"],

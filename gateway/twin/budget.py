@@ -70,7 +70,7 @@ class Budget:
 
     @property
     def interaction(self) -> Errors:
-        """What the causes cost together beyond the sum of what each costs alone."""
+        """Interaction of the causes: the error of all less the sum of the single errors."""
         return self.whole - self.left - sum(self.alone.values(), NO_ERRORS)
 
     @property

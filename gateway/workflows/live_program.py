@@ -31,7 +31,7 @@ class Progress:
 
 @dataclass(frozen=True, kw_only=True)
 class Ended:
-    """How a program ended.
+    """The end of a program.
 
     completed : it came to its end; why : the reason where it did not, empty: it did
     """

@@ -55,7 +55,7 @@ class ParameterDeviation:
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """What causes the gap.
+    """The cause of the gap.
 
     effects : the accepted effects
     classes : for each of them, the effects that these logs cannot tell from it, itself first
@@ -93,7 +93,7 @@ class Cell:
 
 @dataclass(frozen=True, kw_only=True)
 class Location:
-    """Where the gap lies.
+    """The location of the gap.
 
     subsystem : None: there is no gap
     channel, phase : where the residual is largest over its noise; None: not known

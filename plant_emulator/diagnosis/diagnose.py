@@ -65,7 +65,7 @@ THRESHOLDS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Findings:
-    """What a diagnosis found.
+    """The findings of a diagnosis.
 
     details : what a report shows beside the answer
     final : fit whose values can be saved

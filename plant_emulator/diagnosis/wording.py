@@ -134,7 +134,7 @@ def times_noise(gap: Mapping[str, float], noise_floor: Mapping[str, float]) -> f
 
 
 def logs_used(logs: Logs) -> str:
-    """How many logs were fitted, and how many were held out."""
+    """Numbers of fitted and of held-out logs, in words."""
     fitted, held_out = logs.estimation, logs.held_out
     if len(fitted) == 1 and fitted == held_out:
         return "1 log, its last part held out"
@@ -155,7 +155,7 @@ def closed_share(gap: HeldOutGap) -> str | None:
 
 
 def describe_location(location: Location, units: Mapping[str, str]) -> str | None:
-    """Where the gap lies, in one line; None where there is none."""
+    """The location of the gap in one line; None where there is none."""
     if location.subsystem is None:
         return None
     parts = [in_words(location.subsystem)]
@@ -192,7 +192,7 @@ def indistinguishable(verdict: Verdict) -> dict[str, tuple[str, ...]]:
 
 
 def describe_draft_gain(draft: Draft) -> str:
-    """How much of the held-out gap a draft closes."""
+    """Share of the held-out gap that a draft closes, in words."""
     if draft.held_out_gain is None or draft.held_out_gain_ci95 is None:
         return "no held-out run can be predicted"
     low, high = map(percent, draft.held_out_gain_ci95)

@@ -1,4 +1,4 @@
-"""How an effect is declared. One declaration serves simulation, fit and report."""
+"""The declaration of an effect. One declaration serves simulation, fit and report."""
 
 from __future__ import annotations
 

@@ -126,7 +126,7 @@ def correlation_time(residual: Array) -> float:
 
 
 def structure(residual: Array, lags: int = 20) -> float:
-    """How much more a residual is correlated than white noise is, in units of chi squared.
+    """Ljung-Box excess of a residual: its correlation beyond white noise, in units of chi squared.
 
     Expected 0 with a standard deviation of sqrt(2 lags) for white noise (Ljung and Box, Biometrika
     65 (1978) 297). Samples of exactly 0 do not count.

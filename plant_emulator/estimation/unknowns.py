@@ -71,7 +71,7 @@ class Unknown:
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate:
-    """What a fit found; z is on the scale of the estimation, shape (unknowns,).
+    """The result of a fit; z is on the scale of the estimation, shape (unknowns,).
 
     residuals, jacobians : one a run, shape (channels, samples) and (channels, samples, unknowns)
     cost : sum of squares of the whitened residuals, without the priors

@@ -92,7 +92,7 @@ class Identification:
 
     @property
     def gap_positions(self) -> tuple[float, ...]:
-        """Where in the gap each run starts, -1 to 1."""
+        """The start of each run in the backlash gap, from -1 to 1."""
         return tuple(states[GAP_POSITION] for states in self.states)
 
 

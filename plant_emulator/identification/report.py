@@ -1,4 +1,4 @@
-"""What an identification found, as a machine and as a person reads it, and as a parameter set."""
+"""The result of an identification as JSON, as text, and as a parameter set."""
 
 from __future__ import annotations
 

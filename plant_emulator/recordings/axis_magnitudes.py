@@ -1,4 +1,4 @@
-"""How fast and how strong an axis is, and whether its values can be in the unit of their column.
+"""Speed and power of an axis, and whether its values can be in the unit of their column.
 
 A position in degrees under `position_rad` shows in two ways: the steps of its encoder divide 360
 evenly, not 2 pi, and the axis turns faster than motors do. A torque in mN m gives a power that few
@@ -150,7 +150,7 @@ def counts_degrees(position: Array) -> bool:
 
 
 def _on_lattice(values: Array, revolution: float) -> float:
-    """How well values stand on the lattice of an encoder: 1 for all, 0 for none."""
+    """Agreement of values with the lattice of an encoder: 1 for all, 0 for none."""
     best = 0.0
     for counts in COUNTS:
         step = revolution / counts

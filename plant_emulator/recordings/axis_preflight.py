@@ -40,7 +40,7 @@ HOLE_INTERVALS = 5.0
 
 
 def axis_notes(logs: Sequence[AxisLog]) -> list[str]:
-    """What a user should know of the runs, a sentence each; LogError for one that is no use."""
+    """Notes on the runs for the user, a sentence each; LogError for a run that is no use."""
     notes = [note for log in logs for note in axis_preflight(log)]
     if unused := dict.fromkeys(name for log in logs for name in log.other):
         notes.append(f"columns that are not used: {', '.join(unused)}")
@@ -48,7 +48,7 @@ def axis_notes(logs: Sequence[AxisLog]) -> list[str]:
 
 
 def axis_preflight(log: AxisLog) -> list[str]:
-    """What a user should know of a log, a sentence each; LogError where it cannot be used."""
+    """Notes on a log for the user, a sentence each; LogError where it cannot be used."""
     motion = "position" if log.velocity is None else "velocity"
     force = "torque" if log.rotary else "force"
     measured = log.position if log.velocity is None else log.velocity
@@ -181,7 +181,7 @@ def _means(signal: Array, weight: Array) -> Array:
 
 
 def _load_notes(log: AxisLog) -> list[str]:
-    """What a user should know of the load channel."""
+    """Notes on the load channel for the user."""
     load = np.asarray(log.load)
     if np.ptp(load) == 0.0:
         return [f"{log.source}: the load is {load[0]:g} in all samples: it says nothing"]

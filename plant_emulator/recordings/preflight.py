@@ -1,4 +1,4 @@
-"""What a log must be before anything is fitted to it, and which of its samples count.
+"""Conditions that a log must meet before a fit, and the samples of it that count.
 
 Refused, with file, time and value: a run that does not start at rest, a hole that hides too much, a
 sampling too slow for the bench's spikes, a torque of the wrong sign, speeds of drum and

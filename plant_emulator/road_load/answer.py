@@ -176,7 +176,7 @@ def estimates_of(fit: RoadFit, errors: dict[str, Any]) -> dict[str, TruckEstimat
 def not_separable(
     fit: RoadFit, covariance: Array, estimates: dict[str, TruckEstimate]
 ) -> tuple[str, ...]:
-    """What the logs cannot separate, one sentence each."""
+    """Parameters that the logs cannot separate, one sentence each."""
     found = [MASS]
     low, high = estimates["crr_v"].interval
     if low <= 0.0 <= high:

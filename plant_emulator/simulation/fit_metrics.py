@@ -1,4 +1,4 @@
-"""How well a simulation follows a measurement: Val1, Val2, NRMSD.
+"""Agreement of a simulation with a measurement: Val1, Val2, NRMSD.
 
     NRMSD = sqrt(mean e^2) / (max y - min y)    Val1 = 100 (1 - NRMSD)     (thesis, eq. 3.37-3.39)
     Val2  = 100 (1 - sum |e| / sum |y|)                                    (thesis, eq. 3.40-3.41)

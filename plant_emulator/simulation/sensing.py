@@ -1,4 +1,4 @@
-"""What declared sensors show of a simulated run.
+"""Readings of declared sensors in a simulated run.
 
 A lag is discretised exactly for a quantity u that is linear between its samples, h apart:
 
@@ -38,7 +38,7 @@ PHASES = 64
 
 @dataclass(frozen=True, kw_only=True)
 class SensorMemory:
-    """What a sensor keeps between two blocks of samples.
+    """The state of a sensor between two blocks of samples.
 
     time, value : of the last sample of the quantity; lagged, shown : what followed from it
     """
@@ -198,7 +198,7 @@ class RunningSensor:
         self._random = np.random.default_rng(seed)
 
     def show(self, time: Array, values: Array) -> Array:
-        """What is shown of the steps of a block, shape (n,) [unit of the channel].
+        """Compute the readings at the steps of a block, shape (n,) [unit of the channel].
 
         time, values : at the end of each step, shape (n,) [s, unit of the channel]
         """

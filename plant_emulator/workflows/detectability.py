@@ -1,4 +1,4 @@
-"""What recorded or planned runs can show of every effect, as a library call."""
+"""Detection limits of all effects in recorded or planned runs, as a library call."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SCHEMA = "detectability/1"
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Detectability:
-    """What some runs can show together; `print` shows it as the command `detectability` does.
+    """Detection limits in some runs; `print` shows them as the command `detectability` does.
 
     effects : of the library, the one that shows best first
     notes : what was noticed about the logs, a sentence each

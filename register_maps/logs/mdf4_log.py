@@ -67,7 +67,7 @@ def values(data: bytes, names: Sequence[str]) -> list[list[float]]:
 
 
 def _opened(data: bytes, take: Callable[[Any], Taken]) -> Taken:
-    """What `take` finds in the open file. Raises LogTableError for a damaged one."""
+    """Result of `take` on the open file. Raises LogTableError for a damaged one."""
     asammdf = _package()
     _check_blocks(data)
     failure = ""

@@ -11,7 +11,7 @@ SHOWN: Final = 4
 
 @dataclass(kw_only=True)
 class PollQuality:
-    """What a poller saw of the samples of a PLC.
+    """Quality of the polling of a PLC's samples.
 
     interval : time between two samples of the PLC [s]
     periods : number of times that a sample came so many intervals after the one before

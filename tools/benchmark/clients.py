@@ -32,7 +32,7 @@ PLC_PRIORITY = 20
 
 
 class NoPeerError(Exception):
-    """What the comparison lacks."""
+    """A peer cannot run; the message says what it lacks."""
 
 
 def measure() -> tuple[float, float]:

@@ -126,7 +126,7 @@ def _named(f: AxisFindings, term: Term) -> str:
 
 
 def _location(f: AxisFindings) -> Location:
-    """Where the evidence lies: what the best effect of each subsystem closes."""
+    """The subsystems with the evidence that the best effect of each has."""
     falls: dict[str, float] = {}
     for found in _singles(f.search):
         (term,) = found.terms

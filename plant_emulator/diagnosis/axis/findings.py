@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class AxisFindings:
-    """What the search and the held-out runs of an axis have shown.
+    """The results of the search and of the held-out runs of an axis.
 
     floor : rms of the force's error [N or N m]; see `floor`
     """
@@ -76,7 +76,7 @@ def traces(f: AxisFindings) -> tuple[Trace, ...]:
 
 
 def remainder(f: AxisFindings) -> Remainder:
-    """What the named effects leave, by frequency."""
+    """The unmodelled remainder beside the named effects, by frequency."""
     regression, found = f.search.regression, f.decision.found
     fitted = set(f.fitted).isdisjoint(f.held_out.runs)
     own = [(regression.residual(found, k), r.time) for k, r in enumerate(regression.rows)]

@@ -1,4 +1,4 @@
-"""What a set of effects leaves on runs that were not fitted.
+"""The residual of a set of effects on held-out runs.
 
 A fold fits some runs and predicts others. A predicted run keeps all values but its own friction
 level, which is known as well as that of a fitted run.

@@ -82,7 +82,7 @@ def rich_terms(library: Sequence[Effect], scale: Scale) -> list[Term]:
 
 
 def scale_of(runs: Sequence[Run]) -> Scale:
-    """How large the axis is that made these runs."""
+    """Estimate the magnitudes of the axis from its runs."""
     low = min(float(r.motion.position.min()) for r in runs)
     high = max(float(r.motion.position.max()) for r in runs)
     return Scale(

@@ -1,4 +1,4 @@
-"""What runs can show of each effect, and which effects they cannot tell apart.
+"""Detection limits of the effects in some runs, and the classes of collinear effects.
 
 The signatures are those of the hypothesis tests: at the fit of a recorded run, or at the nominal
 parameters for a run that is only planned. An effect is detectable from the size on at which the
@@ -38,7 +38,7 @@ ALIKE_SIGNATURES = 0.95
 
 @dataclass(frozen=True, kw_only=True)
 class DetectionLimit:
-    """What some runs can show of an effect.
+    """The detection limit of an effect in some runs.
 
     orthogonal_norm : norm of the signature at the plausible size, in the noise, without the part
         that a nuisance parameter can follow
@@ -58,7 +58,7 @@ class DetectionLimit:
 
 @dataclass(frozen=True, kw_only=True)
 class EffectDetectability:
-    """What some runs can show of an effect, its parameters by their names in the effect.
+    """The detection limit of an effect, its parameters by their names in the effect.
 
     smallest_size : sizes from which on the effect shows [`units`]; None: no size that was tried
     hidden_up_to : largest sizes that were tried and did not show, where larger ones are possible
@@ -205,7 +205,7 @@ def _hidden_up_to(found: DetectionLimit, candidate: Candidate) -> dict[str, floa
 
 
 def _needs(found: DetectionLimit, candidate: Candidate) -> str | None:
-    """What is missing for an effect that does not show at its plausible size."""
+    """The sensor or manoeuvre that an effect lacks which does not show at its plausible size."""
     if found.orthogonal_norm >= DETECTABLE_NORM:
         return None
     if candidate.needs:

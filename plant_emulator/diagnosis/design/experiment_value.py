@@ -1,4 +1,4 @@
-"""What a planned run would add to the logs at hand.
+"""The information that a planned run would add to the logs at hand.
 
 The machine simulates planned runs at a fit to its logs (`Model.with_planned_runs`).
 

@@ -186,7 +186,7 @@ class Advice:
         return [(source, norms) for (source, _, _), norms in zip(planned, found, strict=True)]
 
     def _needs(self, names: Iterable[str]) -> list[str]:
-        """What these effects need of a log, each need once."""
+        """Sensors and manoeuvres that these effects need of a log, each once."""
         needs = (self.runner.model.candidates[name].needs for name in names)
         return [need for need in dict.fromkeys(needs) if need]
 
@@ -197,7 +197,7 @@ def norm(values: Iterable[float]) -> float:
 
 
 def separation(norms: Sequence[float]) -> tuple[int, float]:
-    """How many pairs a run tells apart, and the least of their norms; the larger, the better."""
+    """Number of pairs that a run separates, and the least of their norms; larger is better."""
     clear = [value for value in norms if value >= DETECTABLE_NORM]
     return len(clear), min(clear, default=max(norms, default=0.0))
 

@@ -1,1 +1,1 @@
-"""How the tasks of a diagnosis run, in this process or side by side, and report progress."""
+"""Execution of the tasks of a diagnosis, in this process or in a pool, with progress."""

@@ -1,4 +1,4 @@
-"""How the tasks of a diagnosis run: one after the other, or side by side (`workflows.workers`).
+"""Execution of the tasks of a diagnosis: in sequence, or in a pool (`workflows.workers`).
 
 A step is a function of a model and one item. A worker gets the recipe of the model instead of the
 model, and builds the model once.

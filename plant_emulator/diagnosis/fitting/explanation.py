@@ -35,7 +35,7 @@ class Hypothesis:
 
 @dataclass(frozen=True, kw_only=True)
 class Explanation:
-    """What the hypothesis tests found.
+    """The result of the hypothesis tests.
 
     null : fit without effects
     final : fit with the accepted effects

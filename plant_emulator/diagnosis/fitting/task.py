@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """What a step of the diagnosis is asked to do.
+    """The input of a task of the diagnosis.
 
     base : fit that the step begins with
     runs : that the step fits

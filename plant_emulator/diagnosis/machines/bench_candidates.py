@@ -54,7 +54,7 @@ def candidate(effect: Effect, *, voltage: bool = False, unknown_torque: bool = F
 
 
 def _needs(effect: Effect, *, voltage: bool, unknown_torque: bool) -> str:
-    """What a log must have to show the effect and these logs lack."""
+    """The sensor or manoeuvre that shows the effect and that these logs lack."""
     if unknown_torque and effect.subsystem in BEHIND_THE_GEAR:
         return LOG_WHEEL_TORQUE
     return "" if voltage and effect.needs.startswith(LOG_VOLTAGE) else effect.needs

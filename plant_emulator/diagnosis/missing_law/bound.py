@@ -1,4 +1,4 @@
-"""How much of the gap a law over the candidate states could close at best.
+"""Upper bound of the share of the gap that a law over the candidate states closes.
 
 Runs that nothing was fitted to are the judge, as they are of a law. Each quantity has candidates:
 curves over each of its states (linear splines, lags, harmonics of an angle), their sum over all

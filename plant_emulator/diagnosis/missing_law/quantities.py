@@ -1,4 +1,4 @@
-"""Where a law may be missing: the quantities of the bench, from the drive to the gear."""
+"""The quantities of the bench in which a law may be missing, from the drive to the gear."""
 
 from __future__ import annotations
 

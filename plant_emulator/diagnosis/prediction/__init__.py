@@ -1,1 +1,1 @@
-"""How far the gap shrinks: held-out runs, bootstrap intervals, unmodelled remainder."""
+"""The held-out gap: prediction, bootstrap intervals, unmodelled remainder."""

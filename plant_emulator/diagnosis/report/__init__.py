@@ -1,1 +1,1 @@
-"""How a diagnosis is shown: the answer as JSON, the terminal, the HTML report."""
+"""The presentation of a diagnosis: the answer as JSON, the terminal, the HTML report."""

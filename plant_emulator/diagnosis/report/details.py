@@ -1,4 +1,4 @@
-"""What a report shows beside the answer."""
+"""Details of a report that are not part of the answer."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class EstimatedInput:
 
 @dataclass(frozen=True, kw_only=True)
 class Details:
-    """What a report shows beside the answer.
+    """Details of a report that are not part of the answer.
 
     settings : what repeats the diagnosis: command, version, date, hashes of files, thresholds
     notes : what was noticed about the logs, a sentence each

@@ -1,4 +1,4 @@
-"""How far the held-out gap shrinks: channel by channel, and effect by effect."""
+"""The shrinkage of the held-out gap, by channel and by effect."""
 
 from __future__ import annotations
 

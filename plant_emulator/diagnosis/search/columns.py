@@ -40,7 +40,7 @@ class Column:
 
 @dataclass(frozen=True, kw_only=True)
 class Score:
-    """What an effect gains in one linear regression at its best size.
+    """The gain of an effect in one linear regression, at its best size.
 
     gain : of log evidence
     values, states : of the effect, and of each run, where a fit may start

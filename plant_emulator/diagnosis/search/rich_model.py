@@ -1,4 +1,4 @@
-"""The rich model that noise is estimated beside: what any effect of the library could add to a fit.
+"""The rich model of the noise estimate: the columns of all effects of the library beside a fit.
 
 What a rich model leaves is noise, or a cause that is not in the library.
 """

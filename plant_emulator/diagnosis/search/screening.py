@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Start:
-    """Where a joint fit may begin: values by name, and the states of each run."""
+    """A start of a joint fit: values by name, and the states of each run."""
 
     values: Mapping[str, float]
     states: tuple[Mapping[str, float], ...]
@@ -56,7 +56,7 @@ class Promise:
 
 @dataclass(frozen=True, kw_only=True)
 class Visibility:
-    """How well the runs of a fit show an effect of its plausible size.
+    """The visibility of an effect of its plausible size in the runs of a fit.
 
     total_norm : of the change of the simulation's residual
     orthogonal_norm : of the part that no nuisance parameter can follow
@@ -69,7 +69,7 @@ class Visibility:
 
 
 def visibilities(model: Model, task: Task) -> dict[str, Visibility]:
-    """How well the runs of `task.base` show each effect of the library (a step)."""
+    """Compute the visibility of each effect in the runs of `task.base` (a task)."""
     simulation = SimulationColumns(model, task.base, task.runs)
     return {
         name: Visibility() if one.stochastic else _visibility(simulation, one)

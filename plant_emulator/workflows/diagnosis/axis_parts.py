@@ -110,7 +110,7 @@ def _run(source: Source, files: Mapping[Path, AxisLog]) -> AxisLog:
 def _left(
     source: Source, files: Mapping[Path, AxisLog], held_out: Sequence[Source]
 ) -> list[AxisLog]:
-    """What is left of a source to fit, without the parts of its file that are held out."""
+    """The part of a source that is fitted: its file without the parts that are held out."""
     run = _run(source, files)
     if isinstance(source, AxisLog):
         return [run]

@@ -71,7 +71,7 @@ class Diagnosis:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was noticed about the logs, a sentence each."""
+        """Notes on the logs, a sentence each."""
         return self.findings.details.notes
 
     @property

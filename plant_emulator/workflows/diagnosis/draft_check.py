@@ -25,7 +25,7 @@ SCHEMA = "draft-check/1"
 
 @dataclass(frozen=True, kw_only=True)
 class DraftCheck:
-    """What an effect file closes of the held-out gap; each log is held out in turn.
+    """Share of the held-out gap that an effect file closes; each log is held out in turn.
 
     mean_square : of the residual that the joint fit leaves, over the noise [1]
     """

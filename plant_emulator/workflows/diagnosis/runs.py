@@ -164,7 +164,7 @@ def _unmeasured(
 
 
 def sampling(time: Array) -> str:
-    """How regularly a log was sampled, in words; time : of its rows [s], shape (n,)."""
+    """The regularity of a log's sampling in words; time : of its rows [s], shape (n,)."""
     steps = np.diff(time)
     quality = PollQuality(interval=float(np.median(steps)))
     quality.count(steps.tolist())

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Scale:
-    """How large an axis and its runs are [SI].
+    """The magnitudes of an axis and its runs [SI].
 
     force : deviation of the force; speed : highest; middle, travel : middle and half of the travel
     period : between two samples of the slowest log; length : of the longest run

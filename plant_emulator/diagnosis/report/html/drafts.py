@@ -34,7 +34,7 @@ COLUMNS = 340
 
 
 def drafts(found: Sequence[Draft], traces: Sequence[Trace]) -> Markup:
-    """What every draft says, with its curve; below the best one what it changes.
+    """Every draft with its curve; below the best one the signal that it changes most.
 
     traces : held-out runs, predicted without and with the best draft
     """

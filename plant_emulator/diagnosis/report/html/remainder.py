@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def remainder_by_band(remainder: Remainder) -> Markup:
-    """How much a machine that is modelled in outline leaves, and in which bands."""
+    """Table of the unmodelled remainder of a machine in outline, by frequency band."""
     before, after = 100.0 * remainder.before, 100.0 * remainder.after
     words = (
         f"Relative error norm(e)/norm(y) of the held-out {remainder.channel}: {before:.2f} % with "

@@ -210,7 +210,7 @@ def undetectable(entries: Sequence[Undetectable]) -> Markup:
 
 
 def search_steps(steps: Sequence[SearchStep]) -> Markup:
-    """What the search tried, in its order."""
+    """Table of the hypotheses that the search tried, in its order."""
     rows = [
         tag(
             "tr",
