@@ -3,8 +3,8 @@
 The rows are the whitened parity relations of all runs, then the drum speeds of all runs over their
 noise. The nuisance columns are the deviations of the parameters, the noise of the smoothed motor
 speed in the drum speed, and the errors of a logged voltage. Each block adds columns of its unknown
-laws. The evidence of the model (`ard_evidence`) says how much more probable the columns of a block
-make all measurements.
+laws. The marginal likelihood of the model says how much more probable the columns of a block make
+all measurements.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.localisation import block_basis, drum_basis, parameter_sensitivities
-from plant_emulator.diagnosis.localisation.ard_evidence import (
-    LinearModel,
-    Products,
-    variance_gain,
-)
 from plant_emulator.diagnosis.localisation.drum_subsystem import (
     TORQUE_STD,
     DrumSubsystem,
     is_torque_size,
     prior_means,
+)
+from plant_emulator.diagnosis.localisation.marginal_likelihood import (
+    LinearModel,
+    Products,
+    variance_gain,
 )
 from plant_emulator.diagnosis.localisation.measured_signals import interval_means, measured_signals
 from plant_emulator.diagnosis.localisation.parity_covariance import whitened_relations
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.localisation.ard_evidence import MarginalLikelihood
+    from plant_emulator.diagnosis.localisation.marginal_likelihood import MarginalLikelihood
     from plant_emulator.estimation.unknowns import Estimate
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
@@ -267,7 +267,7 @@ class BlockRegression:
         return np.asarray(TORQUE_STD * mean[-group.shape[1] :])
 
     def marginal_likelihood(self, blocks: Sequence[str]) -> MarginalLikelihood:
-        """The evidence with unknown laws in these blocks."""
+        """The largest marginal likelihood with unknown laws in these blocks."""
         groups = [g for name in blocks if name != "drum" for g in self.groups[name]]
         if "drum" not in blocks:
             return self.model.marginal_likelihood(groups)

@@ -4,8 +4,8 @@ Every block is judged by what it must do with the measured signals at its border
 drum, and drive must satisfy parity relations, which need no simulation (`parity_relations`). Gap,
 shaft and drum must satisfy a simulation with the measured motor speed (`drum_subsystem`). Each
 block in turn may hold unknown laws of its own quantities (`block_basis`) beside the deviations of
-all parameters. The evidence says how much more probable that makes all measurements
-(`block_regression`). The pattern tells the blocks apart:
+all parameters. The marginal likelihood says how much more probable that makes all
+measurements (`block_regression`). The pattern tells the blocks apart:
 
     torque sensor          motor's and gear's relation, with opposite sign
     motor / gear / drive   that relation alone; where the voltage is logged, motor and drive the

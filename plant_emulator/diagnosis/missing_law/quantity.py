@@ -17,8 +17,8 @@ from plant_emulator.diagnosis.missing_law.states import LawState
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from plant_emulator.diagnosis.localisation.ard_evidence import LinearModel
     from plant_emulator.diagnosis.localisation.block_basis import BlockQuantities
+    from plant_emulator.diagnosis.localisation.marginal_likelihood import LinearModel
     from plant_emulator.signals.log import Array
 
 

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from plant_emulator.diagnosis.localisation.ard_evidence import LinearModel
     from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
+    from plant_emulator.diagnosis.localisation.marginal_likelihood import LinearModel
     from plant_emulator.diagnosis.missing_law.quantity import LawQuantity
     from plant_emulator.signals.log import Array
 

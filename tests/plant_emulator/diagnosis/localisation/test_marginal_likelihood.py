@@ -1,10 +1,10 @@
-"""The evidence of a linear model against the dense normal distribution of scipy."""
+"""The marginal likelihood of a linear model against the dense normal distribution of scipy."""
 
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from plant_emulator.diagnosis.localisation.ard_evidence import (
+from plant_emulator.diagnosis.localisation.marginal_likelihood import (
     LinearModel,
     log_marginal_likelihood,
     variance_gain,

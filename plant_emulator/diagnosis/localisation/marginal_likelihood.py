@@ -1,15 +1,14 @@
-"""The evidence of a linear model whose coefficients lie in groups of unknown size.
+"""The marginal likelihood of a linear model whose coefficients lie in groups of unknown size.
 
     y = F theta + sum_g B_g beta_g + white noise,   theta ~ N(0, 1),   beta_g ~ N(0, a_g^2)
 
-The evidence is the marginal likelihood: the probability of y with theta and beta integrated out.
-Its logarithm is
+The marginal likelihood is the probability of y with theta and beta integrated out. Its logarithm is
 
     - y'y/2 + v'v/2 - log det L,    L L' = 1 + S G S,  v = L^-1 S g,  G = X'X, g = X'y, X = [F B]
 
-S is the diagonal of the standard deviations. The sizes a_g are chosen to make the evidence largest;
-a_g = 0 leaves the group out (automatic relevance determination: D. MacKay, Neural Computation 4
-(1992) 415). A group that explains only noise makes the evidence smaller, and is not taken.
+S is the diagonal of the standard deviations. The sizes a_g maximise it; a_g = 0 leaves the group
+out (automatic relevance determination: D. MacKay, Neural Computation 4 (1992) 415). A group that
+explains only noise makes the marginal likelihood smaller, and is not taken.
 """
 
 from __future__ import annotations
@@ -108,7 +107,7 @@ class LinearModel:
         return float(y @ y - product @ np.linalg.solve(system, product))
 
     def marginal_likelihood(self, groups: Sequence[Array]) -> MarginalLikelihood:
-        """The largest evidence with these groups of columns, each as large as the data want it."""
+        """The largest marginal likelihood over the sizes of these groups of columns."""
         parts, of = [*self.nuisance, *groups], self._products.of
         gram = np.block([[of(a, b) for b in parts] for a in parts])
         product = np.concatenate([of(a, self._y)[:, 0] for a in parts])
@@ -141,7 +140,7 @@ class _SizeSearch:
         )
 
     def run(self) -> None:
-        """Search the sizes of the largest evidence."""
+        """Search the sizes of the largest marginal likelihood."""
         for _ in range(MOST_SWEEPS):
             before = self.best
             self._take_groups()
