@@ -10,7 +10,7 @@ from plant_emulator.blind.dirt import Dirt
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-Kind = Literal["none", "drift", "effect", "two", "outside"]
+Kind = Literal["none", "deviation", "effect", "two", "outside"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +39,7 @@ class Hidden:
 class Case:
     """The truth of one bench and its runs.
 
-    kind : "none": the nominal bench; "drift": parameters deviate; "effect": one effect of the
+    kind : "none": the nominal bench; "deviation": parameters deviate; "effect": one effect of the
         library; "two": two of them; "outside": one effect outside the library
     parameters : true values of the parameters that deviate [SI]
     gaps : backlash gap position at the start of every run, -1 to 1
@@ -59,7 +59,7 @@ class Case:
     @property
     def truth(self) -> str:
         """The case's row in the confusion matrix."""
-        if self.kind in {"none", "drift"}:
+        if self.kind in {"none", "deviation"}:
             return self.kind
         names = "+".join(sorted(hidden.effect for hidden in self.hidden))
         return f"outside: {names}" if self.kind == "outside" else names

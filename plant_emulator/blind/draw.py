@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from plant_emulator.effects import Effect, EffectParameter
     from plant_emulator.model.parameters import ParameterSet
 
-DECK: dict[Kind, int] = {"none": 2, "drift": 3, "effect": 10, "two": 2, "outside": 3}
+DECK: dict[Kind, int] = {"none": 2, "deviation": 3, "effect": 10, "two": 2, "outside": 3}
 KINDS = [kind for kind in get_args(Kind) for _ in range(DECK[kind])]
 # Ranges of a size and of a shape constant, each over its plausible value.
 SIZE_RANGE = (0.5, 2.0)

@@ -95,7 +95,7 @@ def is_right(unsealed: Unsealed) -> bool:
     match unsealed.case.kind:
         case "none":
             return kind == "none"
-        case "drift":
+        case "deviation":
             return kind == "parameter"
         case "outside":
             return kind == "unknown" or (not unsealed.detectable and kind in {"none", "parameter"})
@@ -105,7 +105,7 @@ def is_right(unsealed: Unsealed) -> bool:
 
 def is_false_alarm(unsealed: Unsealed) -> bool:
     """Whether the verdict is an effect or unknown, although the case hides no effect."""
-    return unsealed.case.kind in {"none", "drift"} and unsealed.kind in {"effect", "unknown"}
+    return unsealed.case.kind in {"none", "deviation"} and unsealed.kind in {"effect", "unknown"}
 
 
 def is_located(unsealed: Unsealed) -> bool:

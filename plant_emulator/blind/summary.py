@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     Results = Sequence[CaseResult]
 
-WITHOUT_EFFECT = {"none", "drift"}
+WITHOUT_EFFECT = {"none", "deviation"}
 OF_THE_LIBRARY = {"effect", "two"}
 
 

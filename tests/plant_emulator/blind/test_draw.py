@@ -22,8 +22,8 @@ def cases(nominal: ParameterSet, all_effects: dict[str, Effect]) -> list[Case]:
 
 def test_a_quarter_of_the_cases_hides_no_effect() -> None:
     counted = Counter(kinds(1, 80))
-    assert counted["none"] + counted["drift"] == 20
-    assert counted == {"none": 8, "drift": 12, "effect": 40, "two": 8, "outside": 12}
+    assert counted["none"] + counted["deviation"] == 20
+    assert counted == {"none": 8, "deviation": 12, "effect": 40, "two": 8, "outside": 12}
 
 
 def test_more_cases_begin_with_the_same() -> None:
@@ -85,7 +85,7 @@ def test_runs_start_anywhere_in_the_gap(cases: list[Case]) -> None:
 
 def test_programs_with_a_truck_do_not_betray_that_the_wheel_is_the_cause(cases: list[Case]) -> None:
     with_truck = [case for case in cases if "program6" in case.programs]
-    assert any(case.kind in {"none", "drift"} for case in with_truck)
+    assert any(case.kind in {"none", "deviation"} for case in with_truck)
 
 
 def test_effects_of_a_truck_have_one(cases: list[Case]) -> None:

@@ -68,8 +68,8 @@ def unsealed(
 @pytest.mark.parametrize(
     ("kind", "verdict", "holds"),
     [
-        ("none", "none", True), ("none", "parameter", False), ("drift", "parameter", True),
-        ("drift", "none", False), ("drift", "unknown", False),
+        ("none", "none", True), ("none", "parameter", False), ("deviation", "parameter", True),
+        ("deviation", "none", False), ("deviation", "unknown", False),
     ],
 )  # fmt: skip
 def test_without_effect_only_its_own_verdict_is_right(
@@ -83,7 +83,7 @@ def test_without_effect_only_its_own_verdict_is_right(
 )
 def test_claimed_cause_of_parameter_deviations_is_a_false_alarm(verdict: Kind, alarm: bool) -> None:
     named = ["stribeck"] if verdict == "effect" else []
-    assert is_false_alarm(unsealed(answer(verdict, *named), kind="drift")) is alarm
+    assert is_false_alarm(unsealed(answer(verdict, *named), kind="deviation")) is alarm
 
 
 def test_effect_by_its_name_is_right() -> None:
@@ -171,7 +171,7 @@ def test_evidence_is_that_of_the_weakest_name(all_effects: dict[str, Effect]) ->
 def results(all_effects: dict[str, Effect]) -> tuple[CaseResult, ...]:
     cases = [
         unsealed(answer("none"), kind="none"),
-        unsealed(answer("effect", "stribeck"), kind="drift"),
+        unsealed(answer("effect", "stribeck"), kind="deviation"),
         unsealed(answer("effect", "torque_sensor_offset", place="torque_sensor"), OFFSET),
         unsealed(answer("effect", "stribeck", place="gear"), OFFSET),
         unsealed(answer("unknown", place="motor"), RIPPLE, kind="outside"),
@@ -209,7 +209,7 @@ def test_result_survives_json(results: tuple[CaseResult, ...]) -> None:
 
 def test_confusion_has_a_row_for_every_truth(results: tuple[CaseResult, ...]) -> None:
     assert confusion(results) == {
-        "drift": {"stribeck": 1},
+        "deviation": {"stribeck": 1},
         "none": {"none": 1},
         "outside: torque_ripple": {"unknown": 1},
         "torque_sensor_offset": {"stribeck": 1, "torque_sensor_offset": 1},
@@ -219,7 +219,7 @@ def test_confusion_has_a_row_for_every_truth(results: tuple[CaseResult, ...]) ->
 def test_terminal_names_every_wrong_case(trial: TrialAnswer) -> None:
     text = str(trial)
     assert "torque_sensor_offset (norm 50) answered as stribeck in gear" in text
-    assert "drift answered as stribeck" in text
+    assert "deviation answered as stribeck" in text
     assert text.count("answered as") == 2
 
 
