@@ -8,9 +8,10 @@ import asyncio
 import contextlib
 import gc
 import os
+import selectors
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 
 from plant_emulator import logs
 from plant_emulator.emulator.control_channel import ControlChannel
@@ -139,13 +140,26 @@ async def _until_stopped(run: _Run, announce: Callable[[str], None], *, control:
 
 async def _answer(channel: ControlChannel, run: _Run, announce: Callable[[str], None]) -> None:
     """Answer requests until standard input ends, then stop the run."""
+    async for line in _lines(run.loop):
+        announce(channel.answer(line.decode()))
+    run.stopping.set()
+
+
+async def _lines(loop: asyncio.AbstractEventLoop) -> AsyncIterator[bytes]:
+    """Lines of standard input."""
+    try:
+        with selectors.DefaultSelector() as selector:
+            selector.register(sys.stdin, selectors.EVENT_READ)
+    except PermissionError:  # a file, or /dev/null, which no loop can wait for and none has to
+        for line in sys.stdin.buffer:
+            yield line
+        return
     reader = asyncio.StreamReader()
     protocol = asyncio.StreamReaderProtocol(reader)
-    transport, _ = await run.loop.connect_read_pipe(lambda: protocol, sys.stdin)
+    transport, _ = await loop.connect_read_pipe(lambda: protocol, sys.stdin)
     with contextlib.closing(transport):
         while line := await reader.readline():
-            announce(channel.answer(line.decode()))
-    run.stopping.set()
+            yield line
 
 
 async def _show(timer: ScanTimer, emulator: Emulator) -> None:

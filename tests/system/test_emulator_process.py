@@ -54,6 +54,17 @@ def test_switches_and_faults_are_turned_from_outside():
             emulator.set_faults("gremlins")
 
 
+@pytest.mark.slow
+def test_control_ends_with_a_standard_input_that_no_loop_can_wait_for():
+    """/dev/null, as a shell gives it to a program in the background."""
+    command = [sys.executable, "-m", "plant_emulator", "serve", "--port", "0", "--control"]
+    done = subprocess.run(
+        command, stdin=subprocess.DEVNULL, capture_output=True, timeout=60, check=False
+    )
+    assert done.returncode == 0
+    assert b"Traceback" not in done.stderr
+
+
 def test_emulator_that_cannot_start_says_why():
     with pytest.raises(ProcessError, match="no_such_map"), EmulatorProcess(map="no_such_map"):
         pass
