@@ -18,6 +18,8 @@ from typing import Any, Final
 
 from gateway.cycle.record import NOTHING, Tick, number
 from gateway.cycle.supervisor import State
+from gateway.monitoring import alarms
+from gateway.monitoring.alarms import ALARM, Alarm
 from gateway.reasons import BY_OPERATOR, Reason
 
 BOUNDS: Final = (
@@ -45,6 +47,7 @@ class Values:
         missed, and missed in a row; records that the recorder did not get
     images, runs, trips : good images; entries into RUN; ends of a run that no operator asked for
     changes : of state or reason so far
+    acknowledged : monotonic time of the operator's last acknowledgement [s], 0: there was none
     state, reason, fault : codes as in a recording
     age, latency, lateness : of the newest sample, of the tick [s]
     latency_sum, latency_max, lateness_sum, lateness_max : over all ticks [s]
@@ -64,6 +67,7 @@ class Values:
     runs: int = 0
     trips: int = 0
     changes: int = 0
+    acknowledged: float = 0.0
     state: int = 0
     reason: int = NOTHING
     fault: int = NOTHING
@@ -94,7 +98,8 @@ AT_LATENCY: Final = -(-(AT_VALUES + VALUES.size) // COUNTER) * COUNTER
 AT_LATENESS: Final = AT_LATENCY + len(BOUNDS) * COUNTER
 AT_REASONS: Final = AT_LATENESS + len(BOUNDS) * COUNTER
 AT_FAULTS: Final = AT_REASONS + len(CODES) * COUNTER
-AT_RING: Final = AT_FAULTS + len(CODES) * COUNTER
+AT_ALARMS: Final = AT_FAULTS + len(CODES) * COUNTER
+AT_RING: Final = AT_ALARMS + len(CODES) * ALARM.size
 SIZE: Final = AT_RING + RING * CHANGE.size
 
 
@@ -114,6 +119,7 @@ class Snapshot:
     """The whole block at one tick.
 
     latency, lateness : counts for each of BOUNDS
+    alarms : what has ended runs, oldest first
     reasons, faults : by code: changes to this reason, ticks with this fault
     changes : the last ones, oldest first; `values.changes` tells how many there were
     """
@@ -123,6 +129,7 @@ class Snapshot:
     lateness: Sequence[int]
     reasons: dict[int, int]
     faults: dict[int, int]
+    alarms: Sequence[Alarm]
     changes: Sequence[Change]
 
 
@@ -136,11 +143,12 @@ class Block:
         self._latency = view[AT_LATENCY:AT_LATENESS].cast("Q")
         self._lateness = view[AT_LATENESS:AT_REASONS].cast("Q")
         self._reasons = view[AT_REASONS:AT_FAULTS].cast("Q")
-        self._faults = view[AT_FAULTS:AT_RING].cast("Q")
+        self._faults = view[AT_FAULTS:AT_ALARMS].cast("Q")
         self._state = self._reason = NOTHING
         self._since = self._latency_sum = self._latency_max = 0.0
         self._lateness_sum = self._lateness_max = 0.0
         self._images = self._runs = self._trips = self._changes = 0
+        self._acknowledged = 0.0
 
     def update(self, tick: Tick) -> None:
         """Take one tick in."""
@@ -159,7 +167,11 @@ class Block:
         if state != self._state:
             self._since = tick.now
             self._runs += state == State.RUN
-            self._trips += state == State.RAMPDOWN and reason not in BY_OPERATOR
+            if state == State.RAMPDOWN and reason not in BY_OPERATOR:
+                self._trips += 1
+                alarms.note(self._buffer, AT_ALARMS + PLACE[reason] * ALARM.size, tick.now)
+            if (self._state, state) == (State.SAFE, State.SHADOW):
+                self._acknowledged = tick.now
         if reason != self._reason:
             self._reasons[PLACE[reason]] += 1
         self._state, self._reason = state, reason
@@ -185,7 +197,14 @@ class Block:
         return (
             *(tick.now, self._since, tick.tick + 1, tick.tick + 1 - self._images, tick.missed),
             *(tick.overruns, tick.dropped, self._images, self._runs, self._trips, self._changes),
-            *(tick.state, tick.reason, tick.fault, tick.shadow, number(tick.age)),
+            *(
+                self._acknowledged,
+                tick.state,
+                tick.reason,
+                tick.fault,
+                tick.shadow,
+                number(tick.age),
+            ),
             *(tick.latency, tick.lateness, self._latency_sum, self._latency_max),
             *(self._lateness_sum, self._lateness_max, number(tick.demand)),
             math.nan if commanded is None else number(commanded.speed_setpoint),
@@ -225,7 +244,8 @@ def decode(content: bytes) -> Snapshot:
         latency=_counters(content, AT_LATENCY, AT_LATENESS),
         lateness=_counters(content, AT_LATENESS, AT_REASONS),
         reasons=dict(zip(CODES, _counters(content, AT_REASONS, AT_FAULTS), strict=True)),
-        faults=dict(zip(CODES, _counters(content, AT_FAULTS, AT_RING), strict=True)),
+        faults=dict(zip(CODES, _counters(content, AT_FAULTS, AT_ALARMS), strict=True)),
+        alarms=alarms.decode(content, AT_ALARMS, CODES, values.acknowledged),
         changes=[
             _change(content, index)
             for index in range(max(0, values.changes - RING), values.changes)

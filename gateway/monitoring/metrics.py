@@ -4,6 +4,7 @@ Names and units follow the conventions of Prometheus: base units, `_total` for c
 `metrics` brings prometheus_client.
 """
 
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from math import isinf
 from typing import TYPE_CHECKING, Any, Final
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 from gateway.cycle.supervisor import State
 from gateway.errors import ConfigError
 from gateway.monitoring.block import BOUNDS, Snapshot
+from gateway.monitoring.lines import REASONS
 from gateway.reasons import Reason
 
 if TYPE_CHECKING:
@@ -76,6 +78,7 @@ def families(identity: Mapping[str, Any], snapshot: Snapshot, age: float) -> "It
     for field, (name, text) in GAUGES.items():
         yield GaugeMetricFamily(f"gateway_{name}", text, value=getattr(values, field))
     yield from _counters(snapshot)
+    yield from _alarms(snapshot, age)
     yield _states(snapshot)
     yield _relations(snapshot)
     yield _histogram(
@@ -97,6 +100,24 @@ def _counters(snapshot: Snapshot) -> "Iterator[Metric]":
         for reason in Reason:
             family.add_metric([reason.name], counts[reason])
         yield family
+
+
+def _alarms(snapshot: Snapshot, age: float) -> "Iterator[Metric]":
+    """Alarms so far; age : of the last tick [s]."""
+    from prometheus_client.metrics_core import CounterMetricFamily, GaugeMetricFamily
+
+    counts = CounterMetricFamily("gateway_alarms", "Trips by this reason", labels=["reason"])
+    text = "Unix time of the first trip by this reason"
+    first = GaugeMetricFamily("gateway_alarm_first_seconds", text, labels=["reason"])
+    text = "1 until the operator acknowledges this alarm at the PLC"
+    active = GaugeMetricFamily("gateway_alarm_active", text, labels=["reason"])
+    offset = time.time() - age - snapshot.values.now
+    for alarm in snapshot.alarms:
+        name = [REASONS[alarm.reason].name]
+        counts.add_metric(name, alarm.count)
+        first.add_metric(name, offset + alarm.first)
+        active.add_metric(name, float(not alarm.acknowledged))
+    return iter((counts, first, active))
 
 
 def _states(snapshot: Snapshot) -> "Metric":

@@ -6,9 +6,11 @@ Units here are the operator's: rpm, Nm, ms.
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from datetime import datetime
 from typing import Any, Final
 
 from gateway.cycle.supervisor import State
+from gateway.monitoring.alarms import Alarm
 from gateway.monitoring.block import Snapshot, Values, quantile
 from gateway.monitoring.lines import WARNED, reason_text
 from register_maps.units import RPM
@@ -121,8 +123,22 @@ def count_rows(snapshot: Snapshot) -> list[Row]:
     ]
 
 
-def document(snapshot: Snapshot, age: float, lines: Sequence[str]) -> dict[str, Any]:
-    """The page as a JSON document; lines : of the last changes."""
+def alarm_rows(alarms: Sequence[Alarm], date: Callable[[float], datetime]) -> list[Row]:
+    """Reason and state of each alarm; date : of a monotonic time [s]."""
+    return [(reason_text(alarm.reason), alarm_text(alarm, date)) for alarm in alarms]
+
+
+def alarm_text(alarm: Alarm, date: Callable[[float], datetime]) -> str:
+    """How often, since when, and whether acknowledged."""
+    times = f"{alarm.count} time{'s' if alarm.count > 1 else ''}"
+    first = date(alarm.first).isoformat(timespec="seconds")
+    return f"{times}, first {first}, {'' if alarm.acknowledged else 'not '}acknowledged"
+
+
+def document(
+    snapshot: Snapshot, age: float, lines: Sequence[str], alarms: Sequence[Row]
+) -> dict[str, Any]:
+    """The page as a JSON document; lines : of the last changes; alarms : their rows."""
     values = snapshot.values
     return {
         "status": status_rows(values, age),
@@ -130,6 +146,7 @@ def document(snapshot: Snapshot, age: float, lines: Sequence[str]) -> dict[str, 
         "values": value_rows(values),
         "times": time_rows(snapshot),
         "counts": count_rows(snapshot),
+        "alarms": alarms,
         "changes": lines,
         "trend": {
             name: value if math.isfinite(value := getattr(values, name)) else None

@@ -21,7 +21,7 @@ from rich.table import Table
 from gateway.cycle.supervisor import State
 from gateway.monitoring import page
 from gateway.monitoring.block import RING, Change, Snapshot, Values
-from gateway.monitoring.lines import LINES, NOTES, text_line
+from gateway.monitoring.lines import LINES, NOTES, reason_text, text_line
 from gateway.monitoring.rate import Rate
 from gateway.monitoring.shared import Observer
 
@@ -44,7 +44,7 @@ def show_run(ended: Connection, path: Path, form: str) -> None:
 
 
 class RunLog:
-    """The lines of a run: its start, each change, the link's words, no more than the rate allows.
+    """The lines of a run: start, changes, alarms, the link's words; no more than the rate allows.
 
     identity : of the daemon, as the status block has it; form : one of LINES
     """
@@ -54,6 +54,7 @@ class RunLog:
         self._start: str | None = f"{identity['recording']}; real time: {identity['real_time']}"
         self._refused = " no (" in identity["real_time"]
         self._told, self._problem = 0, ""
+        self._alarms: set[object] = set()
         self._rate = Rate(self._left_out)
 
     def lines(self, snapshot: Snapshot, now: float, *, over: bool) -> list[str]:
@@ -61,6 +62,7 @@ class RunLog:
         values, found = snapshot.values, page.problem_text(snapshot.values)
         new = new_lines(snapshot, self._told, self._line)
         lost, self._told = values.changes - self._told - len(new), values.changes
+        new += self._alarm_lines(snapshot)
         if self._start is not None:
             start, self._start = self._start, None
             new = [self._note("start", start, date(now), warning=self._refused), *new]
@@ -69,6 +71,20 @@ class RunLog:
             new.append(self._note("link", found, date(values.now)))
         passed = self._rate.passed(new, now, lost=lost)
         return passed + (self._rate.rest() if over else [])
+
+    def _alarm_lines(self, snapshot: Snapshot) -> list[str]:
+        """A line for each alarm that has come, come again or been acknowledged."""
+        changed = [one for one in snapshot.alarms if one not in self._alarms]
+        self._alarms = set(snapshot.alarms)
+        return [
+            self._note(
+                "alarm",
+                f"{reason_text(one.reason)}: {page.alarm_text(one, date)}",
+                date(snapshot.values.acknowledged if one.acknowledged else one.last),
+                warning=not one.acknowledged,
+            )
+            for one in changed
+        ]
 
     def _left_out(self, count: int) -> str:
         return self._note("log", f"{count} lines left out", date(time.monotonic()))
@@ -131,6 +147,7 @@ def rendered(identity: dict[str, Any], snapshot: Snapshot, trend: page.Trend) ->
             _grid(page.status_rows(values, time.monotonic() - values.now)),
             _trends(values, trend),
             _grid(page.time_rows(snapshot)),
+            _grid(page.alarm_rows(snapshot.alarms, date)),
             _grid(page.count_rows(snapshot)),
             *last,
         ),

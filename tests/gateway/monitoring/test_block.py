@@ -75,6 +75,33 @@ def test_ring_keeps_the_last_changes_and_tells_how_many_there_were() -> None:
     assert [change.tick for change in found.changes] == list(range(6, RING + 6))
 
 
+def test_alarm_has_first_time_and_count_and_is_acknowledged_by_the_operator() -> None:
+    """Two time-outs with an overspeed between them; remote off and on in SAFE acknowledges."""
+    first = [
+        good(0, State.RUN),
+        good(1, State.RAMPDOWN, Reason.TIMEOUT),
+        good(2, State.SAFE, Reason.TIMEOUT),
+    ]
+    (alarm,) = shown(*first).alarms
+    assert (alarm.reason, alarm.count, alarm.acknowledged) == (Reason.TIMEOUT, 1, False)
+    assert (alarm.first, alarm.last) == (1000.01, 1000.01)
+    stopped = shown(*first, good(3, State.OFF, Reason.TIMEOUT)).alarms
+    assert not stopped[0].acknowledged
+    second = [*first, good(3, State.SHADOW), good(4, State.RUN)]
+    assert shown(*second).alarms[0].acknowledged
+    third = [*second, good(5, State.RAMPDOWN, Reason.OVERSPEED), good(6, State.SAFE)]
+    timeout, overspeed = shown(*third).alarms
+    assert (timeout.acknowledged, overspeed.acknowledged) == (True, False)
+    again = [*third, good(7, State.SHADOW), good(8), good(9, State.RAMPDOWN, Reason.TIMEOUT)]
+    timeout, overspeed = shown(*again).alarms
+    assert (timeout.count, timeout.first, timeout.last) == (2, 1000.01, 1000.09)
+    assert (timeout.acknowledged, overspeed.acknowledged) == (False, True)
+
+
+def test_end_of_a_run_by_the_operator_is_no_alarm() -> None:
+    assert shown(good(0), good(1, State.RAMPDOWN, Reason.REMOTE_OFF)).alarms == []
+
+
 def test_histogram_counts_each_latency_below_its_bound() -> None:
     latencies = (0.00005, 0.0001, 0.00011, 0.0099, 0.5)
     found = shown(*(replace(good(k), latency=value) for k, value in enumerate(latencies)))

@@ -1,5 +1,8 @@
 """The rate limit: a burst passes, a flood does not, and the last line is always told."""
 
+import json
+
+from gateway.cycle.record import Tick
 from gateway.cycle.supervisor import State
 from gateway.monitoring.rate import BURST, EVERY, Rate
 from gateway.monitoring.terminal import RunLog
@@ -57,6 +60,23 @@ def test_log_begins_with_recording_and_what_real_time_was_refused() -> None:
     assert second.endswith("RUN")
     (told, *_) = RunLog(IDENTITY, "json").lines(shown(), 100.0, over=False)
     assert '"level": "warning", "event": "start"' in told
+
+
+def test_log_tells_an_alarm_once_and_its_acknowledgement() -> None:
+    log = RunLog(IDENTITY, "json")
+    trip = [good(0), good(1, State.RAMPDOWN, Reason.TIMEOUT), good(2, State.SAFE, Reason.TIMEOUT)]
+
+    def alarms(*ticks: Tick) -> list[dict[str, str]]:
+        lines = map(json.loads, log.lines(shown(*ticks), 100.0, over=False))
+        return [line for line in lines if line["event"] == "alarm"]
+
+    (told,) = alarms(*trip)
+    assert told["level"] == "warning"
+    assert told["message"].startswith("TIMEOUT: PLC did not answer in time: 1 time, first 20")
+    assert told["message"].endswith(", not acknowledged")
+    assert alarms(*trip) == []
+    (told,) = alarms(*trip, good(3, State.SHADOW))
+    assert (told["level"], told["message"][-14:]) == ("info", ", acknowledged")
 
 
 def test_link_that_comes_and_goes_does_not_fill_the_log() -> None:

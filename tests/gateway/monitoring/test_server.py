@@ -54,6 +54,22 @@ def test_prometheus_reads_the_metrics_and_finds_the_values_in_si(web: Web) -> No
     assert 0.0 <= found["gateway_tick_age_seconds",] < 5.0
 
 
+def test_prometheus_reads_an_alarm_with_its_first_time(web: Web) -> None:
+    trip = (good(0), good(1, State.RAMPDOWN, Reason.TIMEOUT), good(2, State.SAFE, Reason.TIMEOUT))
+    begun = time.time()
+    for one in trip:
+        web.publish(one)
+    found = web.samples()
+    assert found["gateway_alarms_total", "TIMEOUT"] == 1.0
+    assert found["gateway_alarm_active", "TIMEOUT"] == 1.0
+    assert begun - 1.0 < found["gateway_alarm_first_seconds", "TIMEOUT"] < time.time() + 1.0
+    web.publish(good(3, State.SHADOW))
+    assert web.samples()["gateway_alarm_active", "TIMEOUT"] == 0.0
+    ((label, text),) = json.loads(web.get("status.json")[1])["alarms"]
+    assert label.startswith("TIMEOUT")
+    assert text.endswith(", acknowledged")
+
+
 def test_histogram_is_cumulative_and_ends_with_its_count(web: Web) -> None:
     for k, latency in enumerate((0.0004, 0.0004, 0.004, 3.0)):
         web.publish(replace(good(k), latency=latency))
