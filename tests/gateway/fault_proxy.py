@@ -33,14 +33,15 @@ def proxy(port: int) -> Iterator[Proxy]:
         def answer(request: Request) -> bytes | None:
             pdu = bytes([request.function]) + request.data
             plc.sendall(frame(request.transaction, request.unit, pdu))
-            return running.toxic(request, _whole_frame(plc))
+            return running.toxic(request, whole_frame(plc))
 
         with peer(answer) as listening:
             running = Proxy(listening=listening)
             yield running
 
 
-def _whole_frame(connection: socket.socket) -> bytes:
+def whole_frame(connection: socket.socket) -> bytes:
+    """The next frame that comes."""
     received = b""
     while len(received) < 6 or len(received) < 6 + int.from_bytes(received[4:6], "big"):
         chunk = connection.recv(4096)

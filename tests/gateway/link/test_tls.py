@@ -2,7 +2,6 @@
 
 import re
 import ssl
-import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -18,6 +17,7 @@ from gateway.link import tls
 from gateway.link.plc import LinkError, TcpLink
 from gateway.reasons import Reason
 from register_maps.register_map import Block
+from tests.gateway.certificates import certificates, server_context
 from tests.gateway.peer import Request, normal
 
 pytestmark = pytest.mark.peer
@@ -27,25 +27,7 @@ PROBE = Block(table="holding", start=0, count=2)
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory, require_program: Callable[[str], str]) -> Path:
-    """Two authorities, `plant` and `other`; from each a certificate of a PLC and of a gateway."""
-    openssl, made = require_program("openssl"), tmp_path_factory.mktemp("certificates")
-
-    def run(*words: str) -> None:
-        subprocess.run([openssl, *words], cwd=made, check=True, capture_output=True)
-
-    curve = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes")
-    for authority in ("plant", "other"):
-        own = (f"{authority}.pem", f"{authority}.key")
-        run("req", "-x509", *curve, "-out", own[0], "-keyout", own[1], "-subj", f"/CN={authority}")
-        for name, alternative in (("plc", "IP:127.0.0.1"), ("gateway", "DNS:gateway")):
-            stem = f"{authority}_{name}"
-            run(
-                *("req", "-x509", *curve, "-CA", own[0], "-CAkey", own[1], "-subj", f"/CN={name}"),
-                *("-addext", f"subjectAltName={alternative}"),
-                *("-addext", "basicConstraints=critical,CA:FALSE"),
-                *("-out", f"{stem}.pem", "-keyout", f"{stem}.key"),
-            )
-    return made
+    return certificates(tmp_path_factory.mktemp("certificates"), require_program("openssl"))
 
 
 def config(folder: Path, authority: str = "plant", own: str = "plant") -> Config:
@@ -64,10 +46,7 @@ def secured_plc(folder: Path, *, pieces: bool = False) -> Iterator[int]:
 
     pieces : it sends its reply in two TLS records
     """
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-    context.load_cert_chain(folder / "plant_plc.pem", folder / "plant_plc.key")
-    context.load_verify_locations(folder / "plant.pem")
-    context.verify_mode = ssl.CERT_REQUIRED
+    context = server_context(folder)
 
     def serve() -> None:
         while True:
