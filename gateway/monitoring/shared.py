@@ -20,7 +20,7 @@ from gateway.errors import GatewayError
 from gateway.monitoring import block
 from gateway.monitoring.block import Block, Snapshot
 
-MAGIC: Final = b"RLSTAT\x01\n"
+MAGIC: Final = b"RLSTAT\x02\n"
 """The last number changes with the layout of the block."""
 IDENTITY: Final = 16384
 """[bytes] Room for magic and identity."""
