@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from gateway.cli._options import write_json
+from gateway.cli._shared.options import write_json
 from register_maps.command_line.parameters import Command, OutputFile
 
 EXAMPLE = """

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from gateway.cli._options import assignments, write_json
+from gateway.cli._shared.options import assignments, write_json
 from gateway.review.finding import Review
 from gateway.workflows.check import check
 from register_maps.command_line.parameters import Command, OutputFile

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gateway.cli._options import write_json
+from gateway.cli._shared.options import write_json
 from register_maps.command_line.parameters import Command, Number, OutputFile
 from register_maps.units import KMH
 

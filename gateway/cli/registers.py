@@ -7,8 +7,8 @@ from typing import Any
 import click
 
 import register_maps
-from gateway.cli._options import write_json
-from gateway.cli._register_rows import (
+from gateway.cli._shared.options import write_json
+from gateway.cli._shared.register_rows import (
     FOUND,
     LIVE,
     PAPER,

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from gateway.cli._options import assignments, write_json
+from gateway.cli._shared.options import assignments, write_json
 from gateway.reports.replay import draw, write_csv
 from gateway.workflows.replay import replay
 from register_maps.command_line.parameters import PICTURES, Command, OutputFile

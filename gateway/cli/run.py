@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 import register_maps
-from gateway.cli._options import assignments
+from gateway.cli._shared.options import assignments
 from gateway.config_file import load, with_values
 from gateway.runtime import daemon
 from register_maps.command_line.parameters import Command, Number
