@@ -47,7 +47,7 @@ def budget_of(path: Path, parameters: str) -> RecordedBudget:
         raise ConfigError(
             "the run of a program", file=path, expected="a recording of a truck in road load"
         )
-    told = config_file.with_values(config, {"regulator.friction": str(_file(parameters))})
+    told = config_file.with_values(config, {"regulator.friction": str(parameter_file(parameters))})
     driver = RecordedTorque(torque=wheel_torque(found, told, known))
     duration = SCAN * len(driver.torque)
 
@@ -58,6 +58,7 @@ def budget_of(path: Path, parameters: str) -> RecordedBudget:
     return RecordedBudget(recording=path, parameters=parameters, budget=budget(twin, told, run))
 
 
-def _file(parameters: str) -> Path:
+def parameter_file(parameters: str, folder: Path = Path()) -> Path:
+    """File of a parameter set, given by its shipped name or its path from a folder on."""
     shipped = parameter_sets.FOLDER / f"{parameters}.toml"
-    return shipped if shipped.is_file() else Path(parameters)
+    return shipped if shipped.is_file() else folder / parameters
