@@ -5,23 +5,20 @@
 Nobody measures this torque on a bench. It is known as well as the parameter set.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from gateway.arrays import Array
 from gateway.configuration.config import Config
-from gateway.cycle.cycle import initial, step
-from gateway.cycle.supervisor import State
 from gateway.errors import GatewayError
 from gateway.offline.recording_replay import observations
+from gateway.offline.truck_torque import truck_torques
 from gateway.recordings.recording import GatewayRecording
-from gateway.regulators import compensated
 from gateway.regulators.window import Window
 from plant_emulator.simulation.truck import PARKED_TORQUE
 from register_maps.register_map import RegisterMap
-from register_maps.signals import PlcState
 from register_maps.timing import SCAN
 
 SMOOTHING_SAMPLES: Final = 11
@@ -52,21 +49,12 @@ def wheel_torque(found: GatewayRecording, config: Config, register_map: Register
 
     Raises GatewayError for a recording without a run in road load.
     """
-    params = replace(
-        compensated.Params.of(config), under_compensation=0.0, under_compensation_slow=0.0
-    )
     lever = config.truck.wheel_radius / config.bench.drum_radius
     ends, torques, standing = [0.0], [0.0], [True]
-    state = initial(config, register_map)
-    for seen in observations(found.rows(), register_map):
-        state, output = step(config, register_map, state, seen)
-        window, newest = state.samples.window, state.samples.newest
-        if output.state is not State.RUN or window is None or newest is None:
-            continue
-        if newest.plc_state is not PlcState.ROAD_LOAD:
-            continue
+    seen = observations(found.rows(), register_map)
+    for window, torque in truck_torques(seen, config, register_map):
         ends.append(ends[-1] + window.duration)
-        torques.append(lever * compensated.truck_torque(params, window))
+        torques.append(lever * torque)
         standing.append(_stands(window, config.bench.gear_ratio))
     if len(ends) < SMOOTHING_SAMPLES:
         raise GatewayError("no run in road load: there is no truck whose torque could be known")
