@@ -91,6 +91,17 @@ def test_mains_are_found_where_the_sampling_folds_them() -> None:
     assert np.mean(left**2) == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.parametrize("mains", [49.971, 49.992, 50.024, 60.013])
+def test_mains_are_found_to_a_hundredth_of_a_turn(mains: float) -> None:
+    """Near half the sampling rate, where the line and its mirror image stand side by side."""
+    value, t = white(4000, 19), np.arange(4000) / RATE
+    value += 2.0 * np.cos(2 * np.pi * mains * t + 1.0) + 1.5 * np.cos(4 * np.pi * mains * t + 2.0)
+    noise, _ = estimate_channel_noise([series(value)])
+    mirrored = min(abs(noise.lines[0] - mains), abs(100.0 - noise.lines[0] - mains))
+    assert mirrored * 40.0 < 0.015
+    assert noise.colour.order == 0
+
+
 def test_single_spikes_are_left_out_and_counted() -> None:
     value = white(5000, 9)
     places = np.arange(100, 4900, 320)
