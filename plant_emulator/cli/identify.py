@@ -52,7 +52,8 @@ def command(
 
     Without --free, all parameters that the set calls estimated are fitted, except gear_inertia. A
     logged voltage adds armature_resistance and flux_constant. Every log has its own start position
-    in the backlash gap. Standard errors come from the residuals and their autocorrelation.
+    in the backlash gap. The noise is estimated from the logs, with its colour, hum and outliers.
+    Standard errors come from the residuals and their autocorrelation.
     """
     from plant_emulator import parameter_sets
     from plant_emulator.cli._progress import progress

@@ -25,6 +25,7 @@ import numpy as np
 from plant_emulator.errors import UnsettledError
 from plant_emulator.estimation.covariance import data_errors
 from plant_emulator.estimation.least_squares import linearise_at
+from plant_emulator.estimation.noise.channel_noise import ChannelNoise, Whitener
 from plant_emulator.identification.identify import FINAL_TOLERANCE
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import Recording
@@ -160,7 +161,7 @@ def _linearisations(
     for position in PLANNED_GAP_POSITIONS:
         unknowns = _unknowns(found, position)
         with suppress(UnsettledError):
-            residual = _planned_residual(run, {**values, **_starts(unknowns)}, noise)
+            residual = _planned_residual(run, {**values, **_starts(unknowns)}, noise, found.noise)
             near = near or linearise_at(unknowns, [residual])
             yield linearise_at(unknowns, [residual], near=near)
 
@@ -183,9 +184,15 @@ def _starts(unknowns: Sequence[Unknown]) -> dict[str, float]:
 
 
 def _planned_residual(
-    run: RunInputs, there: Mapping[str, float], noise: Mapping[str, float]
+    run: RunInputs,
+    there: Mapping[str, float],
+    noise: Mapping[str, float],
+    shown: Mapping[str, ChannelNoise],
 ) -> Residual:
-    """Residual of a planned run whose measurement is its simulation at the values `there`."""
+    """Residual of a planned run whose measurement is its simulation at the values `there`.
+
+    noise : level by channel [SI]; shown : noise that the logs have shown, over that level
+    """
     values = dict(there)
     measured = simulate(
         run, values, gap_position=values.pop(GAP_POSITION), tolerance=FINAL_TOLERANCE
@@ -195,8 +202,12 @@ def _planned_residual(
         measured, run, tuple(noise), levels, np.ones((len(noise), len(run.time)), bool)
     )
 
+    everything = np.ones(len(run.time), bool)
+    whiteners = [Whitener(shown.get(name, ChannelNoise()), everything, run.time) for name in noise]
+
     def residual(found: Mapping[str, float]) -> Array:
         trial = {**values, **found}
-        return planned.strict_residual(trial, trial.pop(GAP_POSITION), FINAL_TOLERANCE)
+        rows = planned.strict_residual(trial, trial.pop(GAP_POSITION), FINAL_TOLERANCE)
+        return np.stack([w.white(row) for w, row in zip(whiteners, rows, strict=True)])
 
     return residual

@@ -8,6 +8,8 @@
     A residual above the noise suggests a local minimum: the fit is repeated from other basins.
  4. For logs with a truck, a refit that is whitened for the noise of the wheel torque
     (`input_noise`).
+ 5. For logs whose noise has a colour, hum or outliers, a refit that is whitened for the noise that
+    the fit leaves (`estimation.noise`).
 
 The prior of a parameter is its value and standard deviation in the set. The priors hold parameters
 that the logs do not determine. The prior of a parameter is dropped where the data alone determine
@@ -17,13 +19,15 @@ bring its standard error under half of the prior one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from plant_emulator.estimation import least_squares
 from plant_emulator.estimation.equation_error import start_values
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
 from plant_emulator.estimation.initial_states import GAP, states_of, with_logged_values
+from plant_emulator.estimation.noise.channel_noise import NoiseSeries
+from plant_emulator.estimation.noise.logged_noise import noise_of_runs
 from plant_emulator.estimation.residuals import residual_functions, whitened_functions
 from plant_emulator.estimation.start_search import FINE_SCANS, StartSearch
 from plant_emulator.model.stage import GAP_POSITION
@@ -31,11 +35,12 @@ from plant_emulator.signals.log import VOLTAGE
 from plant_emulator.simulation.simulate import TOLERANCE, values_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from plant_emulator.estimation.initial_states import Effects
+    from plant_emulator.estimation.noise.channel_noise import ChannelNoise
     from plant_emulator.estimation.start_search import Progress
-    from plant_emulator.estimation.unknowns import Estimate, Unknown
+    from plant_emulator.estimation.unknowns import Estimate, Residual, Unknown
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
 
@@ -48,6 +53,8 @@ INFORMED_WITHOUT_PRIOR = 0.1
 # chi^2 per sample above which other basins are tried.
 NOISE_REACHED = 1.2
 RETRIES = 3
+# Estimates of the logs' noise, at most; the last ones change little.
+NOISE_ESTIMATES = 3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,6 +89,7 @@ class Identification:
 
     states : initial states of every run, by name [SI]
     chi_squared : mean square of the whitened residual; 1: nothing but noise is left
+    noise : by channel, over the noise of the recordings; empty: the noise is white and as large
     """
 
     parameter_set: ParameterSet
@@ -89,6 +97,7 @@ class Identification:
     states: tuple[Mapping[str, float], ...]
     estimate: Estimate
     chi_squared: float
+    noise: Mapping[str, ChannelNoise] = field(default_factory=dict)
 
     @property
     def gap_positions(self) -> tuple[float, ...]:
@@ -130,9 +139,15 @@ def identify(
         search.simulations += retried.simulations
         best = min(best, other, key=lambda e: e.cost + e.penalty)
     wanted = unknowns(parameters, free, search.values, search.gaps, states)
-    best = _fit_with_input_noise(recordings, search.values, free, wanted, best, progress)
+    report = _report_cost(recordings, progress)
+    residuals = whitened_functions(recordings, search.values, free, best)
+    if residuals is not None:
+        best = _refit(wanted, residuals, best, report)
+    else:
+        residuals = residual_functions(recordings, search.values, free, _tolerance(recordings))
+    best, noise = _fit_with_logged_noise(recordings, residuals, wanted, best, report)
     best = replace(best, simulations=best.simulations + search.simulations)
-    return identification_of(best, parameters, free, len(recordings))
+    return replace(identification_of(best, parameters, free, len(recordings)), noise=noise)
 
 
 def fit_from(
@@ -145,9 +160,7 @@ def fit_from(
 ) -> Estimate:
     """Fit by least squares from the values of a search, then again without the outdone priors."""
     coarse = residual_functions(recordings, search.values, free)
-    truck = any(recording.inputs.truck for recording in recordings)
-    tolerance = TOLERANCE if truck else FINAL_TOLERANCE
-    fine = residual_functions(recordings, search.values, free, tolerance)
+    fine = residual_functions(recordings, search.values, free, _tolerance(recordings))
     report = _report_cost(recordings, progress)
     wanted = unknowns(parameters, free, search.values, search.gaps, states)
     first = least_squares.estimate(wanted, coarse, progress=report)
@@ -163,28 +176,62 @@ def _without_outdone_priors(first: Estimate) -> list[Unknown]:
     ]
 
 
-def _fit_with_input_noise(
-    recordings: Sequence[Recording],
-    values: Mapping[str, float],
-    free: Sequence[str],
+def _tolerance(recordings: Sequence[Recording]) -> float:
+    """Tolerance of the simulations of a last fit."""
+    truck = any(recording.inputs.truck for recording in recordings)
+    return TOLERANCE if truck else FINAL_TOLERANCE
+
+
+def _refit(
     wanted: Sequence[Unknown],
+    residuals: Sequence[Residual],
     best: Estimate,
-    progress: Progress | None,
+    report: Callable[[float], None] | None,
 ) -> Estimate:
-    """Refit with residuals that are whitened for the input noise near the best fit.
+    """Fit residuals that are whitened for further noise, from the best fit without it.
 
     wanted : the unknowns with all priors; the whitened data outdo fewer of them
-    Returns the best fit itself where no run has input noise that counts.
     """
-    residuals = whitened_functions(recordings, values, free, best)
-    if residuals is None:
-        return best
-    report = _report_cost(recordings, progress)
     near = [replace(u, start=u.value(float(z))) for u, z in zip(wanted, best.z, strict=True)]
     first = least_squares.estimate(near, residuals, progress=report)
     last = least_squares.estimate(_without_outdone_priors(first), residuals, progress=report)
     simulations = best.simulations + first.simulations + last.simulations
     return replace(last, simulations=simulations)
+
+
+def _fit_with_logged_noise(
+    recordings: Sequence[Recording],
+    residuals: Sequence[Residual],
+    wanted: Sequence[Unknown],
+    best: Estimate,
+    report: Callable[[float], None] | None,
+) -> tuple[Estimate, Mapping[str, ChannelNoise]]:
+    """Refit with residuals that are whitened for the noise that the fit leaves; give it too.
+
+    Gives the best fit and no noise where that is white and as large as the recordings say, and
+    where the fit leaves what is no noise of a sensor: noise that follows a misfit would hide it.
+    """
+    noise, plain = None, best
+    for _ in range(NOISE_ESTIMATES):
+        found = noise_of_runs(_left(recordings, residuals, best))
+        if not all(one.of_sensor for one in found.channels.values()):
+            return plain, {}
+        if found.plain if noise is None else noise.resembles(found):
+            break
+        noise = found
+        whitened = [noise.whitened(k, residual) for k, residual in enumerate(residuals)]
+        best = _refit(wanted, whitened, best, report)
+    return best, noise.channels if noise else {}
+
+
+def _left(
+    recordings: Sequence[Recording], residuals: Sequence[Residual], best: Estimate
+) -> Iterator[tuple[int, str, NoiseSeries]]:
+    """Run, channel and residual of a fit, for every channel of every run."""
+    for k, (recording, residual) in enumerate(zip(recordings, residuals, strict=True)):
+        rows = residual({**best.parameters(), **best.states(k)})
+        for name, row, use in zip(recording.channels, rows, recording.use, strict=True):
+            yield k, name, NoiseSeries(time=recording.log.time, value=row, use=use)
 
 
 def _report_cost(

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from plant_emulator.estimation.noise.channel_noise import ChannelNoise, NoiseSeries, Whitener
+    from plant_emulator.estimation.unknowns import Residual
+    from plant_emulator.signals.log import Array
 
 # Deviations up to this much off the declared one are the declared one's own error [1].
 KNOWN = 0.03
@@ -44,6 +46,16 @@ class LoggedNoise:
             and a.lines == b.lines
             for a, b in ((one, other.channels[name]) for name, one in self.channels.items())
         )
+
+    def whitened(self, run: int, residual: Residual) -> Residual:
+        """The residual function of a run, whitened for this noise."""
+        whiteners = self.whiteners[run]
+
+        def white(values: Mapping[str, float]) -> Array:
+            rows = residual(values)
+            return np.stack([w.white(row) for w, row in zip(whiteners, rows, strict=True)])
+
+        return white
 
 
 def noise_of_runs(series: Iterable[tuple[int, str, NoiseSeries]]) -> LoggedNoise:
