@@ -85,7 +85,7 @@ def _refuse_points(name: str, points: Sequence[Point], repeats: int) -> None:
         )
 
 
-def configured(config: Config, program: Program) -> Config:
+def configure_program(config: Config, program: Program) -> Config:
     """Configuration that runs the program. Raises ConfigError where the limits would clip it."""
     for step in program.steps:
         if isinstance(step, Profile):

@@ -52,7 +52,7 @@ class StepRun:
                 yield one, slice(int(inside[0]), int(inside[-1]) + 1)
 
 
-def replayed(
+def replay_steps(
     config: Config, register_map: RegisterMap, seen: Iterable[Observation]
 ) -> tuple[list[int], list[float]]:
     """Step at work, and temperature of the oil [K], in each tick of a run, from its replay."""

@@ -105,7 +105,7 @@ def close_gap(seed: int, out: Path, console: Console) -> GapResult:
         (out / "seal.json").write_text(truth.text, "utf-8")
         runs = [_truck(bench, friction, out, console) for friction in (None, out / "set.toml")]
     forces = [felt(run) for run in runs]
-    curves = [_titled(*one) for one in zip(("before", "after"), runs, forces, strict=True)]
+    curves = [_add_titles(*one) for one in zip(("before", "after"), runs, forces, strict=True)]
     plot.draw(curves, out / "gap.png")
     result = GapResult(
         truth=truth,
@@ -209,7 +209,7 @@ def felt(run: BenchRun) -> CruiseForce | None:
     return cruise_force(run.log.time, run.road_speed, run.force, run.truck.road_load)
 
 
-def _titled(name: str, run: BenchRun, force: CruiseForce | None) -> plot.Curves:
+def _add_titles(name: str, run: BenchRun, force: CruiseForce | None) -> plot.Curves:
     """Curves of a run with the error of its force."""
     title = f"{name}: force in cruise {told(force)}"
     return curves_of(run, title, agreement(run.road_speed, run.speed))

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gateway.commissioning.step_run import StepRun, replayed
+from gateway.commissioning.step_run import StepRun, replay_steps
 from gateway.errors import ConfigError
 from gateway.offline.recording_replay import observations
 from gateway.recordings import recording, steady_runs
@@ -23,7 +23,7 @@ def read(path: Path) -> StepRun:
         raise ConfigError(
             "not the run of a program", file=path, expected="a recording of drive, ready or verify"
         )
-    numbers, oil = replayed(config, register_map, observations(found.rows(), register_map))
+    numbers, oil = replay_steps(config, register_map, observations(found.rows(), register_map))
     samples = of_recording(found)
     rows = found.records[samples]
     beats = unwrap_time(rows["measured_plc_heartbeat"], register_map.modulus("plc_heartbeat"))

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from gateway.commissioning.drive import Point, configured, program_of
+from gateway.commissioning.drive import Point, configure_program, program_of
 from gateway.configuration.config import Config
 from gateway.configuration.program import Program
 from gateway.cycle.supervisor import State
@@ -70,7 +70,7 @@ def drive(
 
     Raises ConfigError, before anything turns, where the limits would clip the program.
     """
-    prepared = configured(config, program)
+    prepared = configure_program(config, program)
     report(
         f"no truck on the drum; {program.name} takes {program.duration:.0f} s from the moment in "
         "which the PLC is switched to remote"

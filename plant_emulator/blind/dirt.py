@@ -99,7 +99,7 @@ def _spikes(log: Log, share: float, random: np.random.Generator) -> Log:
     return _changed(log, found)
 
 
-def _held(log: Log, period: float, _: np.random.Generator) -> Log:
+def _hold_channels(log: Log, period: float, _: np.random.Generator) -> Log:
     """Renew some channels every few samples only."""
     fresh = np.arange(len(log.time)) // round(period) * round(period)
     return _changed(log, {name: log[name][fresh] for name in HELD_CHANNELS})
@@ -132,7 +132,7 @@ _SOILS: dict[DirtKind, Callable[[Log, float, np.random.Generator], Log]] = {
     "colour": _colour,
     "hum": _hum,
     "spikes": _spikes,
-    "held": _held,
+    "held": _hold_channels,
     "coarse": _coarse,
     "jitter": _jitter,
     "lost": _lost,

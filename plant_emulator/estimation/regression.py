@@ -39,7 +39,7 @@ class Regression:
         """Factor the nuisance's precision once."""
         gram = np.eye(nuisance.shape[1]) + nuisance.T @ nuisance
         lower = np.asarray(np.linalg.cholesky(gram), float)
-        return cls(y, nuisance, lower, y - nuisance @ _solved(lower, nuisance.T @ y))
+        return cls(y, nuisance, lower, y - nuisance @ _solve(lower, nuisance.T @ y))
 
     def along(self, columns: Array) -> Array:
         """Products C' M y, shape (k,)."""
@@ -54,21 +54,21 @@ class Regression:
 
     def theta(self, columns: Array, beta: Array) -> Array:
         """Nuisance coefficients beside these columns at these coefficients, shape (k,)."""
-        return _solved(self.lower, self.nuisance.T @ (self.y - columns @ beta))
+        return _solve(self.lower, self.nuisance.T @ (self.y - columns @ beta))
 
     def follow(self, column: Array) -> Array:
         """Nuisance coefficients that follow a column best, shape (k,)."""
-        return _solved(self.lower, self.nuisance.T @ column)
+        return _solve(self.lower, self.nuisance.T @ column)
 
 
 def gain(gram: Array, along: Array) -> tuple[float, Array]:
     """Gain of log evidence, and mean of the coefficients, of columns with unit priors."""
     lower = np.asarray(np.linalg.cholesky(np.eye(len(gram)) + gram), float)
-    mean = _solved(lower, along)
+    mean = _solve(lower, along)
     return float(0.5 * along @ mean - np.log(np.diag(lower)).sum()), mean
 
 
-def _solved(lower: Array, right: Array) -> Array:
+def _solve(lower: Array, right: Array) -> Array:
     from scipy.linalg import cho_solve
 
     return np.asarray(cho_solve((lower, True), right))

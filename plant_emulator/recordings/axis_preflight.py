@@ -109,7 +109,7 @@ def held_period(time: Array, values: Array) -> float | None:
 
 def _sign_notes(log: AxisLog, force: str) -> list[str]:
     """Refuse a force that points against motion and acceleration; a note on one against motion."""
-    found = [_regression(x, y) for x, y in _weighted(log)]
+    found = [_regression(x, y) for x, y in _average(log)]
     if not found:
         return []
     inertia, power = max(found, key=lambda one: abs(one[0]))
@@ -146,7 +146,7 @@ def _regression(regressors: Array, force: Array) -> tuple[float, float]:
     return float(inertia / error), float(force @ speed / largest)
 
 
-def _weighted(log: AxisLog) -> Iterator[tuple[Array, Array]]:
+def _average(log: AxisLog) -> Iterator[tuple[Array, Array]]:
     """Regressors and net force, averaged by weights of each width; rows of acceleration first."""
     step = float(np.median(np.diff(log.time)))
     net = log.force if log.load is None else log.force - log.load

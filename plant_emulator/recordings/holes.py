@@ -45,7 +45,9 @@ def bridge_holes(log: Log, use: Use) -> tuple[Log, Use]:
         for k in holes:
             within = (whole > time[k]) & (whole < time[k + 1])
             reference = log["speed_reference"]
-            signals["speed_reference"][within] = _continued(time, reference, int(k), whole[within])
+            signals["speed_reference"][within] = _continue_reference(
+                time, reference, int(k), whole[within]
+            )
     if KNEE_TIME in log:  # a knee of 0 s is none: the reference is straight in the hole
         signals[KNEE_TIME][~logged] = 0.0
     counted = {}
@@ -61,7 +63,7 @@ def _regular(first: float, last: float, interval: float) -> Array:
     return np.linspace(first, last, count + 2)[1:-1]
 
 
-def _continued(time: Array, reference: Array, hole: int, at: Array) -> Array:
+def _continue_reference(time: Array, reference: Array, hole: int, at: Array) -> Array:
     """The reference in the hole behind a sample, at these times."""
     before = slice(max(0, hole - BESIDE), hole + 1)
     after = slice(hole + 1, hole + 2 + BESIDE)

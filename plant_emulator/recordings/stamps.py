@@ -43,7 +43,7 @@ FEW_ROWS = 60
 LARGEST_DEPARTURE = 0.4
 
 
-def restamped(log: Log) -> tuple[Log, float]:
+def restamp(log: Log) -> tuple[Log, float]:
     """The log with its rows at the times that its reference shows, and the jitter's deviation [s].
 
     A staircase (a log with a truck) tells nothing and stays as it is. So does one with knees

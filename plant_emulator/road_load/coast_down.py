@@ -79,12 +79,12 @@ class CoastDown:
         return {
             "schema": "truck/1",
             "method": "coast-down",
-            "crr": _scaled(self.f0, 1.0 / weight),
-            "crr_v": _scaled(self.f1, drum_radius / weight),
+            "crr": _scale(self.f0, 1.0 / weight),
+            "crr_v": _scale(self.f1, drum_radius / weight),
             "efficiency": None,
-            "f0_newton": _scaled(self.f0, 1.0),
-            "f1_newton_per_m_s": _scaled(self.f1, 1.0),
-            "grade_newton": _scaled(self.grade, 1.0),
+            "f0_newton": _scale(self.f0, 1.0),
+            "f1_newton_per_m_s": _scale(self.f1, 1.0),
+            "grade_newton": _scale(self.grade, 1.0),
             "force_error": self.force_error,
             "runs": {"forward": self.forward, "backward": self.backward},
             "not_separable": [
@@ -116,7 +116,7 @@ class CoastDown:
         )
 
 
-def _scaled(estimate: TruckEstimate, factor: float) -> dict[str, float]:
+def _scale(estimate: TruckEstimate, factor: float) -> dict[str, float]:
     return {
         "value": factor * estimate.value,
         "standard_error": factor * estimate.standard_error,

@@ -102,7 +102,7 @@ def inputs_of(
     )
 
 
-def refined(run: RunInputs) -> RunInputs:
+def refine_inputs(run: RunInputs) -> RunInputs:
     """The inputs at the finer samples that knees of the reference and lags of sensors need."""
     if run.sensing is None:
         return run
@@ -157,7 +157,7 @@ def simulate(
     equations were not solved.
     """
     model, values = (kernel, values) if kernel is not None else kernel_for(values)
-    coarse, run = run, refined(run)
+    coarse, run = run, refine_inputs(run)
     out = np.zeros((len(run.time), len(CHANNELS)))
     p = model.parameter_record(values)
     x = model.state(p, gap_position * values["backlash_half_gap"])

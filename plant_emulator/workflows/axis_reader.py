@@ -58,7 +58,7 @@ def read(path: str | Path, columns: Sequence[str] | Mapping[str, str] = ()) -> A
     rotary = _is_rotary(table, chosen, {name: own for name, (_, own) in kept.items()})
     taken = table.take([choice.column for choice in chosen.values()])
     values = {
-        name: _converted(table, choice, found, *kept[name])
+        name: _convert(table, choice, found, *kept[name])
         for (name, choice), found in zip(chosen.items(), taken, strict=True)
     }
     time = values.pop("time")
@@ -66,7 +66,7 @@ def read(path: str | Path, columns: Sequence[str] | Mapping[str, str] = ()) -> A
     if "velocity" in values:
         values["position"] = _integral(time, values["velocity"])
     elif rotary:
-        values["position"] = _unwrapped(values["position"])
+        values["position"] = _unwrap(values["position"])
     used = {choice.column for choice in chosen.values()}
     log = AxisLog(
         time=time,
@@ -155,10 +155,10 @@ def _unit(table: Table, choice: Choice) -> tuple[str, str]:
     return words, own
 
 
-def _converted(table: Table, choice: Choice, values: Array, unit: str, own: str) -> Array:
+def _convert(table: Table, choice: Choice, values: Array, unit: str, own: str) -> Array:
     """Values of a column in the unit of the log."""
     table.check_finite(choice.column, values)
-    return units.converted(values * choice.factor, unit, own)
+    return units.convert_unit(values * choice.factor, unit, own)
 
 
 def _is_rotary(table: Table, chosen: Mapping[str, Choice], kept: Mapping[str, str]) -> bool:
@@ -179,7 +179,7 @@ def _integral(time: Array, velocity: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(means * np.diff(time))])
 
 
-def _unwrapped(position: Array) -> Array:
+def _unwrap(position: Array) -> Array:
     """Angles without the jumps of an encoder that begins anew each revolution; shape (n,)."""
     within = np.ptp(position) <= 2.0 * np.pi
     slow = np.median(np.abs(np.diff(position))) < JUMP_ANGLE

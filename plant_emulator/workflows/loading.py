@@ -18,7 +18,7 @@ from plant_emulator.recordings.holes import bridge_holes
 from plant_emulator.recordings.preflight import NAMES, preflight
 from plant_emulator.recordings.recording import recording
 from plant_emulator.recordings.same_bench import check_same_bench
-from plant_emulator.recordings.stamps import restamped
+from plant_emulator.recordings.stamps import restamp
 from plant_emulator.recordings.wheel_torque import telling, with_estimated_torque
 from plant_emulator.signals.log import VOLTAGE, Log
 from plant_emulator.workflows.arguments import check_signals
@@ -79,7 +79,7 @@ def load_recordings(
         check_unlabelled(log)
         check_signals(log, NEEDED)
         checked = preflight(log, parameters.value("gear_ratio"))
-        log, jitter = restamped(log)
+        log, jitter = restamp(log)
         if jitter > 0.0:
             notes.append(
                 f"{log.source}: rows were taken {1e3 * jitter:.1f} ms (rms) off their stamps, as "

@@ -65,11 +65,11 @@ def _text(data: bytes) -> str:
 def _rows(text: str) -> Rows:
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     if '"' in text:
-        return list(_quoted(lines))
+        return list(_split_quoted(lines))
     return [(k, line.split(",")) for k, line in enumerate(lines, start=1) if line.strip()]
 
 
-def _quoted(lines: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
+def _split_quoted(lines: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
     """Line number and cells of each line of a text with quotes."""
     reader = csv.reader(lines, strict=True)
     try:

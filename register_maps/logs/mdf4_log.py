@@ -50,7 +50,7 @@ def recognises(head: bytes) -> bool:
 
 def parse(data: bytes) -> LogTable:
     """Log in these bytes. Raises LogTableError."""
-    return _opened(data, _table)
+    return _open(data, _table)
 
 
 def units(data: bytes) -> dict[str, str]:
@@ -58,15 +58,15 @@ def units(data: bytes) -> dict[str, str]:
 
     The master in seconds is the column `time`.
     """
-    return _opened(data, lambda file: {"time": "s"} | {n: u for n, (u, _) in _places(file).items()})
+    return _open(data, lambda file: {"time": "s"} | {n: u for n, (u, _) in _places(file).items()})
 
 
 def values(data: bytes, names: Sequence[str]) -> list[list[float]]:
     """Values of these columns, all sampled at the same times. Raises LogTableError."""
-    return _opened(data, lambda file: _values(file, names))
+    return _open(data, lambda file: _values(file, names))
 
 
-def _opened(data: bytes, take: Callable[[Any], Taken]) -> Taken:
+def _open(data: bytes, take: Callable[[Any], Taken]) -> Taken:
     """Result of `take` on the open file. Raises LogTableError for a damaged one."""
     asammdf = _package()
     _check_blocks(data)

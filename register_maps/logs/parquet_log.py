@@ -30,7 +30,7 @@ def recognises(head: bytes) -> bool:
 
 def parse(data: bytes) -> LogTable:
     """Log in these bytes. Raises LogTableError."""
-    with _opened(data) as (arrow, file, fields):
+    with _open(data) as (arrow, file, fields):
         return table(
             [with_metadata(field.name, _unit(field)) for field in fields],
             lambda k: _numbers(arrow, file, fields, k),
@@ -39,19 +39,19 @@ def parse(data: bytes) -> LogTable:
 
 def units(data: bytes) -> dict[str, str]:
     """Units of all columns by name, empty where there is none. Raises LogTableError."""
-    with _opened(data) as (_, _, fields):
+    with _open(data) as (_, _, fields):
         return {field.name: _unit(field) for field in fields}
 
 
 def values(data: bytes, names: Sequence[str]) -> list[list[float]]:
     """Values of these columns, NaN where one is missing. Raises LogTableError."""
-    with _opened(data) as (arrow, file, fields):
+    with _open(data) as (arrow, file, fields):
         places = {field.name: k for k, field in enumerate(fields)}
         return [_numbers(arrow, file, fields, places[name]) for name in names]
 
 
 @contextlib.contextmanager
-def _opened(data: bytes) -> Iterator[tuple[Any, Any, list[Any]]]:
+def _open(data: bytes) -> Iterator[tuple[Any, Any, list[Any]]]:
     """The package, the file and its fields; a damaged file raises LogTableError."""
     arrow, parquet = _packages()
     try:

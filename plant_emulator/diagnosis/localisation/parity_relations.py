@@ -72,7 +72,7 @@ def reconstructed_reference(
         voltage = p["armature_resistance"] * m.current + flux(m.speed, p) * m.motor_speed
         voltage += p["armature_inductance"] * np.gradient(m.current, m.time)
     steps = np.diff(m.time, prepend=2.0 * m.time[0] - m.time[1])
-    return _compiled()(
+    return _compile_loop()(
         voltage,
         np.ascontiguousarray(m.current),
         np.ascontiguousarray(m.motor_speed),
@@ -121,8 +121,8 @@ def _solve_backwards(
 
 
 @cache
-def _compiled() -> Callable[..., tuple[Array, NDArray[np.bool_]]]:
-    """The loop, compiled once in this process."""
+def _compile_loop() -> Callable[..., tuple[Array, NDArray[np.bool_]]]:
+    """Compile the loop once in this process."""
     compiler.use_cache([__file__, str(compiler.__file__)], ["reconstructed reference"])
     return compiler.compile_function(_solve_backwards, on_disk=True)
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from plant_emulator.diagnosis.missing_law.states import lagged
+from plant_emulator.diagnosis.missing_law.states import lag_state
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -70,9 +70,9 @@ class Factor:
 
     def _plain(self, x: Array, time: Array) -> Array:
         if self.function == "delay":
-            return lagged(time, x, self.scale, float(x[0])) - x
+            return lag_state(time, x, self.scale, float(x[0])) - x
         if self.function == "lag":
-            return lagged(time, x, self.scale, 0.0)
+            return lag_state(time, x, self.scale, 0.0)
         if self.function == "bell":
             return np.asarray(np.exp(-((x / self.scale) ** 2)))
         return np.asarray(PLAIN[self.function](x))

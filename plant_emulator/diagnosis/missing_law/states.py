@@ -47,7 +47,7 @@ class LawState:
         return max(float(np.max(np.abs(own))) for own in self.values)
 
 
-def lagged(time: Array, value: Array, tau: float, start: float) -> Array:
+def lag_state(time: Array, value: Array, tau: float, start: float) -> Array:
     """First-order lag of a state, tau dx/dt = value - x, from `start` on, shape (n,).
 
     Exact for a value that holds over each interval.

@@ -133,11 +133,11 @@ def _estimate(
                 amplitudes.append(float(np.hypot(cosine, sine)))
                 turned[run][angle] = float(np.arctan2(sine, cosine))
             factor = float(np.mean(amplitudes))
-        values[u.name] = _scaled(candidate, u, factor, values_at_size(candidate, size)[u.name])
+        values[u.name] = _scale_size(candidate, u, factor, values_at_size(candidate, size)[u.name])
     return values, tuple(turned)
 
 
-def _scaled(candidate: Candidate, size: Unknown, factor: float, value: float) -> float:
+def _scale_size(candidate: Candidate, size: Unknown, factor: float, value: float) -> float:
     """A size at a factor of its distance from neutral, within its bounds."""
     neutral = candidate.neutral[size.name]
     return float(np.clip(neutral + factor * (value - neutral), size.lower, size.upper))

@@ -41,16 +41,18 @@ def confirm(model: Model, trial: Trial) -> FitResult:
     nominal = [
         replace(one, values={**one.values, **model.nominal(trial.runs)}) for one in trial.starts[:1]
     ]
-    placed = [_placed(model, trial, one) for one in (*trial.starts, *nominal)]
+    placed = [_scan_gap_positions(model, trial, one) for one in (*trial.starts, *nominal)]
     loss, best = min(placed, key=lambda pair: pair[0])
     if trial.effects:
-        best = _resized(model, trial, loss, best)
+        best = _scan_size(model, trial, loss, best)
     return fit(model, trial.effects, trial.runs, best.values, best.states, SETTINGS.iterations)
 
 
 def look(model: Model, trial: Trial) -> FitResult:
     """Fit a hypothesis from its best start with slopes that are differenced only there (a step)."""
-    _, best = min((_placed(model, trial, one) for one in trial.starts), key=lambda pair: pair[0])
+    _, best = min(
+        (_scan_gap_positions(model, trial, one) for one in trial.starts), key=lambda pair: pair[0]
+    )
     near = linearise(
         model, FitValues(effects=trial.effects, values=best.values, states=best.states), trial.runs
     )
@@ -70,7 +72,7 @@ def advance(model: Model, task: Task) -> FitResult:
     return fit_from(model, task.base.effects, task.runs, task.base, SETTINGS.iterations)
 
 
-def _placed(model: Model, trial: Trial, start: Start) -> tuple[float, Start]:
+def _scan_gap_positions(model: Model, trial: Trial, start: Start) -> tuple[float, Start]:
     """Scan the gap position of each run; return the least loss and its start."""
     total, states = 0.0, []
     for k, own in zip(trial.runs, start.states, strict=True):
@@ -86,7 +88,7 @@ def _placed(model: Model, trial: Trial, start: Start) -> tuple[float, Start]:
     return total, replace(start, states=tuple(states))
 
 
-def _resized(model: Model, trial: Trial, loss: float, start: Start) -> Start:
+def _scan_size(model: Model, trial: Trial, loss: float, start: Start) -> Start:
     """Scan the size of the last effect; return the start of least loss."""
     candidate = model.candidates[trial.effects[-1]]
     residuals = [model.rough().residual(k, trial.effects) for k in trial.runs]

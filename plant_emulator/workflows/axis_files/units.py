@@ -64,7 +64,7 @@ def _base(unit: Any) -> Any:
     return _registry().get_base_units(unit)[1]
 
 
-def converted(values: Array, text: str, own: str) -> Array:
+def convert_unit(values: Array, text: str, own: str) -> Array:
     """Values in that unit as values in the unit of a log, shape (n,)."""
     found = _registry().Quantity(values, unit_of(text)).to(unit_of(own)).magnitude
     if not np.isfinite(found).all():

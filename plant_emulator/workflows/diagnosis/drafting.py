@@ -80,7 +80,7 @@ def draft(runs: Runs[Any], null: FitResult | None, pool: Pool, folder: Path) -> 
         DraftedLaw(effect=file.stem, values=one.law.parameters, null=null, runs=runs.plan.fitted)
         for one, file in zip(found, files, strict=True)
     ]
-    drafted = _ranked(book, files, compare_laws(runner, runs.plan, alternatives))
+    drafted = _rank(book, files, compare_laws(runner, runs.plan, alternatives))
     return replace(drafted, next_program=_next_program(runs.fitted, recipe, drafted.fits))
 
 
@@ -113,13 +113,13 @@ def _write(found: Sequence[Sketch], folder: Path) -> list[Path]:
     return files
 
 
-def _ranked(book: Sketchbook, files: Sequence[Path], results: Sequence[LawResult]) -> Drafted:
+def _rank(book: Sketchbook, files: Sequence[Path], results: Sequence[LawResult]) -> Drafted:
     """The drafts that certainly close a part of the held-out gap worth their terms, best first.
 
     Of two laws that the fit has made alike, the better one stays.
     """
     rows = [
-        (one, _fitted(one, result), file, result)
+        (one, _insert_fitted_values(one, result), file, result)
         for one, file, result in zip(book.sketches, files, results, strict=True)
         if result.is_draft(len(one.law.terms))
     ]
@@ -154,7 +154,7 @@ def _with_drafts(found: Bound | None, results: Sequence[LawResult]) -> Bound | N
     return Bound(share=max(one.share for one in every), interval=(low, high))
 
 
-def _fitted(one: Sketch, result: LawResult) -> Law:
+def _insert_fitted_values(one: Sketch, result: LawResult) -> Law:
     """The law with the values of its fit."""
     name = f"{result.effect}_"
     own = {k.removeprefix(name): v for k, v in result.fit.values.items() if k.startswith(name)}

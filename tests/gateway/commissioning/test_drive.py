@@ -5,7 +5,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from gateway.commissioning.drive import Point, configured, program_of
+from gateway.commissioning.drive import Point, configure_program, program_of
 from gateway.configuration.config import Config, from_document
 from gateway.configuration.program import Profile, Ramp
 from gateway.cycle.supervisor import State
@@ -26,7 +26,7 @@ def points(*pairs: tuple[float, float]) -> list[Point]:
 def refused(pairs: list[Point], **values: str) -> str:
     config = Config().with_values({f"limits.{key}": value for key, value in values.items()})
     with pytest.raises(ConfigError) as error:
-        configured(config, program_of("test", pairs))
+        configure_program(config, program_of("test", pairs))
     return str(error.value)
 
 
@@ -51,18 +51,18 @@ def test_a_program_that_ends_moving_is_followed_by_a_ramp_to_standstill():
 
 @pytest.mark.parametrize("name", ["program1", "program2", "program3"])
 def test_programs_of_the_thesis_pass_the_usual_limits(name):
-    config = configured(Config(), read_program(name))
+    config = configure_program(Config(), read_program(name))
     assert from_document(config.document) == config
 
 
 def test_program_4_steps_faster_than_the_usual_slope_and_says_so():
     """50 rad/s in 80 ms are 5968 rpm/s; the lag is the whole step of 477 rpm."""
     with pytest.raises(ConfigError, match=r"46\.00 s: .*slope.*5968 rpm/s.*rate_up_rpm_s = 3000"):
-        configured(Config(), read_program("program4"))
+        configure_program(Config(), read_program("program4"))
     rates = {"limits.rate_up_rpm_s": "6000", "limits.rate_down_rpm_s": "6000"}
     with pytest.raises(ConfigError, match=r"lag of the bench.*477 rpm.*deviation_rpm = 400"):
-        configured(Config().with_values(rates), read_program("program4"))
-    configured(
+        configure_program(Config().with_values(rates), read_program("program4"))
+    configure_program(
         Config().with_values({**rates, "limits.deviation_rpm": "500"}), read_program("program4")
     )
 
@@ -103,7 +103,7 @@ def test_points_that_give_no_program_are_refused(corners, repeats, match):
 @pytest.mark.slow
 def test_the_plc_drives_what_was_asked_for_and_the_run_ends_by_itself():
     program = program_of("test", points((0, 0), (0.5, 0), (2.5, 600), (4, 600), (5, 300), (6, 0)))
-    loop, progress = ClosedLoop(configured(Config(), program)), Progress()
+    loop, progress = ClosedLoop(configure_program(Config(), program)), Progress()
     loop.run(0.2)
     loop.operate(remote=True)
     reference, began = [], None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from plant_emulator.recordings.stamps import lateness, restamped
+from plant_emulator.recordings.stamps import lateness, restamp
 from plant_emulator.signals.log import Log
 
 RATE = 75.0
@@ -23,7 +23,7 @@ def log(time: np.ndarray, taken: np.ndarray, **more: np.ndarray) -> Log:
 def test_rows_off_their_stamps_get_the_times_they_were_taken_at() -> None:
     time = np.arange(0.0, 15.0, 0.01)
     off = np.random.default_rng(1).uniform(-2e-3, 2e-3, len(time))
-    found, jitter = restamped(log(time, time + off))
+    found, jitter = restamp(log(time, time + off))
     ramp = np.abs(np.gradient(reference(time), time)) > 50.0
     assert jitter == pytest.approx(2e-3 / np.sqrt(3.0), rel=0.35)
     error = (found.time - time - off)[ramp]
@@ -35,7 +35,7 @@ def test_rows_off_their_stamps_get_the_times_they_were_taken_at() -> None:
 def test_rows_on_their_stamps_stay() -> None:
     time = np.arange(0.0, 15.0, 0.01)
     given = log(time, time)
-    found, jitter = restamped(given)
+    found, jitter = restamp(given)
     assert jitter == 0.0
     assert found is given
 
@@ -43,7 +43,7 @@ def test_rows_on_their_stamps_stay() -> None:
 def test_a_staircase_tells_nothing() -> None:
     time = np.arange(0.0, 15.0, 0.01)
     given = log(time, time + 1e-3 * np.sin(time), wheel_torque=np.zeros(len(time)))
-    assert restamped(given) == (given, 0.0)
+    assert restamp(given) == (given, 0.0)
 
 
 def test_a_sine_is_no_jitter() -> None:
@@ -51,4 +51,4 @@ def test_a_sine_is_no_jitter() -> None:
     given = Log(time, {"speed_reference": 200.0 + 50.0 * np.sin(2.0 * time)})
     _, told = lateness(given.time, given["speed_reference"])
     assert told.any()
-    assert restamped(given)[1] == 0.0
+    assert restamp(given)[1] == 0.0

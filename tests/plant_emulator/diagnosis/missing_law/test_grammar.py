@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.missing_law.grammar import Factor, Term, terms
-from plant_emulator.diagnosis.missing_law.states import LawState, lagged
+from plant_emulator.diagnosis.missing_law.states import LawState, lag_state
 
 TIME = np.arange(0.005, 3.0, 0.01)
 
@@ -23,12 +23,12 @@ def state(kind: str, values: list[float], lags: tuple[float, ...] = ()) -> LawSt
 
 
 def test_lag_of_a_step_reaches_63_percent_after_its_time_constant() -> None:
-    found = lagged(TIME, np.ones_like(TIME), 0.5, 0.0)
+    found = lag_state(TIME, np.ones_like(TIME), 0.5, 0.0)
     assert found[49] == pytest.approx(1.0 - np.exp(-1.0), abs=1e-9)
 
 
 def test_lag_of_a_ramp_follows_its_time_constant_behind() -> None:
-    found = lagged(TIME, 2.0 * TIME, 0.1, 0.0)
+    found = lag_state(TIME, 2.0 * TIME, 0.1, 0.0)
     assert 2.0 * TIME[-1] - found[-1] == pytest.approx(2.0 * 0.1, rel=0.06)
 
 

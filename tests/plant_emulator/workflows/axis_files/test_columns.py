@@ -12,7 +12,7 @@ from plant_emulator.workflows.axis_files.columns import (
     unit_behind,
     unit_in,
 )
-from plant_emulator.workflows.axis_files.units import converted, target
+from plant_emulator.workflows.axis_files.units import convert_unit, target
 
 
 @pytest.mark.parametrize(
@@ -71,11 +71,11 @@ def test_a_quantity_is_chosen_once() -> None:
 )
 def test_units_convert_to_those_of_a_log(quantity: str, unit: str, own: str, factor: float) -> None:
     assert target(quantity, unit) == own
-    assert converted(np.array([2.0]), unit, own) == pytest.approx([2.0 * factor])
+    assert convert_unit(np.array([2.0]), unit, own) == pytest.approx([2.0 * factor])
 
 
 def test_kelvin_converts_to_degrees_celsius() -> None:
-    assert converted(np.array([300.0]), "K", "degC") == pytest.approx([26.85])
+    assert convert_unit(np.array([300.0]), "K", "degC") == pytest.approx([26.85])
 
 
 @pytest.mark.parametrize(
