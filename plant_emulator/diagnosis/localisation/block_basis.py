@@ -198,21 +198,17 @@ def torque_sensor(q: BlockQuantities, top: Mapping[str, float]) -> list[UnknownL
     """
     where = {MOTOR: -1.0, GEAR: 1.0}
     seconds = (q.time - q.time[0]) / 20.0
-    slow = time_splines(q.time, SLOW_KNOTS)
+    slow, torque = time_splines(q.time, SLOW_KNOTS), q.torque / TORQUE_UNIT
     rates = np.stack(
         [q.torque_rate / ACCELERATION_UNIT, q.torque_curvature / ACCELERATION_UNIT**2], -1
     )
     return [
         UnknownLaw(acting_in(where, np.stack([np.ones_like(seconds), seconds], -1))),
         UnknownLaw(acting_in(where, linear_splines(q.torque, _both(top["torque"], 10)))),
-        UnknownLaw(
-            acting_in(
-                where, np.stack([q.torque / TORQUE_UNIT, seconds * q.torque / TORQUE_UNIT], -1)
-            )
-        ),
+        UnknownLaw(acting_in(where, np.stack([torque, seconds * q.torque / TORQUE_UNIT], -1))),
         UnknownLaw(acting_in(where, rates)),
         UnknownLaw(acting_in(where, slow), own=True),
-        UnknownLaw(acting_in(where, _times(slow, q.torque / TORQUE_UNIT)), own=True),
+        UnknownLaw(acting_in(where, _times(slow, torque)), own=True),
     ]
 
 
