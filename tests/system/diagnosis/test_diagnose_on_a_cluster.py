@@ -1,7 +1,6 @@
 """A diagnosis on a Dask cluster: a scheduler and two workers, each a process of its own."""
 
 import contextlib
-import json
 import os
 import subprocess
 import sys
@@ -9,13 +8,19 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from plant_emulator import parameter_sets, read_log
+from plant_emulator.cli import main
+from plant_emulator.diagnosis.execution.pool import InProcess
+from plant_emulator.diagnosis.fitting.fit_steps import start
+from plant_emulator.diagnosis.machines.bench import BenchRecipe
 from plant_emulator.errors import EmulatorError
+from plant_emulator.recordings.recording import recording
 from plant_emulator.workflows.workers import Cluster
-from tests.plant_emulator.diagnosis import axis_truth
 from tests.plant_emulator.workflows.test_workers import Number
+from tests.system.diagnosis.conftest import FITTED, LEFT_OUT
 
 pytestmark = pytest.mark.slow
 
@@ -57,36 +62,30 @@ def scheduler() -> Iterator[str]:
 
 
 @pytest.fixture
-def logs(tmp_path: Path) -> list[str]:
-    files = []
-    for seed, phase in ((1, 0.0), (2, 2.0)):
-        log = axis_truth.log(lambda q, v, a: 40.0 * np.maximum(v, 0.0), phase=phase, seed=seed)
-        file = tmp_path / f"run{seed}.csv"
-        table = np.column_stack([log.time, log.position, log.force])
-        np.savetxt(file, table, delimiter=",", header="time_s,position_m,force_N", comments="")
-        files.append(str(file))
-    return files
+def log(tmp_path: Path) -> str:
+    file = tmp_path / "run.csv"
+    rows = [f"{0.001 * n:.3f},{0.01 * n},{n % 7}" for n in range(100)]
+    file.write_text("\n".join(["time_s,position_m,force_N", *rows, ""]))
+    return str(file)
 
 
-def answer(logs: list[str], folder: Path, *options: str) -> dict[str, Any]:
-    file = folder / "answer.json"
-    command = [sys.executable, "-m", "plant_emulator", "diagnose", "--model", "axis", *logs]
-    command += [*options, "--json", str(file)]
-    done = subprocess.run(command, check=False, timeout=300, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    found = json.loads(file.read_text())
-    assert isinstance(found, dict)
-    return found
+def test_steps_of_a_diagnosis_find_on_a_cluster_what_one_process_finds(scheduler: str) -> None:
+    recordings = tuple(recording(read_log(path)) for path in FITTED)
+    recipe = BenchRecipe(recordings, parameter_sets.load("thesis_table_3_1"), tuple(LEFT_OUT))
+    fitted: list[tuple[int, ...]] = [(0,), (1,)]
+    alone = list(InProcess().map(start, recipe, fitted))
+    cluster = Cluster(scheduler)
+    try:
+        found = list(cluster.map(start, recipe, fitted))
+    finally:
+        cluster.close()
+    assert all(fit.converged for fit in found)
+    assert found[0] != found[1]
+    assert found == alone
 
 
-def test_the_answer_is_that_of_one_process(scheduler: str, logs: list[str], tmp_path: Path) -> None:
-    alone = answer(logs, tmp_path, "--workers", "1")
-    assert alone["verdict"]["effects"] == ["viscous_asymmetry"]
-    assert answer(logs, tmp_path, "--scheduler", scheduler) == alone
-
-
-def test_a_scheduler_that_does_not_answer_is_told(logs: list[str]) -> None:
-    command = [sys.executable, "-m", "plant_emulator", "diagnose", "--model", "axis", *logs]
+def test_a_scheduler_that_does_not_answer_is_told(log: str) -> None:
+    command = [sys.executable, "-m", "plant_emulator", "diagnose", "--model", "axis", log]
     command += ["--scheduler", "tcp://127.0.0.1:1"]
     done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=300)
     assert done.returncode == 1
@@ -111,10 +110,9 @@ def test_a_worker_that_is_lost_is_told_in_one_line(
         cluster.close()
 
 
-def test_an_address_that_cannot_be_is_wrong_usage(logs: list[str]) -> None:
-    command = [sys.executable, "-m", "plant_emulator", "diagnose", "--model", "axis", *logs]
-    command += ["--scheduler", "nonsense"]
-    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 2
+def test_an_address_that_cannot_be_is_wrong_usage(log: str) -> None:
+    command = ["diagnose", "--model", "axis", log, "--scheduler", "nonsense"]
+    done = CliRunner().invoke(main, command)
+    assert done.exit_code == 2
     (line,) = done.stderr.splitlines()
     assert line.startswith("error: --scheduler nonsense: missing port number")
