@@ -16,7 +16,6 @@ CASES = Path(__file__).parents[2] / "data" / "bench_practice"
     [
         ("practice_002", "parameter"),  # every parameter off, by up to 16 %
         ("practice_004", "none"),
-        ("practice_008", "parameter"),  # the drum's inertia 8 % off, and others
     ],
 )
 def test_no_effect_is_named_where_there_is_none(case: str, kind: str) -> None:
