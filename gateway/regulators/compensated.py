@@ -8,7 +8,8 @@ It differs from the regulator of the thesis in four points.
   cancels the torque of the bench's own acceleration.
 - Lead and trim: the demand leads by the virtual truck's acceleration over the delay of drive and
   link, so that the drum does not lag. A share of the drum's speed error is added, which the
-  backlash causes at a reversal.
+  backlash causes at a reversal. The slope of the demand is that of truck and trim: a slope that
+  contradicts the next demand makes a saw-tooth, to which the drive answers with pulses of current.
 - Standstill: while the gear sticks, the sensor shows friction and truck together. The virtual truck
   stands until the impulse above road load and margin is worth START_SPEED, and then has this speed.
   So noise and a slow offset do not start it, and a real start loses nothing. Inside the backlash
@@ -16,6 +17,7 @@ It differs from the regulator of the thesis in four points.
 """
 
 from dataclasses import dataclass, replace
+from math import exp
 
 from gateway.configuration.config import Config
 from gateway.friction.law import Friction, bearing_torque, friction_torque, load_loss
@@ -31,6 +33,8 @@ STICK_SPEED = 0.005
 """[rad/s] Speed of the gear output below which its friction has any value up to f_gc."""
 TRIM_MOST = 0.8
 """[rad/s] Largest trim, at the drum: the error that the backlash causes at a torque reversal."""
+SMOOTH = 0.05
+"""[s] Time constant of the drum's acceleration in the slope: noise of one sample is no slope."""
 LEAD_MOST = 0.5
 """rho above which the lead is reduced, because it feeds back rho times the acceleration."""
 
@@ -80,10 +84,14 @@ class Params:
 
 @dataclass(frozen=True, kw_only=True)
 class State:
-    """Speed of the virtual truck [rad/s of the drum], and whether it has started."""
+    """Speed of the virtual truck [rad/s of the drum], and whether it has started.
+
+    drum_acceleration : of the drum itself, smoothed [rad/s^2]
+    """
 
     virtual_speed: float
     moving: bool
+    drum_acceleration: float = 0.0
 
 
 def seed(params: Params, motor_speed: float, drum_speed: float) -> State:
@@ -98,14 +106,17 @@ def update(params: Params, state: State, window: Window) -> tuple[State, Demand]
     """State and demand after one new sample."""
     torque = truck_torque(params, window)
     moving, speed = _move(params, state, torque, window.duration)
-    after = State(virtual_speed=speed, moving=moving)
+    rise = window.drum_speed_change / window.duration
+    smoothed = rise + (state.drum_acceleration - rise) * exp(-window.duration / SMOOTH)
+    after = State(virtual_speed=speed, moving=moving, drum_acceleration=smoothed)
     if not moving:
         return after, Demand(speed=0.0)
     acceleration = (speed - state.virtual_speed) / window.duration if state.moving else 0.0
     trim = _clip(params.trim * (speed - window.drum_speed), TRIM_MOST)
     wanted = params.gear_ratio * (speed + params.lead * acceleration + trim)
     demanded = min(max(wanted, 0.0), params.speed_max)
-    rate = params.gear_ratio * acceleration if demanded == wanted else 0.0
+    turning = params.trim * (acceleration - smoothed) if abs(trim) < TRIM_MOST else 0.0
+    rate = params.gear_ratio * (acceleration + turning) if demanded == wanted else 0.0
     return after, Demand(speed=demanded, rate=rate)
 
 

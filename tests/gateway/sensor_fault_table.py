@@ -3,13 +3,19 @@
     python -m tests.gateway.sensor_fault_table
 
 prints one row a fault, speed and driver: reason, time with the drum above 1 rad/s until the trip,
-the bound of that time, the drum's speed at the trip and what it gained until SAFE.
+two bounds of that time, the drum's speed at the trip and what it gained until SAFE.
 
-The bound is the time of an observer who knows the error of the sensor itself. He has to bear what
-a sound sensor on a drifted bench may show: the tolerance k of each relation, and the level h of its
-noise. So he may trip when the sum of the error beyond k reaches h, in any of the three relations,
-or when a speed has stood still for as many samples as its noise cannot. The error follows the run:
-it fades where the fault slows its own bench.
+The first bound is the time of an observer who knows the error of the sensor itself. He has to bear
+what a sound sensor on a drifted bench may show: the tolerance k of each relation, and the level h
+of its noise. So he may trip when the sum of the error beyond k reaches h, in any of the three
+relations, or when a speed has stood still for as many samples as its noise cannot. The error
+follows the run: it fades where the fault slows its own bench.
+
+That observer knows that the bench itself shows nothing: its residual without the fault is zero. A
+drifted bench shows up to k and h, and nobody can tell it from the error. Where it stands against
+the error, the sum shown is that of the error beyond k, less k and h once more. So an alarm that
+bears every sound bench is certain when the sum of the error beyond 2 k reaches 2 h: the second
+bound. "later" says that the trip came before it.
 """
 
 from collections.abc import Sequence
@@ -36,11 +42,15 @@ Pair = tuple[Measurement, Measurement]
 
 @dataclass(frozen=True, kw_only=True)
 class Cell:
-    """Times above FAST [s]; drum, gained : speed at the trip, and what the drum gains [rad/s]."""
+    """Times above FAST [s]; drum, gained : speed at the trip, and what the drum gains [rad/s].
+
+    certain : second bound; None: the trip came before it
+    """
 
     reason: str
     time: float
-    bound: float
+    bound: float | None
+    certain: float | None
     drum: float
     gained: float
 
@@ -65,13 +75,19 @@ def cell(name: str, kmh: float, driver: str) -> Cell:
         reason="-" if reason is None else reason.name,
         time=float(SCAN * np.sum(drum > FAST)),
         bound=bound(loop.state.watched.relations, pairs, drum),
+        certain=bound(loop.state.watched.relations, pairs, drum, sides=2.0),
         drum=float(drum[-1]),
         gained=max(loop.drum_speed[begin:]) - max(float(drum[0]), FAST),
     )
 
 
-def bound(p: Params, pairs: Sequence[Pair], drum: np.ndarray) -> float:
-    """Time above FAST until the observer may trip [s]; that of the run where he may not."""
+def bound(
+    p: Params, pairs: Sequence[Pair], drum: np.ndarray, *, sides: float = 1.0
+) -> float | None:
+    """Time above FAST until the observer may trip [s]; None: he may not in this run.
+
+    sides : of the tolerance and the level that he has to bear; 2: the bench stands at the far one
+    """
     sums, before, still, sound = np.zeros((2, 3)), np.zeros(3), 0, Plausibility()
     levels = np.array([p.motor_level, p.gear_level, p.drum_level])
     held: Pair | None = None
@@ -103,12 +119,16 @@ def bound(p: Params, pairs: Sequence[Pair], drum: np.ndarray) -> float:
                 p.truck_torque,
             ]
         )
-        sums = np.maximum(sums + np.array([growth, -growth]) - tolerances, 0.0)
+        sums = np.maximum(sums + np.array([growth, -growth]) - sides * tolerances, 0.0)
         still = still + 1 if held is not None and _stands(held[1], shown) else 1
         held, before = (true, shown), error
-        if np.any(sums > levels) or still > STUCK:
+        if np.any(sums > sides * levels) or still > STUCK:
             return float(SCAN * np.sum(drum[:count] > FAST))
-    return float(SCAN * np.sum(drum > FAST))
+    return None
+
+
+def _text(seconds: float | None) -> str:
+    return "later" if seconds is None else f"{seconds:.2f}"
 
 
 def _stands(before: Measurement, now: Measurement) -> bool:
@@ -119,7 +139,8 @@ def _stands(before: Measurement, now: Measurement) -> bool:
 def main() -> None:
     """Print the table."""
     print(
-        f"{'fault':18s} km/h driver {'reason':13s} {'time':>6s} {'bound':>6s} {'drum':>6s} gained"
+        f"{'fault':18s} km/h driver {'reason':13s} {'time':>6s} {'bound':>6s} {'certain':>7s} "
+        f"{'drum':>6s} gained"
     )
     for name in FAULTS:
         for kmh in SPEEDS:
@@ -127,7 +148,8 @@ def main() -> None:
                 found = cell(name, kmh, driver)
                 print(
                     f"{name:18s} {kmh:4d} {driver:6s} {found.reason:13s} {found.time:6.2f} "
-                    f"{found.bound:6.2f} {found.drum:6.2f} {max(found.gained, 0.0):6.2f}",
+                    f"{_text(found.bound):>6s} {_text(found.certain):>7s} {found.drum:6.2f} "
+                    f"{max(found.gained, 0.0):6.2f}",
                     flush=True,
                 )
 

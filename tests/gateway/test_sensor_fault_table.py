@@ -30,12 +30,27 @@ def test_dead_sensor_trips_when_its_error_beyond_the_tolerance_fills_the_level()
 
 
 def test_error_within_the_tolerance_has_no_bound() -> None:
-    assert bound(P, steady(-16.0), DRUM) == pytest.approx(1.0)
+    assert bound(P, steady(-16.0), DRUM) is None
+
+
+def test_bench_at_the_far_side_of_its_tolerance_takes_more_than_twice_as_long() -> None:
+    """18.5 N m less k = 5.3 N m fill h; less 2 k they fill 2 h: 2 (18.5 - 5.3) / (18.5 - 10.5)."""
+    near, far = bound(P, steady(0.0), DRUM), bound(P, steady(0.0), DRUM, sides=2.0)
+    assert near is not None
+    assert far is not None
+    assert 2.0 * near < far < 4.0 * near
+
+
+def test_error_between_one_and_two_tolerances_is_never_certain() -> None:
+    assert bound(P, steady(-11.0), DRUM) is not None
+    assert bound(P, steady(-11.0), DRUM, sides=2.0) is None
 
 
 def test_time_counts_while_the_drum_is_fast() -> None:
     slow = np.concatenate((np.full(2, 0.5), np.full(98, 2.0)))
-    assert bound(P, steady(0.0), slow) == pytest.approx(bound(P, steady(0.0), DRUM) - 0.02)
+    fast = bound(P, steady(0.0), DRUM)
+    assert fast is not None
+    assert bound(P, steady(0.0), slow) == pytest.approx(fast - 0.02)
 
 
 def test_speed_that_stands_still_is_seen_after_twenty_samples() -> None:
