@@ -88,6 +88,9 @@ def scale_of(runs: Sequence[Run]) -> Scale:
     return Scale(
         force=float(np.sqrt(np.mean(np.concatenate([r.log.force for r in runs]) ** 2))),
         speed=max(float(np.abs(r.motion.velocity).max()) for r in runs),
+        acceleration=float(
+            np.sqrt(np.mean(np.concatenate([r.motion.acceleration for r in runs]) ** 2))
+        ),
         middle=0.5 * (low + high),
         travel=0.5 * (high - low),
         period=max(r.period for r in runs),

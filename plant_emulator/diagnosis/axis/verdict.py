@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.diagnosis.axis.leftover import rest_of
 from plant_emulator.diagnosis.axis.motion import UNCERTAIN
 from plant_emulator.diagnosis.axis.settings import SETTINGS
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.answer import Kind
     from plant_emulator.diagnosis.axis.held_out import HeldOut
+    from plant_emulator.diagnosis.axis.leftover import Rest
     from plant_emulator.diagnosis.axis.regression import Fit, Regression, Rows, Term
     from plant_emulator.diagnosis.axis.search import AxisSearch
 
@@ -38,20 +40,38 @@ class Decision:
 def decide(search: AxisSearch, held_out: HeldOut, floor: float) -> Decision:
     """Decide by the held-out runs; floor : rms of the force's error that noise or repeats leave."""
     found, reason = _confirmed(search, held_out)
-    error = held_out.relative(found.terms)
-    if found.terms and error > 1.0:
-        told = " and ".join(found.names)
-        reason = f"with {told} the error is {100.0 * error:.0f} % of the force"
+    if not found.terms:
+        return _without_a_name(search, held_out, floor, reason)
+    reason = _insufficient(found, held_out)
+    if reason:
         return Decision(kind="unknown", found=search.null, reason=reason)
-    wrong = forbidden_parameter(found)
-    if found.terms and wrong:
-        return Decision(kind="unknown", found=search.null, reason=wrong)
-    if found.terms:
-        return Decision(kind="effect", found=found)
+    return Decision(kind="effect", found=found)
+
+
+def _insufficient(found: Fit, held_out: HeldOut) -> str:
+    """Why confirmed effects do not stand for the gap; empty where they do."""
+    told = " and ".join(found.names)
+    error = held_out.relative(found.terms)
+    if error > 1.0:
+        return f"with {told} the error is {100.0 * error:.0f} % of the force"
+    if wrong := forbidden_parameter(found):
+        return wrong
+    # A name stands for the gap only if it closes more than a law that nobody has named yet.
+    rest, closed = rest_of(held_out, found.terms), held_out.share(found.terms, ()).value
+    if rest.share.low > SETTINGS.worth and rest.share.value > closed:
+        return f"{told} closes {describe(closed)}, and {_described(rest)} beside it"
+    return ""
+
+
+def _without_a_name(search: AxisSearch, held_out: HeldOut, floor: float, reason: str) -> Decision:
+    """The verdict where no effect is confirmed; reason : why the best one is not."""
+    found = search.null
     # Beside an effect the inertia of a single run is not certain enough to be told.
-    other = other_inertia(held_out.regression, held_out.rows)
-    if other:
+    if other := other_inertia(held_out.regression, held_out.rows):
         return Decision(kind="parameter", found=found, inertia=other)
+    rest = rest_of(held_out, ())
+    if rest.share.low > SETTINGS.worth:
+        return Decision(kind="unknown", found=found, reason=reason or _described(rest))
     left = np.concatenate(held_out.errors((), timing=True))
     small = float(np.mean(left**2)) <= SETTINGS.noisy * floor**2
     if small or held_out.relative((), timing=True) <= SETTINGS.worth:
@@ -102,6 +122,11 @@ def _failing(search: AxisSearch, held_out: HeldOut, found: Fit) -> tuple[str, st
         if why and (worst is None or share.low < worst[0]):
             worst = (share.low, name, why)
     return None if worst is None else worst[1:]
+
+
+def _described(rest: Rest) -> str:
+    """What a law that is not in the library would close, as a part of a sentence."""
+    return f"a law over {rest.state} that the library lacks closes {describe(rest.share.value)}"
 
 
 def describe(share: float) -> str:

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 class Scale:
     """The magnitudes of an axis and its runs [SI].
 
-    force : deviation of the force; speed : highest; middle, travel : middle and half of the travel
+    force : deviation of the force; speed : highest; acceleration : rms
+    middle, travel : middle and half of the travel
     period : between two samples of the slowest log; length : of the longest run
     rotary : whether the axis turns
     width : speed over which the Coulomb friction changes its sign
@@ -30,6 +31,7 @@ class Scale:
 
     force: float
     speed: float
+    acceleration: float
     middle: float
     travel: float
     period: float
@@ -103,4 +105,4 @@ class Effect:
 
 FORCE, SPEED = ("N", "N m"), ("m/s", "rad/s")
 TIME, NONE = ("s", "s"), ("1", "1")
-TRAVEL = ("m", "rad")
+TRAVEL, RATE = ("m", "rad"), ("m/s^2", "rad/s^2")

@@ -10,12 +10,14 @@ import numpy as np
 from plant_emulator.diagnosis.axis.effects.effect import (
     FORCE,
     NONE,
+    RATE,
     TIME,
     TRAVEL,
     Effect,
     Shape,
     Size,
 )
+from plant_emulator.diagnosis.axis.effects.gap import crossed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -48,24 +50,10 @@ def _place(c: Context, _: Shapes) -> Sequence[Array]:
 
 
 def _backlash(c: Context, s: Shapes) -> Sequence[Array]:
-    """Inertia and friction behind a gap, which do not count while the gap is crossed."""
+    """Inertia and friction behind a gap: not felt while the gap is crossed, and hit at its end."""
     m = c.motion
-    free = ~engaged(m.position, 0.5 * s["gap"])
-    return (-m.acceleration * free, -m.direction * free)
-
-
-def engaged(position: Array, half: float) -> np.ndarray:
-    """Whether the motor's side of a gap lies on the load's side, shape as the positions.
-
-    The load follows the motor as the play operator does: it rests while the gap is crossed.
-    """
-    found, load = np.empty(len(position), np.bool_), float(position[0])
-    for k, q in enumerate(position.tolist()):
-        offset = q - load
-        found[k] = abs(offset) >= half
-        if found[k]:
-            load = q - half if offset > 0.0 else q + half
-    return found
+    free, hit = crossed(m, 0.5 * s["gap"], s["slowing"])
+    return (hit - m.acceleration * free, -m.direction * free)
 
 
 def _elasticity(c: Context, s: Shapes) -> Sequence[Array]:
@@ -158,13 +146,17 @@ MOTION = (
         name="backlash",
         title="a part of the load hangs behind a gap",
         subsystem="backlash_shaft",
-        equation="F - m q'' - f sgn q' while the gap is crossed",
+        equation="F - m q'' - f sgn q' while the gap is crossed, + m dq' where it ends",
         needs="reversals",
         sizes=(
             Size(name="inertia", unit=("kg", "kg m^2"), lowest=0.0),
             Size(name="friction", unit=FORCE, lowest=0.0),
         ),
-        shapes=(Shape(name="gap", unit=TRAVEL, lower=0.005, upper=0.5, of="travel"),),
+        shapes=(
+            Shape(name="gap", unit=TRAVEL, lower=0.005, upper=0.5, of="travel"),
+            # Of the free load by its own friction.
+            Shape(name="slowing", unit=RATE, lower=0.03, upper=10.0, of="acceleration"),
+        ),
         columns=_backlash,
     ),
     Effect(

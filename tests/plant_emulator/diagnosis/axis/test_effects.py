@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from plant_emulator.diagnosis.axis.effects import LIBRARY
 from plant_emulator.diagnosis.axis.effects.friction import bristle
-from plant_emulator.diagnosis.axis.effects.motion_and_force import engaged
+from plant_emulator.diagnosis.axis.effects.gap import crossed
+from plant_emulator.diagnosis.axis.motion import Motion
 
+Array = NDArray[np.float64]
 BY_NAME = {effect.name: effect for effect in LIBRARY}
 TIME = np.arange(0.0, 4.0, 1e-3)
 
@@ -19,12 +22,44 @@ def test_a_bristle_bends_exponentially_and_turns_with_the_motion() -> None:
     assert found[399 + 40] == pytest.approx(2.0 * np.exp(-there[40] / 0.1) - 1.0, abs=1e-3)
 
 
-def test_a_gap_is_crossed_once_after_every_reversal() -> None:
-    position = np.concatenate([np.linspace(0.0, 1.0, 101), np.linspace(0.99, 0.0, 100)])
-    found = engaged(position, 0.1)
-    assert found.sum() == pytest.approx(len(position) - 10 - 20, abs=2)
-    assert not found[101:119].any()
-    assert found[122:].all()
+def test_a_load_flies_through_its_gap_and_is_caught() -> None:
+    """The motor brakes with 4 m/s2 from 1 m/s; the load, slowed with 1 m/s2, leaves it at once.
+
+    Way of the load less that of the motor: 3 t^2 / 2 = 0.06 m at 0.2 s. Then the motor has 0.2 m/s
+    and the load 0.8 m/s.
+    """
+    time = np.arange(0.0, 0.21, 1e-3)
+    motion = moved(time, time - 2.0 * time**2, 1.0 - 4.0 * time, np.full(len(time), -4.0))
+    motion.acceleration[0] = 1.0
+    free, hit = crossed(motion, 0.03, 1.0)
+    first = int(np.flatnonzero(hit)[0])
+    assert time[first] == pytest.approx(0.2, abs=2e-3)
+    assert not free[0]
+    assert free[1:first].all()
+    # A node at a sample counts for a third of two steps, one between for two thirds.
+    impulse = hit[first] * 2e-3 / 3.0 * (2.0 if first % 2 else 1.0)
+    assert impulse == pytest.approx(0.2 - 0.8, abs=0.02)
+
+
+def test_a_load_that_brakes_harder_than_its_motor_stays_at_its_flank() -> None:
+    time = np.arange(0.0, 0.2, 1e-3)
+    motion = moved(time, time - 2.0 * time**2, 1.0 - 4.0 * time, np.full(len(time), -4.0))
+    free, hit = crossed(motion, 0.03, 5.0)
+    assert not free.any()
+    assert not hit.any()
+
+
+def moved(time: Array, position: Array, velocity: Array, acceleration: Array) -> Motion:
+    return Motion(
+        time=time,
+        position=position,
+        velocity=velocity,
+        acceleration=acceleration,
+        direction=np.sign(velocity),
+        slope=np.zeros(len(time)),
+        slow=np.zeros(len(time), np.bool_),
+        deviation=0.0,
+    )
 
 
 def test_a_lag_follows_a_ramp_by_its_time() -> None:
