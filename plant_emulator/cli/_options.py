@@ -22,6 +22,13 @@ parameters = click.option(
     metavar="SET",
     help="Shipped parameter set, or the path of a TOML file.",
 )
+model = click.option(
+    "--model",
+    type=click.Choice(["bench", "axis"]),
+    default="bench",
+    show_default=True,
+    help="The machine: the bench, or a single motor-driven axis.",
+)
 effect = click.option(
     "--effect",
     "effects",

@@ -44,13 +44,7 @@ part of a file in time [s].
     help="A log to predict; may be repeated. Without it every log is held out in turn.",
 )
 @_options.parameters
-@click.option(
-    "--model",
-    type=click.Choice(["bench", "axis"]),
-    default="bench",
-    show_default=True,
-    help="The machine: the bench, or a single motor-driven axis.",
-)
+@_options.model
 @click.option(
     "--without", multiple=True, metavar="EFFECT", help="Take an effect out of the library."
 )

@@ -171,6 +171,18 @@ def test_one_effect_is_shown_with_equation_source_and_parameters(
     assert all(key in page for key in effects.load(name).parameters)
 
 
+def test_effects_of_an_axis_are_shown_with_the_units_of_both_kinds(command: Command) -> None:
+    page = command("effects", "--model", "axis", "backlash").stdout
+    assert page.startswith("backlash (backlash_shaft)")
+    assert [line.split() for line in page.splitlines() if line.startswith("gap")] == [
+        ["gap", "m", "rad"]
+    ]
+    answer = json.loads(command("effects", "--model", "axis", "--json", "-").stdout)
+    drag = next(e for e in answer["effects"] if e["effect"] == "quadratic_drag")
+    (size,) = drag["parameters"]
+    assert (size["unit"], size["unit_rotary"]) == ("N s^2/m^2", "N m s^2/rad^2")
+
+
 def test_effects_as_json_hold_every_parameter_with_its_unit(command: Command) -> None:
     answer = json.loads(command("effects", "--json", "-").stdout)
     assert [entry["effect"] for entry in answer["effects"]] == effects.names()
@@ -205,6 +217,7 @@ def test_effects_as_json_hold_every_parameter_with_its_unit(command: Command) ->
         (("validate",), "LOG"),
         (("validate", PROGRAM1, "--start", "left"), "left"),
         (("effects", "gear_ghost"), "effect gear_ghost: unknown; known: armature_reaction"),
+        (("effects", "--model", "axis", "ghost"), "effect ghost: unknown; known: backlash"),
         (("draft-check", "ghost.py", NOISY), "ghost.py: no Python file with an effect"),
         (("simulate", "--program", "program1", "--json", "-"), "--json"),
     ],

@@ -7,7 +7,7 @@ time or a speed; a grid finds it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -101,6 +101,24 @@ class Effect:
     columns: Callable[[Context, Shapes], Sequence[Array]] | None = None
     replaced: Callable[[Callable[[Array], Array], Array, Shapes], Array] | None = None
     applies: Callable[[Motion, Scale], bool] = lambda _motion, _scale: True
+
+    @property
+    def constants(self) -> list[Size | Shape]:
+        """Sizes, then shapes."""
+        return [*self.sizes, *self.shapes]
+
+    def to_json(self) -> dict[str, Any]:
+        """The effect as an entry of the document `effects/1`; units of a linear, a rotary axis."""
+        return {
+            "effect": self.name,
+            "subsystem": self.subsystem,
+            "description": f"{self.title}: {self.equation}",
+            "needs": self.needs or None,
+            "parameters": [
+                {"name": one.name, "unit": one.unit[0], "unit_rotary": one.unit[1]}
+                for one in self.constants
+            ],
+        }
 
 
 FORCE, SPEED = ("N", "N m"), ("m/s", "rad/s")
