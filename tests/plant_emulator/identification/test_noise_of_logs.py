@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from plant_emulator.estimation.covariance import data_errors
-from plant_emulator.estimation.start_search import Search
+from plant_emulator.estimation.start_search import StartSearch
 from plant_emulator.identification.identify import Identification, fit_from, identify
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import Recording, recording
@@ -61,7 +61,7 @@ def white_errors(run: Recording, nominal: ParameterSet, found: Identification) -
 
     Shape (2, parameters).
     """
-    search = Search([run], values_of(found.parameter_set), FREE)
+    search = StartSearch([run], values_of(found.parameter_set), FREE)
     search.gaps = list(found.gap_positions)
     fitted = fit_from([run], nominal, FREE, search)
     count = len(FREE)
