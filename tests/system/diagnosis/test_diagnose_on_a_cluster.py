@@ -64,7 +64,7 @@ def scheduler() -> Iterator[str]:
 @pytest.fixture
 def log(tmp_path: Path) -> str:
     file = tmp_path / "run.csv"
-    rows = [f"{0.001 * n:.3f},{0.01 * n},{n % 7}" for n in range(100)]
+    rows = [f"{0.001 * n:.3f},{n * n * 1e-6},{n % 7}" for n in range(2000)]
     file.write_text("\n".join(["time_s,position_m,force_N", *rows, ""]))
     return str(file)
 
