@@ -43,10 +43,12 @@ class Stalls:
 
 def measure() -> None:
     largest = 0.0
+    before = time.monotonic()
     while True:
-        before = time.monotonic()
         asked = select.select([sys.stdin], [], [], PERIOD)[0]
-        largest = max(largest, time.monotonic() - before - PERIOD)
+        now = time.monotonic()  # once a turn, so that no stop falls between two measurements
+        largest = max(largest, now - before - PERIOD)
+        before = now
         if not asked:
             continue
         if sys.stdin.readline():
