@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from gateway.config_file import load as load_config
     from gateway.configuration.config import Config
-    from gateway.errors import ConfigError, GatewayError
+    from gateway.errors import ConfigError, GatewayError, RecordingError
     from gateway.recordings.log import LogError
-    from gateway.recordings.recording import RecordingError
     from gateway.review.finding import Review
     from gateway.workflows.check import check
     from gateway.workflows.replay import Replay, replay
@@ -42,7 +41,7 @@ _PLACES = {
     "GatewayError": ("gateway.errors", "GatewayError"),
     "LogError": ("gateway.recordings.log", "LogError"),
     "MapError": ("register_maps.register_map", "MapError"),
-    "RecordingError": ("gateway.recordings.recording", "RecordingError"),
+    "RecordingError": ("gateway.errors", "RecordingError"),
     "Replay": ("gateway.workflows.replay", "Replay"),
     "Review": ("gateway.review.finding", "Review"),
     "check": ("gateway.workflows.check", "check"),

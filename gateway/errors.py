@@ -31,6 +31,10 @@ class ConfigError(GatewayError):
         super().__init__(f"{where}{what}{found}{right}")
 
 
+class RecordingError(ConfigError):
+    """A file that is no recording, or that cannot be written as one."""
+
+
 class PlcError(GatewayError):
     """Fault of the PLC or the link: no reply, a refusal, or a reply to something else."""
 

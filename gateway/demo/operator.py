@@ -13,21 +13,19 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Final, Protocol
 
 import numpy as np
 
 import register_maps
 from gateway.configuration.config import Config
-from gateway.cycle.record import Layout
 from gateway.cycle.supervisor import State
 from gateway.demo.view import Moment, Screen
 from gateway.errors import GatewayError
 from gateway.link.plc import TcpLink
 from gateway.recordings import recording
-from gateway.recordings.header import header
+from gateway.recordings.header import Header
 from gateway.recordings.parts import SUFFIX
-from gateway.recordings.recording import encode_header
 from gateway.runtime.loop import Loop
 from register_maps.timing import SCAN
 
@@ -186,10 +184,10 @@ class _FileSink:
 
     dropped, failed = 0, False
 
-    def __init__(self, path: Path, head: dict[str, Any], session: Session, layout: Layout) -> None:
+    def __init__(self, path: Path, header: Header, session: Session) -> None:
         self._file = path.open("wb")
-        self._file.write(encode_header(head))
-        self._dtype, self._session = np.dtype(layout.formats), session
+        self._file.write(header.encode())
+        self._dtype, self._session = np.dtype(header.layout.formats), session
         self.state, self.began, self.now = State.OFF, math.inf, 0.0
         self._shown = -1.0
 
@@ -218,10 +216,10 @@ def operate_fast(session: Session) -> GatewayRun:
     """Run the loop through one cycle as fast as this computer allows. Raises GatewayError."""
     config = session.config
     register_map = register_maps.load(config.plc.map)
-    clock, layout = _ScanClock(session.emulator), Layout.of(register_map)
-    head = header(config, register_map, started=0.0, shadow=False, real_time="not asked for")
+    clock = _ScanClock(session.emulator)
+    header = Header.of(config, register_map, started=0.0, shadow=False, real_time="not asked for")
     path = session.file.with_suffix(SUFFIX)
-    sink = _FileSink(path, head, session, layout)
+    sink = _FileSink(path, header, session)
     link = TcpLink(config.plc.host, config.plc.port, config.plc.unit, 1.0)
     loop = Loop(config=config, register_map=register_map, link=link, sink=sink, clock=clock)
     remote = False

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from gateway.arrays import Array
 from gateway.cycle.record import READ, WRITTEN
 from gateway.recordings.header import map_of
-from gateway.recordings.recording import GatewayRecording, Stream, reason_name, state_name
+from gateway.recordings.recording import GatewayRecording, Stream
 from register_maps.logs.poll_quality import PollQuality
 from register_maps.signals import LOG_COLUMNS, SIGNALS, Status
 from register_maps.timing import SCAN
@@ -119,14 +119,14 @@ class Export:
     @property
     def start_date(self) -> datetime:
         """Date at which the time of the columns is zero."""
-        date = datetime.fromisoformat(self.recording.header["date"])
+        date = datetime.fromisoformat(self.recording.header.date)
         return date + timedelta(seconds=self.survey.waited)
 
     def _take(self, piece: Piece) -> None:
         """Add a piece to the survey."""
         known, rows = self.survey, piece.rows
         if not known.samples and not self.extent.every:
-            known.waited = float(rows["now"][0] - self.recording.header["started"])
+            known.waited = float(rows["now"][0] - self.recording.header.started)
         status = rows["measured_status"]
         driven = np.nan_to_num(status).astype(int) & int(Status.ROAD_LOAD)
         known.truck = known.truck or bool(np.any(driven))
@@ -145,7 +145,7 @@ class Export:
                 begun = True
                 yield {k: v[inside] for k, v in self._columns(piece).items()}
         if not begun:
-            empty = np.zeros(0, dtype=np.dtype(self.recording.layout.formats))
+            empty = np.zeros(0, dtype=np.dtype(self.recording.header.layout.formats))
             yield self._columns(Piece(rows=empty, time=np.zeros(0), knees=np.zeros((2, 0))))
 
     def _inside(self, time: Array) -> NDArray[np.bool_]:
@@ -156,7 +156,7 @@ class Export:
         if not self.extent.every:
             yield from self._samples()
             return
-        started = self.recording.header["started"]
+        started = self.recording.header.started
         for rows in self.recording.chunks():
             yield Piece(rows=rows, time=rows["now"] - started)
 
@@ -207,12 +207,12 @@ class Export:
             found[TRUCK] = np.ones(len(rows))
         kept = {name: key for name, key in OWN.items() if self.survey.finite.get(key, 1)}
         found |= {name: rows[key] for name, key in kept.items()}
-        found["gateway_time_s"] = rows["now"] - self.recording.header["started"]
+        found["gateway_time_s"] = rows["now"] - self.recording.header.started
         found["written"] = (rows["flags"] & WRITTEN) > 0
         header = self.recording.header
         for name, key in NAMED.items():
-            say = state_name if key == "state" else reason_name
-            found[name] = np.array([say(header, int(code)) for code in rows[key]], dtype=str)
+            say = header.state if key == "state" else header.reason
+            found[name] = np.array([say(int(code)) for code in rows[key]], dtype=str)
         return found | self._other_signals(rows)
 
     def _filled(self, signal: str, *, log: bool) -> bool:

@@ -19,14 +19,13 @@ from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from gateway.cycle.record import Layout
-from gateway.errors import GatewayError
+from gateway.errors import GatewayError, RecordingError
+from gateway.recordings.header import Header
 from gateway.recordings.parts import Keeping, Parts
-from gateway.recordings.recording import RecordingError, encode_header
 from gateway.recordings.triggers import Trips, Wait
 
 BATCH: Final = 0.05
@@ -37,11 +36,10 @@ PIPE_SIZE: Final = 1 << 20
 
 @dataclass(frozen=True, kw_only=True)
 class Job:
-    """Task of the recorder's process: file, header, layout, and what is kept."""
+    """Task of the recorder's process: file, header, and what is kept."""
 
     path: Path
-    header: dict[str, Any]
-    layout: Layout
+    header: Header
     keeping: Keeping = field(default_factory=Keeping)
 
 
@@ -128,13 +126,13 @@ def record(receiver: Connection, job: Job) -> None:
 
 
 def _append(receiver: Connection, job: Job) -> None:
-    head, fields = encode_header(job.header), job.layout.formats
-    wait, kind = Wait(fields), np.dtype(fields)
+    head, layout = job.header.encode(), job.header.layout
+    wait, kind = Wait(layout.formats), np.dtype(layout.formats)
     with (
         closing(Parts(job.path, head, job.keeping)) as parts,
-        closing(Trips(job.path, head, fields)) as trips,
+        closing(Trips(job.path, head, layout.formats)) as trips,
     ):
-        for batch in _batches(receiver.fileno(), job.layout.size):
+        for batch in _batches(receiver.fileno(), layout.size):
             if batch:
                 last = float(np.frombuffer(batch, kind)["now"][-1])
                 parts.write(wait.passed(batch), last)
@@ -158,7 +156,7 @@ def _create(job: Job) -> None:
     try:
         job.path.parent.mkdir(parents=True, exist_ok=True)
         with job.path.open("xb") as file:
-            file.write(encode_header(job.header))
+            file.write(job.header.encode())
     except OSError as error:
         raise RecordingError(
             error.strerror or "cannot be created",

@@ -1,15 +1,14 @@
 """Recordings: a header, and one record a tick.
 
-File = magic, length of the header (4 bytes, little-endian), header (JSON), records
-(gateway.cycle.record). The header has configuration and register map with their hashes, so that a
-recording can be replayed without their files.
+File = head (gateway.recordings.header), records (gateway.cycle.record). The header has
+configuration and register map with their hashes, so that a recording can be replayed without their
+files.
 
 A recording is only appended to. A crash leaves a file whose last record may be cut; that record is
 left out with a note. Any other record with a wrong checksum is damage, and a damaged recording is
 refused.
 """
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,22 +16,17 @@ from typing import Any, BinaryIO, Final
 
 import numpy as np
 
-from gateway.cycle.record import MAGIC, NOTHING, Layout, is_intact
+from gateway.cycle.record import MAGIC, is_intact
 from gateway.cycle.supervisor import State
-from gateway.errors import ConfigError
+from gateway.errors import RecordingError
+from gateway.recordings.header import PREFIX, Header, decode, length_of
 from gateway.recordings.parts import SUFFIX, following, open_plain_or_compressed, plain_size
 
-SCHEMA: Final = "recording/1"
 CHUNK: Final = 1000
 PIECE: Final = 5000
 """Records that a stream reads at once: some megabytes."""
-HEAD: Final = len(MAGIC) + 4
 TAIL: Final = 1 << 16
 """[bytes] Piece in which zeros at the end of a file are sought."""
-
-
-class RecordingError(ConfigError):
-    """A file that is no recording, or that cannot be written as one."""
 
 
 class DamageError(RecordingError):
@@ -50,8 +44,7 @@ class GatewayRecording:
     """
 
     path: Path
-    header: dict[str, Any]
-    layout: Layout
+    header: Header
     records: "np.ndarray[Any, np.dtype[np.void]]"
     note: str
 
@@ -67,32 +60,16 @@ class GatewayRecording:
 
     def state(self, code: int) -> str:
         """Name of a state."""
-        return state_name(self.header, code)
+        return self.header.state(code)
 
     def reason(self, code: int) -> str:
         """Name of a reason or fault; empty: none."""
-        return reason_name(self.header, code)
+        return self.header.reason(code)
 
     def stop_reason(self) -> str:
         """Name of the reason for which the gateway first left RUN; empty: it did not."""
         after = self.records[self.records["state"] == State.RAMPDOWN]
         return self.reason(int(after["reason"][0])) if len(after) else ""
-
-
-def state_name(header: dict[str, Any], code: int) -> str:
-    """Name of a state by the header of its recording."""
-    return str(header["states"][str(code)])
-
-
-def reason_name(header: dict[str, Any], code: int) -> str:
-    """Name of a reason or fault by the header of its recording; empty: none."""
-    return str(header["reasons"][str(code)][0]) if code != NOTHING else ""
-
-
-def encode_header(header: dict[str, Any]) -> bytes:
-    """First bytes of a recording: magic, length, header."""
-    text = json.dumps({"schema": SCHEMA, **header}).encode()
-    return MAGIC + len(text).to_bytes(4, "little") + text
 
 
 def read(path: Path) -> GatewayRecording:
@@ -116,15 +93,14 @@ def _read_part(path: Path) -> GatewayRecording:
             content = file.read()
     except (OSError, EOFError) as error:
         raise _unreadable(path, error) from error
-    header, start = _header(path, content)
-    layout = Layout(read_count=header["read_count"], write_count=header["write_count"])
-    body = content[start:]
+    header, start = decode(path, content)
+    layout, body = header.layout, content[start:]
     whole = _count_finished(body, layout.size)
     left = len(body) - whole * layout.size
     records = np.frombuffer(body, dtype=np.dtype(layout.formats), count=whole)
     _check(path, body, records)
     note = f"{path}: {left} bytes of an unfinished last record left out" if left else ""
-    return GatewayRecording(path=path, header=header, layout=layout, records=records, note=note)
+    return GatewayRecording(path=path, header=header, records=records, note=note)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,8 +111,7 @@ class Stream:
     """
 
     path: Path
-    header: dict[str, Any]
-    layout: Layout
+    header: Header
     start: int
     note: str
     count: int
@@ -152,12 +127,12 @@ class Stream:
             yield from part.chunks()
 
     def _chunks(self) -> "Iterator[np.ndarray[Any, np.dtype[np.void]]]":
-        size, tick = self.layout.size, 0
+        layout, tick = self.header.layout, 0
         with open_plain_or_compressed(self.path) as file:
             file.seek(self.start)
             for first in range(0, self.count, PIECE):
-                body = file.read(min(PIECE, self.count - first) * size)
-                records = np.frombuffer(body, dtype=np.dtype(self.layout.formats))
+                body = file.read(min(PIECE, self.count - first) * layout.size)
+                records = np.frombuffer(body, dtype=np.dtype(layout.formats))
                 _check(self.path, body, records, tick)
                 tick = int(records["tick"][-1]) + 1
                 yield records
@@ -176,17 +151,15 @@ def stream(path: Path) -> Stream:
 def _stream_part(path: Path) -> Stream:
     try:
         with open_plain_or_compressed(path) as file:
-            head = file.read(HEAD)
-            length = int.from_bytes(head[len(MAGIC) : len(MAGIC) + 4], "little")
-            header, start = _header(path, head + file.read(length))
-            layout = Layout(read_count=header["read_count"], write_count=header["write_count"])
-            end = plain_size(path)
-            whole = _whole_records(file, start, end, layout.size)
+            head = file.read(PREFIX)
+            header, start = decode(path, head + file.read(length_of(head)))
+            end, size = plain_size(path), header.layout.size
+            whole = _whole_records(file, start, end, size)
     except OSError as error:
         raise _unreadable(path, error) from error
-    left = end - start - whole * layout.size
+    left = end - start - whole * size
     note = f"{path}: {left} bytes of an unfinished last record left out" if left else ""
-    return Stream(path=path, header=header, layout=layout, start=start, note=note, count=whole)
+    return Stream(path=path, header=header, start=start, note=note, count=whole)
 
 
 def _whole_records(file: BinaryIO, start: int, end: int, size: int) -> int:
@@ -254,28 +227,3 @@ def is_recording(path: Path) -> bool:
             file=path,
             expected="a log or a recording",
         ) from error
-
-
-def _header(path: Path, content: bytes) -> tuple[dict[str, Any], int]:
-    start = len(MAGIC) + 4
-    length = int.from_bytes(content[len(MAGIC) : start], "little")
-    if not content.startswith(MAGIC) or len(content) < start + length:
-        raise RecordingError(
-            "not a recording",
-            file=path,
-            value=content[: len(MAGIC)],
-            expected=f"a file that begins with {MAGIC!r} and a whole header",
-        )
-    try:
-        header = json.loads(content[start : start + length])
-    except ValueError as error:
-        raise RecordingError(str(error), file=path, place="header", expected="JSON") from error
-    if header.get("schema") != SCHEMA:
-        raise RecordingError(
-            "unknown format",
-            file=path,
-            place="schema",
-            value=header.get("schema"),
-            expected=repr(SCHEMA),
-        )
-    return header, start + length

@@ -51,7 +51,7 @@ def read(path: Path) -> SteadyRun:
     found = recording.read(path)
     return SteadyRun(
         path=path,
-        date=datetime.fromisoformat(found.header["date"]),
+        date=datetime.fromisoformat(found.header.date),
         sha256=digest,
         trace=trace_of(found, map_of(found.header)),
         config=config_of(found.header),

@@ -20,7 +20,7 @@ from typing import Any, Final
 from gateway.configuration.config import Config
 from gateway.configuration.sections import RecordingConfig
 from gateway.cycle.cycle import Output
-from gateway.cycle.record import Layout, Tick
+from gateway.cycle.record import Tick
 from gateway.cycle.supervisor import State
 from gateway.errors import GatewayError
 from gateway.link import tls
@@ -28,7 +28,7 @@ from gateway.link.plc import TcpLink
 from gateway.monitoring import metrics, server, terminal
 from gateway.monitoring.shared import Publisher
 from gateway.reasons import BY_OPERATOR, Reason
-from gateway.recordings.header import header
+from gateway.recordings.header import Header
 from gateway.recordings.parts import SUFFIX, Keeping
 from gateway.recordings.recorder import Job, Recorder
 from gateway.runtime.companion import Companion
@@ -114,11 +114,10 @@ def run(
     with granted as real:
         started = time.monotonic()
         stop = _Stop(None if duration is None else started + duration)
-        head = header(config, register_map, started=started, shadow=shadow, real_time=real)
+        head = Header.of(config, register_map, started=started, shadow=shadow, real_time=real)
         job = Job(
             path=_new_file(config),
             header=head,
-            layout=Layout.of(register_map),
             keeping=_keeping(config.recording),
         )
         listener = _listener(config)
@@ -175,12 +174,12 @@ def _identity(job: Job) -> dict[str, Any]:
     """Fields of the status that identify this daemon."""
     return {
         "pid": os.getpid(),
-        "title": job.header["title"],
-        "date": job.header["date"],
-        "period": job.header["config"]["loop"]["period_ms"] * 1e-3,
-        "version": job.header["versions"]["gateway"],
+        "title": job.header.title,
+        "date": job.header.date,
+        "period": job.header.config["loop"]["period_ms"] * 1e-3,
+        "version": job.header.versions["gateway"],
         "recording": str(job.path),
-        "real_time": job.header["real_time"],
+        "real_time": job.header.real_time,
     }
 
 

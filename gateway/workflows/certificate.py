@@ -87,7 +87,7 @@ def certify(
         "program": "gateway " + version("road-load-bench"),
         "holds": bool(checks) and all(check["holds"] for check in checks),
         "bench": configs[0].document["bench"],
-        "map": {"name": found[0].header["map"], "sha256": found[0].header["map_hash"]},
+        "map": {"name": found[0].header.map, "sha256": found[0].header.map_hash},
         "parameters": _parameters(parameters, file, folder),
         "runs": runs,
     }
@@ -97,12 +97,12 @@ def certify(
 def _refuse_other_bench(found: Sequence[GatewayRecording], configs: Sequence[Config]) -> None:
     first, known = found[0], configs[0].document["bench"]
     for one, config in zip(found, configs, strict=True):
-        if one.header["map_hash"] != first.header["map_hash"]:
+        if one.header.map_hash != first.header.map_hash:
             raise ConfigError(
                 "another register map",
                 file=one.path,
-                value=one.header["map"],
-                expected=f"that of {first.path}, {first.header['map']}, with the same hash",
+                value=one.header.map,
+                expected=f"that of {first.path}, {first.header.map}, with the same hash",
             )
         if config.document["bench"] != known:
             raise ConfigError(
@@ -134,9 +134,9 @@ def _run(
     return {
         "files": _digests(found.path, folder),
         "run": name or "road load",
-        "date": found.header["date"],
-        "config_sha256": found.header["config_hash"],
-        "gateway": found.header["versions"]["gateway"],
+        "date": found.header.date,
+        "config_sha256": found.header.config_hash,
+        "gateway": found.header.versions["gateway"],
         "truck": {"mass_kg": config.truck.mass, "load_kg": config.truck.load},
         "checks": checks,
         "budget": causes,

@@ -14,6 +14,7 @@ import numpy as np
 import register_maps
 from gateway import config_file
 from gateway.configuration.config import Config
+from gateway.errors import RecordingError
 from gateway.losses import sections
 from gateway.offline import log_replay, recording_replay
 from gateway.offline.comparison import SetpointComparison, compare
@@ -24,7 +25,7 @@ from gateway.offline.recording_replay import Difference
 from gateway.physics.road_load import road_load
 from gateway.recordings import log, recording, steady_runs
 from gateway.recordings.header import config_of, map_of
-from gateway.recordings.recording import GatewayRecording, RecordingError
+from gateway.recordings.recording import GatewayRecording
 from gateway.reports.replay import describe_comparison, describe_differences
 from gateway.workflows.run_quality import quality_of
 
@@ -119,7 +120,7 @@ def _from_its_start(found: GatewayRecording) -> GatewayRecording:
 
 
 def _replay_recording(found: GatewayRecording, config: Config, *, is_exact: bool) -> Replay:
-    register_map, started = map_of(found.header), found.header["started"]
+    register_map, started = map_of(found.header), found.header.started
     seen = recording_replay.observations(found.rows(), register_map)
     outputs = list(recording_replay.outputs(config, register_map, seen))
     comparison = compare(

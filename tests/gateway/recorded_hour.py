@@ -21,9 +21,8 @@ import numpy as np
 from gateway.configuration.config import Config
 from gateway.cycle.record import NOTHING, Layout, Tick
 from gateway.cycle.supervisor import State
-from gateway.recordings.header import header
+from gateway.recordings.header import Header
 from gateway.recordings.parts import compress
-from gateway.recordings.recording import encode_header
 from register_maps.codec import encode_measurement, encode_setpoint
 from register_maps.timing import SCAN
 from tests.gateway.closed_loop import ClosedLoop
@@ -134,11 +133,11 @@ def main() -> None:
                 print(f"{(tick.tick + 1) * SCAN:.0f} s: {resources()}", flush=True)
         file.seek(0)
         stretch = file.read()
-    head = header(loop.config, loop.map, started=1000.0, shadow=False, real_time="no")
+    head = Header.of(loop.config, loop.map, started=1000.0, shadow=False, real_time="no")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "hour.rlrec"
         with path.open("wb") as file:
-            file.write(encode_header(head))
+            file.write(head.encode())
             for times in range(STRETCHES):
                 file.write(again(stretch, layout, times))
         before, begun = path.stat().st_size, time.process_time()

@@ -17,11 +17,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gateway.configuration.config import Config
-from gateway.cycle.record import Layout, Tick
+from gateway.cycle.record import Tick
 from gateway.cycle.supervisor import State
 from gateway.link.plc import TcpLink
 from gateway.monitoring.shared import Publisher
-from gateway.recordings.header import header
+from gateway.recordings.header import Header
 from gateway.recordings.recorder import Job, Recorder
 from gateway.runtime.loop import Loop
 from plant_emulator.emulator.process import EmulatorProcess
@@ -63,8 +63,8 @@ class Soak:
 
     def runs(self, count: int, drive: float = DRIVE) -> Iterator[Found]:
         """What is found after each of so many runs; drive [s]. Raises AssertionError for a trip."""
-        head = header(self.config, MAP, started=1000.0, shadow=False, real_time="no")
-        job = Job(path=self.files_in / "soak.rlrec", header=head, layout=Layout.of(MAP))
+        head = Header.of(self.config, MAP, started=1000.0, shadow=False, real_time="no")
+        job = Job(path=self.files_in / "soak.rlrec", header=head)
         with closing(Recorder(job)) as recorder, Publisher({"title": "soak"}) as publisher:
             (child,) = multiprocessing.active_children()
             link = TcpLink("127.0.0.1", self.config.plc.port, 1, 1.0, probe=MAP.measurement)

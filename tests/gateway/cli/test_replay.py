@@ -25,8 +25,7 @@ from gateway.cycle.record import NOTHING, Layout, Tick
 from gateway.cycle.supervisor import State
 from gateway.errors import ConfigError
 from gateway.recordings import log, recording
-from gateway.recordings.header import header
-from gateway.recordings.recording import encode_header
+from gateway.recordings.header import Header
 from register_maps.codec import decode_measurement, encode_measurement, encode_setpoint
 from register_maps.signals import Alarm, Interlock, Measurement, PlcState, Status
 
@@ -78,7 +77,7 @@ def recorded(path: Path, ticks: int = 120) -> Path:
     # this bench follows no setpoint: limits that let it
     wide = {"limits.deviation_rpm": 4830.0, "limits.rate_up_rpm_s": 30000.0}
     config, layout = Config().with_values(wide), Layout.of(MAP)
-    content = encode_header(header(config, MAP, started=0.0, shadow=False, real_time="no"))
+    content = Header.of(config, MAP, started=0.0, shadow=False, real_time="no").encode()
     state: CycleState = initial(config, MAP)
     mode, echo = State.OFF, 0
     for number in range(ticks):
@@ -134,9 +133,9 @@ def test_a_changed_recording_does_not_and_the_place_is_named(tmp_path: Path) -> 
     found = recording.read(path)
     content = bytearray(path.read_bytes())
     place = found.records.dtype.fields["demand"][1]  # type: ignore[index]
-    start = len(content) - len(found.records) * found.layout.size
-    begin = start + 60 * found.layout.size
-    end = begin + found.layout.size
+    start = len(content) - len(found.records) * found.header.layout.size
+    begin = start + 60 * found.header.layout.size
+    end = begin + found.header.layout.size
     content[begin + place] ^= 1  # the last bit of tick 60's demand
     content[end - 4 : end] = zlib.crc32(content[begin : end - 4]).to_bytes(4, "little")
     path.write_bytes(content)
@@ -149,7 +148,7 @@ def test_a_changed_recording_does_not_and_the_place_is_named(tmp_path: Path) -> 
 def test_a_damaged_recording_is_one_line_and_code_1(tmp_path: Path, command: str) -> None:
     path = recorded(tmp_path / "a.rlrec")
     content = bytearray(path.read_bytes())
-    content[-1 - 60 * recording.read(path).layout.size] ^= 1  # the checksum of tick 59
+    content[-1 - 60 * recording.read(path).header.layout.size] ^= 1  # the checksum of tick 59
     path.write_bytes(content)
     target = ["--to", str(tmp_path / "a.csv")] if command == "export" else []
     result = CliRunner().invoke(main, [command, str(path), *target])
@@ -239,8 +238,8 @@ def test_exported_mdf4_holds_units_texts_and_the_date_of_its_first_sample(tmp_pa
     assert torque.timestamps == pytest.approx(np.arange(120) * 0.01)
     assert state.samples[-1] == b"RUN"
     found = recording.read(path)
-    waited = float(found.records["now"][0]) - found.header["started"]
-    assert (began - datetime.fromisoformat(found.header["date"])).total_seconds() == pytest.approx(
+    waited = float(found.records["now"][0]) - found.header.started
+    assert (began - datetime.fromisoformat(found.header.date)).total_seconds() == pytest.approx(
         waited, abs=1e-3
     )
 
@@ -257,9 +256,7 @@ def test_an_exported_recording_replays_like_its_csv(tmp_path: Path, suffix: str)
 @pytest.mark.parametrize("suffix", [".csv", ".parquet", ".mf4"])
 def test_a_recording_without_a_sample_is_exported_empty(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / "a.rlrec"
-    path.write_bytes(
-        encode_header(header(Config(), MAP, started=0.0, shadow=False, real_time="no"))
-    )
+    path.write_bytes(Header.of(Config(), MAP, started=0.0, shadow=False, real_time="no").encode())
     assert "0 samples of 0 ticks" in call(export, path, "--to", tmp_path / f"a{suffix}").output
     with pytest.raises(log.LogError, match="0 samples; at least 2"):
         log.read(tmp_path / f"a{suffix}")

@@ -18,8 +18,7 @@ from gateway.cycle.supervisor import State
 from gateway.reasons import Reason
 from gateway.recordings import log, recording
 from gateway.recordings.export import knees_of
-from gateway.recordings.header import header
-from gateway.recordings.recording import encode_header
+from gateway.recordings.header import Header
 from register_maps.signals import Measurement, Status
 
 MAP = register_maps.load("bench_int16")
@@ -47,9 +46,9 @@ def tick(number: int, sample: int | None, status: Status) -> Tick:
 
 def recorded(path: Path, samples: list[int | None], status: Status = STANDING) -> Path:
     layout, began = Layout.of(MAP), 100.0
-    head = header(Config(), MAP, started=began, shadow=False, real_time="no")
+    head = Header.of(Config(), MAP, started=began, shadow=False, real_time="no")
     rows = (layout.pack(tick(k, sample, status)) for k, sample in enumerate(samples))
-    path.write_bytes(encode_header(head) + b"".join(rows))
+    path.write_bytes(head.encode() + b"".join(rows))
     return path
 
 

@@ -19,12 +19,12 @@ from gateway.reasons import Reason
 from gateway.recordings import triggers
 from gateway.recordings.parts import Keeping, Parts, remove_old
 from gateway.recordings.recorder import Job, Recorder
-from gateway.recordings.recording import encode_header, read, stream
+from gateway.recordings.recording import read, stream
 from gateway.recordings.triggers import Trips, Wait
 from tests.gateway.closed_loop import ClosedLoop, Reading
 from tests.gateway.recordings.test_recorder import HEADER, LAYOUT, tick
 
-HEAD = encode_header(HEADER)
+HEAD = HEADER.encode()
 WAITING = int(State.CONNECT)
 
 
@@ -69,7 +69,7 @@ def test_part_ends_after_its_time(tmp_path: Path) -> None:
 def test_recorder_rotates_while_the_loop_goes_on(tmp_path: Path) -> None:
     path = tmp_path / "a.rlrec"
     keeping = Keeping(size=len(HEAD) + 20 * LAYOUT.size)
-    recorder = Recorder(Job(path=path, header=HEADER, layout=LAYOUT, keeping=keeping))
+    recorder = Recorder(Job(path=path, header=HEADER, keeping=keeping))
     for index in range(200):
         recorder.push(packed(index))
         if index % 50 == 0:

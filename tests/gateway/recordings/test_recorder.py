@@ -1,5 +1,6 @@
 """A recording holds every tick, whatever happens to the gateway or to the end of the file."""
 
+import json
 import math
 import os
 import resource
@@ -7,24 +8,33 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+import register_maps
+from gateway.configuration.config import Config
 from gateway.cycle.record import COMMANDED, MEASURED, NOTHING, Layout, Tick
-from gateway.errors import GatewayError
+from gateway.errors import GatewayError, RecordingError
+from gateway.recordings.header import Header
 from gateway.recordings.recorder import Job, Recorder, reason_of_end
-from gateway.recordings.recording import RecordingError, encode_header, is_recording, read
+from gateway.recordings.recording import is_recording, read, stream
 from register_maps.signals import Control, Measurement, Mode, Setpoint, Status
 
 LAYOUT = Layout(read_count=3, write_count=2)
-HEADER = {
-    "read_count": 3,
-    "write_count": 2,
-    "states": {"1": "RUN"},
-    "reasons": {"12": ["LATE", ""]},
-}
+HEADER = replace(
+    Header.of(
+        Config(), register_maps.load("bench_int16"), started=1000.0, shadow=True, real_time="no"
+    ),
+    read_count=3,
+    write_count=2,
+    states={"1": "RUN"},
+    reasons={"12": ["LATE", ""]},
+)
 
 MEASUREMENT = Measurement(
     sequence_start=65535,
@@ -72,19 +82,19 @@ def tick(index: int, *, read_back: bool = True) -> Tick:
 
 
 def write(path: Path, count: int) -> bytes:
-    content = encode_header(HEADER) + b"".join(LAYOUT.pack(tick(index)) for index in range(count))
+    content = HEADER.encode() + b"".join(LAYOUT.pack(tick(index)) for index in range(count))
     path.write_bytes(content)
     return content
 
 
 def test_what_was_recorded_is_read_bit_for_bit(tmp_path: Path) -> None:
     path = tmp_path / "a.rlrec"
-    recorder = Recorder(Job(path=path, header=HEADER, layout=LAYOUT))
+    recorder = Recorder(Job(path=path, header=HEADER))
     for index in range(5):
         recorder.push(LAYOUT.pack(tick(index)))
     recorder.close()
     found = read(path)
-    assert (found.header["states"], len(found), found.note) == ({"1": "RUN"}, 5, "")
+    assert (found.header.states, len(found), found.note) == ({"1": "RUN"}, 5, "")
     assert found.records["now"].tolist() == [1000.0 + 0.01 * index for index in range(5)]
     last = found.records[-1]
     assert last["demand"] == 0.1 + 4
@@ -167,6 +177,44 @@ def test_a_file_without_a_whole_header_is_refused(tmp_path: Path, length: int) -
     assert caught.value.exit_code == 2
 
 
+def with_header(content: bytes, change: Callable[[dict[str, Any]], object]) -> bytes:
+    """A recording whose header is changed as JSON, without the gateway's own reader and writer."""
+    length = int.from_bytes(content[8:12], "little")
+    document = json.loads(content[12 : 12 + length])
+    text = json.dumps(change(document)).encode()
+    return content[:8] + len(text).to_bytes(4, "little") + text + content[12 + length :]
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda _: [], r"schema: unknown format, found \[\]; expected 'recording/1'"),
+        (lambda head: head | {"schema": "recording/9"}, "schema: unknown format, found 'rec"),
+        (lambda head: head | {"map_text": 3}, "map_text: bad header, found 3; expected a value of"),
+        (lambda head: head | {"states": None}, "states: bad header, found 'nothing'; expected a"),
+        (lambda head: {"schema": head["schema"]}, "title: bad header, found 'nothing'; expected"),
+    ],
+)
+def test_a_bad_header_is_refused_with_its_key(
+    tmp_path: Path, change: Callable[[dict[str, Any]], object], says: str
+) -> None:
+    path = tmp_path / "a.rlrec"
+    path.write_bytes(with_header(write(path, 1), change))
+    for reading in (read, stream):
+        with pytest.raises(RecordingError, match=says) as caught:
+            reading(path)
+        assert caught.value.exit_code == 2
+
+
+def test_a_recording_older_than_the_entry_of_its_program_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "a.rlrec"
+    without = {"program"}
+    path.write_bytes(
+        with_header(write(path, 1), lambda head: {k: head[k] for k in head if k not in without})
+    )
+    assert read(path).header == HEADER
+
+
 def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("time_s,motor_speed_rad_s\n0,1\n")
@@ -179,11 +227,11 @@ def test_a_directory_that_cannot_be_written_is_refused_at_the_start(tmp_path: Pa
     file = tmp_path / "file"
     file.write_text("")
     with pytest.raises(RecordingError, match="recording"):
-        Recorder(Job(path=file / "a.rlrec", header=HEADER, layout=LAYOUT))
+        Recorder(Job(path=file / "a.rlrec", header=HEADER))
 
 
 def test_a_full_pipe_drops_the_record_and_counts_it(tmp_path: Path) -> None:
-    recorder = Recorder(Job(path=tmp_path / "a.rlrec", header=HEADER, layout=LAYOUT))
+    recorder = Recorder(Job(path=tmp_path / "a.rlrec", header=HEADER))
     record = LAYOUT.pack(tick(0))
     pushed = 0
     while not recorder.dropped:
@@ -198,11 +246,11 @@ def test_a_full_disk_is_told_in_one_line_and_keeps_every_whole_record(
 ) -> None:
     """The limit on a file's size, inherited by the recorder, stands for the disk's end."""
     path, record = tmp_path / "a.rlrec", LAYOUT.pack(tick(0))
-    room = len(encode_header(HEADER)) + 3 * LAYOUT.size + 5
+    room = len(HEADER.encode()) + 3 * LAYOUT.size + 5
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (room, before[1]))
     try:
-        recorder = Recorder(Job(path=path, header=HEADER, layout=LAYOUT))
+        recorder = Recorder(Job(path=path, header=HEADER))
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     while not recorder.failed:  # what has no room ends the recorder, and its end the pipe
@@ -221,7 +269,7 @@ from pathlib import Path
 from gateway.recordings.recorder import Job, Recorder, reason_of_end
 from tests.gateway.recordings.test_recorder import HEADER, LAYOUT, tick
 if __name__ == "__main__":
-    recorder = Recorder(Job(path=Path(sys.argv[1]), header=HEADER, layout=LAYOUT))
+    recorder = Recorder(Job(path=Path(sys.argv[1]), header=HEADER))
     for index in range(100):
         recorder.push(LAYOUT.pack(tick(index)))
     os.kill(os.getpid(), signal.SIGKILL)

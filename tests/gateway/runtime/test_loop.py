@@ -16,8 +16,8 @@ from gateway.offline import recording_replay
 from gateway.reasons import Reason
 from gateway.recordings import log, log_writer
 from gateway.recordings.export import Export, Extent
-from gateway.recordings.header import config_of, header, map_of
-from gateway.recordings.recording import GatewayRecording, encode_header, read, stream
+from gateway.recordings.header import Header, config_of, map_of
+from gateway.recordings.recording import GatewayRecording, read, stream
 from gateway.runtime.loop import Loop
 from plant_emulator.emulator.process import EmulatorProcess
 from register_maps.register_map import RegisterMap
@@ -55,8 +55,8 @@ class Sink:
 
     def __init__(self, config: Config, path: Path) -> None:
         self.path = path
-        made_with = header(config, MAP, started=1000.0, shadow=False, real_time="no")
-        path.write_bytes(encode_header(made_with))
+        made_with = Header.of(config, MAP, started=1000.0, shadow=False, real_time="no")
+        path.write_bytes(made_with.encode())
 
     def push(self, record: bytes) -> None:
         with self.path.open("ab") as file:
