@@ -25,7 +25,7 @@ from gateway.cycle.surveillance import Surveillance
 from gateway.cycle.tolerances import Params
 from gateway.errors import ConfigError
 from gateway.regulators import Regulator
-from gateway.regulators.window import Demand
+from gateway.regulators.demand import Demand
 from register_maps.register_map import RegisterMap
 from register_maps.signals import Measurement, Setpoint, Status
 

@@ -15,8 +15,9 @@ from typing import Any
 from gateway import regulators
 from gateway.configuration.config import Config
 from gateway.configuration.program import Emulation, Profile, Ramp, Step
+from gateway.physics.window import Window
 from gateway.regulators import Regulator
-from gateway.regulators.window import Demand, Window
+from gateway.regulators.demand import Demand
 from register_maps.logs.drive_programs import interpolate
 
 NOTHING = Demand(speed=0.0)

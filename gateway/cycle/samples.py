@@ -19,8 +19,8 @@ from math import exp, inf
 from gateway.configuration.config import Config
 from gateway.configuration.sections import RegulatorConfig
 from gateway.friction.law import oil_temperature
+from gateway.physics.window import Window
 from gateway.reasons import Reason
-from gateway.regulators.window import Window
 from register_maps.codec import difference
 from register_maps.register_map import RegisterMap
 from register_maps.signals import Measurement

@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Final
 
-from gateway.regulators.window import Window
+from gateway.physics.window import Window
 
 HOUR: Final = 3600.0
 KWH: Final = 3.6e6

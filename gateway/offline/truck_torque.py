@@ -11,8 +11,8 @@ from dataclasses import replace
 from gateway.configuration.config import Config
 from gateway.cycle.cycle import Observation, initial, step
 from gateway.cycle.supervisor import State
-from gateway.regulators import compensated
-from gateway.regulators.window import Window
+from gateway.physics.virtual_truck import VirtualTruck, truck_torque
+from gateway.physics.window import Window
 from register_maps.register_map import RegisterMap
 from register_maps.signals import PlcState
 
@@ -21,9 +21,7 @@ def truck_torques(
     seen: Iterable[Observation], config: Config, register_map: RegisterMap
 ) -> Iterator[tuple[Window, float]]:
     """Windows of a run in road load, each with the truck's mean torque on the drum [N m]."""
-    params = replace(
-        compensated.Params.of(config), under_compensation=0.0, under_compensation_slow=0.0
-    )
+    params = replace(VirtualTruck.of(config), under_compensation=0.0, under_compensation_slow=0.0)
     state = initial(config, register_map)
     for observation in seen:
         state, output = step(config, register_map, state, observation)
@@ -31,4 +29,4 @@ def truck_torques(
         if output.state is not State.RUN or window is None or newest is None:
             continue
         if newest.plc_state is PlcState.ROAD_LOAD:
-            yield window, compensated.truck_torque(params, window)
+            yield window, truck_torque(params, window)

@@ -1,1 +1,1 @@
-"""What the regulator knows of the bench and the truck: motor, friction, road load (pure)."""
+"""What the regulator knows of the bench and the truck: motor, road load, virtual truck (pure)."""

@@ -19,7 +19,8 @@ from gateway.errors import ConfigError
 
 if TYPE_CHECKING:
     from gateway.configuration.config import Config
-    from gateway.regulators.window import Demand, Window
+    from gateway.physics.window import Window
+    from gateway.regulators.demand import Demand
 
 
 class _Params(Protocol):
@@ -44,7 +45,7 @@ class Regulator(Protocol):
 
 def names() -> tuple[str, ...]:
     """Names of all regulators, sorted."""
-    return tuple(sorted(found.name for found in iter_modules(__path__) if found.name != "window"))
+    return tuple(sorted(found.name for found in iter_modules(__path__) if found.name != "demand"))
 
 
 def unknown_error(name: str, place: str) -> ConfigError:

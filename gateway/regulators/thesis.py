@@ -19,7 +19,8 @@ from dataclasses import dataclass, replace
 from gateway.configuration.config import Config
 from gateway.friction.law import Friction, friction_torque
 from gateway.physics.road_load import RoadLoad, road_load
-from gateway.regulators.window import Demand, Window
+from gateway.physics.window import Window
+from gateway.regulators.demand import Demand
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,8 +15,8 @@ from gateway.configuration.config import Config
 from gateway.errors import GatewayError
 from gateway.offline.recording_replay import observations
 from gateway.offline.truck_torque import truck_torques
+from gateway.physics.window import Window
 from gateway.recordings.recording import GatewayRecording
-from gateway.regulators.window import Window
 from plant_emulator.simulation.truck import PARKED_TORQUE
 from register_maps.register_map import RegisterMap
 from register_maps.timing import SCAN

@@ -8,7 +8,7 @@ from gateway.cli import main
 from gateway.configuration.config import Config
 from gateway.offline.travel_cycle import Auxiliary, Leg, TravelCycle, work
 from gateway.offline.truck_torque import truck_torques
-from gateway.regulators.window import Window
+from gateway.physics.window import Window
 from register_maps.timing import SCAN
 from tests.gateway.closed_loop import ClosedLoop
 

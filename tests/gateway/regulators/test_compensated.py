@@ -7,8 +7,9 @@ import pytest
 
 from gateway.configuration.config import Config
 from gateway.friction.law import friction_torque
+from gateway.physics.virtual_truck import truck_torque
+from gateway.physics.window import Window
 from gateway.regulators import compensated
-from gateway.regulators.window import Window
 
 CONFIG = Config().with_values({"regulator.trim": "0.8"})
 PARAMS = compensated.Params.of(CONFIG)
@@ -81,7 +82,7 @@ def test_friction_follows_the_motor_and_not_the_drum():
     seen = window(motor=200.0, drum=0.0)
     share = 1.0 - 0.003
     expected = share * friction_torque(200.0 / 62.6, PARAMS.friction)
-    assert compensated.truck_torque(PARAMS, seen) == pytest.approx(expected)
+    assert truck_torque(PARAMS, seen) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(
@@ -90,19 +91,19 @@ def test_friction_follows_the_motor_and_not_the_drum():
 def test_friction_is_compensated_less_only_below_half_a_radian_per_second(gear_speed, left_out):
     seen = window(motor=62.6 * gear_speed)
     whole = friction_torque(gear_speed, PARAMS.friction)
-    assert 1.0 - compensated.truck_torque(PARAMS, seen) / whole == pytest.approx(left_out, rel=1e-9)
+    assert 1.0 - truck_torque(PARAMS, seen) / whole == pytest.approx(left_out, rel=1e-9)
 
 
 def test_a_sticking_gear_explains_up_to_its_coulomb_friction():
     for torque, left in ((0.3, 0.0), (-0.3, 0.0), (1.0, 62.6 - 35.989), (-1.0, -62.6 + 35.989)):
-        assert compensated.truck_torque(PARAMS, window(torque=torque)) == pytest.approx(left)
+        assert truck_torque(PARAMS, window(torque=torque)) == pytest.approx(left)
 
 
 def test_friction_falls_with_the_temperature_of_the_shell():
     friction = replace(PARAMS.friction, temperature_coefficient=0.01)
     params = replace(PARAMS, friction=friction)
-    warm = compensated.truck_torque(params, window(motor=200.0, temperature=273.15 + 42.0))
-    nominal = compensated.truck_torque(PARAMS, window(motor=200.0))
+    warm = truck_torque(params, window(motor=200.0, temperature=273.15 + 42.0))
+    nominal = truck_torque(PARAMS, window(motor=200.0))
     assert warm == pytest.approx(nominal * np.exp(-0.1))
 
 
@@ -177,14 +178,14 @@ def test_a_bench_that_turns_faster_than_a_start_is_seeded_as_moving(speed, movin
 
 @pytest.mark.parametrize(("speed", "sticks"), [(0.0049, True), (0.005, False), (-0.005, False)])
 def test_a_gear_sticks_below_five_thousandths(speed, sticks):
-    seen = compensated.truck_torque(DIRECT, window(torque=1.0, motor=speed))
+    seen = truck_torque(DIRECT, window(torque=1.0, motor=speed))
     assert (seen == 0.0) is sticks
 
 
 def test_a_share_left_out_at_standstill_counts_only_where_it_is_the_greater():
     params = replace(PARAMS, under_compensation=0.01, under_compensation_slow=0.003)
     whole = friction_torque(0.01, params.friction)
-    seen = compensated.truck_torque(params, window(motor=0.626))
+    seen = truck_torque(params, window(motor=0.626))
     assert 1.0 - seen / whole == pytest.approx(0.01)
 
 

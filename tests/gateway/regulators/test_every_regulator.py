@@ -7,7 +7,7 @@ import pytest
 from gateway import regulators
 from gateway.configuration.config import Config
 from gateway.errors import ConfigError
-from gateway.regulators.window import Window
+from gateway.physics.window import Window
 
 CONFIG = Config()
 

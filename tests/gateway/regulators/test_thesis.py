@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from gateway.configuration.config import Config
+from gateway.physics.window import Window
 from gateway.regulators import thesis
-from gateway.regulators.window import Window
 
 LOGS = Path(__file__).parents[2] / "data" / "bench_nominal"
 

@@ -1,4 +1,4 @@
-"""Input and output of a regulator."""
+"""What the gateway sees of the bench between two samples."""
 
 from dataclasses import dataclass
 
@@ -21,11 +21,3 @@ class Window:
     drum_speed_change: float
     shell_temperature: float | None = None
     oil_temperature: float | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Demand:
-    """Demanded motor speed [rad/s], and its slope until the next sample [rad/s^2]."""
-
-    speed: float
-    rate: float = 0.0
