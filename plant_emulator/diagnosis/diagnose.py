@@ -19,6 +19,7 @@ from plant_emulator.diagnosis.design.next_experiment import Advice
 from plant_emulator.diagnosis.execution.pool import TaskRunner, build_model
 from plant_emulator.diagnosis.execution.progress import ReportingPool
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
+from plant_emulator.diagnosis.fitting.fit_steps import simulate_once
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.prediction.gap import shows_shrinkage
 from plant_emulator.diagnosis.prediction.held_out import HeldOut
@@ -154,6 +155,8 @@ class Diagnose:
 
     def diagnose(self) -> Findings:
         """Test the hypotheses, predict the held-out runs, locate the gap; give the findings."""
+        # Nobody waits for it: processes load their code while one of them makes the first fit.
+        self.runner.map(simulate_once, self.plan.fitted)
         tests = self._test()
         # Asked for first, so that it is looked for beside the predictions.
         located = self.runner.map(

@@ -18,6 +18,7 @@ Answer = TypeVar("Answer")
 
 # What a person reads about a step, by the name of its function.
 LABELS = {
+    "simulate_once": "start of the processes",
     "start": "fit without effects",
     "find_input_noise": "noise of the inputs",
     "estimate_noise": "noise of the sensors",

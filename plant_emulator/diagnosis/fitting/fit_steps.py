@@ -12,6 +12,12 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.machine import Model
 
 
+def simulate_once(model: Model, run: int) -> None:
+    """Simulate a run, so that this process has the compiled code when it is asked (a step)."""
+    states = {u.name: u.start for u in model.states}
+    model.residual(run, ())({**model.nominal((run,)), **states})
+
+
 def start(model: Model, runs: tuple[int, ...]) -> FitResult:
     """The fit without effects (a step)."""
     return fit_null(model, runs)

@@ -112,7 +112,12 @@ class Screening:
 
 def promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
     """Predicted gains of all effects on top of a fit, the largest first."""
-    (states,) = runner.map(start_states, [Task(base=base, runs=runner.runs)])
+    alone = [
+        Task(base=replace(base, states=(own,)), runs=(run,))
+        for run, own in zip(runner.runs, base.states, strict=True)
+    ]
+    of_runs = list(runner.map(start_states, alone))
+    states = {name: [own[name] for own in of_runs] for name in of_runs[0]}
     asked = [
         Screening(base=base, runs=runner.runs, fidelity=fidelity, states=states)
         for fidelity in ("relations", "simulation")
@@ -177,8 +182,8 @@ def _library(model: Model, base: FitResult) -> dict[str, Candidate]:
     }
 
 
-def start_states(model: Model, task: Task) -> dict[str, list[dict[str, float]]]:
-    """States of each effect in each run that its columns are taken at (a step).
+def start_states(model: Model, task: Task) -> dict[str, dict[str, float]]:
+    """States of each effect in the run of the task that its columns are taken at (a step).
 
     A state with many narrow basins, as a frequency, is scanned on top of a fit without effects.
     """
@@ -186,16 +191,15 @@ def start_states(model: Model, task: Task) -> dict[str, list[dict[str, float]]]:
     return {name: _start_states(model, one, task) for name, one in library.items()}
 
 
-def _start_states(model: Model, candidate: Candidate, task: Task) -> list[dict[str, float]]:
-    where, rough = task.base, model.rough()
-    plain = [{u.name: u.start for u in candidate.states} for _ in task.runs]
+def _start_states(model: Model, candidate: Candidate, task: Task) -> dict[str, float]:
+    where = task.base
+    plain = {u.name: u.start for u in candidate.states}
     if where.effects or all(u.step is None for u in candidate.states):
         return plain
-    values = {**where.values, **values_at_size(candidate, SETTINGS.sizes[0])}
-    return [
-        scan_states(rough.residual(k, (candidate.name,)), {**values, **fit}, candidate.states, own)
-        for k, fit, own in zip(task.runs, where.states, plain, strict=True)
-    ]
+    (run,), (fit,) = task.runs, where.states
+    values = {**where.values, **fit, **values_at_size(candidate, SETTINGS.sizes[0])}
+    residual = model.rough().residual(run, (candidate.name,))
+    return scan_states(residual, values, candidate.states, plain)
 
 
 def scan_states(
