@@ -69,7 +69,7 @@ def command(
     for one in found.findings:
         if one.severity == "warning" and one.where.startswith("regulator."):
             click.echo(f"warning: {config}: {_line(one)}", err=True)
-    check = shlex.join(["gateway", "check", "-c", str(config), *_repeated("--set", values)])
+    check = shlex.join(["gateway", "check", "-c", str(config), *_repeat_option("--set", values)])
     for line in refused:
         click.echo(f"{'warning' if shadow else 'error'}: {config}: {line}; see {check}", err=True)
     if refused and not shadow:
@@ -98,7 +98,7 @@ def _line(one: "Finding") -> str:
     return f"{one.where}: {one.what}: found {one.value}, expected {one.allowed}"
 
 
-def _repeated(option: str, values: tuple[str, ...]) -> list[str]:
+def _repeat_option(option: str, values: tuple[str, ...]) -> list[str]:
     return [word for value in values for word in (option, value)]
 
 

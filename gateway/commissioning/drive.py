@@ -97,24 +97,24 @@ def _refuse_clipped(config: Config, name: str, step: Profile) -> None:
     most, delay = config.limits, delay_of(config)
     for time, speed in zip(step.times, step.speeds, strict=True):
         if not 0.0 <= speed <= most.speed_max * ROUNDING_SLACK:
-            raise _clipped(name, time, "speed", speed, "rpm", "speed_max_rpm", most.speed_max)
+            raise _refusal(name, time, "speed", speed, "rpm", "speed_max_rpm", most.speed_max)
     for (since, before), (time, speed) in pairwise(zip(step.times, step.speeds, strict=True)):
         slope = (speed - before) / (time - since)
         if slope > most.rate_up * ROUNDING_SLACK:
-            raise _clipped(name, since, "slope", slope, "rpm/s", "rate_up_rpm_s", most.rate_up)
+            raise _refusal(name, since, "slope", slope, "rpm/s", "rate_up_rpm_s", most.rate_up)
         if -slope > most.rate_down * ROUNDING_SLACK:
-            raise _clipped(name, since, "slope", slope, "rpm/s", "rate_down_rpm_s", most.rate_down)
+            raise _refusal(name, since, "slope", slope, "rpm/s", "rate_down_rpm_s", most.rate_down)
     for time in step.times:
         for moment in (time, time + delay):
             before = interpolate(step.times, step.speeds, moment - delay)
             lag = interpolate(step.times, step.speeds, moment) - before
             if lag > most.deviation * ROUNDING_SLACK:
-                raise _clipped(
+                raise _refusal(
                     name, moment, "lag of the bench", lag, "rpm", "deviation_rpm", most.deviation
                 )
 
 
-def _clipped(
+def _refusal(
     name: str, time: float, what: str, value: float, unit: str, key: str, limit: float
 ) -> ConfigError:
     return ConfigError(

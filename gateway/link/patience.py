@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Final
 
 from gateway.link.reply import HEADER, split
-from gateway.link.tls import arrived
+from gateway.link.tls import receive
 from register_maps.register_map import Block
 
 READ: Final = {"holding": 3, "input": 4}
@@ -51,7 +51,7 @@ class Settling:
         if self._request:
             request, self._request = self._request, b""
             self.connection.sendall(request)
-        chunk = arrived(self.connection, 0.0)
+        chunk = receive(self.connection, 0.0)
         if chunk is None:
             return False
         if not chunk:

@@ -27,7 +27,7 @@ from gateway.errors import PlcError
 from gateway.link.connector import LAST_DELAY, Connector
 from gateway.link.patience import Retired, Settling, first_request
 from gateway.link.reply import Rejection, Request, check_reply
-from gateway.link.tls import arrived
+from gateway.link.tls import receive
 from gateway.reasons import Reason
 from register_maps.register_map import Block
 
@@ -107,14 +107,14 @@ class TcpLink:
         """Start or continue a connection attempt without waiting; nothing while connected."""
         if self._client is not None:
             return
-        connection = self._settled() if self._retired.is_empty() else None
+        connection = self._poll_connection() if self._retired.is_empty() else None
         if connection is None:
             raise self._error(self._last)
         self._client = _Client(connection, self._timeout)
         self._abandoned.clear()
         self._failures = 0
 
-    def _settled(self) -> socket.socket | None:
+    def _poll_connection(self) -> socket.socket | None:
         """Connection that may be used; None: there is none yet, `_last` says why."""
         if self._settling is None:
             connection = self._connector.poll()
@@ -147,7 +147,7 @@ class TcpLink:
 
     def read(self, address: int, count: int, function: int = READ_HOLDING) -> tuple[int, ...]:
         """Words of one block, read by one request."""
-        client = self._connected()
+        client = self._require_client()
         ask = (
             client.read_input_registers if function == READ_INPUT else client.read_holding_registers
         )
@@ -161,7 +161,7 @@ class TcpLink:
 
     def write(self, address: int, words: Sequence[int]) -> None:
         """Write one block by one request."""
-        client = self._connected()
+        client = self._require_client()
         reply = self._ask(
             lambda: client.write_registers(address, list(words), device_id=self._unit),
             WRITE_MANY,
@@ -177,7 +177,7 @@ class TcpLink:
 
     def write_one(self, address: int, word: int) -> None:
         """Write one register by function code 6."""
-        client = self._connected()
+        client = self._require_client()
         reply = self._ask(
             lambda: client.write_register(address, word, device_id=self._unit), WRITE_ONE, 5
         )
@@ -195,14 +195,14 @@ class TcpLink:
             self._client.close()  # type: ignore[no-untyped-call]  # pymodbus declares none here
             self._client = None
 
-    def _connected(self) -> "_Client":
+    def _require_client(self) -> "_Client":
         if self._client is None:
             raise self._error(self._last)
         return self._client
 
     def _ask(self, call: Callable[[], ModbusPDU], function: int, length: int) -> ModbusPDU:
         """Reply to one request, checked; `length` is that of its PDU [bytes]."""
-        client = self._connected()
+        client = self._require_client()
         client.begin()
         reply, refusal = _attempt(call)
         request = Request(
@@ -265,7 +265,7 @@ class _Client(ModbusTcpClient):
     def recv(self, size: int | None) -> bytes:  # noqa: ARG002 - pymodbus's signature
         connection = self.socket
         while connection and (remaining := self._deadline - time.monotonic()) > 0.0:
-            chunk = arrived(connection, remaining)
+            chunk = receive(connection, remaining)
             if chunk is None:
                 continue
             if not chunk:

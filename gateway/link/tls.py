@@ -58,7 +58,7 @@ def has_shaken_hands(connection: ssl.SSLSocket) -> bool:
     return True
 
 
-def arrived(connection: socket.socket, within: float) -> bytes | None:
+def receive(connection: socket.socket, within: float) -> bytes | None:
     """Bytes that arrive within this time [s]; none: the peer has closed the connection.
 
     None: nothing has come yet, or a part of a TLS record only. Raises OSError.

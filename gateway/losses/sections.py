@@ -133,7 +133,7 @@ def steady(trace: SweepTrace, bench: BenchConfig, sensor: RegulatorConfig = PLAI
     for part in _stretches(trace):
         why = _rejection(trace, part, bench.gear_ratio)
         if why:
-            left_out.append(_left_out(trace, part, why))
+            left_out.append(_leave_out(trace, part, why))
         else:
             sections.append(_section(trace, part, bench, sensor))
     _refuse_sign(sections)
@@ -197,7 +197,7 @@ def _batch_means(values: Array) -> Array:
     return np.array([batch.mean() for batch in np.array_split(values, BATCHES)])
 
 
-def _left_out(trace: SweepTrace, part: slice, why: str) -> LeftOut:
+def _leave_out(trace: SweepTrace, part: slice, why: str) -> LeftOut:
     time = trace.time[part]
     speed = float(trace.motor_speed[part].mean())
     start, end = float(time[0]), float(time[-1])

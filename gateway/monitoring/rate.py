@@ -21,7 +21,7 @@ class Rate:
         self._held: str | None = None
         self._count = 0
 
-    def passed(self, lines: Sequence[str], now: float, *, lost: int = 0) -> list[str]:
+    def filter(self, lines: Sequence[str], now: float, *, lost: int = 0) -> list[str]:
         """Lines to write now [s]; lost : count of lines that the caller knows are missing."""
         self._tokens = min(float(BURST), self._tokens + (now - self._now) / EVERY)
         self._now, self._count = now, self._count + lost
@@ -33,9 +33,9 @@ class Rate:
                 continue
             written.append(line)
             self._tokens -= 1.0
-        return written + (self.rest() if self._tokens >= 1.0 else [])
+        return written + (self.flush() if self._tokens >= 1.0 else [])
 
-    def rest(self) -> list[str]:
+    def flush(self) -> list[str]:
         """The held line, and before it how many lines are left out."""
         written = [self._tell(self._count)] * (self._count > 0)
         written += [] if self._held is None else [self._held]

@@ -69,8 +69,8 @@ class RunLog:
         if found not in ("", self._problem) and State(values.state) is State.CONNECT:
             self._problem = found
             new.append(self._note("link", found, date(values.now)))
-        passed = self._rate.passed(new, now, lost=lost)
-        return passed + (self._rate.rest() if over else [])
+        passed = self._rate.filter(new, now, lost=lost)
+        return passed + (self._rate.flush() if over else [])
 
     def _alarm_lines(self, snapshot: Snapshot) -> list[str]:
         """A line for each alarm that has come, come again or been acknowledged."""
@@ -115,7 +115,7 @@ def watch(observer: Observer, console: Console) -> None:
             time.sleep(PERIOD)
             draw(observer.snapshot())
     if not console.is_terminal:
-        console.print(rendered(observer.identity, observer.snapshot(), page.Trend()))
+        console.print(render(observer.identity, observer.snapshot(), page.Trend()))
 
 
 @contextmanager
@@ -129,7 +129,7 @@ def _screen(
     def draw(snapshot: Snapshot) -> None:
         trend.add(snapshot.values)
         if live:
-            shown.update(rendered(observer.identity, snapshot, trend), refresh=True)
+            shown.update(render(observer.identity, snapshot, trend), refresh=True)
 
     if not live:
         yield console, draw
@@ -138,7 +138,7 @@ def _screen(
         yield console, draw
 
 
-def rendered(identity: dict[str, Any], snapshot: Snapshot, trend: page.Trend) -> Panel:
+def render(identity: dict[str, Any], snapshot: Snapshot, trend: page.Trend) -> Panel:
     """The page of a snapshot for a terminal."""
     values = snapshot.values
     last = new_lines(snapshot, values.changes - page.LAST)

@@ -119,7 +119,7 @@ class TravelCycle:
         rows = [
             f"{one.name:32s} {one.count:3d} x {one.mass:6.0f} kg {one.distance:8.1f} m "
             f"{one.duration:7.1f} s  driving {one.driving / 1e3:8.2f} kJ  "
-            f"braking {one.braking / 1e3:8.2f} kJ{_mirrored(one)}"
+            f"braking {one.braking / 1e3:8.2f} kJ{_direction_note(one)}"
             for one in self.legs
         ]
         room = HOUR / self.cycles_per_hour
@@ -138,7 +138,7 @@ class TravelCycle:
         )
 
 
-def _mirrored(leg: Leg) -> str:
+def _direction_note(leg: Leg) -> str:
     """What is said of a leg in reverse: the bench turns forward only."""
     return "  in reverse, driven forward on the bench" if leg.direction == REVERSE else ""
 

@@ -177,15 +177,15 @@ class Export:
             time = np.round(time, CLOCK_DIGITS)
             steps = np.diff(time, prepend=elapsed)
             self.survey.quality.count(steps[0 if np.isfinite(last) else 1 :].tolist())
-            told = self._told(found)
-            begin = reached(np.append(echo, told[:-1]), told, steps)
+            told = self._next_reference(found)
+            begin = interpolate_reference(np.append(echo, told[:-1]), told, steps)
             knees = knees_of(begin, told, *asked[:, new])
             found[REFERENCE] = begin
             last, elapsed, echo = clock[-1], float(time[-1]), float(told[-1])
             whole = np.all([np.isfinite(found[name]) for name in NEEDED], axis=0)
             yield Piece(rows=found[whole], time=time[whole], knees=knees[:, whole])
 
-    def _told(self, rows: Any) -> Array:
+    def _next_reference(self, rows: Any) -> Array:
         """Reference at the end of the next scan [rad/s]; without its register, the setpoint."""
         told: Array = rows[REFERENCE]
         asked = np.nan_to_num(rows["setpoint_speed_setpoint"])
@@ -196,7 +196,7 @@ class Export:
         found: Columns = {}
         rows = piece.rows
         for column in LOG_COLUMNS.values():
-            if column.measured is not None and self._filled(column.measured, log=True):
+            if column.measured is not None and self._has_values(column.measured, log=True):
                 unit = UNITS[column.unit]
                 values = (rows[f"measured_{column.measured}"] - unit.shift) / unit.factor
                 found[column.column] = values
@@ -215,7 +215,7 @@ class Export:
             found[name] = np.array([say(int(code)) for code in rows[key]], dtype=str)
         return found | self._other_signals(rows)
 
-    def _filled(self, signal: str, *, log: bool) -> bool:
+    def _has_values(self, signal: str, *, log: bool) -> bool:
         """Whether a signal has values; in a log without every tick, at every sample."""
         count = self.survey.finite.get(f"measured_{signal}", 0)
         if log and not self.extent.every:
@@ -230,11 +230,11 @@ class Export:
             for signal in SIGNALS.values()
             if signal.kind == "measurement"
             and signal.name not in taken
-            and self._filled(signal.name, log=False)
+            and self._has_values(signal.name, log=False)
         }
 
 
-def reached(before: Array, told: Array, steps: Array) -> Array:
+def interpolate_reference(before: Array, told: Array, steps: Array) -> Array:
     """Reference at each sample [rad/s]: what the sample before said, or a line across a hole.
 
     before, told : what the sample before and this one said of the end of the next scan [rad/s]

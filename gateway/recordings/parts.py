@@ -106,7 +106,7 @@ def part_path(first: Path, number: int) -> Path:
     return first.with_name(f"{first.name.removesuffix(SUFFIX)}.{number:03d}{SUFFIX}")
 
 
-def following(first: Path) -> Iterator[Path]:
+def find_later_parts(first: Path) -> Iterator[Path]:
     """Parts that follow the first part of a run, compressed or not."""
     plain = first.with_name(first.name.removesuffix(COMPRESSED))
     number = 2

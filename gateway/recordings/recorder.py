@@ -135,9 +135,9 @@ def _append(receiver: Connection, job: Job) -> None:
         for batch in _batches(receiver.fileno(), layout.size):
             if batch:
                 last = float(np.frombuffer(batch, kind)["now"][-1])
-                parts.write(wait.passed(batch), last)
+                parts.write(wait.filter(batch), last)
                 trips.take(batch)
-        parts.write(wait.rest(), 0.0)
+        parts.write(wait.flush(), 0.0)
 
 
 def _batches(source: int, size: int) -> Iterator[bytes]:

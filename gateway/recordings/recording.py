@@ -20,7 +20,7 @@ from gateway.cycle.record import MAGIC, is_intact
 from gateway.cycle.supervisor import State
 from gateway.errors import RecordingError
 from gateway.recordings.header import PREFIX, Header, decode, length_of
-from gateway.recordings.parts import SUFFIX, following, open_plain_or_compressed, plain_size
+from gateway.recordings.parts import SUFFIX, find_later_parts, open_plain_or_compressed, plain_size
 
 CHUNK: Final = 1000
 PIECE: Final = 5000
@@ -77,7 +77,7 @@ def read(path: Path) -> GatewayRecording:
 
     Raises RecordingError, and DamageError for a damaged record.
     """
-    first, *others = [_read_part(one) for one in (path, *following(path))]
+    first, *others = [_read_part(one) for one in (path, *find_later_parts(path))]
     if not others:
         return first
     return replace(
@@ -143,7 +143,7 @@ def stream(path: Path) -> Stream:
 
     Raises RecordingError.
     """
-    first, *others = [_stream_part(one) for one in (path, *following(path))]
+    first, *others = [_stream_part(one) for one in (path, *find_later_parts(path))]
     note = "; ".join(one.note for one in (first, *others) if one.note)
     return replace(first, parts=tuple(others), note=note)
 

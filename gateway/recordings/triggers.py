@@ -51,7 +51,7 @@ class Wait:
         self._held = Held(WAIT)
         self._since: float | None = None
 
-    def passed(self, batch: bytes) -> bytes:
+    def filter(self, batch: bytes) -> bytes:
         """The records of a batch that are to be written, and held ones before them."""
         written, size = [], self._type.itemsize
         for index, tick in enumerate(np.frombuffer(batch, self._type)):
@@ -64,7 +64,7 @@ class Wait:
                 written += [self._held.release(), record]
         return b"".join(written)
 
-    def rest(self) -> bytes:
+    def flush(self) -> bytes:
         """Records that are still held."""
         return self._held.release()
 

@@ -22,7 +22,7 @@ FOR_EVER = 1.0
 """[s] Longest time of missed deadlines: the longest time of a watchdog."""
 
 
-def limits(config: Config) -> Iterator[Finding]:
+def review_limits(config: Config) -> Iterator[Finding]:
     """Findings on overspeed, deviation and missed deadlines."""
     most, loop = config.limits, config.loop
     overspeed, top = most.overspeed / RPM, most.speed_max / RPM
@@ -54,7 +54,7 @@ def limits(config: Config) -> Iterator[Finding]:
     )
 
 
-def bench(config: Config) -> Iterator[Finding]:
+def review_bench(config: Config) -> Iterator[Finding]:
     """Findings on slopes, lead and inertia: are they those of a possible bench?"""
     can = steepest(config) / RPM
     for key, rate, is_refused in (

@@ -18,7 +18,7 @@ DRIVE_LAG = 1.0 / DRIVE
 """[s] Lag of the speed-controlled motor behind its reference."""
 
 
-def timing(config: Config) -> Iterator[Finding]:
+def review_timing(config: Config) -> Iterator[Finding]:
     """Findings on polls, time-outs and watchdog: do they fit each other?"""
     period, stale = config.loop.period, config.loop.stale
     timeout, watchdog = config.plc.timeout, config.limits.watchdog
@@ -65,7 +65,7 @@ def _delay(config: Config) -> Finding:
     )
 
 
-def speeds(config: Config) -> Iterator[Finding]:
+def review_speeds(config: Config) -> Iterator[Finding]:
     """Findings on the planned run: does it fit into the limits of the setpoint?"""
     truck, bench, most = config.truck, config.bench, config.limits
     to_motor = bench.gear_ratio / bench.drum_radius
@@ -88,7 +88,7 @@ def speeds(config: Config) -> Iterator[Finding]:
         )
 
 
-def torque(config: Config) -> Iterator[Finding]:
+def review_torque(config: Config) -> Iterator[Finding]:
     """Findings on the motor: does its current allow the torque of the planned run?
 
     xi T_m = J theta_d'' + T_f - T_w' with T_w' = m r_d^2 theta_d'' + T_RL

@@ -54,7 +54,7 @@ def _filters_match(config: Config) -> bool:
     return config.bench.torque_filter == config.bench.speed_filter
 
 
-def gain(config: Config) -> Iterator[Finding]:
+def review_gain(config: Config) -> Iterator[Finding]:
     """Findings on rho, and on the conditions for a high rho."""
     rho = rho_of(config)
     safe = _same_window(config) and _filters_match(config) and lead_of(config) == 0.0
@@ -79,7 +79,7 @@ def gain(config: Config) -> Iterator[Finding]:
         )
 
 
-def stability(config: Config) -> Iterator[Finding]:
+def review_stability(config: Config) -> Iterator[Finding]:
     """Findings on the stability of the sampled loop.
 
     With lead the model is too strict, so that it only warns.
@@ -104,7 +104,7 @@ def stability(config: Config) -> Iterator[Finding]:
         )
 
 
-def aliasing(config: Config) -> Iterator[Finding]:
+def review_aliasing(config: Config) -> Iterator[Finding]:
     """Findings on a torque that misses the response to the steps of the setpoint."""
     if _same_window(config):
         return

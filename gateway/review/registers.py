@@ -16,7 +16,7 @@ UNENDING = 2**31
 """Count of commands that a counter without wrap must hold: 248 days at 100 Hz."""
 
 
-def measurements(config: Config, register_map: RegisterMap) -> Iterator[Finding]:
+def review_measurements(config: Config, register_map: RegisterMap) -> Iterator[Finding]:
     """Findings on the torque and the temperature that the configuration needs."""
     needed = NEEDS[config.regulator.torque]
     if register_map.register(needed) is None:
@@ -73,7 +73,7 @@ TEST_WORDS: Final = {
 """Constants of which one is enough."""
 
 
-def protections(_config: Config, register_map: RegisterMap) -> Iterator[Finding]:
+def review_protections(_config: Config, register_map: RegisterMap) -> Iterator[Finding]:
     """Warnings for each protection that the register map does not have."""
     missing = {name: why for name, why in PROTECTIONS.items() if not _has(register_map, name)}
     if not any(_has(register_map, name) for name in TEST_WORDS):
@@ -92,7 +92,7 @@ def _has(register_map: RegisterMap, signal: str) -> bool:
     return register_map.register(signal) is not None
 
 
-def commands(config: Config, register_map: RegisterMap) -> Iterator[Finding]:
+def review_commands(config: Config, register_map: RegisterMap) -> Iterator[Finding]:
     """Findings on commands that the limits allow and that do not fit into their registers.
 
     Such a command would be refused when it is written, in the middle of a run.

@@ -9,17 +9,17 @@ from register_maps.register_map import RegisterMap
 def review(config: Config, register_map: RegisterMap) -> Review:
     """Review limits, times, loop stability and register map; the worst finding comes first."""
     found = [
-        *registers.measurements(config, register_map),
-        *registers.commands(config, register_map),
-        *registers.protections(config, register_map),
-        *loop.gain(config),
-        *loop.stability(config),
-        *loop.aliasing(config),
-        *limits.timing(config),
-        *limits.speeds(config),
-        *limits.torque(config),
-        *bounds.limits(config),
-        *bounds.bench(config),
+        *registers.review_measurements(config, register_map),
+        *registers.review_commands(config, register_map),
+        *registers.review_protections(config, register_map),
+        *loop.review_gain(config),
+        *loop.review_stability(config),
+        *loop.review_aliasing(config),
+        *limits.review_timing(config),
+        *limits.review_speeds(config),
+        *limits.review_torque(config),
+        *bounds.review_limits(config),
+        *bounds.review_bench(config),
     ]
     found.sort(key=lambda finding: SEVERITIES.index(finding.severity))
     return Review(findings=tuple(found))

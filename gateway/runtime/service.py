@@ -16,7 +16,7 @@ def unit(config: Path) -> str:
     """Text of the unit that runs this installation with a configuration."""
     template = resources.files(__package__).joinpath(NAME).read_text("utf-8")
     words = (sys.executable, "-m", "gateway", "run", "-c", str(config.resolve()))
-    command = " ".join((*map(_quoted, words), "--log-format", "json"))
+    command = " ".join((*map(_quote, words), "--log-format", "json"))
     return template.replace("{command}", command)
 
 
@@ -37,7 +37,7 @@ def install(config: Path, folder: Path) -> Path:
     return path
 
 
-def _quoted(word: str) -> str:
+def _quote(word: str) -> str:
     """Word of a command line as systemd reads it: no specifiers, no variables."""
     if word.replace("/", "").replace("-", "").replace(".", "").replace("_", "").isalnum():
         return word

@@ -21,7 +21,7 @@ from gateway.configuration.config import Config
 from gateway.errors import ConfigError
 from gateway.recordings import recording, step_runs
 from gateway.recordings.header import config_of
-from gateway.recordings.parts import following
+from gateway.recordings.parts import find_later_parts
 from gateway.recordings.recording import GatewayRecording
 from gateway.reports import certificate as report
 from gateway.workflows.run_quality import quality_of
@@ -146,7 +146,7 @@ def _run(
 
 def _digests(path: Path, folder: Path) -> dict[str, str]:
     """SHA-256 of every part of a recording, by its path from the folder on."""
-    return {_relative(part, folder): _digest(part) for part in (path, *following(path))}
+    return {_relative(part, folder): _digest(part) for part in (path, *find_later_parts(path))}
 
 
 def _relative(path: Path, folder: Path) -> str:

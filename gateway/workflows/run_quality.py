@@ -11,7 +11,7 @@ from gateway.offline.drive_quality import DriveQuality, drive_quality
 from gateway.physics.road_load import road_load
 from gateway.recordings import recording
 from gateway.recordings.header import config_of
-from gateway.recordings.parts import following
+from gateway.recordings.parts import find_later_parts
 from gateway.recordings.recording import GatewayRecording
 
 
@@ -31,7 +31,7 @@ def quality_at_the_end(path: Path) -> DriveQuality | None:
     None also for a recording that cannot be read, or that has a second part: the end of the daemon
     must not wait for hours of records, which `replay` takes.
     """
-    if any(following(path)):
+    if any(find_later_parts(path)):
         return None
     try:
         found = recording.read(path)

@@ -62,7 +62,7 @@ def _push(mass: float, force: float, scale: float, label: str) -> Step:
     )
 
 
-def between(run: StepRun) -> Iterator[tuple[Emulation, slice]]:
+def find_pushes(run: StepRun) -> Iterator[tuple[Emulation, slice]]:
     """Pushes with their samples between the two speeds, where the drum came from end to end."""
     for step, part in run.parts(LABEL):
         inside = np.flatnonzero((run.rim_speed[part] >= LOWEST) & (run.rim_speed[part] <= HIGHEST))
@@ -77,7 +77,7 @@ def evaluate(run: StepRun) -> list[Check]:
     """Worst and mean error of the acceleration."""
     limit = 100.0 * run.config.verification.acceleration
     errors = []
-    for step, part in between(run):
+    for step, part in find_pushes(run):
         time, speed = run.trace.time[part], run.rim_speed[part]
         found = float(np.polyfit(time - time[0], speed, 1)[0])
         errors.append(100.0 * (found / (step.force / step.mass) - 1.0))

@@ -24,7 +24,7 @@ steps = acceleration.steps
 
 def inertias(run: StepRun) -> Array:
     """Inertia of gear and drum [kg m^2] of every pair of a run up and a run down."""
-    pushes = list(acceleration.between(run))
+    pushes = list(acceleration.find_pushes(run))
     pairs = zip(pushes[::2], pushes[1::2], strict=False)
     return np.array([_inertia(run, up[1], down[1]) for up, down in pairs])
 

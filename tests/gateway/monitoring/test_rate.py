@@ -20,17 +20,17 @@ def names(first: int, last: int) -> list[str]:
 
 def test_a_burst_passes_and_a_quiet_log_is_never_limited() -> None:
     one = rate()
-    assert one.passed(names(0, BURST), 100.0) == names(0, BURST)
+    assert one.filter(names(0, BURST), 100.0) == names(0, BURST)
     for number in range(1, 50):
-        assert one.passed(["again"], 100.0 + number * EVERY) == ["again"]
+        assert one.filter(["again"], 100.0 + number * EVERY) == ["again"]
 
 
 def test_flood_is_counted_and_its_newest_line_comes_when_it_may() -> None:
     one = rate()
-    assert one.passed(names(0, BURST + 7), 100.0) == names(0, BURST)
-    assert one.passed(["line 27"], 100.1) == []
-    assert one.passed([], 100.0 + EVERY) == ["7 left out", "line 27"]
-    assert one.passed([], 200.0) == []
+    assert one.filter(names(0, BURST + 7), 100.0) == names(0, BURST)
+    assert one.filter(["line 27"], 100.1) == []
+    assert one.filter([], 100.0 + EVERY) == ["7 left out", "line 27"]
+    assert one.filter([], 200.0) == []
 
 
 def test_ten_lines_a_second_for_an_hour_are_not_more_than_the_rate() -> None:
@@ -38,7 +38,7 @@ def test_ten_lines_a_second_for_an_hour_are_not_more_than_the_rate() -> None:
     written = [
         line
         for tick in range(36000)
-        for line in one.passed([f"line {tick}"], 0.1 * tick)
+        for line in one.filter([f"line {tick}"], 0.1 * tick)
         if line.startswith("line")
     ]
     assert BURST + 3600 / EVERY - 2 <= len(written) <= BURST + 3600 / EVERY
@@ -46,9 +46,9 @@ def test_ten_lines_a_second_for_an_hour_are_not_more_than_the_rate() -> None:
 
 def test_end_of_the_run_tells_what_is_held() -> None:
     one = rate()
-    one.passed(names(0, BURST + 2), 100.0)
-    assert one.rest() == ["1 left out", f"line {BURST + 1}"]
-    assert one.rest() == []
+    one.filter(names(0, BURST + 2), 100.0)
+    assert one.flush() == ["1 left out", f"line {BURST + 1}"]
+    assert one.flush() == []
 
 
 IDENTITY = {"recording": "runs/1.rlrec", "real_time": "SCHED_FIFO no (Operation not permitted)"}

@@ -163,5 +163,5 @@ def test_page_fits_a_terminal_of_80_columns(publisher: Publisher) -> None:
     for _ in range(100):
         trend.add(snapshot.values)
     with console.capture() as capture:
-        console.print(terminal.rendered(IDENTITY, snapshot, trend))
+        console.print(terminal.render(IDENTITY, snapshot, trend))
     assert max(map(len, capture.get().splitlines())) <= 80

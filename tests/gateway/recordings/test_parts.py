@@ -129,7 +129,7 @@ def test_long_wait_for_the_plc_is_written_at_its_beginning_and_at_its_end() -> N
     """20 s of wait at 100 Hz, then two ticks with an image; 3 s are kept at both ends."""
     wait = Wait(LAYOUT.formats)
     made = [*map(waiting, range(2000)), tick(2000), tick(2001)]
-    content = b"".join(wait.passed(LAYOUT.pack(one)) for one in made) + wait.rest()
+    content = b"".join(wait.filter(LAYOUT.pack(one)) for one in made) + wait.flush()
     kept = ticks_in(content)
     assert kept == sorted(set(kept))
     assert set(kept) >= {*range(300), *range(1710, 2002)}
@@ -138,7 +138,7 @@ def test_long_wait_for_the_plc_is_written_at_its_beginning_and_at_its_end() -> N
 
 def test_end_of_a_wait_without_a_plc_is_written_too() -> None:
     wait = Wait(LAYOUT.formats)
-    content = b"".join(wait.passed(LAYOUT.pack(waiting(k))) for k in range(1000)) + wait.rest()
+    content = b"".join(wait.filter(LAYOUT.pack(waiting(k))) for k in range(1000)) + wait.flush()
     assert ticks_in(content)[-1] == 999
 
 
