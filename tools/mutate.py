@@ -174,6 +174,9 @@ def run_tests(mutant: Mutant) -> int:
     """Run the tests with the mutant in the place of its module; their exit code."""
     import pytest  # loaded by the parent, so that a child does not wait for it
 
+    # A module that holds a function of the unchanged one would go on calling that.
+    for loaded in [one for one in sys.modules if one.split(".")[0] == "gateway"]:
+        del sys.modules[loaded]
     changed = types.ModuleType(mutant.module)
     package, _, name = mutant.module.rpartition(".")
     sys.modules[mutant.module] = changed

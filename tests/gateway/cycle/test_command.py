@@ -35,6 +35,7 @@ def test_before_the_first_tick_nothing_is_written_nor_known():
     assert (begin.speed, begin.written) == (0.0, 0.0)
     assert (begin.echo_moved, begin.got_through) == (-inf, -inf)
     assert (begin.sent, begin.other_wrote, begin.unanswered) == (-inf, -inf, 0)
+    assert (begin.ticked, begin.heard, begin.asked, begin.arrived) == (-inf,) * 4
     assert (begin.down, begin.enabled) == (False, False)
 
 
@@ -249,6 +250,11 @@ def test_a_fault_beside_a_good_reading_is_that_of_the_write():
     again = command.note_reply(after, READING, Reason.CONNECTION_LOST)
     assert (again.fault, again.down) == (Reason.TIMEOUT, True)
     assert not command.note_reply(again, READING, Reason.TIMEOUT).down
+
+
+def test_a_state_that_writes_nothing_has_setpoint_zero_and_enable_off():
+    after = command.reset(replace(SENT, speed=12.0, enabled=True), 6.0)
+    assert (after.speed, after.written, after.enabled) == (0.0, 6.0, False)
 
 
 @pytest.mark.parametrize("fault", [None, Reason.TIMEOUT])

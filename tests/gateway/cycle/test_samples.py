@@ -8,6 +8,7 @@ import pytest
 from gateway.configuration.config import Config
 from gateway.cycle import samples
 from gateway.cycle.samples import Samples
+from gateway.friction.law import friction_torque
 from gateway.reasons import Reason
 from register_maps import load
 from register_maps.signals import Measurement, Status
@@ -80,7 +81,10 @@ def test_oil_begins_at_the_shell_and_warms_from_window_to_window():
     last = replace(LATER, sequence_start=13, sequence_end=13, plc_time=1.06)
     readings = [replace(one, shell_temperature_1=300.0) for one in (FIRST, LATER, last)]
     assert after(*readings[:2]).window.oil_temperature == 300.0
-    assert after(*readings, every=0.03).window.oil_temperature > 300.0
+    law, gear_speed = CONFIG.regulator.friction, 100.0 / 62.6
+    heat = friction_torque(gear_speed, law, 300.0, 300.0) * gear_speed
+    warmed = after(*readings, every=0.03).window.oil_temperature - 300.0
+    assert warmed == pytest.approx(0.03 * heat / law.gear_oil_temperature.heat_capacity, rel=1e-3)
 
 
 def test_a_sample_without_its_torque_falls_back_to_that_at_its_end():
@@ -349,11 +353,18 @@ def test_sample_number_that_starts_anew_behind_the_middle_of_its_range_is_a_rest
     assert restarted(old, changed(sequence_start=1, sequence_end=1))
 
 
-@pytest.mark.parametrize(("ahead", "found"), [(129, False), (131, True)])
-def test_sample_number_may_lead_by_what_a_scan_of_1_ms_allows_and_100(ahead, found):
-    """0.03 s between the readings."""
+@pytest.mark.parametrize(("ahead", "found"), [(599, False), (600, True)])
+def test_sample_number_may_lead_by_less_than_a_scan_of_1_ms_allows_and_100(ahead, found):
+    """0.5 s between the readings."""
     number = FIRST.sequence_start + ahead
-    assert restarted(FIRST, changed(sequence_start=number, sequence_end=number)) is found
+    now = changed(sequence_start=number, sequence_end=number, plc_time=1.5)
+    assert restarted(FIRST, now, every=0.5) is found
+
+
+def test_sample_number_that_does_not_move_follows_none():
+    seen = replace(after(FIRST, LATER), is_new=True, before=LATER)
+    still = replace(seen, newest=replace(LATER, plc_time=LATER.plc_time + 0.01))
+    assert samples.with_window(CONFIG, MAP, still).window_fault is Reason.PLC_RESTARTED
 
 
 def test_sample_number_that_wraps_is_no_restart():

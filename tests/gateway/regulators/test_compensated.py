@@ -107,6 +107,33 @@ def test_friction_falls_with_the_temperature_of_the_shell():
     assert warm == pytest.approx(nominal * np.exp(-0.1))
 
 
+def test_losses_by_load_and_in_the_bearings_are_part_of_the_friction():
+    """626 N m drive the gear: what its friction leaves loses 1/11 by load; the bearings take 20.
+
+    0.003 of the friction is left uncompensated.
+    """
+    nominal = PARAMS.friction
+    friction = replace(
+        nominal,
+        load_dependent_gear_loss=replace(
+            nominal.load_dependent_gear_loss, share=0.1, difference=0.0
+        ),
+        drum_bearing_friction=replace(nominal.drum_bearing_friction, coulomb=20.0, viscous=0.0),
+    )
+    gear = friction_torque(1.0, nominal)
+    seen = truck_torque(
+        replace(PARAMS, friction=friction), window(torque=-10.0, motor=62.6, drum=1.0)
+    )
+    assert seen == pytest.approx(-626.0 + 0.997 * (gear + (626.0 - gear) / 11.0 + 20.0))
+
+
+def test_acceleration_of_the_drum_is_smoothed_over_50_ms():
+    """The drum gains 2 rad/s^2 over 10 ms: 1 - exp(-0.2) of the way from 1 to 2."""
+    state = replace(compensated.seed(PARAMS, 200.0, 3.0), drum_acceleration=1.0)
+    after, _ = compensated.update(PARAMS, state, window(motor=200.0, drum=3.0, change=0.02))
+    assert after.drum_acceleration == pytest.approx(1.0 + 0.181269)
+
+
 def test_lead_adds_the_acceleration_times_its_time():
     state = compensated.seed(PARAMS, 200.0, 200.0 / 62.6)
     seen = window(torque=10.0, motor=200.0, drum=200.0 / 62.6)
