@@ -14,7 +14,7 @@ from gateway.friction.document import regulator_entries
 
 
 def load(path: str | Path) -> Config:
-    """Configuration in a TOML file; a relative friction file is searched beside it.
+    """Configuration in a TOML file; relative files of friction and memory are searched beside it.
 
     Raises ConfigError with file and line.
     """
@@ -26,6 +26,7 @@ def load(path: str | Path) -> Config:
 
     written = _toml(file, text)
     document = _with_friction(written, file.parent, place, _keys_of(written.get("regulator")))
+    document = _with_memory(document, file.parent, place)
     return _refuse_unknown_regulator(from_document(document, place=place), place)
 
 
@@ -38,7 +39,8 @@ def with_values(config: Config, values: Mapping[str, object]) -> Config:
     """Configuration with some values changed, `{"truck.load_kg": 1600}`; a text is read as TOML.
 
     `regulator.friction` may also be the path of a friction file; what that tells of the torque
-    sensor holds unless the values name it. Raises ConfigError.
+    sensor holds unless the values name it. `regulator.learned` may be a path, too. Raises
+    ConfigError.
     """
     try:
         document = merge(config.document, values)
@@ -46,7 +48,7 @@ def with_values(config: Config, values: Mapping[str, object]) -> Config:
         raise ConfigError(_why(error), place="--set", expected="KEY=VALUE as in TOML") from error
     place = "{}.{}".format
     named = {name.removeprefix("regulator.") for name in values}
-    whole = _with_friction(document, Path(), place, named)
+    whole = _with_memory(_with_friction(document, Path(), place, named), Path(), place)
     return _refuse_unknown_regulator(from_document(whole), place)
 
 
@@ -78,6 +80,16 @@ def _with_friction(
     found = load_friction(directory / regulator["friction"])
     told = {key: one for key, one in found.items() if key == "friction" or key not in named}
     return document | {"regulator": {**regulator, **told}}
+
+
+def _with_memory(document: dict[str, Any], directory: Path, place: Place) -> dict[str, Any]:
+    """Document with the content of the file that the learned regulator remembers by."""
+    regulator = document.get("regulator")
+    if not isinstance(regulator, Mapping) or not isinstance(regulator.get("learned"), str):
+        return document
+    check_text(regulator["learned"], place("regulator", "learned"))
+    path = directory / regulator["learned"]
+    return document | {"regulator": {**regulator, "learned": _toml(path, _text(path))}}
 
 
 def _text(path: Path) -> str:

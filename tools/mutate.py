@@ -33,6 +33,7 @@ TARGETS = {
     "gateway.regulators.thesis": (EVERY, "tests/gateway/regulators/test_thesis.py"),
     "gateway.physics.virtual_truck": (EVERY, "tests/gateway/regulators/test_compensated.py"),
     "gateway.regulators.compensated": (EVERY, "tests/gateway/regulators/test_compensated.py"),
+    "gateway.regulators.learned": (EVERY, "tests/gateway/regulators/test_learned.py"),
 }
 """The tests of each module, the quick ones first."""
 OPTIONS = ("-x", "-q", "-p", "no:cacheprovider", "-W", "ignore", "--tb=no", "--assert=plain")

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any, get_type_hints
 
 from gateway.configuration.keys import keys, read_value
+from gateway.configuration.memory import read_memory
 from gateway.configuration.program import Program, document_of, read_program
 from gateway.configuration.sections import (
     SECTIONS,
@@ -38,6 +39,11 @@ Document = dict[str, dict[str, Any]]
 Place = Callable[[str, str], str]
 PROGRAMS = {"sweep": read_sweep, "program": read_program}
 """Tables that ask for a program, and what reads them."""
+TABLES: dict[str, Callable[[object, str], Any]] = {
+    "friction": read_friction,
+    "learned": read_memory,
+}
+"""Tables inside [regulator], and what reads them."""
 
 
 def _defaults() -> Document:
@@ -125,8 +131,8 @@ def _section(name: str, section: type, entries: Mapping[str, Any], place: Place)
     values = {}
     for entry, value in entries.items():
         where = place(name, entry)
-        if section is RegulatorConfig and entry == "friction":
-            values["friction"] = read_friction(value, where)
+        if section is RegulatorConfig and entry in TABLES:
+            values[entry] = TABLES[entry](value, where)
             continue
         if entry not in known:
             expected = ", ".join(sorted(known))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gateway.configuration.keys import declare
+from gateway.configuration.memory import NOTHING, Memory
 from gateway.friction.law import THESIS, Friction
 from register_maps.units import KMH, RPM
 
@@ -119,6 +120,7 @@ class RegulatorConfig:
     torque_offset, torque_gain, torque_lag : of the torque sensor, which the regulator takes out:
         torque that it shows without load [N m], error of its gain [1], time constant [s]
     breakaway : torque over the road load at which a standing truck starts [N m at the drum]
+    learned : what the learned regulator remembers of earlier runs
     """
 
     name: str = declare("name", "compensated")
@@ -138,6 +140,7 @@ class RegulatorConfig:
     torque_lag: float = declare("torque_lag_ms", 0.0, scale=MILLI, lower=0.0, upper=1000.0)
     breakaway: float = declare("breakaway_Nm", 30.0, lower=0.0, upper=2000.0)
     friction: Friction = THESIS
+    learned: Memory = NOTHING
 
     def shaft_torque(self, shown: Any) -> Any:
         """Torque of the shaft where the sensor steadily shows this one [N m], a number or array."""

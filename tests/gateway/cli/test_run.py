@@ -244,4 +244,4 @@ def test_a_regulator_that_there_is_not_is_one_line_and_exit_code_2(
     assert ended.stderr.count("\n") == 1
     why = "unknown regulator" if name else "empty"
     assert f"bench.toml:2: [regulator] name: {why}" in ended.stderr
-    assert not name or "compensated or thesis" in ended.stderr
+    assert not name or "compensated or learned or thesis" in ended.stderr

@@ -32,9 +32,10 @@ def params(regulator):
     return regulator.Params.of(CONFIG)
 
 
-def test_both_are_found_and_an_unknown_one_is_refused():
-    assert set(regulators.names()) >= {"thesis", "compensated"}
-    with pytest.raises(ConfigError, match=r"regulator\.name.*'best'.*compensated or thesis"):
+def test_all_are_found_and_an_unknown_one_is_refused():
+    assert set(regulators.names()) >= {"thesis", "compensated", "learned"}
+    expected = r"regulator\.name.*'best'.*compensated or learned or thesis"
+    with pytest.raises(ConfigError, match=expected):
         regulators.load("best")
 
 
