@@ -23,7 +23,8 @@ LAST: Final = 8
 STALLED: Final = 1.0
 """[s] A daemon whose last tick is older does not run as it should."""
 
-Row = tuple[str, str]
+Row = tuple[str, ...]
+"""Label, and what stands beside it."""
 ROWS: Final[tuple[tuple[str, str, Callable[[float], str]], ...]] = (
     ("setpoint, motor", "setpoint", lambda v: f"{v / RPM:.1f} rpm"),
     ("demand, motor", "demand", lambda v: f"{v / RPM:.1f} rpm"),
@@ -68,7 +69,7 @@ def bars(values: Iterable[float]) -> str:
 def status_rows(values: Values, age: float) -> list[Row]:
     """State and reason; age : of the last tick [s]."""
     shadow = " (shadow)" if values.shadow else ""
-    rows = [
+    rows: list[Row] = [
         ("state", f"{State(values.state).name}{shadow} for {values.now - values.since:.0f} s"),
         ("reason", reason_text(values.reason)),
     ]
@@ -117,22 +118,23 @@ def _bound(duration: float) -> str:
 def count_rows(snapshot: Snapshot) -> list[Row]:
     """Reasons and faults that have occurred: changes to the reason, ticks with the fault."""
     return [
-        (reason_text(code), f"as reason {count}, as fault in ticks {snapshot.faults[code]}")
+        (reason_text(code), f"reason of {count} changes", f"fault in {snapshot.faults[code]} ticks")
         for code, count in snapshot.reasons.items()
         if code and (count or snapshot.faults[code])
     ]
 
 
 def alarm_rows(alarms: Sequence[Alarm], date: Callable[[float], datetime]) -> list[Row]:
-    """Reason and state of each alarm; date : of a monotonic time [s]."""
-    return [(reason_text(alarm.reason), alarm_text(alarm, date)) for alarm in alarms]
+    """Alarms, those that wait for the operator first; date : of a monotonic time [s]."""
+    ordered = sorted(alarms, key=lambda alarm: alarm.acknowledged)
+    return [(reason_text(alarm.reason), *alarm_cells(alarm, date)) for alarm in ordered]
 
 
-def alarm_text(alarm: Alarm, date: Callable[[float], datetime]) -> str:
+def alarm_cells(alarm: Alarm, date: Callable[[float], datetime]) -> Row:
     """How often, since when, and whether acknowledged."""
     times = f"{alarm.count} time{'s' if alarm.count > 1 else ''}"
     first = date(alarm.first).isoformat(timespec="seconds")
-    return f"{times}, first {first}, {'' if alarm.acknowledged else 'not '}acknowledged"
+    return times, f"first {first}", f"{'' if alarm.acknowledged else 'not '}acknowledged"
 
 
 def document(

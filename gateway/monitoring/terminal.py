@@ -79,7 +79,7 @@ class RunLog:
         return [
             self._note(
                 "alarm",
-                f"{reason_text(one.reason)}: {page.alarm_text(one, date)}",
+                f"{reason_text(one.reason)}: {', '.join(page.alarm_cells(one, date))}",
                 date(snapshot.values.acknowledged if one.acknowledged else one.last),
                 warning=not one.acknowledged,
             )
@@ -145,9 +145,9 @@ def render(identity: dict[str, Any], snapshot: Snapshot, trend: page.Trend) -> P
     return Panel(
         Group(
             _grid(page.status_rows(values, time.monotonic() - values.now)),
+            _grid(page.alarm_rows(snapshot.alarms, date)),
             _trends(values, trend),
             _grid(page.time_rows(snapshot)),
-            _grid(page.alarm_rows(snapshot.alarms, date)),
             _grid(page.count_rows(snapshot)),
             *last,
         ),
@@ -158,8 +158,8 @@ def render(identity: dict[str, Any], snapshot: Snapshot, trend: page.Trend) -> P
 def _grid(rows: list[page.Row]) -> Table:
     grid = Table.grid(padding=(0, 2))
     grid.add_column(style="bold", min_width=18)
-    for label, text in rows:
-        grid.add_row(label, text)
+    for row in rows:
+        grid.add_row(*row)
     return grid
 
 

@@ -61,7 +61,9 @@ def test_page_shows_state_values_trend_and_changes_and_complains_of_nothing(chro
     assert re.search(r'id="motor_speed" points="[\d., ]+"', document)
     assert re.search(r'id="gone" role="alert" hidden', document)
     assert '<table id="status" class="warning">' in document
-    assert '<section id="counted">' in document
+    for shown_section in ("alarmed", "counted"):
+        assert f'<section id="{shown_section}">' in document
+    assert re.search(r'id="alarms"><tr class="open">.*>not acknowledged<', document)
     assert "  RUN" in shown
 
 

@@ -54,7 +54,7 @@ def test_prometheus_reads_the_metrics_and_finds_the_values_in_si(web: Web) -> No
     assert 0.0 <= found["gateway_tick_age_seconds",] < 5.0
 
 
-def test_prometheus_reads_an_alarm_with_its_first_time(web: Web) -> None:
+def test_alarm_has_its_first_time_and_stands_first_until_it_is_acknowledged(web: Web) -> None:
     trip = (good(0), good(1, State.RAMPDOWN, Reason.TIMEOUT), good(2, State.SAFE, Reason.TIMEOUT))
     begun = time.time()
     for one in trip:
@@ -65,9 +65,13 @@ def test_prometheus_reads_an_alarm_with_its_first_time(web: Web) -> None:
     assert begun - 1.0 < found["gateway_alarm_first_seconds", "TIMEOUT"] < time.time() + 1.0
     web.publish(good(3, State.SHADOW))
     assert web.samples()["gateway_alarm_active", "TIMEOUT"] == 0.0
-    ((label, text),) = json.loads(web.get("status.json")[1])["alarms"]
-    assert label.startswith("TIMEOUT")
-    assert text.endswith(", acknowledged")
+    for one in (good(4), good(5, State.RAMPDOWN, Reason.STALE)):
+        web.publish(one)
+    rows = json.loads(web.get("status.json")[1])["alarms"]
+    assert [(row[0].partition(":")[0], row[1], row[-1]) for row in rows] == [
+        ("STALE", "1 time", "not acknowledged"),
+        ("TIMEOUT", "1 time", "acknowledged"),
+    ]
 
 
 def test_histogram_is_cumulative_and_ends_with_its_count(web: Web) -> None:
