@@ -1,8 +1,9 @@
 """The files of one run: its parts one after another, compressed when closed, old files removed.
 
-A part ends at a size or after a time. The first part is NAME.rlrec, the next ones are
-NAME.002.rlrec and so on; each has the whole header. A closed part becomes NAME.rlrec.gz in a thread
-of the recorder, whose pipe meanwhile takes the records. The last part stays as it is.
+A part ends at a size or after a time. Old files are removed then, and at the start of a run. The
+first part is NAME.rlrec, the next ones are NAME.002.rlrec and so on; each has the whole header. A
+closed part becomes NAME.rlrec.gz in a thread of the recorder, whose pipe meanwhile takes the
+records. The last part stays as it is.
 """
 
 import gzip
@@ -49,7 +50,8 @@ class Parts:
         self._number, self._began = 1, -1.0
         self._synced = time.monotonic()
         self._file = path.open("ab", buffering=0)
-        self._packer: threading.Thread | None = None
+        self._tidier = threading.Thread(target=self._tidy, args=(path,))
+        self._tidier.start()
 
     def write(self, batch: bytes, now: float) -> None:
         """Append whole records."""
@@ -67,8 +69,7 @@ class Parts:
         """Close the last part, when all is on the disk."""
         os.fsync(self._file.fileno())
         self._file.close()
-        if self._packer is not None:
-            self._packer.join()
+        self._tidier.join()
 
     def _is_full(self, now: float) -> bool:
         return self._file.tell() >= self._keeping.size or now - self._began >= self._keeping.time
@@ -81,15 +82,16 @@ class Parts:
         self._file.close()
         self._file = following.open("xb", buffering=0)
         write_all(self._file, self._head)
-        if self._packer is not None:
-            self._packer.join()
-        self._packer = threading.Thread(target=self._pack, args=(closed, following))
-        self._packer.start()
+        self._tidier.join()
+        self._tidier = threading.Thread(target=self._tidy, args=(following, closed))
+        self._tidier.start()
 
-    def _pack(self, closed: Path, following: Path) -> None:
+    def _tidy(self, current: Path, closed: Path | None = None) -> None:
+        """Compress a closed part, and remove what is not to be kept beside the current one."""
         with suppress(OSError):  # a full disk: the closed part stays as it is
-            compress(closed)
-            remove_old(closed.parent, self._keeping, spared=following)
+            if closed is not None:
+                compress(closed)
+            remove_old(current.parent, self._keeping, spared=current)
 
 
 def write_all(file: FileIO, batch: bytes) -> None:

@@ -107,6 +107,14 @@ def test_old_recordings_and_old_trips_are_removed_and_nothing_else(tmp_path: Pat
     assert left_in(tmp_path) == kept
 
 
+def test_old_recordings_are_removed_at_the_start_of_a_run_too(tmp_path: Path) -> None:
+    """Runs may all be shorter than a part."""
+    aged(tmp_path, "old.rlrec", 40.0)
+    path = tmp_path / "now.rlrec"
+    written(path, Keeping(age=30 * 86400.0), 3)
+    assert left_in(tmp_path) == {"now.rlrec"}
+
+
 def test_oldest_recordings_give_way_to_the_total_size_and_trips_stay(tmp_path: Path) -> None:
     for days, name in enumerate(("now", "a", "b", "c")):
         aged(tmp_path, f"{name}.rlrec", float(days))
