@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from gateway.errors import ConfigError
+from gateway.errors import ConfigError, PlcError
 from gateway.link.tls import has_shaken_hands, wrap
 
 FIRST_DELAY: Final = 0.1
@@ -121,11 +121,15 @@ Address = tuple[socket.AddressFamily, tuple[str, int]]
 def resolve(host: str, port: int) -> list[Address]:
     """Address families and numeric addresses of a peer, in the order in which to try them.
 
-    Raises ConfigError for an unknown host.
+    Raises ConfigError for an unknown host, PlcError for name servers that do not answer now.
     """
     try:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
     except (OSError, ValueError) as error:  # a ValueError for a text that cannot be a name
+        if isinstance(error, socket.gaierror) and error.errno == socket.EAI_AGAIN:
+            raise PlcError(
+                f"{host}: {error.strerror}; expected a name server that answers"
+            ) from error
         raise ConfigError(
             getattr(error, "strerror", None) or "cannot be a name",
             place="[plc] host",

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from gateway.errors import ConfigError
+from gateway.errors import ConfigError, PlcError
 from gateway.link.connector import Connector
 from gateway.link.plc import LinkError, TcpLink
 from gateway.reasons import Reason
@@ -261,3 +261,15 @@ def test_a_connection_sends_at_once_and_notices_a_dead_peer() -> None:
 def test_an_unknown_host_is_refused_when_the_link_is_made() -> None:
     with pytest.raises(ConfigError, match="host"):
         TcpLink("no such host", 502, unit=1, timeout=TIMEOUT)
+
+
+def test_name_servers_that_do_not_answer_are_no_bad_input(monkeypatch: pytest.MonkeyPatch) -> None:
+    """systemd starts the gateway again after exit code 1, and not after 2."""
+
+    def unanswered(*_: object, **__: object) -> None:
+        raise socket.gaierror(socket.EAI_AGAIN, "Temporary failure in name resolution")
+
+    monkeypatch.setattr(socket, "getaddrinfo", unanswered)
+    with pytest.raises(PlcError, match="plc: Temporary failure in name resolution") as raised:
+        TcpLink("plc", 502, unit=1, timeout=TIMEOUT)
+    assert raised.value.exit_code == 1
