@@ -140,5 +140,7 @@ def _is_locked(file: int) -> bool:
 def _identity(page: bytes) -> dict[str, Any] | None:
     if not page.startswith(MAGIC):
         return None
-    found: dict[str, Any] = json.loads(page[len(MAGIC) :].rstrip(b"\0"))
-    return found
+    with suppress(ValueError):  # the file of somebody else, or of one who died while writing it
+        found: dict[str, Any] = json.loads(page[len(MAGIC) :].rstrip(b"\0"))
+        return found
+    return None

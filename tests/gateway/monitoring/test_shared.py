@@ -14,7 +14,7 @@ from rich.console import Console
 import gateway.cli
 from gateway.cycle.supervisor import State
 from gateway.monitoring import page, terminal
-from gateway.monitoring.shared import NotRunningError, Observer, Publisher, find
+from gateway.monitoring.shared import MAGIC, NotRunningError, Observer, Publisher, find
 from tests.gateway.monitoring.test_block import good
 
 IDENTITY = {"pid": os.getpid(), "title": "bench Ölprüfstand"}
@@ -39,6 +39,14 @@ def memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def publisher() -> Iterator[Publisher]:
     with Publisher(IDENTITY) as made:
         yield made
+
+
+def test_file_that_nobody_can_read_keeps_no_gateway_from_its_start(memory: Path) -> None:
+    foreign = memory / "gateway-1.status"
+    foreign.write_bytes(MAGIC + b"no JSON")
+    with Publisher(IDENTITY) as made:
+        assert find() == made.path
+    assert not foreign.exists()
 
 
 def another(*arguments: str) -> "subprocess.Popen[str]":
