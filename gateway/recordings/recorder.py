@@ -30,6 +30,11 @@ from gateway.recordings.triggers import Trips, Wait
 
 BATCH: Final = 0.05
 """[s] Period of writing to the file."""
+PATIENCE: Final = 30.0
+"""[s] Time in which the last records reach the disk; systemd kills the gateway after 60 s."""
+FULL: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
+"""Errors of a disk without room."""
+ROOM: Final = "room on the disk"
 PIPE_SIZE: Final = 1 << 20
 """[bytes] About 10 s of records at 100 Hz: the disk may be busy so long before one is dropped."""
 
@@ -76,13 +81,18 @@ class Recorder:
     def close(self) -> None:
         """End the recording, and return when it is on the disk.
 
-        Raises GatewayError where the recorder ended early.
+        Raises GatewayError where the recorder failed, or does not come to its end.
         """
         self._sender.close()
-        self._process.join()
-        code = self._process.exitcode
-        if code:
-            raise GatewayError(f"{self.path}: the recorder ended early: {reason_of_end(code)}")
+        self._process.join(PATIENCE)
+        if self._process.exitcode is None:
+            self._process.kill()  # a process that waits for its disk dies when the disk answers
+            raise GatewayError(
+                f"{self.path}: the recorder has not ended in {PATIENCE:g} s; "
+                "expected a disk that takes what is written"
+            )
+        if code := self._process.exitcode:
+            raise GatewayError(f"{self.path}: the recorder failed: {reason_of_end(code)}")
 
 
 def reason_of_end(code: int) -> str:
@@ -94,12 +104,7 @@ def reason_of_end(code: int) -> str:
         return f"killed by {signal.Signals(-code).name}"
     if code == 1:
         return "exit code 1, a mistake in this software"
-    right = (
-        "room on the disk"
-        if code in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-        else "a file to write to"
-    )
-    return f"{os.strerror(code)}; expected {right}"
+    return f"{os.strerror(code)}; expected {ROOM if code in FULL else 'a file to write to'}"
 
 
 @contextmanager
@@ -138,6 +143,8 @@ def _append(receiver: Connection, job: Job) -> None:
                 parts.write(wait.filter(batch), last)
                 trips.take(batch)
         parts.write(wait.flush(), 0.0)
+    if trips.problem is not None:
+        raise trips.problem
 
 
 def _batches(source: int, size: int) -> Iterator[bytes]:
@@ -152,12 +159,18 @@ def _batches(source: int, size: int) -> Iterator[bytes]:
 
 
 def _create(job: Job) -> None:
-    """Create the file before anything runs. Raises RecordingError for a bad folder."""
+    """Create the file before anything runs. Raises RecordingError for a bad folder.
+
+    Raises GatewayError for a full disk, which is no bad input: systemd tries again.
+    """
     try:
         job.path.parent.mkdir(parents=True, exist_ok=True)
         with job.path.open("xb") as file:
             file.write(job.header.encode())
     except OSError as error:
+        if error.errno in FULL:
+            job.path.unlink(missing_ok=True)
+            raise GatewayError(f"{job.path}: {error.strerror}; expected {ROOM}") from error
         raise RecordingError(
             error.strerror or "cannot be created",
             file=job.path,

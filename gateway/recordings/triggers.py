@@ -70,7 +70,10 @@ class Wait:
 
 
 class Trips:
-    """Writes the seconds around every trip to a file of its own."""
+    """Writes the seconds around every trip to a file of its own.
+
+    problem : the first error of such a file. It ends no recording, which has these seconds, too.
+    """
 
     def __init__(self, path: Path, head: bytes, fields: Fields) -> None:
         self._path, self._head, self._type = path, head, np.dtype(fields)
@@ -78,9 +81,19 @@ class Trips:
         self._count, self._state = 0, int(State.OFF)
         self._file: Any = None
         self._until = 0.0
+        self.problem: OSError | None = None
 
     def take(self, batch: bytes) -> None:
         """Take a batch of whole records."""
+        if self.problem is not None:
+            return
+        try:
+            self._take(batch)
+        except OSError as error:
+            self.problem = error
+            self.close()
+
+    def _take(self, batch: bytes) -> None:
         size = self._type.itemsize
         for index, tick in enumerate(np.frombuffer(batch, self._type)):
             record, now = batch[index * size : (index + 1) * size], float(tick["now"])

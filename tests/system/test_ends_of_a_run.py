@@ -76,7 +76,7 @@ def test_run_without_a_recorder_ramps_down_and_says_why(tmp_path: Path, end: str
         ended = emulator.status()
     assert (ended["speed_reference"], ended["alarms"]) == (0.0, [])
     why = "killed by SIGKILL" if end == "killed" else "File too large; expected room on the disk"
-    assert f"the recorder ended early: {why}" in daemon.output
+    assert f"the recorder failed: {why}" in daemon.output
     assert "Traceback" not in daemon.output
     records = read(next((tmp_path / "recordings").glob("*.rlrec"))).records
     assert records["tick"].tolist() == list(range(len(records)))

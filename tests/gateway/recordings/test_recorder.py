@@ -255,7 +255,7 @@ def test_a_full_disk_is_told_in_one_line_and_keeps_every_whole_record(
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     while not recorder.failed:  # what has no room ends the recorder, and its end the pipe
         recorder.push(record)
-    with pytest.raises(GatewayError, match="ended early: File too large; expected room"):
+    with pytest.raises(GatewayError, match="failed: File too large; expected room"):
         recorder.close()
     assert capfd.readouterr() == ("", "")
     found = read(path)
