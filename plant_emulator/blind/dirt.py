@@ -60,7 +60,7 @@ def soil(log: Log, dirt: Dirt, seed: int) -> Log:
     return _SOILS[dirt.kind](log, dirt.size, np.random.default_rng([seed, 5]))
 
 
-def _changed(log: Log, changes: dict[str, Array]) -> Log:
+def _replace_signals(log: Log, changes: dict[str, Array]) -> Log:
     return replace(log, signals={**log.signals, **changes})
 
 
@@ -74,7 +74,7 @@ def _colour(log: Log, time_constant: float, random: np.random.Generator) -> Log:
         draws = random.standard_normal(len(log.time))
         slow = lfilter([np.sqrt(1.0 - pole**2)], [1.0, -pole], draws)
         found[name] = log[name] + 2.0 * SENSORS[name][0] * slow
-    return _changed(log, found)
+    return _replace_signals(log, found)
 
 
 def _hum(log: Log, amplitude: float, random: np.random.Generator) -> Log:
@@ -86,7 +86,7 @@ def _hum(log: Log, amplitude: float, random: np.random.Generator) -> Log:
         turns = 2.0 * np.pi * mains * log.time
         wave = np.cos(turns + first) + 0.5 * np.cos(2.0 * turns + second)
         found[name] = log[name] + amplitude * SENSORS[name][0] * wave
-    return _changed(log, found)
+    return _replace_signals(log, found)
 
 
 def _spikes(log: Log, share: float, random: np.random.Generator) -> Log:
@@ -96,19 +96,19 @@ def _spikes(log: Log, share: float, random: np.random.Generator) -> Log:
         there = random.random(len(log.time)) < share
         height = random.uniform(*SPIKE, len(log.time)) * random.choice([-1.0, 1.0], len(log.time))
         found[name] = log[name] + np.where(there, height, 0.0) * SENSORS[name][0]
-    return _changed(log, found)
+    return _replace_signals(log, found)
 
 
 def _hold_channels(log: Log, period: float, _: np.random.Generator) -> Log:
     """Renew some channels every few samples only."""
     fresh = np.arange(len(log.time)) // round(period) * round(period)
-    return _changed(log, {name: log[name][fresh] for name in HELD_CHANNELS})
+    return _replace_signals(log, {name: log[name][fresh] for name in HELD_CHANNELS})
 
 
 def _coarse(log: Log, quantum: float, _: np.random.Generator) -> Log:
     """Round all channels to a multiple of the noise."""
     steps = {name: quantum * SENSORS[name][0] for name in COMPARED}
-    return _changed(log, {name: np.round(log[name] / q) * q for name, q in steps.items()})
+    return _replace_signals(log, {name: np.round(log[name] / q) * q for name, q in steps.items()})
 
 
 def _jitter(log: Log, half_width: float, random: np.random.Generator) -> Log:
@@ -118,7 +118,7 @@ def _jitter(log: Log, half_width: float, random: np.random.Generator) -> Log:
     return replace(log, signals=signals)
 
 
-def _lost(log: Log, share: float, random: np.random.Generator) -> Log:
+def _lose_rows(log: Log, share: float, random: np.random.Generator) -> Log:
     """Leave out this share of the rows, and a hole."""
     kept = random.random(len(log.time)) >= share
     start = random.uniform(0.2, 0.8) * log.time[-1]
@@ -135,5 +135,5 @@ _SOILS: dict[DirtKind, Callable[[Log, float, np.random.Generator], Log]] = {
     "held": _hold_channels,
     "coarse": _coarse,
     "jitter": _jitter,
-    "lost": _lost,
+    "lost": _lose_rows,
 }

@@ -97,13 +97,13 @@ def or_impossible(residual: Residual, like: Array) -> Residual:
     The search then turns away from such parameters instead of ending.
     """
 
-    def found(values: Mapping[str, float]) -> Array:
+    def evaluate(values: Mapping[str, float]) -> Array:
         try:
             return residual(values)
         except UnsettledError:
             return np.full_like(like, IMPOSSIBLE)
 
-    return found
+    return evaluate
 
 
 def _minus(simulated: Residual, base: Array) -> Residual:
@@ -120,9 +120,9 @@ def _simulation(
     effects = {h.law: h.in_run(run) for h in hidden}
     fixed = values_of(parameters.with_values(case.parameters), effects)
 
-    def whitened_run(found: Mapping[str, float]) -> Array:
+    def evaluate(found: Mapping[str, float]) -> Array:
         values, gap = split_gap_position({**fixed, **found})
         out = simulate(inputs, values, gap_position=gap)
         return np.stack([out[name] for name in COMPARED]) / levels
 
-    return whitened_run
+    return evaluate

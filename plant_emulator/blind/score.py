@@ -115,7 +115,7 @@ def is_located(unsealed: Unsealed) -> bool:
     return unsealed.answer.location.subsystem in {h.subsystem for h in unsealed.case.hidden}
 
 
-def evidence(unsealed: Unsealed) -> float | None:
+def weakest_evidence(unsealed: Unsealed) -> float | None:
     """Smallest evidence of the named effects; without a name, the largest of the ranking."""
     if unsealed.answer is None:
         return None
@@ -187,7 +187,7 @@ def score(
         effects=unsealed.named,
         classes=answer.verdict.classes if answer else (),
         answered=unsealed.column,
-        evidence=evidence(unsealed),
+        evidence=weakest_evidence(unsealed),
         confidence=answer.verdict.confidence if answer else None,
         right=is_right(unsealed),
         top1=sorted(unsealed.named) == sorted(h.effect for h in case.hidden),

@@ -95,11 +95,11 @@ def shares(results: Results) -> dict[str, HitRate]:
         "right place": count("located", lambda one: is_inside(one) or is_outside(one)),
         "sizes covered, same law": share_of([s.covered for s in sizes if s.same_law]),
         "sizes covered, other law": share_of([s.covered for s in sizes if not s.same_law]),
-        "shrinkage covered": share_of(_covered(results)),
+        "shrinkage covered": share_of(_list_covered(results)),
     }
 
 
-def _covered(results: Results) -> list[bool]:
+def _list_covered(results: Results) -> list[bool]:
     """Whether the interval of the closed fraction holds its true value, of every case with both."""
     return [
         one.closed_fraction_ci95[0] <= one.closed_fraction_true <= one.closed_fraction_ci95[1]

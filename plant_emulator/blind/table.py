@@ -52,7 +52,7 @@ def cases(results: Sequence[CaseResult]) -> str:
     return _text(COLUMNS, [row(one) for one in results])
 
 
-def evidence(results: Sequence[CaseResult]) -> str:
+def evidence_table(results: Sequence[CaseResult]) -> str:
     """CSV text with verdict, evidence and correctness of every case that has an answer."""
     rows = [[one.verdict, one.evidence, one.right] for one in results if one.evidence is not None]
     return _text(("kind", "evidence", "right"), rows)

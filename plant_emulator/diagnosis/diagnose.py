@@ -22,7 +22,7 @@ from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.fit_steps import simulate_once
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.prediction.gap import shows_shrinkage
-from plant_emulator.diagnosis.prediction.held_out import HeldOut
+from plant_emulator.diagnosis.prediction.held_out import HeldOutRuns
 from plant_emulator.diagnosis.report.details import Details
 from plant_emulator.diagnosis.report.ranking import (
     hypotheses_to_rank,
@@ -107,7 +107,7 @@ class _Tests:
             return None
         return {"parameter": gaps.nominal, "effect": gaps.null}.get(self.decision.kind)
 
-    def confirmed_by(self, gaps: Gaps) -> _Tests:
+    def confirm(self, gaps: Gaps) -> _Tests:
         """The tests; with an unknown cause where the held-out runs do not confirm the effects."""
         reference = self.reference(gaps)
         if not self.effects or reference is None:
@@ -162,8 +162,8 @@ class Diagnose:
         located = self.runner.map(
             subsystem.locate_gap, [Task(base=tests.explained.null, runs=self.plan.fitted)]
         )
-        gaps = HeldOut(runner=tests.runner, plan=self.plan).gaps(tests.explained, tests.effects)
-        tests = tests.confirmed_by(gaps)
+        gaps = HeldOutRuns(runner=tests.runner, plan=self.plan).gaps(tests.explained, tests.effects)
+        tests = tests.confirm(gaps)
         return Findings(
             answer=self._answer(tests, gaps, next(located)),
             details=Details(

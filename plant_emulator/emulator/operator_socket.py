@@ -31,7 +31,7 @@ def socket_path(port: int) -> Path:
 
 
 @asynccontextmanager
-async def operated(channel: ControlChannel, port: int) -> AsyncIterator[None]:
+async def serve_operator(channel: ControlChannel, port: int) -> AsyncIterator[None]:
     """Answer the operator inside the block."""
 
     async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

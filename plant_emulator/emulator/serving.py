@@ -16,7 +16,7 @@ from collections.abc import AsyncIterator, Callable
 from plant_emulator import logs
 from plant_emulator.emulator.control_channel import ControlChannel
 from plant_emulator.emulator.emulator import Emulator, Options, build
-from plant_emulator.emulator.operator_socket import operated
+from plant_emulator.emulator.operator_socket import serve_operator
 from plant_emulator.emulator.scan_timer import ScanTimer
 from register_maps.timing import SCAN
 
@@ -130,7 +130,7 @@ async def _until_stopped(run: _Run, announce: Callable[[str], None], *, control:
             others.append(_show(run.timer, run.emulator))
     tasks = [asyncio.create_task(other) for other in others]
     port = run.emulator.server.port
-    async with operated(channel, port):
+    async with serve_operator(channel, port):
         announce(f"listening on {run.options.host}:{port}")
         await run.stopping.wait()
     for task in tasks:

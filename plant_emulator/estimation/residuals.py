@@ -31,7 +31,7 @@ def residual_function(
     return residual
 
 
-def whitened_function(residual: Residual, noise: NoiseDirections | None) -> Residual:
+def whiten_function(residual: Residual, noise: NoiseDirections | None) -> Residual:
     """The residual function, whitened for the noise of a measured input; None: as it is."""
     if noise is None:
         return residual
@@ -52,7 +52,7 @@ def residual_functions(
     return [residual_function(r, {**fixed, **r.logged_values}, tolerance) for r in recordings]
 
 
-def whitened_functions(
+def whiten_functions(
     recordings: Sequence[Recording],
     values: Mapping[str, float],
     free: Sequence[str],
@@ -71,4 +71,4 @@ def whitened_functions(
     if not any(noise):
         return None
     plain = residual_functions(recordings, values, free)
-    return [whitened_function(r, directions) for r, directions in zip(plain, noise, strict=True)]
+    return [whiten_function(r, directions) for r, directions in zip(plain, noise, strict=True)]

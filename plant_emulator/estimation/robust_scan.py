@@ -38,7 +38,7 @@ def combinations(states: Sequence[Unknown]) -> Iterator[tuple[dict[str, float], 
         yield {u.name: value for u, value in zip(others, values, strict=True)}, angle
 
 
-def turning(ahead: Array, aside: Array, behind: Array) -> Array:
+def harmonic_parts(ahead: Array, aside: Array, behind: Array) -> Array:
     """Mean, cosine and sine part of a function of an angle, shape (3, ...).
 
     ahead, aside, behind : its values at 0, pi/2 and pi
@@ -47,7 +47,7 @@ def turning(ahead: Array, aside: Array, behind: Array) -> Array:
     return np.stack([middle, ahead - middle, aside - middle])
 
 
-def turns(angles: Array) -> Array:
+def harmonic_weights(angles: Array) -> Array:
     """Weights of the mean, cosine and sine part at angles [rad], shape (n, 3)."""
     return np.stack([np.ones_like(angles), np.cos(angles), np.sin(angles)], axis=1)
 
@@ -71,8 +71,8 @@ def scan_unknowns(
         if angle is None:
             trials.append((cauchy_loss(residual(trial)), trial))
             continue
-        basis = turning(*(residual({**trial, angle: a}) for a in (0.0, pi / 2, pi)))
-        for a, weights in zip(ANGLES, turns(ANGLES), strict=True):
+        basis = harmonic_parts(*(residual({**trial, angle: a}) for a in (0.0, pi / 2, pi)))
+        for a, weights in zip(ANGLES, harmonic_weights(ANGLES), strict=True):
             turned = np.tensordot(weights, basis, axes=1)
             trials.append((cauchy_loss(turned), {**trial, angle: float(a)}))
     return min(trials, key=lambda one: one[0])[1]

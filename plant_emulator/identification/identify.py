@@ -28,7 +28,7 @@ from plant_emulator.estimation.free_parameters import free_parameters, unknowns
 from plant_emulator.estimation.initial_states import GAP, states_of, with_logged_values
 from plant_emulator.estimation.noise.channel_noise import NoiseSeries
 from plant_emulator.estimation.noise.logged_noise import noise_of_runs
-from plant_emulator.estimation.residuals import residual_functions, whitened_functions
+from plant_emulator.estimation.residuals import residual_functions, whiten_functions
 from plant_emulator.estimation.start_search import FINE_SCANS, StartSearch
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.signals.log import VOLTAGE
@@ -140,7 +140,7 @@ def identify(
         best = min(best, other, key=lambda e: e.cost + e.penalty)
     wanted = unknowns(parameters, free, search.values, search.gaps, states)
     report = _report_cost(recordings, progress)
-    residuals = whitened_functions(recordings, search.values, free, best)
+    residuals = whiten_functions(recordings, search.values, free, best)
     if residuals is not None:
         best = _refit(wanted, residuals, best, report)
     else:
@@ -213,7 +213,7 @@ def _fit_with_logged_noise(
     """
     noise, plain = None, best
     for _ in range(NOISE_ESTIMATES):
-        found = noise_of_runs(_left(recordings, residuals, best))
+        found = noise_of_runs(_list_series(recordings, residuals, best))
         if not all(one.of_sensor for one in found.channels.values()):
             return plain, {}
         if found.plain if noise is None else noise.resembles(found):
@@ -224,7 +224,7 @@ def _fit_with_logged_noise(
     return best, noise.channels if noise else {}
 
 
-def _left(
+def _list_series(
     recordings: Sequence[Recording], residuals: Sequence[Residual], best: Estimate
 ) -> Iterator[tuple[int, str, NoiseSeries]]:
     """Run, channel and residual of a fit, for every channel of every run."""

@@ -153,7 +153,7 @@ def recording(
     counted = np.stack([(use or {}).get(name, everything) for name in channels])
     inputs = inputs_of(log, hold, sensors)
     if inputs.sensing is not None:
-        counted &= np.stack([inputs.sensing.renewed(name) for name in channels])
+        counted &= np.stack([inputs.sensing.has_new_reading(name) for name in channels])
     known = {name: sensor.noise for name, sensor in (sensors or {}).items()}
     levels = [
         known.get(name) or noise(log[name], use)

@@ -60,7 +60,7 @@ BENCH_DIFFERENCE = 6.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scale:
+class SpeedDeficit:
     """The share s of a log with its standard error."""
 
     source: str
@@ -70,7 +70,7 @@ class Scale:
 
 def check_same_bench(logs: Sequence[Log], values: Mapping[str, float]) -> None:
     """Raise LogError if two logs cannot be of one bench; values : of all parameters [SI]."""
-    found = [scale for log in logs if (scale := scale_of(log, values)) is not None]
+    found = [deficit for log in logs if (deficit := speed_deficit_of(log, values)) is not None]
     for first, second in combinations(found, 2):
         error = float(np.sqrt(first.error**2 + second.error**2 + EQUATION_ERROR**2))
         apart = abs(first.share - second.share) / error
@@ -82,11 +82,11 @@ def check_same_bench(logs: Sequence[Log], values: Mapping[str, float]) -> None:
             )
 
 
-def _percent(scale: Scale) -> str:
-    return f"{100.0 * (1.0 - scale.share):.2f} %"
+def _percent(deficit: SpeedDeficit) -> str:
+    return f"{100.0 * (1.0 - deficit.share):.2f} %"
 
 
-def scale_of(log: Log, values: Mapping[str, float]) -> Scale | None:
+def speed_deficit_of(log: Log, values: Mapping[str, float]) -> SpeedDeficit | None:
     """Share s by which the drum shows less than the gear ratio says; None where no s is found."""
     if has_truck(log):
         return None
@@ -111,7 +111,7 @@ def scale_of(log: Log, values: Mapping[str, float]) -> Scale | None:
     share, error = _first(
         np.diff(columns[index], axis=0) / sigma[:, None], np.diff(delta[index]) / sigma
     )
-    return Scale(source=log.source, share=share, error=error)
+    return SpeedDeficit(source=log.source, share=share, error=error)
 
 
 def _sum(values: Array, time: Array) -> Array:

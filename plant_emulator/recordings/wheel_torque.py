@@ -98,7 +98,7 @@ def deviation(log: Log, parameters: ParameterSet) -> Array:
     return np.asarray(share * np.sqrt(sum((other - base) ** 2 for other in changed)))
 
 
-def telling(log: Log, p: Mapping[str, float]) -> NDArray[np.bool_]:
+def mark_informative(log: Log, p: Mapping[str, float]) -> NDArray[np.bool_]:
     """Samples of a run with an unknown torque that count, shape (n,); p : parameter values [SI].
 
     Where the gear passes hardly any torque to the drum, the drum may float in the gap or stand with

@@ -48,7 +48,7 @@ PRECISION = 0.03
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class RollOut:
     """One roll-out in SI, shape (n,) each; speed over ground, direction +1 or -1."""
 
     name: str
@@ -123,7 +123,7 @@ def _scale(estimate: TruckEstimate, factor: float) -> dict[str, float]:
     }
 
 
-def roll_out(name: str, time: Array, velocity: Array) -> Run:
+def roll_out(name: str, time: Array, velocity: Array) -> RollOut:
     """The part of a log in which the truck rolls out: from its fastest to its slowest speed.
 
     time [s], velocity [m/s], shape (n,) each; a negative velocity is the other direction
@@ -147,10 +147,10 @@ def roll_out(name: str, time: Array, velocity: Array) -> Run:
         raise LogError(
             f"{name}: shows no roll-out; a fall of the speed by {LEAST_FALL:g} m/s is needed"
         )
-    return Run(name=name, time=time[rest], speed=speed[rest], direction=direction)
+    return RollOut(name=name, time=time[rest], speed=speed[rest], direction=direction)
 
 
-def fit(runs: Sequence[Run], mass: float) -> CoastDown:
+def fit(runs: Sequence[RollOut], mass: float) -> CoastDown:
     """Fit the road load of a truck of this mass [kg] to its coast-downs.
 
     Raises LogError where all runs go in one direction.
@@ -185,7 +185,7 @@ def fit(runs: Sequence[Run], mass: float) -> CoastDown:
     )
 
 
-def _columns(run: Run, number: int, count: int) -> Array:
+def _columns(run: RollOut, number: int, count: int) -> Array:
     """Columns of F0, F1, G (times the inertia) and of the first speed of each run."""
     time = run.time - run.time[0]
     way = 0.5 * (run.speed[1:] + run.speed[:-1]) * np.diff(time)
@@ -197,7 +197,7 @@ def _columns(run: Run, number: int, count: int) -> Array:
     return columns
 
 
-def _variance(residuals: Array, runs: Sequence[Run], unknowns: int) -> float:
+def _variance(residuals: Array, runs: Sequence[RollOut], unknowns: int) -> float:
     """Variance of the residuals, larger where they follow each other (first-order, per run)."""
     ends = np.cumsum([len(run.time) for run in runs])[:-1]
     parts = np.split(residuals, ends)

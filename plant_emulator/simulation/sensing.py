@@ -54,7 +54,7 @@ def at_rest(time: float, value: float) -> SensorMemory:
     return SensorMemory(time=time, value=value, lagged=value, shown=value)
 
 
-def lagged(values: Array, intervals: Array, time_constant: float, start: float) -> Array:
+def lag(values: Array, intervals: Array, time_constant: float, start: float) -> Array:
     """First-order lag of a quantity that is linear between its samples, shape (n,).
 
     values : shape (n,); intervals : between them [s], shape (n - 1,)
@@ -69,7 +69,7 @@ def lagged(values: Array, intervals: Array, time_constant: float, start: float) 
     return np.asarray(solve_banded((1, 0), banded, right, check_finite=False))
 
 
-def reading(time: Array, period: float, phase: float) -> Array:
+def count_readings(time: Array, period: float, phase: float) -> Array:
     """Number of the task's last reading at each time [1]; the reading 0 is at the phase [s]."""
     return np.asarray(np.floor((time - phase) / period + TIME_ROUNDING))
 
@@ -84,10 +84,10 @@ def follow(
     times = np.concatenate([[before.time], time])
     inner = np.concatenate([[before.value], values])
     if sensor.time_constant > 0.0:
-        inner = lagged(inner, np.diff(times), sensor.time_constant, before.lagged)
+        inner = lag(inner, np.diff(times), sensor.time_constant, before.lagged)
     shown = inner[1:]
     if sensor.period > 0.0:
-        number = reading(times, sensor.period, phase)
+        number = count_readings(times, sensor.period, phase)
         read = np.interp(phase + number[1:] * sensor.period, times, inner)
         shown = np.where(number[1:] > number[0], read, before.shown)
     memory = SensorMemory(
@@ -122,12 +122,12 @@ class Sensing:
         shown, _ = follow(sensor, start, self.time[1:], values[1:], phase)
         return np.concatenate([values[:1], shown])[self.rows]
 
-    def renewed(self, name: str) -> NDArray[np.bool_]:
+    def has_new_reading(self, name: str) -> NDArray[np.bool_]:
         """Whether each sample of the log shows a new reading of a channel, shape (n,)."""
         time = self.time[self.rows]
         if name not in self.sensors or self.sensors[name].period == 0.0:
             return np.ones(len(time), bool)
-        number = reading(time, self.sensors[name].period, self.phases[name])
+        number = count_readings(time, self.sensors[name].period, self.phases[name])
         return np.diff(number, prepend=number[0] - 1.0) > 0.0
 
 
@@ -180,7 +180,9 @@ def phase_of(log: Log, name: str, period: float) -> float:
     shares = np.sort(np.mod(log.time[1:][changed] / period, 1.0))
     _, first = np.unique(np.floor(shares * PHASES), return_index=True)
     phases = period * shares[first]
-    wrong = [np.sum(changed & (np.diff(reading(log.time, period, p)) == 0.0)) for p in phases]
+    wrong = [
+        np.sum(changed & (np.diff(count_readings(log.time, period, p)) == 0.0)) for p in phases
+    ]
     return float(phases[int(np.argmin(wrong))])
 
 
@@ -211,7 +213,7 @@ class RunningSensor:
         draws = self._level * self._random.standard_normal(len(times))
         draws[0] = self._noise
         if self._sensor.period > 0.0:
-            fresh = np.diff(reading(times, self._sensor.period, 0.0), prepend=np.inf) > 0.0
+            fresh = np.diff(count_readings(times, self._sensor.period, 0.0), prepend=np.inf) > 0.0
             draws = draws[np.maximum.accumulate(np.where(fresh, np.arange(len(times)), 0))]
         self._noise = float(draws[-1])
         return np.asarray(draws[1:])

@@ -50,7 +50,7 @@ def add_noise(log: Log, seed: int, sensors: Mapping[str, Sensor] | None = None) 
         if name in signals:
             draws = random.standard_normal(len(log.time))
             if sensing is not None:
-                draws = draws[np.cumsum(sensing.renewed(name)) - 1]
+                draws = draws[np.cumsum(sensing.has_new_reading(name)) - 1]
             value = signals[name] + noise_of(name, declared) * draws
             signals[name] = np.round(value / step) * step
     return Log(log.time, signals, log.source, log.other)

@@ -93,7 +93,7 @@ def inputs_of(
         slope=slope,
         corners=corners,
         wheel_torque=np.ascontiguousarray(wheel_torque),
-        parked=_parked(wheel_torque) if truck else np.zeros_like(reference),
+        parked=_mark_parked(wheel_torque) if truck else np.zeros_like(reference),
         truck=truck,
         source=log.source,
         interval=float(np.median(np.diff(time))),
@@ -126,7 +126,7 @@ def refine_inputs(run: RunInputs) -> RunInputs:
     )
 
 
-def _parked(wheel_torque: Array) -> Array:
+def _mark_parked(wheel_torque: Array) -> Array:
     """1 for the intervals before the truck's first start, in which it holds the drum; else 0."""
     started = np.abs(wheel_torque) > WHEEL_TORQUE_STARTS
     first = int(np.argmax(started)) if started.any() else len(started)

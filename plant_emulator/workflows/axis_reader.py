@@ -53,7 +53,7 @@ def read(path: str | Path, columns: Sequence[str] | Mapping[str, str] = ()) -> A
     if not path.is_file():
         raise LogError(f"{path}: no such file; a log of an axis is needed")
     table, given = _table(path), choices(columns)
-    chosen = _chosen(table, given)
+    chosen = _choose_columns(table, given)
     kept = {name: _unit(table, choice) for name, choice in chosen.items()}
     rotary = _is_rotary(table, chosen, {name: own for name, (_, own) in kept.items()})
     taken = table.take([choice.column for choice in chosen.values()])
@@ -89,7 +89,7 @@ def _table(path: Path) -> Table:
     return text.table(data, str(path))
 
 
-def _chosen(table: Table, given: Sequence[Choice]) -> dict[str, Choice]:
+def _choose_columns(table: Table, given: Sequence[Choice]) -> dict[str, Choice]:
     """The column of every quantity by its name; a given choice goes before a name of the file."""
     found = {choice.quantity: choice for choice in table.known}
     for name in table.names:
@@ -102,7 +102,7 @@ def _chosen(table: Table, given: Sequence[Choice]) -> dict[str, Choice]:
         found.pop("position" if "velocity" in named and "position" not in named else "velocity")
     for quantity, example in NEEDED.items():
         if quantity not in found and not (quantity == "position" and "velocity" in found):
-            raise _missing(table, quantity, example)
+            raise _missing_column(table, quantity, example)
     for name in table.names:
         other = unit_behind(name)
         if other and other[0] in ("load", "temperature") and other[0] not in found:
@@ -116,7 +116,7 @@ def _chosen(table: Table, given: Sequence[Choice]) -> dict[str, Choice]:
     return found
 
 
-def _missing(table: Table, quantity: str, example: str) -> LogError:
+def _missing_column(table: Table, quantity: str, example: str) -> LogError:
     """Error for a quantity without a column, with the choice that the user may have to make."""
     wanted = ("position", "velocity") if quantity == "position" else (quantity,)
     for name in table.names:

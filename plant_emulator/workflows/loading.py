@@ -19,7 +19,7 @@ from plant_emulator.recordings.preflight import NAMES, preflight
 from plant_emulator.recordings.recording import recording
 from plant_emulator.recordings.same_bench import check_same_bench
 from plant_emulator.recordings.stamps import restamp
-from plant_emulator.recordings.wheel_torque import telling, with_estimated_torque
+from plant_emulator.recordings.wheel_torque import mark_informative, with_estimated_torque
 from plant_emulator.signals.log import VOLTAGE, Log
 from plant_emulator.workflows.arguments import check_signals
 
@@ -88,7 +88,7 @@ def load_recordings(
         log, use = bridge_holes(log, checked.use)
         known = with_estimated_torque(log, parameters.values())
         if known is not log:
-            told = telling(known, parameters.values())
+            told = mark_informative(known, parameters.values())
             use = {name: counted & told for name, counted in use.items()}
             left = 100.0 * (1.0 - np.mean(told))
             notes.append(f"{log.source}: {UNKNOWN_TORQUE}; {left:.0f} % of the run is left out")

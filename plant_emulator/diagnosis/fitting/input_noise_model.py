@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from plant_emulator.diagnosis.fitting.fit_steps import refit, start
 from plant_emulator.diagnosis.fitting.task import Task
-from plant_emulator.estimation.residuals import whitened_function
+from plant_emulator.estimation.residuals import whiten_function
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -73,7 +73,7 @@ class _InputNoiseModel:
 
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
         """See `Model`."""
-        return whitened_function(self._model.residual(run, effects), self._noise.get(run))
+        return whiten_function(self._model.residual(run, effects), self._noise.get(run))
 
 
 @dataclass(frozen=True)

@@ -184,9 +184,9 @@ class BenchRelations:
                 noise = whitener.noise
                 level = LINE_PRIOR * noise.deviation * m.noise[NOISES.index(name)]
                 for column in line_columns(m.time, noise.lines).T:
-                    yield self._changed(k, name, level * column)[:, None]
+                    yield self._perturb(k, name, level * column)[:, None]
 
-    def _changed(self, k: int, name: str, change: Array) -> Array:
+    def _perturb(self, k: int, name: str, change: Array) -> Array:
         """Response of the rows to an error of one channel of one run, shape (n,)."""
         m, p = self.site.signals[k], self.site.values
         field, none = FIELDS[name], [None] * len(self.runs)
@@ -240,7 +240,7 @@ class BenchRelations:
         start = {**site.fitted, GAP_POSITION: states[GAP_POSITION]}
         fixed = self.model.fixed_values(self.runs[k], effects)
         trial = {**fixed, **self.where.values, **states, **extra} if effects else start
-        log, own = self._simulated(k, trial), site.signals[k]
+        log, own = self._simulate(k, trial), site.signals[k]
         m = replace(
             own,
             motor_speed=log["motor_speed"],
@@ -255,7 +255,7 @@ class BenchRelations:
         driven = site.drum.simulate(k, start, m.speed)
         return left, (log["drum_speed"] - driven) / m.noise[NOISES.index("drum_speed")]
 
-    def _simulated(self, k: int, trial: Mapping[str, float]) -> Log:
+    def _simulate(self, k: int, trial: Mapping[str, float]) -> Log:
         """The run's log at these values, at the samples of the thinned recording."""
         log = self.model.simulated(self.runs[k], trial)
         own = self.recordings[k].log.time

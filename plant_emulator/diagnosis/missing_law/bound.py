@@ -52,7 +52,7 @@ class Bound:
     interval: tuple[float, float]
 
 
-def bound(regression: BlockRegression, searches: Sequence[LawSearch]) -> Bound | None:
+def estimate_bound(regression: BlockRegression, searches: Sequence[LawSearch]) -> Bound | None:
     """The bound over all quantities; None: the runs show no gap beyond chance in the relations."""
     rows = run_rows(regression, regression.model)
     none = [np.zeros((len(own.y), 0)) for own in rows]
@@ -83,7 +83,7 @@ def _candidates(regression: BlockRegression, one: LawSearch) -> Iterator[list[Ar
     """Squares that each candidate of a quantity leaves in the held-out runs."""
     quantity = one.quantity
     rows = run_rows(regression, quantity.model)
-    law = [one.terms[j] for j in one.nested()[-1]]
+    law = [one.terms[j] for j in one.list_nested()[-1]]
     own = [term.own for term in law for _ in range(2 if term.own else 1)]
     columns = [
         columns_of(

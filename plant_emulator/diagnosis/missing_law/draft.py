@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
-from plant_emulator.diagnosis.missing_law.bound import bound
+from plant_emulator.diagnosis.missing_law.bound import estimate_bound
 from plant_emulator.diagnosis.missing_law.curve import curve
 from plant_emulator.diagnosis.missing_law.law_search import DRAFTED_GAIN, null_loss, search
 from plant_emulator.diagnosis.missing_law.quantities import quantities
@@ -67,7 +67,7 @@ def sketch(
         before = null_loss(regression)
         searches = [search(regression, one, before) for one in quantities(regression)]
         found = tuple(_sketch(regression, *pair) for pair in _best_laws(searches))
-        return Sketchbook(sketches=found, bound=bound(regression, searches))
+        return Sketchbook(sketches=found, bound=estimate_bound(regression, searches))
 
 
 def _best_laws(searches: Sequence[LawSearch]) -> list[tuple[LawSearch, Law]]:
@@ -78,7 +78,7 @@ def _best_laws(searches: Sequence[LawSearch]) -> list[tuple[LawSearch, Law]]:
     """
     every = []
     for one in searches:
-        nested = one.nested()
+        nested = one.list_nested()
         every += [(one, chosen) for chosen in {nested[0], nested[-1], *one.singles()}]
     every = [pair for pair in every if pair[0].gain(pair[1]) >= DRAFTED_GAIN]
     every.sort(key=lambda pair: -pair[0].score(pair[1]))

@@ -115,7 +115,7 @@ class Law:
         ]
         return f"{' '.join(parts).removeprefix('+')} {self.quantity.unit}"
 
-    def fitted(self, values: Mapping[str, float]) -> Law:
+    def with_fitted_sizes(self, values: Mapping[str, float]) -> Law:
         """The law with the sizes, widths and time constants of a fit, as `effect_text` names them.
 
         values : by name, as `a1` and `b12`
@@ -167,7 +167,7 @@ class LawSearch:
         """All laws of one term, the best one first."""
         return sorted(((j,) for j in range(len(self.terms))), key=self.score, reverse=True)
 
-    def nested(self) -> list[tuple[int, ...]]:
+    def list_nested(self) -> list[tuple[int, ...]]:
         """The best law of one term, and longer ones as long as another term counts."""
         starts = self.singles()[:EXTENDED_LAWS]
         found = [starts[0]]

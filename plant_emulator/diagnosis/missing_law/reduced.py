@@ -43,7 +43,7 @@ class RunRows:
     shared: Array
     own: Array
 
-    def projected(self, columns: Array) -> tuple[Array, Array]:
+    def project(self, columns: Array) -> tuple[Array, Array]:
         """X' P X and X' P y of the shared columns followed by these."""
         x = np.concatenate([self.shared, columns], axis=1)
         cross = self.own.T @ x
@@ -127,18 +127,18 @@ class NuisanceProducts:
 
     def coefficients(self, chosen: Sequence[int], runs: Sequence[int]) -> Array:
         """Nuisance and shared coefficients of the chosen columns, fitted to some runs (scaled)."""
-        systems = [self._reduced(chosen, k) for k in runs]
+        systems = [self._reduce(chosen, k) for k in runs]
         gram = np.diag(self._precision(chosen)) + sum(one[0] for one in systems)
         return np.asarray(np.linalg.solve(gram, sum(one[1] for one in systems)))
 
     def covariance(self, chosen: Sequence[int], runs: Sequence[int]) -> Array:
         """Covariance of the chosen columns' shared coefficients (scaled)."""
-        gram = np.diag(self._precision(chosen)) + sum(self._reduced(chosen, k)[0] for k in runs)
+        gram = np.diag(self._precision(chosen)) + sum(self._reduce(chosen, k)[0] for k in runs)
         return np.asarray(np.linalg.inv(gram)[self.shared :, self.shared :])
 
     def run_loss(self, chosen: Sequence[int], found: Array, run: int) -> float:
         """Loss of a run with these nuisance and shared coefficients, the run's own ones fitted."""
-        gram, product, loss = self._reduced(chosen, run)
+        gram, product, loss = self._reduce(chosen, run)
         return float(loss - product @ found + 0.5 * found @ gram @ found)
 
     def own_coefficients(self, chosen: Sequence[int], found: Array, run: int) -> Array:
@@ -158,7 +158,7 @@ class NuisanceProducts:
             ]
         )
 
-    def _reduced(self, chosen: Sequence[int], run: int) -> tuple[Array, Array, float]:
+    def _reduce(self, chosen: Sequence[int], run: int) -> tuple[Array, Array, float]:
         """Products of nuisance and shared columns, and loss, with the run's own ones fitted.
 
         Each coefficient of a run's own costs as much as chance would gain by it.
@@ -193,7 +193,7 @@ def products(
     """Products of terms; columns : of every run, shape (rows, k); own : see `NuisanceProducts`."""
     length = np.sqrt(sum((one**2).sum(axis=0) for one in columns))
     scale = np.where(length > 0.0, length, 1.0)
-    pairs = [one.projected(part / scale) for one, part in zip(rows, columns, strict=True)]
+    pairs = [one.project(part / scale) for one, part in zip(rows, columns, strict=True)]
     return NuisanceProducts(
         grams=[gram for gram, _ in pairs],
         products=[product for _, product in pairs],

@@ -94,7 +94,7 @@ class Gaps:
 
 
 @dataclass(frozen=True, kw_only=True)
-class HeldOut:
+class HeldOutRuns:
     """The held-out runs of one diagnosis."""
 
     runner: TaskRunner

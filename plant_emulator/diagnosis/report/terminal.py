@@ -209,12 +209,12 @@ def _rest(answer: Answer, width: int) -> list[str]:
     rows = _list_items(
         deviations, width, 2 if verdict.kind == "parameter" else 1, "deviates", names
     )
-    rows += _unseen(answer.undetectable, width, 1 if len(verdict.effects) > 1 else 2)
-    rows += _drafted(answer.drafts, width)
+    rows += _list_unseen(answer.undetectable, width, 1 if len(verdict.effects) > 1 else 2)
+    rows += _list_draft(answer.drafts, width)
     return rows + _paragraph(verdict.next_experiment or "", width, 3, "next")
 
 
-def _drafted(found: Sequence[Draft] | None, width: int) -> list[str]:
+def _list_draft(found: Sequence[Draft] | None, width: int) -> list[str]:
     """The best draft of a missing law, in three lines."""
     if found is None:
         return []
@@ -228,7 +228,7 @@ def _drafted(found: Sequence[Draft] | None, width: int) -> list[str]:
     return [f"{'draft':9}{first}", *(f"{'':9}{row}" for row in rest)]
 
 
-def _unseen(hidden: Sequence[Undetectable], width: int, most: int) -> list[str]:
+def _list_unseen(hidden: Sequence[Undetectable], width: int, most: int) -> list[str]:
     """Effects that these logs cannot show, with their reasons where all of them fit."""
     reasons = "; ".join(f"{u.effect} ({u.reason})" for u in hidden)
     rows = _paragraph(reasons, width, most + 1, "unseen") if hidden else []

@@ -45,7 +45,7 @@ def outlying(value: Array, use: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return found
 
 
-def without_lines(s: NoiseSeries, use: NDArray[np.bool_], lines: Sequence[float]) -> Array:
+def subtract_lines(s: NoiseSeries, use: NDArray[np.bool_], lines: Sequence[float]) -> Array:
     """The residual without its lines, by least squares, shape (n,)."""
     if not lines:
         return s.value
@@ -75,11 +75,11 @@ def likely_lines(
         best = max(best, (float(gains[k]), float(frequencies[k])))
     if not best[1]:
         return ()
-    frequency = _sharpened(series, uses, best[1], longest)
+    frequency = _refine_line(series, uses, best[1], longest)
     return (frequency, 2.0 * frequency)
 
 
-def _sharpened(
+def _refine_line(
     series: Sequence[NoiseSeries],
     uses: Sequence[NDArray[np.bool_]],
     frequency: float,
@@ -96,7 +96,7 @@ def _sharpened(
 
     def left(found: float) -> float:
         return sum(
-            float(np.sum(without_lines(s, use, (found, 2.0 * found))[use] ** 2))
+            float(np.sum(subtract_lines(s, use, (found, 2.0 * found))[use] ** 2))
             for s, use in zip(series, uses, strict=True)
         )
 

@@ -24,7 +24,7 @@ from plant_emulator.estimation.noise.disturbances import (
     EVIDENCE,
     likely_lines,
     outlying,
-    without_lines,
+    subtract_lines,
 )
 
 if TYPE_CHECKING:
@@ -66,12 +66,12 @@ def estimate_channel_noise(
         counted = sum(int(s.use.sum()) for s in series)
         left_out = 1.0 - sum(int(u.sum()) for u in uses) / max(1, counted)
         noise = ChannelNoise(outliers=left_out)
-    noise = _coloured(noise, series, uses, ORDER)
+    noise = _fit_colour(noise, series, uses, ORDER)
     if disturbed:
         noise = _with_lines(noise, series, uses)
     found = _whiteners(noise, series, uses)
     if found[0].noise.ljung_box_excess > COLOURED:
-        found = _whiteners(_coloured(noise, series, uses, LONG_ORDER), series, uses)
+        found = _whiteners(_fit_colour(noise, series, uses, LONG_ORDER), series, uses)
     return found[0].noise, found
 
 
@@ -92,7 +92,7 @@ def _whiteners(noise: ChannelNoise, series: Sequence[NoiseSeries], uses: Uses) -
 def _disturbance(noise: ChannelNoise, series: Sequence[NoiseSeries], uses: Uses) -> float:
     """Mean square of the lines over the samples that count."""
     parts = [
-        (s.value - without_lines(s, use, noise.lines))[use] ** 2
+        (s.value - subtract_lines(s, use, noise.lines))[use] ** 2
         for s, use in zip(series, uses, strict=True)
     ]
     return float(np.mean(np.concatenate(parts)))
@@ -103,21 +103,21 @@ def _with_lines(noise: ChannelNoise, series: Sequence[NoiseSeries], uses: Uses) 
     lines = likely_lines(series, uses, noise.deviation)
     if not lines:
         return noise
-    found = _coloured(replace(noise, lines=lines), series, uses, ORDER)
+    found = _fit_colour(replace(noise, lines=lines), series, uses, ORDER)
     count = sum(int(u.sum()) for u in uses)
     shrunk = noise.colour.innovation_deviation / found.colour.innovation_deviation
     return found if count * np.log(shrunk) > EVIDENCE + 4.0 * len(series) else noise
 
 
-def _coloured(
+def _fit_colour(
     noise: ChannelNoise, series: Sequence[NoiseSeries], uses: Uses, longest: int
 ) -> ChannelNoise:
     """The noise with the autoregression of its quiet blocks; longest : memory [samples]."""
-    values = [without_lines(s, use, noise.lines) for s, use in zip(series, uses, strict=True)]
+    values = [subtract_lines(s, use, noise.lines) for s, use in zip(series, uses, strict=True)]
     # From white noise on: an autoregression that was fitted to a cause would predict the cause.
     found = Autoregression()
     for _ in range(PASSES):
-        kept = _quiet(found, series, values, uses)
+        kept = _mark_quiet(found, series, values, uses)
         found = _autoregression(series, values, kept, longest)
     return replace(noise, colour=found)
 
@@ -132,7 +132,7 @@ def _autoregression(
     return fit_autoregression(runs, times, longest, price, LEAST)
 
 
-def _quiet(
+def _mark_quiet(
     colour: Autoregression, series: Sequence[NoiseSeries], values: Sequence[Array], uses: Uses
 ) -> list[NDArray[np.bool_]]:
     """Samples of the blocks whose innovations are as small as those of the quiet blocks."""

@@ -59,7 +59,7 @@ def table(path: str) -> Table:
         names=tuple(columns),
         take=take,
         row=lambda row: f"row {row + 1}",
-        known=(known := _known(arrays, numbers)),
+        known=(known := _known_columns(arrays, numbers)),
         others=tuple(name for name in held if name not in (*seen, *(FACTORS if known else ()))),
     )
 
@@ -81,7 +81,7 @@ def _arrays(held: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Ar
             yield f"{prefix}{name}(:,{k})", column.astype(np.float64)
 
 
-def _known(arrays: Mapping[str, Array], numbers: Mapping[str, float]) -> tuple[Choice, ...]:
+def _known_columns(arrays: Mapping[str, Array], numbers: Mapping[str, float]) -> tuple[Choice, ...]:
     """The choice of columns of a known bench; none for any other file."""
     if arrays.keys() >= SCREW and "gtau" in numbers:
         return (

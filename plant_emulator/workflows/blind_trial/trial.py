@@ -117,7 +117,7 @@ class BlindTrial:
         found = [self.folder.read_result(number) for number in range(self.count)]
         results = tuple(result for result in found if result is not None)
         write(self.folder.path / "cases.csv", table.cases(results))
-        write(self.folder.path / "evidence.csv", table.evidence(results))
+        write(self.folder.path / "evidence.csv", table.evidence_table(results))
         return TrialAnswer(
             results=results,
             seed=self.seed,

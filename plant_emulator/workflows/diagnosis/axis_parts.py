@@ -61,7 +61,7 @@ def read_runs(
     paths = {file_of(one) for one in (*logs, *held_out) if not isinstance(one, AxisLog)}
     files = {path: axis_reader.read(path, columns) for path in sorted(paths)}
     predicted = [part for one in held_out for part in without_holes(_run(one, files))]
-    left = [run for one in logs for run in _left(one, files, held_out)]
+    left = [run for one in logs for run in _without_held_out(one, files, held_out)]
     fitted = [part for run in left for part in without_holes(run)]
     if predicted or not (one_run or len(fitted) == 1):
         return fitted, predicted
@@ -107,7 +107,7 @@ def _run(source: Source, files: Mapping[Path, AxisLog]) -> AxisLog:
     return log if part is None else cut(log, part)
 
 
-def _left(
+def _without_held_out(
     source: Source, files: Mapping[Path, AxisLog], held_out: Sequence[Source]
 ) -> list[AxisLog]:
     """The part of a source that is fitted: its file without the parts that are held out."""

@@ -158,7 +158,7 @@ def _insert_fitted_values(one: Sketch, result: LawResult) -> Law:
     """The law with the values of its fit."""
     name = f"{result.effect}_"
     own = {k.removeprefix(name): v for k, v in result.fit.values.items() if k.startswith(name)}
-    return one.law.fitted(own)
+    return one.law.with_fitted_sizes(own)
 
 
 def _draft(

@@ -94,14 +94,14 @@ def bench_runs(
         "parameters": parameters.name,
         "without": ", ".join(without) or "-",
         "own effects": ", ".join(map(str, effect_files)) or "-",
-        **{f"sampling of {r.log.source}": sampling(r.log.time) for r in recordings},
+        **{f"sampling of {r.log.source}": describe_sampling(r.log.time) for r in recordings},
     }
     return Runs(
         recipe=BenchRecipe(tuple(recordings), parameters, tuple(without), files),
         plan=plan,
         notes=tuple(notes),
         settings=_settings(settings, [*logs, *held_out, parameters.name, *effect_files]),
-        inputs=_unmeasured(recordings, parameters),
+        inputs=_estimated_torques(recordings, parameters),
         fitted=tuple(recordings[k] for k in plan.fitted),
     )
 
@@ -145,7 +145,7 @@ def axis_runs(
     )
 
 
-def _unmeasured(
+def _estimated_torques(
     recordings: Sequence[Recording], parameters: ParameterSet
 ) -> tuple[EstimatedInput, ...]:
     """Wheel torques that were estimated, one a log."""
@@ -163,7 +163,7 @@ def _unmeasured(
     )
 
 
-def sampling(time: Array) -> str:
+def describe_sampling(time: Array) -> str:
     """The regularity of a log's sampling in words; time : of its rows [s], shape (n,)."""
     steps = np.diff(time)
     quality = PollQuality(interval=float(np.median(steps)))

@@ -227,6 +227,6 @@ def test_spreadsheet_has_a_line_a_case_and_calibration_a_pair_an_answer(
     results: tuple[CaseResult, ...],
 ) -> None:
     assert len(table.cases(results).splitlines()) == 6
-    assert table.evidence(results).splitlines()[:3] == [
+    assert table.evidence_table(results).splitlines()[:3] == [
         "kind,evidence,right", "none,100.0,True", "effect,100.0,False",
     ]  # fmt: skip

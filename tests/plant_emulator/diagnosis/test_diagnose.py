@@ -12,7 +12,7 @@ from plant_emulator.diagnosis.execution.pool import InProcess
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.prediction.gap import Fold, predict
-from plant_emulator.diagnosis.prediction.held_out import HeldOut, Plan
+from plant_emulator.diagnosis.prediction.held_out import HeldOutRuns, Plan
 from plant_emulator.estimation import least_squares
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import TIME, Given, Line, noisy, runner
@@ -155,7 +155,7 @@ def test_prediction_by_a_fit_that_does_not_end_is_told(monkeypatch: pytest.Monke
     found = {(): [predict(model, fold)], ("kink",): [predict(model, fold)]}
     folds = (((0,), (1,)),)
     plan = Plan(fitted=(0,), folds=folds)
-    held_out = HeldOut(runner=runner(model), plan=plan)
+    held_out = HeldOutRuns(runner=runner(model), plan=plan)
     assert held_out.convergence_notes(folds, found) == (
         "run 1: predicted by a fit with no effect that did not end",
         "run 1: predicted by a fit with kink that did not end",

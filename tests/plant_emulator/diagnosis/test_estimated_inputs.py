@@ -8,7 +8,7 @@ import numpy as np
 from plant_emulator.diagnosis.report.details import EstimatedInput
 from plant_emulator.diagnosis.report.document import from_json
 from plant_emulator.diagnosis.report.html.page import html
-from plant_emulator.workflows.diagnosis.runs import sampling
+from plant_emulator.workflows.diagnosis.runs import describe_sampling
 from tests.plant_emulator.diagnosis import answers
 
 TIME = np.linspace(0.0, 30.0, 301)
@@ -37,4 +37,6 @@ def test_a_report_without_such_an_input_has_no_such_section() -> None:
 def test_sampling_of_a_log_is_told_with_what_was_skipped() -> None:
     """A hundred samples every 10 ms, of which three were not seen: one alone, two together."""
     time = np.delete(0.01 * np.arange(101), [20, 50, 51])
-    assert sampling(time) == "every 10 ms 97.9 %, 20 ms 1.0 %, 30 ms 1.0 %; 3 samples skipped"
+    assert (
+        describe_sampling(time) == "every 10 ms 97.9 %, 20 ms 1.0 %, 30 ms 1.0 %; 3 samples skipped"
+    )

@@ -15,7 +15,7 @@ from plant_emulator.recordings.same_bench import (
     BENCH_DIFFERENCE,
     EQUATION_ERROR,
     check_same_bench,
-    scale_of,
+    speed_deficit_of,
 )
 from plant_emulator.signals.log import Log
 from plant_emulator.workflows.simulation import simulate
@@ -63,7 +63,7 @@ def test_run_of_a_bench_whose_drum_shows_less_is_refused_beside_every_other(
 
 
 def test_scale_that_was_hidden_is_found(bench_log: BenchLog, values: Mapping[str, float]) -> None:
-    found = scale_of(bench_log(f"bench_practice/{OTHER}"), values)
+    found = speed_deficit_of(bench_log(f"bench_practice/{OTHER}"), values)
     assert found is not None
     assert found.error < 2e-4
     assert found.share == pytest.approx(0.012, abs=4.0 * found.error)
@@ -73,7 +73,7 @@ def test_scale_of_the_nominal_bench_is_nothing(
     bench_log: BenchLog, values: Mapping[str, float]
 ) -> None:
     for program in ("program1", "program2", "program3", "program4"):
-        found = scale_of(bench_log(f"bench_nominal/{program}"), values)
+        found = speed_deficit_of(bench_log(f"bench_nominal/{program}"), values)
         assert found is not None
         assert abs(found.share) < EQUATION_ERROR
 
@@ -120,7 +120,7 @@ def test_twice_an_effect_in_every_run_is_no_second_bench(
 
 
 def test_run_with_a_truck_tells_nothing(bench_log: BenchLog, values: Mapping[str, float]) -> None:
-    assert scale_of(bench_log("bench_practice/practice_009/program6"), values) is None
+    assert speed_deficit_of(bench_log("bench_practice/practice_009/program6"), values) is None
 
 
 def test_diagnosis_of_two_benches_is_refused_in_one_line() -> None:

@@ -12,7 +12,7 @@ from plant_emulator.recordings.input_noise import noise_directions
 from plant_emulator.recordings.recording import Recording, recording
 from plant_emulator.recordings.wheel_torque import (
     drum_torque,
-    telling,
+    mark_informative,
     with_estimated_torque,
 )
 from plant_emulator.signals.log import COMPARED, TRUCK, WHEEL_TORQUE, Log
@@ -67,7 +67,7 @@ def test_parked_drum_has_no_torque_until_it_moves(nominal: ParameterSet, travel:
 def unknown(log: Log, parameters: ParameterSet) -> Recording:
     """The recording of a log whose truck's torque nobody measured, as the loader makes it."""
     known = with_estimated_torque(unmeasured(log), parameters.values())
-    use = telling(known, parameters.values())
+    use = mark_informative(known, parameters.values())
     assert 0.6 < np.mean(use[log.time > 3.0]) < 1.0
     return recording(known, None, dict.fromkeys(COMPARED, use))
 

@@ -12,7 +12,7 @@ from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Array, Log
 from plant_emulator.simulation import simulate as level
 from plant_emulator.simulation.running_bench import Bench
-from plant_emulator.simulation.sensing import lagged, phase_of
+from plant_emulator.simulation.sensing import lag, phase_of
 from plant_emulator.simulation.sensor_noise import SENSORS
 from plant_emulator.simulation.simulate import inputs_of, values_of
 from plant_emulator.workflows.simulation import simulate
@@ -29,9 +29,9 @@ def shown(nominal: ParameterSet, inputs: Log = INPUTS, **sensors: Sensor) -> Log
 def test_lag_of_a_step_and_of_a_ramp_is_the_solution_of_its_equation() -> None:
     """tau y' + y = u: 1 - exp(-t / tau) after a step, t - tau (1 - exp(-t / tau)) on a ramp."""
     time = np.cumsum([0.0, 0.003, 0.01, 0.02, 0.001, 0.1])
-    step = lagged(np.ones(6), np.diff(time), 0.02, 0.0)
+    step = lag(np.ones(6), np.diff(time), 0.02, 0.0)
     np.testing.assert_allclose(step, 1.0 - np.exp(-time / 0.02), atol=1e-12)
-    ramp = lagged(time, np.diff(time), 0.02, 0.0)
+    ramp = lag(time, np.diff(time), 0.02, 0.0)
     np.testing.assert_allclose(ramp, time - 0.02 * (1.0 - np.exp(-time / 0.02)), atol=1e-12)
 
 
