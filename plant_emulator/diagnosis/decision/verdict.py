@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fitting.evidence import LJUNG_BOX_LIMIT, adequate, significant
+from plant_emulator.estimation.noise.channel_noise import MOST_PREDICTABLE
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.answer import Kind
@@ -18,9 +19,6 @@ DEVIATION_ERRORS = 3.0
 # A deviation of so many standard errors is no chance, among some ten parameters in a hundred
 # diagnoses.
 SIGNIFICANT_DEVIATION_ERRORS = 4.0
-# Share of a residual that its past predicts from which on the residual is no noise [1]. Noise that
-# is correlated over 30 ms at 100 Hz has 0.5; a wave that no effect explains has 0.95.
-MOST_PREDICTABLE = 0.7
 # Mean square up to which a fit without effects leaves nothing but noise.
 NULL_MEAN_SQUARE = 1.1
 
