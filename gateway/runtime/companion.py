@@ -23,7 +23,7 @@ class Companion:
         self._process = context.Process(
             target=_alone, args=(target, receiver, *arguments), name=name
         )
-        with blocked_signals():
+        with block_signals():
             self._process.start()
         receiver.close()
 
@@ -37,7 +37,7 @@ class Companion:
 
 
 @contextmanager
-def blocked_signals() -> Iterator[None]:
+def block_signals() -> Iterator[None]:
     """Block signals while a process starts, so that a Ctrl-C does not end it at once."""
     before = signal.pthread_sigmask(
         signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
