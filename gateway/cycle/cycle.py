@@ -123,7 +123,7 @@ def initial(config: Config, register_map: RegisterMap) -> CycleState:
 
 
 def _regulator(config: Config) -> Regulator:
-    """What makes the demand: the configured regulator, or the program of the configuration."""
+    """The maker of the demand: the configured regulator, or the program of the configuration."""
     if config.program is not None:
         return cast("Regulator", program)
     return regulators.load(config.regulator.name)

@@ -42,7 +42,7 @@ def note(
 
 
 def reason(state: Following, now: float) -> Reason | None:
-    """Reason for which the bench does not follow; None: it does."""
+    """Reason for which the bench does not follow; None: it does. now : our clock [s]."""
     if now - state.reference > REFERENCE_WITHIN:
         return Reason.NOT_FOLLOWED
     return Reason.MOTOR_ASTRAY if now - state.motor > MOTOR_WITHIN else None

@@ -21,5 +21,8 @@ def slow(share: float, latency: float, *, writes: bool, period: float) -> float:
 
 
 def reason(share: float) -> Reason | None:
-    """Reason where too many ticks are slow; None: the PLC is fast enough."""
+    """Reason where too many ticks are slow; None: the PLC is fast enough.
+
+    share : of slow ticks [1]
+    """
     return Reason.TOO_SLOW if share > MOST_LATE else None

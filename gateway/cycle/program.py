@@ -62,7 +62,7 @@ def _truck(config: Config, regulator: Regulator, step: Step) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class State:
-    """Where the program is.
+    """State of a program: its place among the steps.
 
     number : index of the present step; its count after the last one
     time : since the begin of the step, in a ramp since its end [s]
@@ -77,7 +77,7 @@ class State:
 
 
 def seed(params: Params, motor_speed: float, drum_speed: float) -> State:  # noqa: ARG001 - all regulators have these arguments
-    """State before the first step."""
+    """State before the first step; speeds : of motor and drum [rad/s]."""
     return State(number=0, time=0.0, motor_speed=max(motor_speed, 0.0))
 
 
@@ -141,7 +141,7 @@ def _emulate(params: Params, step: Emulation, state: State, window: Window) -> t
 
 
 def follow(params: Params, state: State, demand: float, setpoint: float) -> State:
-    """State that continues from the setpoint that the limits passed."""
+    """State that continues from the setpoint that the limits passed; demand, setpoint [rad/s]."""
     after = replace(state, motor_speed=setpoint)
     if state.regulator is None:
         return after

@@ -168,12 +168,12 @@ def _body(read_count: int, write_count: int) -> struct.Struct:
 
 
 def number(value: float | None) -> float:
-    """Value in a record; NaN for None."""
+    """Value in a record, in SI; NaN for None."""
     return math.nan if value is None else float(value)
 
 
 def values(record: Measurement | Setpoint | None, names: Sequence[str]) -> list[float]:
-    """Named fields of a block in a record; NaN where there is no block."""
+    """Named fields of a block in a record, in SI; NaN where there is no block."""
     if record is None:
         return [math.nan] * len(names)
     return [number(getattr(record, name)) for name in names]

@@ -86,7 +86,7 @@ class Samples:
 def take(
     samples: Samples, measurement: Measurement | None, fault: Reason | None, now: float
 ) -> Samples:
-    """Return the samples after one reading, without its window; `with_window` adds that."""
+    """Return the samples after one reading at `now` [s]; `with_window` adds its window."""
     samples = replace(samples, is_new=False, window=None)
     if measurement is None:
         first = samples.fault or fault or Reason.STALE
@@ -113,7 +113,7 @@ def take(
 
 
 def fault(samples: Samples, now: float, stale: float) -> Reason | None:
-    """Reason for which there is no fresh sample; None: there is one.
+    """Reason for which there is no fresh sample; None: there is one. now, stale [s].
 
     The first fault is the cause. After FORGOTTEN the last one tells what is wrong now.
     """

@@ -39,7 +39,7 @@ def follow(before: Streak | None, value: float, partner: float, visible: float) 
 
 
 def is_stuck(streak: Streak | None, nothing: float) -> bool:
-    """Whether a sensor stands still at more than `nothing` long after its partner has moved."""
+    """Whether a sensor stands still long after its partner has moved, at more than `nothing`."""
     if streak is None or streak.count < STUCK or abs(streak.value) <= nothing:
         return False
     return streak.late > LATE

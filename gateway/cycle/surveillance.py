@@ -65,7 +65,7 @@ def begin(state: Surveillance, now: float) -> Surveillance:
 
 
 def reason(state: Surveillance, now: float, *, running: bool, confirmed: bool) -> Reason | None:
-    """Reason by sensors, motion or pace; None: nothing is wrong.
+    """Reason by sensors, motion or pace; None: nothing is wrong. now : our clock [s].
 
     running, confirmed : a run has begun, and the PLC has confirmed it
     """

@@ -97,7 +97,7 @@ def fit(sections: Sequence[Section]) -> FrictionFit:
 
 
 def count_speeds(speeds: Iterable[float]) -> int:
-    """Count of different speeds; speeds within a ratio of SAME_SPEED_RATIO count as one."""
+    """Count of different speeds [rad/s]; speeds within a ratio of SAME_SPEED_RATIO count as one."""
     counted, last = 0, 0.0
     for one in sorted(speeds):
         if one > SAME_SPEED_RATIO * last:

@@ -131,7 +131,7 @@ def alarm_rows(alarms: Sequence[Alarm], date: Callable[[float], datetime]) -> li
 
 
 def alarm_cells(alarm: Alarm, date: Callable[[float], datetime]) -> Row:
-    """How often, since when, and whether acknowledged."""
+    """Count of an alarm, its first time, and whether it is acknowledged, in words."""
     times = f"{alarm.count} time{'s' if alarm.count > 1 else ''}"
     first = date(alarm.first).isoformat(timespec="seconds")
     return times, f"first {first}", f"{'' if alarm.acknowledged else 'not '}acknowledged"

@@ -55,7 +55,10 @@ class SetpointComparison:
 def compare(
     title: str, time: Array, wanted: Array, outputs: Sequence[Output]
 ) -> SetpointComparison:
-    """Compare the setpoints of a run with the outputs of its replay, tick by tick."""
+    """Compare the setpoints of a run with the outputs of its replay, tick by tick.
+
+    time [s], wanted [rad/s] : of the run, shape (ticks,)
+    """
     return SetpointComparison(
         title=title,
         time=np.asarray(time, dtype=float),

@@ -86,7 +86,7 @@ def drive_quality(
 
 
 def smooth(speed: Array) -> Array:
-    """Speed after two means of five points, fewer at the ends; standstill is 0. Shape (n,)."""
+    """Speed after two means of five points, fewer at the ends; at rest 0 [m/s]. Shape (n,)."""
     window = np.ones(POINTS)
     count = np.convolve(np.ones_like(speed), window, mode="same")
     for _ in range(2):

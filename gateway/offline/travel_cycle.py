@@ -139,7 +139,7 @@ class TravelCycle:
 
 
 def _direction_note(leg: Leg) -> str:
-    """What is said of a leg in reverse: the bench turns forward only."""
+    """Note on a leg in reverse: the bench turns forward only."""
     return "  in reverse, driven forward on the bench" if leg.direction == REVERSE else ""
 
 

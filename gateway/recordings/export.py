@@ -72,7 +72,7 @@ CLOCK_DIGITS: Final = 6
 
 @dataclass(frozen=True, kw_only=True)
 class Extent:
-    """Which ticks become rows, by the time of the rows.
+    """The ticks that become rows, by the time of the rows.
 
     every : every tick, also without a new sample; begin, end : of the time [s]
     """
@@ -84,7 +84,7 @@ class Extent:
 
 @dataclass(kw_only=True)
 class Survey:
-    """What a recording holds: samples, and how often each field has a value.
+    """Content of a recording: samples, and how often each field has a value.
 
     waited : from the start of the recording to time zero [s]
     truck : whether the bench was in road load, with a truck on the drum

@@ -54,7 +54,7 @@ class Parts:
         self._tidier.start()
 
     def write(self, batch: bytes, now: float) -> None:
-        """Append whole records."""
+        """Append whole records; now : time of the last one [s]."""
         if not batch:
             return
         self._began = now if self._began < 0.0 else self._began

@@ -27,7 +27,7 @@ class Held:
         self._records: deque[tuple[float, bytes]] = deque()
 
     def add(self, now: float, record: bytes) -> None:
-        """Hold a record, and forget those that are too old by now."""
+        """Hold a record, and forget those that are too old by now [s]."""
         self._records.append((now, record))
         while now - self._records[0][0] > self._duration:
             self._records.popleft()

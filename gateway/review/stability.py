@@ -52,7 +52,10 @@ class SpeedLoop:
 
 
 def spectral_radius(loop: SpeedLoop, rho: float) -> float:
-    """Largest modulus of the eigenvalues from poll to poll; above 1 the loop is unstable."""
+    """Largest modulus of the eigenvalues from poll to poll [1]; above 1 the loop is unstable.
+
+    rho : inertia of the drum over that of the truck, at the rim [1]
+    """
     period_map = _one_period(loop, rho, np.eye(_size(loop)))
     return float(np.abs(np.linalg.eigvals(period_map)).max())
 

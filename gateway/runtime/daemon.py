@@ -144,7 +144,7 @@ def run(
 
 
 def _both(publisher: Publisher, notifier: Notifier) -> Callable[[Tick], None]:
-    """What looks at every tick: the status block, and systemd."""
+    """Function that shows every tick to the status block and to systemd."""
 
     def observe(tick: Tick) -> None:
         publisher(tick)

@@ -150,7 +150,7 @@ class Loop:
             self._link.close()
 
     def tick(self, deadline: float, *, stop_requested: bool) -> Output:
-        """Run one tick: read, step, write, record."""
+        """Run one tick: read, step, write, record; deadline : at which the tick was due [s]."""
         woken = self._clock.now()
         reading = self._read()
         observation = Observation(

@@ -112,7 +112,7 @@ def _entry(errors: Errors) -> dict[str, float]:
 
 
 def ideals(told: Config) -> Mapping[str, Callable[[Twin], Twin]]:
-    """What makes each cause ideal; told : the configuration with the friction of the set."""
+    """Functions that make each cause ideal; told : configuration with the friction of the set."""
 
     def knows_the_bench(twin: Twin) -> Twin:
         exact = {"under_compensation_percent": 0.0, "under_compensation_slow_percent": 0.0}

@@ -180,7 +180,7 @@ def _plain(value: Any) -> Any:
 
 
 def differences(path: Path, budget: Budget, file_of: Callable[[str, Path], Path]) -> list[str]:
-    """What a certificate says otherwise than its files, in lines; none: it is verified.
+    """Differences between a certificate and its files, in lines; none: it is verified.
 
     path : of the page or of the document; budget : of a recording with the file of a parameter set
     file_of : file of a parameter set, given by its shipped name or its path from a folder on

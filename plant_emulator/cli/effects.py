@@ -62,7 +62,7 @@ def _of_axis(name: str | None) -> list[AxisEffect]:
 
 
 def _axis_page(effect: AxisEffect) -> str:
-    """What an effect of an axis is, and a table of its parameters."""
+    """Description of an effect of an axis, and a table of its parameters."""
     needs = f"\nneeds {effect.needs}\n" if effect.needs else ""
     head = f"{effect.name} ({effect.subsystem})\n\n{effect.title}\n{effect.equation}\n{needs}"
     columns = f"\n{'parameter':24}{'unit, linear':18}unit, rotary"

@@ -187,7 +187,7 @@ def describe_deviation(parameter: ParameterDeviation, sign: str = "+-") -> str:
 
 
 def indistinguishable(verdict: Verdict) -> dict[str, tuple[str, ...]]:
-    """By accepted effect, the other effects that these logs cannot distinguish from it."""
+    """The effects that these logs cannot distinguish from an accepted effect, by its name."""
     return {group[0]: group[1:] for group in verdict.classes if group}
 
 

@@ -33,7 +33,10 @@ NORMAL_95 = 1.959964
 
 
 def data_errors(information: Array) -> Array:
-    """Standard errors of z from an information matrix, infinite in directions without any."""
+    """Standard errors of z, shape (unknowns,), infinite in directions without information.
+
+    information : matrix, shape (unknowns, unknowns)
+    """
     scale = np.sqrt(np.diag(information))
     safe = np.where(scale > 0.0, scale, 1.0)
     values, vectors = np.linalg.eigh(information / np.outer(safe, safe))
@@ -118,7 +121,10 @@ def colour(slopes: Array, covariance: Array) -> Array:
 
 
 def correlation_time(residual: Array) -> float:
-    """Samples that one independent sample is worth: 1 + 2 sum of the correlations, at least 1."""
+    """Samples that one independent sample is worth: 1 + 2 sum of the correlations, at least 1.
+
+    residual : of one channel, shape (n,)
+    """
     covariance = autocovariance(residual)
     if covariance[0] <= 0.0:
         return 1.0

@@ -58,7 +58,7 @@ class _Problem:
     steps: Array = field(default_factory=lambda: np.zeros(0))
 
     def residual(self, z: Array) -> list[Array]:
-        """Residual of every run at z."""
+        """Residual of every run at z, shape (channels, samples) each."""
         key = z.tobytes()
         if self.known[0] != key:
             self.known = key, [self._run(k, z) for k in range(len(self.residuals))]
@@ -71,7 +71,10 @@ class _Problem:
         return self.residuals[k](_values(self.unknowns, z, k))
 
     def jacobian(self, z: Array) -> list[Array]:
-        """Jacobian of every run at z: forward differences, backward at an upper bound."""
+        """Jacobian of every run at z, shape (channels, samples, unknowns) each.
+
+        Differences are forward, at an upper bound backward.
+        """
         key = z.tobytes()
         if self.slopes_known[0] != key:
             self.slopes_known = key, self._jacobian(z)
@@ -101,7 +104,7 @@ class _Problem:
         return np.concatenate([*(r.ravel() for r in self.residual(z)), self._prior(z)])
 
     def slopes(self, z: Array) -> Array:
-        """Jacobian of `rows`."""
+        """Jacobian of `rows`, shape (rows, unknowns)."""
         p = len(z)
         weight = np.diag([1.0 / u.scaled_std for u in self.unknowns])
         return np.concatenate([*(j.reshape(-1, p) for j in self.jacobian(z)), weight])

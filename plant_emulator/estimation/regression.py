@@ -36,7 +36,7 @@ class Regression:
 
     @classmethod
     def of(cls, y: Array, nuisance: Array) -> Regression:
-        """Factor the nuisance's precision once."""
+        """Factor the nuisance's precision once; y : shape (n,), nuisance : shape (n, k)."""
         gram = np.eye(nuisance.shape[1]) + nuisance.T @ nuisance
         lower = np.asarray(np.linalg.cholesky(gram), float)
         return cls(y, nuisance, lower, y - nuisance @ _solve(lower, nuisance.T @ y))
@@ -62,7 +62,10 @@ class Regression:
 
 
 def gain(gram: Array, along: Array) -> tuple[float, Array]:
-    """Gain of log evidence, and mean of the coefficients, of columns with unit priors."""
+    """Gain of log evidence [1], and mean of the coefficients, of columns with unit priors.
+
+    gram : C' M C, shape (k, k); along : C' M y, shape (k,)
+    """
     lower = np.asarray(np.linalg.cholesky(np.eye(len(gram)) + gram), float)
     mean = _solve(lower, along)
     return float(0.5 * along @ mean - np.log(np.diag(lower)).sum()), mean

@@ -64,7 +64,7 @@ class StartSearch:
         return cauchy_loss(residual)
 
     def total(self, values: Mapping[str, float]) -> float:
-        """Loss of all runs at the gap positions found so far."""
+        """Loss of all runs at the gap positions found so far [1]; values : of all parameters."""
         return sum(self.loss(k, values, gap) for k, gap in enumerate(self.gaps))
 
     def scan(self, scans: Sequence[tuple[str, float, int]] = SCANS) -> None:

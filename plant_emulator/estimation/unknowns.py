@@ -41,7 +41,7 @@ class Unknown:
     angle: bool = False
 
     def starts(self) -> list[float]:
-        """Values of a state, evenly over its prior, or over its bounds where it has none."""
+        """Values of a state, evenly over its prior, or over its bounds without one [its unit]."""
         low, high = self.lower, self.upper
         if self.std is not None:
             reach = np.sqrt(3.0) * self.std  # of an even spread
@@ -54,7 +54,7 @@ class Unknown:
         return float(np.log(value)) if self.logarithmic else value / self.scale
 
     def value(self, scaled: float) -> float:
-        """Back from the scale of the estimation."""
+        """The value [its unit] of a number on the scale of the estimation."""
         return float(np.exp(scaled)) if self.logarithmic else scaled * self.scale
 
     def error(self, value: float, scaled_error: float) -> float:
@@ -93,11 +93,11 @@ class Estimate:
     message: str
 
     def parameters(self) -> dict[str, float]:
-        """Values of the parameters by name."""
+        """Values of the parameters by name [SI]."""
         return {u.name: u.value(z) for u, z in self._pairs() if u.run is None}
 
     def states(self, run: int) -> dict[str, float]:
-        """Values of the states of one run by name."""
+        """Values of the states of one run by name [SI]."""
         return {u.name: u.value(z) for u, z in self._pairs() if u.run == run}
 
     def _pairs(self) -> list[tuple[Unknown, float]]:
@@ -105,7 +105,7 @@ class Estimate:
 
     @property
     def standard_errors(self) -> Array:
-        """Standard errors of z."""
+        """Standard errors of z, shape (unknowns,)."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
@@ -122,7 +122,7 @@ class Estimate:
 
     @property
     def correlation(self) -> Array:
-        """Correlation matrix of z."""
+        """Correlation matrix of z, shape (unknowns, unknowns)."""
         error = self.standard_errors
         known = np.isfinite(error) & (error > 0.0)
         covariance = np.where(np.outer(known, known), self.covariance, 0.0)
@@ -131,6 +131,6 @@ class Estimate:
 
     @property
     def condition_number(self) -> float:
-        """Condition number of the Jacobian on the scale of the estimation."""
+        """Condition number of the Jacobian on the scale of the estimation [1]."""
         singular = np.sqrt(np.clip(np.linalg.eigvalsh(self.information), 0.0, None))
         return float(singular[-1] / singular[0]) if singular[0] > 0.0 else float("inf")

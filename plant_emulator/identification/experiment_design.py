@@ -58,7 +58,7 @@ class Experiment:
 def experiments(
     found: Identification, recordings: Sequence[Recording], values: Mapping[str, float]
 ) -> list[Experiment]:
-    """For every parameter that is not identifiable, the program that would say most about it.
+    """The program that would say most about each parameter that is not identifiable.
 
     recordings : the logs that were fitted
     values : all parameters, at what was found [SI]
@@ -69,7 +69,7 @@ def experiments(
 
 
 def sharpest(found: Identification, errors: Mapping[str, Array]) -> list[Experiment]:
-    """For every parameter that is not identifiable, the program with the least standard error.
+    """The program with the least standard error of each parameter that is not identifiable.
 
     errors : standard errors of the parameters [unit], by program, see `promised_errors`
     """

@@ -119,7 +119,10 @@ def solve_current_loop(base: State, a: float, s: Record, p: Record) -> None:
 
 
 def solve_drive(base: State, a: float, s: Record, p: Record) -> None:
-    """Solve the drive at the motor speed s.motor_speed and write the result to s."""
+    """Solve the drive at the motor speed s.motor_speed [rad/s] and write the result to s.
+
+    base : states at the begin of the implicit stage; a : size of the stage [s]
+    """
     solve_speed_loop(base, a, s, p)
     solve_current_loop(base, a, s, p)
 

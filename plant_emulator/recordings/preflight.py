@@ -192,7 +192,7 @@ def _signs(measured: Log, interval: float) -> None:
 
 
 def _wrong_voltage(measured: Log) -> str:
-    """What is wrong with a voltage, which no log needs; nothing: it can be used."""
+    """The fault of a logged voltage, which no log needs; empty: the voltage can be used."""
     if VOLTAGE not in measured:
         return ""
     if VOLTAGE not in compared_channels(measured):

@@ -87,7 +87,7 @@ def _percent(deficit: SpeedDeficit) -> str:
 
 
 def speed_deficit_of(log: Log, values: Mapping[str, float]) -> SpeedDeficit | None:
-    """Share s by which the drum shows less than the gear ratio says; None where no s is found."""
+    """Share by which the drum shows less than the gear ratio says [1]; None where none is found."""
     if has_truck(log):
         return None
     gear_speed, drum_speed = log["motor_speed"] / values["gear_ratio"], log["drum_speed"]

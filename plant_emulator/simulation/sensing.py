@@ -114,7 +114,7 @@ class Sensing:
     rows: NDArray[np.intp]
 
     def show(self, name: str, values: Array) -> Array:
-        """What the log shows of a channel, shape (n,); values : at the finer samples, (m,)."""
+        """Values of a channel in the log, shape (n,); values : at the finer samples, shape (m,)."""
         if name not in self.sensors:
             return values[self.rows]
         start = at_rest(float(self.time[0]), float(values[0]))

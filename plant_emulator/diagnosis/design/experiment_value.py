@@ -126,7 +126,7 @@ def discriminability(model: Model, asked: PlannedRun) -> float:
 
 
 def visibility(model: Model, asked: PlannedRun) -> dict[str, float]:
-    """Norm of each effect's orthogonal signature with a planned run, in the noise (a step)."""
+    """Norm of each effect's orthogonal signature with a planned run, in the noise [1] (a step)."""
     fitted, runs = _with_planned_run(asked)
     nuisance = NuisanceSpace(linearise(model, fitted, runs))
     return {name: _signature_norm(model, name, fitted, runs, nuisance) for name in asked.effects}

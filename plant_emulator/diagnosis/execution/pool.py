@@ -69,7 +69,7 @@ class InProcess:
 
 @dataclass(frozen=True, kw_only=True)
 class TaskRunner:
-    """What the steps of one diagnosis run on: a pool, a recipe, and the fitted runs.
+    """The pool, the recipe and the fitted runs with which the steps of one diagnosis run.
 
     recipe : of the model that the steps get
     model : the machine in this process, for what it says of its runs and effects

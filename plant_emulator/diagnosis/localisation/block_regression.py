@@ -275,7 +275,7 @@ class BlockRegression:
         return max(found, key=lambda e: e.log)
 
     def log_marginal_likelihood(self, blocks: Sequence[str]) -> float:
-        """Log probability of all measurements with unknown laws in these blocks.
+        """Log probability of all measurements with unknown laws in these blocks [1].
 
         With the drive among them, its dead time may also vary from scan to scan.
         """

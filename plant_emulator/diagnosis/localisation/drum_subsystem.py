@@ -96,7 +96,7 @@ class DrumSubsystem:
         return cauchy_loss(self.residual(run, found))
 
     def scan(self, found: Mapping[str, float]) -> list[float]:
-        """Find the best of some positions in the gap at the start, for every run."""
+        """Find the best of some positions in the gap at the start [1], for every run."""
         positions = np.linspace(-1.0, 1.0, SCANNED_POSITIONS)
         losses = [
             [self.loss(k, {**found, GAP_POSITION: float(g)}) for g in positions]

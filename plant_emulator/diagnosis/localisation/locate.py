@@ -79,7 +79,7 @@ def locate(recordings: Sequence[Recording], parameters: ParameterSet, null: FitR
 
 
 def divide_gain(regression: BlockRegression) -> tuple[dict[str, float], float]:
-    """Share of every subsystem in the gain of log probability, and the whole gain."""
+    """Share of every subsystem in the gain of log probability, and the whole gain [1]."""
     taken: tuple[str, ...] = ()
     before = regression.log_marginal_likelihood(taken)
     credit = dict.fromkeys((*regression.blocks, SILENT_BLOCK), 0.0)

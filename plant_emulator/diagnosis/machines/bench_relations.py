@@ -109,7 +109,7 @@ class BenchRelations:
 
     @cached_property
     def kinds(self) -> NDArray[np.int_]:
-        """Which relation each row is, -1 for the drum speed, shape (n,)."""
+        """Number of the relation of each row, -1 for the drum speed, shape (n,)."""
         relation = [np.tile(np.arange(len(r.value)), r.value.shape[1]) for r in self.site.relations]
         return np.concatenate([*relation, *(np.full(len(m.time), -1) for m in self.site.signals)])
 

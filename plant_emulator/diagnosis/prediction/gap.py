@@ -94,7 +94,7 @@ def refit_fold(model: Model, fold: Fold) -> FitResult:
 
 
 def signature_norms(model: Model, fold: Fold) -> dict[str, float]:
-    """Norm of each effect's orthogonal signature in the fitted runs, in the noise (a step)."""
+    """Norm of each effect's orthogonal signature in the fitted runs, in the noise [1] (a step)."""
     return {name: _signature_norm(model, fold, name) for name in fold.start.effects}
 
 

@@ -42,7 +42,7 @@ Folds = tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """Which runs of the model are fitted and which are predicted.
+    """The runs of the model that are fitted, and those that are predicted.
 
     fitted : runs of the diagnosis itself
     folds : fitted and predicted runs of each cross-validation fold
@@ -127,7 +127,7 @@ class HeldOutRuns:
         folds: Folds,
         lengths: Sequence[int],
     ) -> Gap | None:
-        """What the fit to all runs leaves on the predicted runs; None: each was held out of it."""
+        """Gap that the fit leaves on the predicted runs; None: it did not see all of them."""
         found = explained.final if followed else explained.null
         runs = [run for _, predicted in folds for run in predicted]
         if not set(runs) <= set(self.plan.fitted):

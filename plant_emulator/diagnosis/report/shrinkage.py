@@ -61,12 +61,12 @@ def _interval(reference: Gap, explained: Gap, fitted: Gap | None) -> tuple[float
 
 
 def nrmsd(gap: Gap, runs: Sequence[MeasuredRun]) -> dict[str, float]:
-    """NRMSD of every channel: its rms over its measured range, held-out samples of all runs."""
+    """NRMSD of every channel [1]: its rms over its measured range, held-out samples of all runs."""
     return dict(zip(gap.channels, _shares(gap, runs, gap.by_channel), strict=True))
 
 
 def noise_floor(gap: Gap, runs: Sequence[MeasuredRun]) -> dict[str, float]:
-    """The noise of every channel over its measured range, as `nrmsd`."""
+    """The noise of every channel over its measured range [1], as `nrmsd`."""
     return dict(zip(gap.channels, _shares(gap, runs, np.ones(len(gap.channels))), strict=True))
 
 

@@ -162,5 +162,5 @@ class Inbox:
         return now - self._accepted_at
 
     def watchdog_ok(self, now: float) -> bool:
-        """Whether the heartbeat changed within the gateway's own watchdog time."""
+        """Whether the heartbeat changed within the gateway's own watchdog time; now [s]."""
         return now - self._fed_at <= self.command.watchdog + ROUNDING

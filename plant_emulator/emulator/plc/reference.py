@@ -36,7 +36,7 @@ STOP_AT_ONCE = Target(speed=0.0, slope=0.0, slew=float("inf"), age=0.0)
 
 
 def ramp_down(slew: float) -> Target:
-    """Target of an orderly stop."""
+    """Target of an orderly stop; slew : largest slope [rad/s^2]."""
     return Target(speed=0.0, slope=0.0, slew=slew, age=0.0)
 
 
@@ -52,6 +52,6 @@ def trajectory(reference: float, target: Target, step: float, count: int) -> lis
 
 
 def is_limited(path: list[float], target: Target, step: float) -> bool:
-    """Whether a limit keeps the end of the path away from the command's target."""
+    """Whether a limit keeps the end of a path [rad/s] away from the command's target; step [s]."""
     wanted = target.speed + target.slope * min(target.age + len(path) * step, HOLD)
     return abs(path[-1] - wanted) > 1e-9 * SPEED_MAX

@@ -48,12 +48,12 @@ class Autoregression:
 
     @property
     def deviation(self) -> float:
-        """Standard deviation of the noise."""
+        """Standard deviation of the noise [unit of the series]."""
         return self.deviations[0]
 
     @property
     def innovation_deviation(self) -> float:
-        """Standard deviation of what the past does not predict."""
+        """Standard deviation of the part that the past does not predict [unit of the series]."""
         return self.deviations[-1]
 
     @property
@@ -104,7 +104,7 @@ def samples_since_break(time: Array) -> NDArray[np.int_]:
 
 
 def autocovariance(runs: Sequence[Array], known: Sequence[NDArray[np.int_]], longest: int) -> Array:
-    """Autocovariance of unbroken samples of all runs at the lags 0 to `longest`.
+    """Autocovariance of unbroken samples of all runs at the lags 0 to `longest`, shape (lags,).
 
     known : number of samples that precede each one without a break
     """

@@ -65,12 +65,12 @@ class ChannelNoise:
 
     @property
     def deviation(self) -> float:
-        """Standard deviation of the noise without lines."""
+        """Standard deviation of the noise without lines, in the declared noise [1]."""
         return self.colour.deviation
 
     @property
     def total_deviation(self) -> float:
-        """Standard deviation of the noise with lines, without outliers."""
+        """Deviation of the noise with lines, without outliers, in the declared noise [1]."""
         return float(np.hypot(self.deviation, np.sqrt(self.disturbance)))
 
     @property

@@ -110,7 +110,10 @@ def _refine_line(
 
 
 def periodogram(time: Array, value: Array, frequencies: Array) -> Array:
-    """Squared amplitude |sum v exp(-i 2 pi f t)|^2 / n at evenly spaced frequencies."""
+    """Squared amplitude |sum v exp(-i 2 pi f t)|^2 / n, at frequencies evenly spaced [Hz].
+
+    time : [s], value : shape (n,) each
+    """
     turn = np.exp(-2j * np.pi * frequencies[0] * time) * value
     step = np.exp(-2j * np.pi * (frequencies[1] - frequencies[0]) * time)
     found = np.empty(len(frequencies))

@@ -47,7 +47,7 @@ class Table:
             )
 
     def check_increasing(self, name: str, times: Array) -> None:
-        """Raise LogError for a column of times that does not increase strictly."""
+        """Raise LogError for a column of times [s] that does not increase strictly."""
         if len(times) < 2:
             raise LogError(f"{self.path}: {len(times)} samples; at least 2 are needed")
         if not (later := np.diff(times) > 0.0).all():

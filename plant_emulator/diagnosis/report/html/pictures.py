@@ -44,7 +44,7 @@ def rectangle(x: float, y: float, width: float, height: float, look: str) -> Mar
 
 
 def ticks(low: float, high: float, most: int) -> list[float]:
-    """At most `most` round values between two limits, 1, 2 or 5 times a power of ten apart."""
+    """Round values between two limits, at most `most`, 1, 2 or 5 times a power of ten apart."""
     span = (high - low) / most
     if not isfinite(span) or span <= 0.0:
         return [low]
