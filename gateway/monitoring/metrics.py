@@ -5,14 +5,15 @@ Names and units follow the conventions of Prometheus: base units, `_total` for c
 """
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from math import isinf
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from gateway.cycle.supervisor import State
 from gateway.errors import ConfigError
 from gateway.monitoring.block import BOUNDS, Snapshot
 from gateway.monitoring.lines import REASONS
+from gateway.monitoring.shared import Identity
 from gateway.reasons import Reason
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def require() -> None:
         ) from error
 
 
-def exposition(identity: Mapping[str, Any], snapshot: Snapshot, age: float) -> tuple[bytes, str]:
+def exposition(identity: Identity, snapshot: Snapshot, age: float) -> tuple[bytes, str]:
     """Metrics in the text format, and its content type; age : of the last tick [s]."""
     from prometheus_client import CollectorRegistry
     from prometheus_client.exposition import CONTENT_TYPE_LATEST, generate_latest
@@ -67,12 +68,12 @@ def exposition(identity: Mapping[str, Any], snapshot: Snapshot, age: float) -> t
     return generate_latest(registry), CONTENT_TYPE_LATEST
 
 
-def families(identity: Mapping[str, Any], snapshot: Snapshot, age: float) -> "Iterator[Metric]":
+def families(identity: Identity, snapshot: Snapshot, age: float) -> "Iterator[Metric]":
     """The metrics of a snapshot; age : of the last tick [s]."""
     from prometheus_client.metrics_core import GaugeMetricFamily, InfoMetricFamily
 
     values = snapshot.values
-    told = {key: str(identity[key]) for key in ("version", "title")}
+    told = {"version": identity.version, "title": identity.title}
     yield InfoMetricFamily("gateway", "Version and PLC of the gateway", value=told)
     yield GaugeMetricFamily("gateway_tick_age_seconds", "Age of the last tick", value=age)
     for field, (name, text) in GAUGES.items():

@@ -116,7 +116,7 @@ def answer(observer: Observer, path: str) -> Answer:
         return _json(health(snapshot, age), healthy=is_healthy(snapshot, age))
     last = terminal.new_lines(snapshot, snapshot.values.changes - page.LAST)
     rows = page.alarm_rows(snapshot.alarms, terminal.date)
-    return _json(page.document(snapshot, age, last, rows) | {"title": observer.identity["title"]})
+    return _json(page.document(snapshot, age, last, rows) | {"title": observer.identity.title})
 
 
 def is_healthy(snapshot: Snapshot, age: float) -> bool:

@@ -12,8 +12,9 @@ import os
 import time
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import Final, Self
 
 from gateway.cycle.record import Tick
 from gateway.errors import GatewayError
@@ -34,6 +35,23 @@ class NotRunningError(GatewayError):
     """No gateway shows its status; exit code 1."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Identity:
+    """Facts about one run of the daemon; the fields are the keys of their JSON.
+
+    title, date : of the recording, the date in ISO 8601, UTC; period : between two ticks [s]
+    version : of the gateway; recording : its path; real_time : what the system granted
+    """
+
+    pid: int
+    title: str
+    date: str
+    period: float
+    version: str
+    recording: str
+    real_time: str
+
+
 def folder() -> Path:
     """Folder of the status files."""
     return Path(os.environ.get("RUNTIME_DIRECTORY", "/dev/shm"))
@@ -42,7 +60,7 @@ def folder() -> Path:
 class Publisher:
     """The daemon's side: owns the file, as a context manager, and takes every tick."""
 
-    def __init__(self, identity: dict[str, Any]) -> None:
+    def __init__(self, identity: Identity) -> None:
         for path, _ in _files(alive=False):
             with suppress(OSError):  # it may belong to another user
                 path.unlink()
@@ -64,15 +82,17 @@ class Publisher:
 
 
 class Observer:
-    """A reader of the status of one daemon. identity : what the daemon tells about itself."""
+    """A reader of the status of one daemon. Raises NotRunningError for a file of another kind."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
         with path.open("rb") as file:
             self._memory = mmap.mmap(file.fileno(), IDENTITY + block.SIZE, prot=mmap.PROT_READ)
         self._view = memoryview(self._memory)[IDENTITY:]
-        text = self._memory[len(MAGIC) : IDENTITY].rstrip(b"\0")
-        self.identity: dict[str, Any] = json.loads(text)
+        identity = _identity(self._memory[:IDENTITY])
+        if identity is None:
+            raise NotRunningError(f"{path}: not the status of a gateway of this version")
+        self.identity = identity
 
     def is_alive(self) -> bool:
         """Whether the daemon still runs."""
@@ -94,21 +114,21 @@ def find(pid: int | None = None) -> Path:
     """Status file of the running gateway. Raises NotRunningError for none, or for several."""
     running = {path: identity for path, identity in _files(alive=True) if identity is not None}
     if pid is not None:
-        running = {path: one for path, one in running.items() if one["pid"] == pid}
+        running = {path: one for path, one in running.items() if one.pid == pid}
     if not running:
         whom = "no gateway" if pid is None else f"no gateway of process {pid}"
         raise NotRunningError(
             f"{folder()}: {whom} runs here; expected one that `gateway run` has started"
         )
     if len(running) > 1:
-        several = "; ".join(f"--pid {one['pid']}: {one['title']}" for one in running.values())
+        several = "; ".join(f"--pid {one.pid}: {one.title}" for one in running.values())
         raise NotRunningError(f"several gateways run here; expected one of {several}")
     return next(iter(running))
 
 
-def _create(path: Path, identity: dict[str, Any]) -> int:
+def _create(path: Path, identity: Identity) -> int:
     """A new locked file with identity and empty block; its descriptor. Raises GatewayError."""
-    content = MAGIC + json.dumps(identity, ensure_ascii=False).encode()
+    content = MAGIC + json.dumps(vars(identity), ensure_ascii=False).encode()
     try:
         path.unlink(missing_ok=True)
         file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o644)
@@ -121,7 +141,7 @@ def _create(path: Path, identity: dict[str, Any]) -> int:
     return file
 
 
-def _files(*, alive: bool) -> Iterator[tuple[Path, dict[str, Any] | None]]:
+def _files(*, alive: bool) -> Iterator[tuple[Path, Identity | None]]:
     """Status files of daemons that live or died, each with its identity (None: not readable)."""
     for path in sorted(folder().glob(NAME.format("*"))):
         with suppress(OSError), path.open("rb") as file:
@@ -137,10 +157,10 @@ def _is_locked(file: int) -> bool:
     return False
 
 
-def _identity(page: bytes) -> dict[str, Any] | None:
+def _identity(page: bytes) -> Identity | None:
     if not page.startswith(MAGIC):
         return None
-    with suppress(ValueError):  # the file of somebody else, or of one who died while writing it
-        found: dict[str, Any] = json.loads(page[len(MAGIC) :].rstrip(b"\0"))
-        return found
+    # The file may be that of somebody else, or of one who died while writing it.
+    with suppress(ValueError, TypeError):
+        return Identity(**json.loads(page[len(MAGIC) :].rstrip(b"\0")))
     return None

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from rich.console import Console, Group
 from rich.live import Live
@@ -23,7 +23,7 @@ from gateway.monitoring import page
 from gateway.monitoring.block import RING, Change, Snapshot, Values
 from gateway.monitoring.lines import LINES, NOTES, reason_text, text_line
 from gateway.monitoring.rate import Rate
-from gateway.monitoring.shared import Observer
+from gateway.monitoring.shared import Identity, Observer
 
 PERIOD: Final = 0.1
 """[s] Time between two looks at the block."""
@@ -49,10 +49,10 @@ class RunLog:
     identity : of the daemon, as the status block has it; form : one of LINES
     """
 
-    def __init__(self, identity: dict[str, Any], form: str) -> None:
+    def __init__(self, identity: Identity, form: str) -> None:
         self._line, self._note = LINES[form], NOTES[form]
-        self._start: str | None = f"{identity['recording']}; real time: {identity['real_time']}"
-        self._refused = " no (" in identity["real_time"]
+        self._start: str | None = f"{identity.recording}; real time: {identity.real_time}"
+        self._refused = " no (" in identity.real_time
         self._told, self._problem = 0, ""
         self._alarms: set[object] = set()
         self._rate = Rate(self._left_out)
@@ -138,7 +138,7 @@ def _screen(
         yield console, draw
 
 
-def render(identity: dict[str, Any], snapshot: Snapshot, trend: page.Trend) -> Panel:
+def render(identity: Identity, snapshot: Snapshot, trend: page.Trend) -> Panel:
     """The page of a snapshot for a terminal."""
     values = snapshot.values
     last = new_lines(snapshot, values.changes - page.LAST)
@@ -151,7 +151,7 @@ def render(identity: dict[str, Any], snapshot: Snapshot, trend: page.Trend) -> P
             _grid(page.count_rows(snapshot)),
             *last,
         ),
-        title=identity["title"],
+        title=identity.title,
     )
 
 

@@ -15,7 +15,7 @@ from contextlib import ExitStack, closing, contextmanager, nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from gateway.configuration.config import Config
 from gateway.configuration.sections import RecordingConfig
@@ -26,7 +26,7 @@ from gateway.errors import GatewayError
 from gateway.link import tls
 from gateway.link.plc import TcpLink
 from gateway.monitoring import metrics, server, terminal
-from gateway.monitoring.shared import Publisher
+from gateway.monitoring.shared import Identity, Publisher
 from gateway.reasons import BY_OPERATOR, Reason
 from gateway.recordings.header import Header
 from gateway.recordings.parts import SUFFIX, Keeping
@@ -170,17 +170,17 @@ def _keeping(recording: RecordingConfig) -> Keeping:
     )
 
 
-def _identity(job: Job) -> dict[str, Any]:
-    """Fields of the status that identify this daemon."""
-    return {
-        "pid": os.getpid(),
-        "title": job.header.title,
-        "date": job.header.date,
-        "period": job.header.config["loop"]["period_ms"] * 1e-3,
-        "version": job.header.versions["gateway"],
-        "recording": str(job.path),
-        "real_time": job.header.real_time,
-    }
+def _identity(job: Job) -> Identity:
+    header = job.header
+    return Identity(
+        pid=os.getpid(),
+        title=header.title,
+        date=header.date,
+        period=header.config["loop"]["period_ms"] * 1e-3,
+        version=header.versions["gateway"],
+        recording=str(job.path),
+        real_time=header.real_time,
+    )
 
 
 def _new_file(config: Config) -> Path:

@@ -26,6 +26,7 @@ from gateway.recordings.recorder import Job, Recorder
 from gateway.runtime.loop import Loop
 from plant_emulator.emulator.process import EmulatorProcess
 from register_maps import load
+from tests.gateway.monitoring.identities import IDENTITY
 from tests.gateway.recorded_hour import memory
 from tests.gateway.runtime.test_loop import Bench
 
@@ -65,7 +66,7 @@ class Soak:
         """What is found after each of so many runs; drive [s]. Raises AssertionError for a trip."""
         head = Header.of(self.config, MAP, started=1000.0, shadow=False, real_time="no")
         job = Job(path=self.files_in / "soak.rlrec", header=head)
-        with closing(Recorder(job)) as recorder, Publisher({"title": "soak"}) as publisher:
+        with closing(Recorder(job)) as recorder, Publisher(IDENTITY) as publisher:
             (child,) = multiprocessing.active_children()
             link = TcpLink("127.0.0.1", self.config.plc.port, 1, 1.0, probe=MAP.measurement)
             self.loop = Loop(

@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 import gateway.cli
 from gateway.monitoring.metrics import families
+from tests.gateway.monitoring.identities import IDENTITY
 from tests.gateway.monitoring.test_block import good, shown
 
 
@@ -23,8 +24,7 @@ def board(tmp_path: Path) -> dict:
 
 
 def test_every_query_names_metrics_and_labels_that_the_gateway_has(board: dict) -> None:
-    identity = {"version": "0.2.0", "title": "bench 1"}
-    samples = [s for one in families(identity, shown(good(0)), 0.0) for s in one.samples]
+    samples = [s for one in families(IDENTITY, shown(good(0)), 0.0) for s in one.samples]
     queries = [target["expr"] for panel in board["panels"] for target in panel["targets"]]
     named = {name for query in queries for name in re.findall(r"gateway_\w+", query)}
     assert named <= {sample.name for sample in samples}

@@ -7,6 +7,7 @@ from gateway.cycle.supervisor import State
 from gateway.monitoring.rate import BURST, EVERY, Rate
 from gateway.monitoring.terminal import RunLog
 from gateway.reasons import Reason
+from tests.gateway.monitoring.identities import IDENTITY
 from tests.gateway.monitoring.test_block import good, shown
 
 
@@ -51,12 +52,9 @@ def test_end_of_the_run_tells_what_is_held() -> None:
     assert one.flush() == []
 
 
-IDENTITY = {"recording": "runs/1.rlrec", "real_time": "SCHED_FIFO no (Operation not permitted)"}
-
-
 def test_log_begins_with_recording_and_what_real_time_was_refused() -> None:
     first, second = RunLog(IDENTITY, "text").lines(shown(good(0)), 100.0, over=False)
-    assert first.endswith("start      runs/1.rlrec; real time: " + IDENTITY["real_time"])
+    assert first.endswith("start      runs/1.rlrec; real time: " + IDENTITY.real_time)
     assert second.endswith("RUN")
     (told, *_) = RunLog(IDENTITY, "json").lines(shown(), 100.0, over=False)
     assert '"level": "warning", "event": "start"' in told

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,13 +16,16 @@ import gateway.cli
 from gateway.cycle.supervisor import State
 from gateway.monitoring import page, terminal
 from gateway.monitoring.shared import MAGIC, NotRunningError, Observer, Publisher, find
+from tests.gateway.monitoring.identities import IDENTITY as BENCH
 from tests.gateway.monitoring.test_block import good
 
-IDENTITY = {"pid": os.getpid(), "title": "bench Ölprüfstand"}
+IDENTITY = replace(BENCH, title="bench Ölprüfstand")
 DYING = """
-import json, os, signal, sys
+import os, signal, sys
+from dataclasses import replace
 from gateway.monitoring.shared import Publisher
-publisher = Publisher({"pid": os.getpid(), "title": "another"})
+from tests.gateway.monitoring.identities import IDENTITY
+publisher = Publisher(replace(IDENTITY, pid=os.getpid(), title="another"))
 print("ready", flush=True)
 if "die" in sys.argv:
     os.kill(os.getpid(), signal.SIGKILL)
@@ -41,9 +45,12 @@ def publisher() -> Iterator[Publisher]:
         yield made
 
 
-def test_file_that_nobody_can_read_keeps_no_gateway_from_its_start(memory: Path) -> None:
+@pytest.mark.parametrize("text", [b"no JSON", b"[]", b'{"pid": 1, "title": "half"}'])
+def test_file_that_nobody_can_read_keeps_no_gateway_from_its_start(
+    memory: Path, text: bytes
+) -> None:
     foreign = memory / "gateway-1.status"
-    foreign.write_bytes(MAGIC + b"no JSON")
+    foreign.write_bytes(MAGIC + text)
     with Publisher(IDENTITY) as made:
         assert find() == made.path
     assert not foreign.exists()
@@ -104,7 +111,7 @@ def test_several_gateways_are_told_apart_by_their_process(publisher: Publisher) 
     try:
         with pytest.raises(NotRunningError, match=f"--pid {process.pid}: another"):
             find()
-        assert Observer(find(process.pid)).identity["title"] == "another"
+        assert Observer(find(process.pid)).identity.title == "another"
         with pytest.raises(NotRunningError, match="no gateway of process 1 runs"):
             find(1)
     finally:

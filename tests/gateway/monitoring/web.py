@@ -1,6 +1,5 @@
 """A web server over a published status, for tests that ask it."""
 
-import os
 import threading
 import time
 import urllib.error
@@ -14,8 +13,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from gateway.cycle.record import Tick
 from gateway.monitoring.server import listen, make_server
 from gateway.monitoring.shared import Observer, Publisher
-
-IDENTITY = {"pid": os.getpid(), "title": "bench 1", "version": "0.2.0"}
+from tests.gateway.monitoring.identities import IDENTITY
 
 
 class Web:
