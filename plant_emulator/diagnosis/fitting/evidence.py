@@ -56,6 +56,14 @@ def significant(found: FitResult, null: FitResult) -> bool:
     return evidence_of(null.cost - found.cost, found, null) >= EVIDENCE_THRESHOLD
 
 
+def leaves_little(found: FitResult, gap: float) -> bool:
+    """Whether a fit leaves so little of a gap that its cause is known.
+
+    gap : sum of squares beyond the noise without the cause [chi squared]
+    """
+    return excess(found) <= max(UNEXPLAINED_SHARE * gap, EVIDENCE_THRESHOLD)
+
+
 def adequate(found: FitResult, null: FitResult) -> bool:
-    """Whether a fit leaves so little of the gap that its cause is known."""
-    return excess(found) <= max(UNEXPLAINED_SHARE * excess(null), EVIDENCE_THRESHOLD)
+    """Whether a fit leaves so little of the gap without effects that its cause is known."""
+    return leaves_little(found, excess(null))

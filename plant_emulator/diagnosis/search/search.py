@@ -20,14 +20,16 @@ from plant_emulator.diagnosis.fitting.evidence import (
     UNEXPLAINED_SHARE,
     evidence_of,
     excess,
+    leaves_little,
 )
-from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
+from plant_emulator.diagnosis.fitting.explanation import Explanation
 from plant_emulator.diagnosis.fitting.fit_steps import refit
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.confirmation import Trial, advance, confirm, look
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
 from plant_emulator.diagnosis.search.screening import Start, promises, visibilities
 from plant_emulator.diagnosis.search.settings import SETTINGS
+from plant_emulator.diagnosis.search.summary import alternatives, hypotheses, unconverged
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -248,10 +250,11 @@ class Search:
             (self.null,) = self._fits(refit, [other])
 
     def _without_needless(self, best: FitResult) -> FitResult:
-        """Drop the effect of least evidence until each effect has enough; return the set.
+        """Drop the effect that closes least until each one closes enough; return the set.
 
         The queue takes the noise for known. Where a set leaves something correlated, an effect that
         follows a little of it is needless too: its evidence among what is left is that of chance.
+        An effect is the cause of what the others leave only if it leaves little of that.
         """
         self.reduced_costs = {}
         if len(best.effects) < 2:
@@ -266,37 +269,26 @@ class Search:
         found = self._settled()
         cheapest = min(self.reduced_costs, key=self.reduced_costs.__getitem__)
         fall = self.reduced_costs[cheapest] - found.cost
-        if (
-            found.effects != best.effects
-            or evidence_of(fall, found, self.null) >= EVIDENCE_THRESHOLD
-        ):
+        if found.effects != best.effects:
+            return self._without_needless(found)
+        closes = found.mean_square <= NOISE_MEAN_SQUARE or leaves_little(
+            found, excess(found) + fall
+        )
+        if closes and evidence_of(fall, found, self.null) >= EVIDENCE_THRESHOLD:
             return found
+        self.sets = {k: one for k, one in self.sets.items() if len(k) < len(best.effects)}
         (smaller,) = self._fits(refit, [self.sets[frozenset(best.effects) - {cheapest}]])
         return self._without_needless(smaller)
 
     def _explanation(self, final: FitResult) -> Explanation:
-        singles = {next(iter(k)): one for k, one in self.sets.items() if len(k) == 1}
-        those = " and ".join(final.effects) or "no effect"
         (shown,) = self.runner.map(visibilities, [self._task(self.null)])
         return Explanation(
             null=self.null,
             final=final,
-            hypotheses=tuple(
-                Hypothesis(effect=name, fit=singles.get(name), **vars(visibility))
-                for name, visibility in shown.items()
-            ),
-            alternatives={name: self._alternatives(final, name) for name in final.effects},
-            unconverged="" if final.converged else f"the fit with {those} did not converge",
+            hypotheses=hypotheses(self.sets, shown),
+            alternatives={name: alternatives(self.sets, final, name) for name in final.effects},
+            unconverged=unconverged(final),
             reduced_costs=self.reduced_costs if len(final.effects) > 1 else {},
             trace=tuple(self.trace),
             noise=self.noise.channels if self.noise else {},
         )
-
-    def _alternatives(self, final: FitResult, name: str) -> dict[str, float]:
-        """Costs of the sets that have another effect in the place of this one."""
-        others = frozenset(final.effects) - {name}
-        return {
-            next(iter(key - others)): one.cost
-            for key, one in self.sets.items()
-            if len(key) == len(final.effects) and key >= others
-        }

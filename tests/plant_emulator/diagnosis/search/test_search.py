@@ -12,8 +12,9 @@ from plant_emulator.diagnosis.decision.subsystem import faulty_subsystem
 from plant_emulator.diagnosis.decision.verdict import decide
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, adequate, excess
-from plant_emulator.diagnosis.fitting.joint_fit import fit
+from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
 from plant_emulator.diagnosis.report.ranking import undetectable
+from plant_emulator.diagnosis.search.search import Search
 from plant_emulator.diagnosis.search.simulation_columns import SimulationColumns
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import (
@@ -24,6 +25,7 @@ from tests.plant_emulator.diagnosis.line import (
     explained,
     linear,
     noisy,
+    runner,
 )
 
 
@@ -43,6 +45,27 @@ def test_both_of_two_effects_are_named() -> None:
     assert set(found.final.effects) == {"wave", "cube"}
     assert [names[0] for names in found.classes()] == list(found.final.effects)
     assert adequate(found.final, found.null)
+
+
+class KnownNoise(Search):
+    """A search in noise that no log is asked for."""
+
+    def _estimate_noise(self, where: FitResult) -> bool:
+        return False
+
+
+def test_effect_that_leaves_most_of_what_the_others_leave_is_not_the_cause() -> None:
+    """A wave of 4600, a cube of 750 and 800 of no law of the library, in squares of the noise.
+
+    The two leave 13 % of the gap. The cube leaves 52 % of what the wave leaves, so that it is not
+    named. The wave alone leaves 25 %: the cause is unknown.
+    """
+    rest = np.sqrt(0.4) * np.random.default_rng(7).standard_normal(len(TIME))
+    gap = 2.15 * np.sin(20.0 * TIME) + 4.05 * TIME**3 + rest
+    model = Line([noisy(2.0 + 3.0 * TIME + gap)], ["wave", "cube"])
+    found = KnownNoise(runner=runner(model), null=fit_null(model, [0])).explain()
+    assert found.final.effects == ("wave",)
+    assert decide(model, found).kind == "unknown"
 
 
 def test_two_effects_lie_where_the_larger_share_is() -> None:

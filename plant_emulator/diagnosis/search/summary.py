@@ -1,0 +1,40 @@
+"""What the fitted sets of a search say of single effects."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from plant_emulator.diagnosis.fitting.explanation import Hypothesis
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.search.screening import Visibility
+
+    Sets = Mapping[frozenset[str], FitResult]
+
+
+def hypotheses(sets: Sets, visible: Mapping[str, Visibility]) -> tuple[Hypothesis, ...]:
+    """Join the visibility of each effect and its fit alone, if it was fitted."""
+    singles = {next(iter(key)): one for key, one in sets.items() if len(key) == 1}
+    return tuple(
+        Hypothesis(effect=name, fit=singles.get(name), **vars(visibility))
+        for name, visibility in visible.items()
+    )
+
+
+def alternatives(sets: Sets, final: FitResult, name: str) -> dict[str, float]:
+    """Costs of the sets that have another effect in the place of this one [chi squared]."""
+    others = frozenset(final.effects) - {name}
+    return {
+        next(iter(key - others)): one.cost
+        for key, one in sets.items()
+        if len(key) == len(final.effects) and key >= others
+    }
+
+
+def unconverged(final: FitResult) -> str:
+    """Tell that a fit did not converge; empty where it did."""
+    those = " and ".join(final.effects) or "no effect"
+    return "" if final.converged else f"the fit with {those} did not converge"
