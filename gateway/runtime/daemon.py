@@ -9,6 +9,7 @@ and the PLC's watchdog ramps down.
 import os
 import signal
 import socket
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager, nullcontext
@@ -123,7 +124,7 @@ def run(
         listener = _listener(config)
         with _signals(stop), closing(Recorder(job)) as recorder, ExitStack() as beside:
             publisher = beside.enter_context(Publisher(_identity(job)))
-            if view:
+            if view and sys.stdout is not None:  # as `gateway run >&-`
                 screen = Companion("screen", terminal.show_run, publisher.path, log_format)
                 beside.enter_context(closing(screen))
             if listener is not None:

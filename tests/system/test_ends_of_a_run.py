@@ -83,6 +83,16 @@ def test_run_without_a_recorder_ramps_down_and_says_why(tmp_path: Path, end: str
     assert len(records) > 100
 
 
+def test_run_without_an_output_shows_nothing_and_ends_as_any_other(tmp_path: Path) -> None:
+    """As `gateway run >&-`. Nobody listens at the port."""
+    (tmp_path / "gateway.toml").write_text(CONFIG.format(port=1, map="bench_int16"))
+    run = f"{sys.executable} -m gateway run -c gateway.toml --duration 0.2 >&-"
+    done = subprocess.run(
+        run, shell=True, cwd=tmp_path, stderr=subprocess.PIPE, timeout=60, check=False
+    )
+    assert (done.returncode, done.stderr) == (1, b"")
+
+
 def test_reader_of_the_output_that_goes_away_ends_nothing(tmp_path: Path) -> None:
     """As `gateway run ... | head -1`: only the lines are lost."""
     with EmulatorProcess(driver="pi") as emulator:
