@@ -15,11 +15,14 @@ That observer knows that the bench itself shows nothing: its residual without th
 drifted bench shows up to k and h, and nobody can tell it from the error. Where it stands against
 the error, the sum shown is that of the error beyond k, less k and h once more. So an alarm that
 bears every sound bench is certain when the sum of the error beyond 2 k reaches 2 h: the second
-bound. "later" says that the trip came before it.
+bound. It needs the run as it goes on without a trip, here for 3 s more.
+
+"-" says that the run does not come to the bound.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import inf
 
 import numpy as np
 
@@ -29,11 +32,14 @@ from gateway.cycle.supervisor import State
 from gateway.cycle.tolerances import Params
 from register_maps.signals import Measurement
 from register_maps.timing import SCAN
+from tests.gateway.closed_loop import ClosedLoop, Reading
 from tests.gateway.sensor_faults import FAULTS, driving
 
 SPEEDS, DRIVERS = (0, 5, 14), ("none", "pi")
 LONGEST = 1200
 """Scans after which a fault counts as unseen."""
+MORE = 300
+"""Scans of the run without a trip beyond the trip."""
 FAST = 1.0
 """[rad/s] Speed of the drum from which on the time counts."""
 Pair = tuple[Measurement, Measurement]
@@ -44,7 +50,7 @@ Pair = tuple[Measurement, Measurement]
 class Cell:
     """Times above FAST [s]; drum, gained : speed at the trip, and what the drum gains [rad/s].
 
-    certain : second bound; None: the trip came before it
+    bound, certain : first and second bound; None: the run does not come to it
     """
 
     reason: str
@@ -58,27 +64,39 @@ class Cell:
 def cell(name: str, kmh: float, driver: str) -> Cell:
     """One fault at one speed."""
     loop = driving(kmh, driver)
-    begin, fault, sound = len(loop.drum_speed), FAULTS[name](), loop.disturb
-    pairs: list[Pair] = []
-
-    def disturbed(one: object, reading: Measurement) -> Measurement:
-        true = sound(one, reading)  # type: ignore[arg-type]
-        pairs.append((true, fault(true)))
-        return pairs[-1][1]
-
-    loop.disturb = disturbed  # type: ignore[assignment]
-    while loop.last.state is State.RUN and len(loop.drum_speed) - begin < LONGEST:
-        loop.run(SCAN)
-    reason, drum = loop.last.reason, np.array(loop.drum_speed[begin:])
+    p, begin = loop.state.watched.relations, len(loop.drum_speed)
+    pairs, drum = faulty(loop, name, LONGEST)
+    reason = loop.last.reason
     loop.run(4.0)
+    blind = driving(kmh, driver)
+    watched = blind.state.watched
+    deaf = replace(p, motor_level=inf, gear_level=inf, drum_level=inf)
+    blind.state = replace(blind.state, watched=replace(watched, relations=deaf))
     return Cell(
         reason="-" if reason is None else reason.name,
         time=float(SCAN * np.sum(drum > FAST)),
-        bound=bound(loop.state.watched.relations, pairs, drum),
-        certain=bound(loop.state.watched.relations, pairs, drum, sides=2.0),
+        bound=bound(p, pairs, drum),
+        certain=bound(p, *faulty(blind, name, len(drum) + MORE), sides=2.0),
         drum=float(drum[-1]),
         gained=max(loop.drum_speed[begin:]) - max(float(drum[0]), FAST),
     )
+
+
+def faulty(loop: ClosedLoop, name: str, longest: int) -> tuple[list[Pair], np.ndarray]:
+    """Samples without and with the fault, and the drum's speed, until RUN ends or `longest`."""
+    begin, fault, sound = len(loop.drum_speed), FAULTS[name](), loop.disturb
+    pairs: list[Pair] = []
+
+    def disturbed(one: ClosedLoop, reading: Reading) -> Reading:
+        true = sound(one, reading)
+        assert isinstance(true, Measurement)
+        pairs.append((true, fault(true)))
+        return pairs[-1][1]
+
+    loop.disturb = disturbed
+    while loop.last.state is State.RUN and len(loop.drum_speed) - begin < longest:
+        loop.run(SCAN)
+    return pairs, np.array(loop.drum_speed[begin:])
 
 
 def bound(
@@ -128,7 +146,7 @@ def bound(
 
 
 def _text(seconds: float | None) -> str:
-    return "later" if seconds is None else f"{seconds:.2f}"
+    return "-" if seconds is None else f"{seconds:.2f}"
 
 
 def _stands(before: Measurement, now: Measurement) -> bool:
