@@ -254,13 +254,14 @@ def gateway(_: Study) -> Rows:
         yield row(name, ours, peer, theirs, 1.0 / target)
     except clients.NoPeerError as error:
         yield missing(name, f"libmodbus in C: {error}", 1.0 / target)
-    for name, busy, metrics in (
-        ("gateway", False, False),
-        ("gateway_busy", True, False),
-        ("gateway_metrics", False, True),
-        ("gateway_both", True, True),
+    for name, beside in (
+        ("gateway", ()),
+        ("gateway_busy", ("busy",)),
+        ("gateway_metrics", ("metrics",)),
+        ("gateway_both", ("busy", "metrics")),
+        ("gateway_stalled", ("stalled",)),
     ):
-        for part, found in ticks.measure(busy=busy, metrics=metrics).items():
+        for part, found in ticks.measure(*beside).items():
             p50, p99, longest = ticks.quantiles(found)
             label = f"p99; p50 {1e3 * p50:.2f} ms, max {1e3 * longest:.2f} ms"
             target = 1.0 if part == "lateness" else 0.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import pty
 import subprocess
 import sys
 import tempfile
@@ -27,27 +29,30 @@ SCRAPES = 0.05
 CONFIG = "[plc]\nport = {port}\n[recording]\ndir = '{folder}'\n"
 
 
-def measure(*, busy: bool, metrics: bool) -> dict[str, np.ndarray]:
+def measure(*beside: str) -> dict[str, np.ndarray]:
     """Lateness and latency of every tick [s], armed against the emulator.
 
-    busy : beside a process that computes for ever; metrics : beside a reader of the metrics
+    beside : "busy", a process that computes for ever; "metrics", a reader of the metrics;
+        "stalled", a terminal that takes nothing, in the place of no output
     """
     with (
         tempfile.TemporaryDirectory() as folder,
         EmulatorProcess(driver="none") as emulator,
-        ExitStack() as beside,
+        ExitStack() as stack,
     ):
         config = Path(folder) / "bench.toml"
         config.write_text(CONFIG.format(port=emulator.port, folder=folder))
         command = [sys.executable, "-m", "gateway", "run", "-c", str(config)]
         command += ["--duration", f"{LASTING + SETTLING:g}"]
-        if metrics:
+        if "metrics" in beside:
             port = free_port()
             command += ["--metrics", f"127.0.0.1:{port}"]
-            beside.enter_context(scraping(f"http://127.0.0.1:{port}/metrics"))
-        if busy:
-            beside.enter_context(computing())
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+            stack.enter_context(scraping(f"http://127.0.0.1:{port}/metrics"))
+        if "busy" in beside:
+            stack.enter_context(computing())
+        output = stack.enter_context(stalled()) if "stalled" in beside else subprocess.DEVNULL
+        environment = {**os.environ, "TERM": "xterm"}
+        subprocess.run(command, check=True, stdout=output, env=environment)
         (file,) = Path(folder).glob("*.rlrec")
         records = recording.read(file).records
     settled = records[records["now"] >= records["now"][0] + SETTLING]
@@ -68,6 +73,17 @@ def computing() -> Iterator[None]:
             yield
         finally:
             process.kill()
+
+
+@contextmanager
+def stalled() -> Iterator[int]:
+    """A terminal that nobody reads: after some kilobytes it takes nothing."""
+    reader, terminal = pty.openpty()
+    try:
+        yield terminal
+    finally:
+        os.close(terminal)
+        os.close(reader)
 
 
 @contextmanager
