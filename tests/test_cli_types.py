@@ -20,6 +20,7 @@ OUTPUTS = {
     "--log",
     "--out",
     "--plot",
+    "--save-learned",
     "--report",
     "--next-program",
     "--save",

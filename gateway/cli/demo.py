@@ -77,6 +77,14 @@ Examples:
     metavar="S",
     help="Duration of the truck's cycle.",
 )
+@click.option(
+    "--repeats",
+    type=click.IntRange(1, 100),
+    default=1,
+    show_default=True,
+    metavar="N",
+    help="Runs of each truck; the regulator `learned` remembers those before.",
+)
 @click.option("--fast", is_flag=True, help="Do not wait for a clock; latency is not measured.")
 @click.option(
     "--out",
@@ -100,6 +108,7 @@ def command(
     bench_parameters: str,
     friction: str | None,
     duration: float,
+    repeats: int,
     fast: bool,
     out: Path,
     json_file: str | None,
@@ -128,6 +137,7 @@ def command(
             bench_parameters=bench_parameters,
             friction=friction,
             duration=duration,
+            repeats=repeats,
             fast=fast,
             out=out,
         ),
@@ -154,6 +164,7 @@ def _show(console: "Console", runs: "Sequence[RunFigures]", out: Path) -> None:
         ("force in cruise, error", lambda run: _force(run.force)),
         ("traction energy, error", lambda run: _percent(_energy_error(run), sign="+")),
         ("J2951 inertia work, speed error", lambda run: _quality(run.quality)),
+        ("shaft torque, from / to", lambda run: _torque(run.shaft_torque)),
         ("latency p50 / p99 / max", lambda run: _latency(run.latency)),
         ("missed deadlines", lambda run: f"{run.missed_deadlines} of {run.cycles}"),
         ("stopped by", lambda run: run.stop_reason),
@@ -174,6 +185,10 @@ def _energy_error(run: "RunFigures") -> float | None:
 
 def _force(force: "CruiseForce | None") -> str:
     return "no cruise" if force is None else f"{force.mean_error:+.1f} N of {force.target:.0f} N"
+
+
+def _torque(extremes: tuple[float, float] | None) -> str:
+    return "-" if extremes is None else "{:+.1f} / {:+.1f} Nm".format(*extremes)
 
 
 def _quality(quality: "DriveQuality | None") -> str:

@@ -6,6 +6,7 @@ import click
 
 from gateway.cli._shared.options import assignments, write_json
 from gateway.reports.replay import draw, write_csv
+from gateway.workflows.learning import save_memory
 from gateway.workflows.replay import replay
 from register_maps.command_line.parameters import PICTURES, Command, OutputFile
 
@@ -30,6 +31,11 @@ PICTURE = OutputFile(endings=PICTURES, path_type=Path)
 )
 @click.option("--out", type=OutputFile(path_type=Path), help="write both setpoints to a CSV file")
 @click.option("--plot", type=PICTURE, help="draw both setpoints (PNG)")
+@click.option(
+    "--save-learned",
+    type=OutputFile(path_type=Path),
+    help="write what the learned regulator remembers after the run (TOML)",
+)
 @click.option("--json", "json_file", type=OutputFile(dash=True), help="run/1; - = stdout")
 def command(
     file: Path,
@@ -38,6 +44,7 @@ def command(
     values: tuple[str, ...],
     out: Path | None,
     plot: Path | None,
+    save_learned: Path | None,
     json_file: str | None,
 ) -> int:
     """Put the measurements of a run through regulator, supervisor and limits again.
@@ -52,6 +59,8 @@ def command(
         write_csv(out, result.comparison)
     if plot is not None:
         draw(plot, result.comparison)
+    if save_learned is not None:
+        save_memory(file, result.config, save_learned)
     if json_file is not None:
         write_json(json_file, result.to_json())
     if json_file != "-":

@@ -39,6 +39,19 @@ class Memory:
         """Table `learned` as a configuration file has it."""
         return {"duration": self.duration, "crossings": [asdict(one) for one in self.crossings]}
 
+    @property
+    def toml(self) -> str:
+        """The same as a file that `learned` names; an unseen cycle has no crossings."""
+        lines = [
+            "# What the learned regulator remembers of a cycle: times in s from the truck's start.",
+            f"duration = {self.duration!r}",
+            *([] if self.crossings else ["crossings = []"]),
+        ]
+        for one in self.crossings:
+            values = (f"{name} = {value!r}" for name, value in asdict(one).items())
+            lines += ["", "[[crossings]]", *values]
+        return "\n".join(lines) + "\n"
+
 
 NOTHING = Memory()
 """The memory of a regulator that has seen no repeat."""

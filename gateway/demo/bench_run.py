@@ -74,6 +74,7 @@ def figures_of(options: DemoOptions, run: BenchRun) -> RunFigures:
         quality=drive_quality(
             run.log.time, run.road_speed, run.speed, run.truck.mass, run.truck.road_load
         ),
+        shaft_torque=(float(run.log["shaft_torque"].min()), float(run.log["shaft_torque"].max())),
         cycles=len(ticks),
         missed_deadlines=int(ticks["missed"][-1] - ticks["missed"][0]) if len(ticks) else 0,
         latency=None if options.fast else Latency.of(ticks["latency"]),

@@ -6,7 +6,7 @@ and what the daemon printed; all trucks together leave a picture and a summary.
 """
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,9 +19,12 @@ from gateway.demo.operator import Session, operate_fast, operate_in_real_time
 from gateway.demo.options import UNLOADED, DemoOptions
 from gateway.demo.view import Screen
 from gateway.errors import GatewayError
+from gateway.offline.evaluation import agreement
 from gateway.offline.figures import RunFigures
 from gateway.reasons import Reason
 from gateway.recordings import recording
+from gateway.recordings.header import config_of
+from gateway.workflows.learning import save_memory
 from plant_emulator import logs
 from plant_emulator.emulator.process import EmulatorProcess
 from plant_emulator.signals.log import Log
@@ -30,30 +33,66 @@ from plant_emulator.simulation.truck import Forklift
 
 @dataclass(frozen=True, kw_only=True)
 class DemoResult:
-    """Key figures of every run, and one line for each run that did not end as it should."""
+    """Key figures of every truck, and one line for each run that did not end as it should.
+
+    figures : of the last run of each truck; earlier : of the repeats before it, truck by truck
+    """
 
     figures: tuple[RunFigures, ...]
+    earlier: tuple[RunFigures, ...]
     failures: tuple[str, ...]
 
     def to_json(self) -> dict[str, Any]:
         """Return the figures as the document demo/1."""
-        return {"schema": "demo/1", "runs": [one.to_json() for one in self.figures]}
+        return {
+            "schema": "demo/1",
+            "runs": [one.to_json() for one in self.figures],
+            "earlier": [one.to_json() for one in self.earlier],
+        }
 
 
 def demo(options: DemoOptions, console: Console) -> DemoResult:
     """Drive every truck, and write picture and summary beside the logs."""
     options.out.mkdir(parents=True, exist_ok=True)
-    runs = [drive(options, load_mass, console) for load_mass in options.loads]
+    driven = [_repeat(options, load_mass, console) for load_mass in options.loads]
+    runs = [one[-1] for one in driven]
     figures = tuple(figures_of(options, run) for run in runs)
     curves = [
         curves_of(run, _title(one), one.velocity) for run, one in zip(runs, figures, strict=True)
     ]
     plot.draw(curves, options.out / "demo.png")
-    failures = tuple(filter(None, map(failure_of, runs)))
-    result = DemoResult(figures=figures, failures=failures)
+    result = DemoResult(
+        figures=figures,
+        earlier=tuple(figures_of(options, run) for one in driven for run in one[:-1]),
+        failures=tuple(filter(None, (failure_of(run) for one in driven for run in one))),
+    )
     text = json.dumps(result.to_json(), indent=2)
     (options.out / "summary.json").write_text(text + "\n", "utf-8")
     return result
+
+
+def _repeat(options: DemoOptions, load_mass: float, console: Console) -> list[BenchRun]:
+    """Drive one truck through its cycle as often as asked; a run that failed is the last."""
+    runs: list[BenchRun] = []
+    learned = options.learned
+    for number in range(1, options.repeats + 1):
+        is_last = number == options.repeats
+        out = options.out if is_last else options.out / f"repeat_{number}"
+        out.mkdir(parents=True, exist_ok=True)
+        runs.append(drive(replace(options, out=out, learned=learned), load_mass, console))
+        if is_last or failure_of(runs[-1]):
+            break
+        close, torque = agreement(runs[-1].road_speed, runs[-1].speed), runs[-1].log["shaft_torque"]
+        console.print(
+            f"  repeat {number} of {options.repeats}: Val1 {close.val1:.2f} %, "
+            f"Val2 {close.val2:.2f} %, shaft torque from {torque.min():.1f} Nm",
+            highlight=False,
+        )
+        if options.regulator == "learned":
+            found = runs[-1].recording
+            learned = found.path.with_name(f"learned_{runs[-1].truck.mass:.0f}kg.toml")
+            save_memory(found.path, config_of(found.header), learned)
+    return runs
 
 
 def _title(run: RunFigures) -> str:

@@ -73,6 +73,7 @@ class RunFigures:
     velocity : agreement of the two speeds, or of the two setpoints in a replay
     cycles : ticks of the run
     quality : indices of SAE J2951, of the bench over the road
+    shaft_torque : least and largest [N m]; the least is negative while the motor drives
     latency : of the ticks; None where no clock ran
     stop_reason : name of the reason for which the run ended; empty: it did not end
     """
@@ -84,6 +85,7 @@ class RunFigures:
     force: CruiseForce | None = None
     energy: TractionEnergy | None = None
     quality: DriveQuality | None = None
+    shaft_torque: tuple[float, float] | None = None
     cycles: int
     missed_deadlines: int = 0
     latency: Latency | None = None
@@ -108,6 +110,10 @@ class RunFigures:
                 "error_percent": energy and energy.error_percent,
             },
             "j2951": self.quality and self.quality.to_json(),
+            "shaft_torque_Nm": {
+                "min": self.shaft_torque and self.shaft_torque[0],
+                "max": self.shaft_torque and self.shaft_torque[1],
+            },
             "cycles": self.cycles,
             "missed_deadlines": self.missed_deadlines,
             "latency_ms": {

@@ -37,6 +37,17 @@ def test_replayed_torque_gives_both_trucks_the_speed_of_the_road(tmp_path):
         assert run["stop_reason"] == "REMOTE_OFF"
 
 
+def test_learned_regulator_knows_in_the_second_run_what_the_first_has_shown(tmp_path):
+    """Free through the backlash, the drum meets the gear with 90 N m at the shaft and more."""
+    options = ("--fast", "--regulator", "learned", "--repeats", "2", "--load", "0")
+    (after,) = demo(tmp_path, *options)
+    (before,) = json.loads((tmp_path / "summary.json").read_text())["earlier"]
+    assert before["shaft_torque_Nm"]["min"] < -85.0
+    assert after["shaft_torque_Nm"]["min"] > -60.0
+    assert after["velocity"]["val1"] >= 99.2
+    assert after["velocity"]["val2"] >= 99.7
+
+
 @pytest.mark.parametrize(("regulator", "period"), [("thesis", "20"), ("compensated", "50")])
 def test_slower_poll_gives_a_truck_the_speed_of_the_road(tmp_path, regulator, period):
     """Each truck at each period: test_the_drum_goes_as_the_truck_would_on_the_road."""

@@ -50,3 +50,10 @@ def test_a_memory_is_read_from_a_file_beside_the_configuration(tmp_path):
 def test_what_is_no_memory_is_refused(table, told):
     with pytest.raises(ConfigError, match=told):
         Config().with_values({"regulator.learned": table})
+
+
+def test_a_memory_without_a_crossing_is_written_as_it_is_read(tmp_path):
+    path = tmp_path / "cycle.toml"
+    path.write_text(Memory(duration=3.0).toml, "utf-8")
+    found = with_values(Config(), {"regulator.learned": str(path)})
+    assert found.regulator.learned == Memory(duration=3.0)

@@ -1,14 +1,17 @@
 """What the learned regulator adds: it knows a reversal from earlier repeats and prepares for it."""
 
+import tomllib
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from gateway.configuration.config import Config
-from gateway.configuration.memory import NOTHING, Crossing, Memory
+from gateway.configuration.memory import NOTHING, Crossing, Memory, read_memory
 from gateway.cycle.supervisor import State
+from gateway.errors import ConfigError
 from gateway.offline.evaluation import agreement
+from gateway.offline.learning import memory_after
 from gateway.physics.window import Window
 from gateway.regulators import compensated, learned
 from plant_emulator.simulation.truck import Cycle, Forklift, ReplayedTorque, road_speed
@@ -191,6 +194,18 @@ def test_a_repeated_cycle_comes_nearer_to_the_road_and_its_flanks_meet_more_gent
     assert close.val1 >= 99.2
     assert close.val2 >= 99.7
     assert peak(after) < 0.6 * peak(before)
+
+
+@pytest.mark.slow
+def test_a_recording_of_the_run_tells_the_memory_that_it_left(first):
+    loop, _ = first
+    memory = loop.state.regulator.memory
+    assert memory_after(loop.config, loop.map, loop.observations) == memory
+    assert memory != NOTHING
+    assert read_memory(tomllib.loads(memory.toml), "") == memory
+    other = loop.config.with_values({"regulator.name": "compensated"})
+    with pytest.raises(ConfigError, match=r"regulator\.name.*'compensated'; expected learned"):
+        memory_after(other, loop.map, loop.observations)
 
 
 @pytest.mark.slow
