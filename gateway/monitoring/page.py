@@ -18,6 +18,8 @@ from register_maps.units import RPM
 BARS: Final = "▁▂▃▄▅▆▇█"
 WIDTH: Final = 48
 """Columns of a trend."""
+FULL, EMPTY, BAR = "█", "░", 30
+"""Signs and columns of a bar of progress."""
 LAST: Final = 8
 """Changes on the page."""
 STALLED: Final = 1.0
@@ -64,6 +66,15 @@ def bars(values: Iterable[float]) -> str:
         BARS[int((value - least) / span * (len(BARS) - 1))] if math.isfinite(value) else " "
         for value in shown
     )
+
+
+def progress_rows(values: Values, planned: float | None) -> list[Row]:
+    """Progress of a program that takes a planned time [s]; none outside of its run."""
+    if planned is None or State(values.state) is not State.RUN:
+        return []
+    done = min(values.now - values.since, planned)
+    bar = FULL * round(BAR * done / planned)
+    return [("program", f"{bar:{EMPTY}<{BAR}} {done:.0f} of {planned:.0f} s")]
 
 
 def status_rows(values: Values, age: float) -> list[Row]:

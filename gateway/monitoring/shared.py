@@ -41,6 +41,7 @@ class Identity:
 
     title, date : of the recording, the date in ISO 8601, UTC; period : between two ticks [s]
     version : of the gateway; recording : its path; real_time : what the system granted
+    planned : time that the program takes [s]; None: a run without a program
     """
 
     pid: int
@@ -50,6 +51,7 @@ class Identity:
     version: str
     recording: str
     real_time: str
+    planned: float | None
 
 
 def folder() -> Path:

@@ -145,6 +145,7 @@ def render(identity: Identity, snapshot: Snapshot, trend: page.Trend) -> Panel:
     return Panel(
         Group(
             _grid(page.status_rows(values, time.monotonic() - values.now)),
+            _grid(page.progress_rows(values, identity.planned)),
             _grid(page.alarm_rows(snapshot.alarms, date)),
             _trends(values, trend),
             _grid(page.time_rows(snapshot)),

@@ -123,7 +123,7 @@ def run(
         )
         listener = _listener(config)
         with _signals(stop), closing(Recorder(job)) as recorder, ExitStack() as beside:
-            publisher = beside.enter_context(Publisher(_identity(job)))
+            publisher = beside.enter_context(Publisher(_identity(job, config)))
             if view and sys.stdout is not None:  # as `gateway run >&-`
                 screen = Companion("screen", terminal.show_run, publisher.path, log_format)
                 beside.enter_context(closing(screen))
@@ -171,7 +171,7 @@ def _keeping(recording: RecordingConfig) -> Keeping:
     )
 
 
-def _identity(job: Job) -> Identity:
+def _identity(job: Job, config: Config) -> Identity:
     header = job.header
     return Identity(
         pid=os.getpid(),
@@ -181,6 +181,7 @@ def _identity(job: Job) -> Identity:
         version=header.versions["gateway"],
         recording=str(job.path),
         real_time=header.real_time,
+        planned=None if config.program is None else config.program.duration,
     )
 
 

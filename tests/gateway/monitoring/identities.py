@@ -12,4 +12,5 @@ IDENTITY = Identity(
     version="0.2.0",
     recording="runs/1.rlrec",
     real_time="SCHED_FIFO no (Operation not permitted)",
+    planned=None,
 )

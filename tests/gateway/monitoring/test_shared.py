@@ -15,6 +15,7 @@ from rich.console import Console
 import gateway.cli
 from gateway.cycle.supervisor import State
 from gateway.monitoring import page, terminal
+from gateway.monitoring.block import Values
 from gateway.monitoring.shared import MAGIC, NotRunningError, Observer, Publisher, find
 from tests.gateway.monitoring.identities import IDENTITY as BENCH
 from tests.gateway.monitoring.test_block import good
@@ -153,6 +154,20 @@ def test_page_calls_a_loop_that_stands_still_stalled(publisher: Publisher) -> No
     assert "STALLED" not in dict(page.status_rows(values, 0.5))
 
 
+@pytest.mark.parametrize(
+    ("done", "full", "told"),
+    [(0.0, 0, "0 of 40 s"), (12.0, 9, "12 of 40 s"), (50.0, 30, "40 of 40 s")],
+)
+def test_program_shows_its_progress_while_it_runs(done: float, full: int, told: str) -> None:
+    values = Values(now=100.0 + done, since=100.0, state=int(State.RUN))
+    [(label, shown)] = page.progress_rows(values, 40.0)
+    assert label == "program"
+    assert shown.count(page.FULL) == full
+    assert shown.endswith(f" {told}")
+    assert page.progress_rows(values, None) == []
+    assert page.progress_rows(replace(values, state=int(State.ARMED)), 40.0) == []
+
+
 def test_trend_spans_its_values_and_leaves_holes() -> None:
     assert page.bars([0.0, 1.0, float("nan"), 7.0]) == "▁▂ █"
     assert page.bars([3.0, 3.0]) == "▁▁"
@@ -178,5 +193,5 @@ def test_page_fits_a_terminal_of_80_columns(publisher: Publisher) -> None:
     for _ in range(100):
         trend.add(snapshot.values)
     with console.capture() as capture:
-        console.print(terminal.render(IDENTITY, snapshot, trend))
+        console.print(terminal.render(replace(IDENTITY, planned=1e4), snapshot, trend))
     assert max(map(len, capture.get().splitlines())) <= 80
