@@ -172,6 +172,8 @@ def estimate(
 ) -> Estimate:
     """Fit the unknowns from their starts.
 
+    A fit does not begin where no unknown changes the residual, as where nothing can be simulated.
+
     residuals : one function a run, from the values by name to the whitened residual
     settled : relative fall of the cost that ends the fit
     iterations : at most so many; None: MAX_ITERATIONS
@@ -192,11 +194,15 @@ def estimate(
     followed = None if follow is None else _Followed(unknowns, follow)
     problem = _Problem(unknowns, residuals, progress, followed, difference)
     problem.steps = np.full(len(unknowns), FIRST_DIFFERENCE)
+    start = np.clip(start, lower + margin, upper - margin)
+    free = any(u.std is None for u in unknowns)
+    if free and not any(slopes.any() for slopes in problem.jacobian(start)):
+        return _estimate(problem, start, False, "no unknown changes the residual")
     # Threads that wait for each other in a decomposition of ten columns take most of the time.
     with threadpool_limits(1):
         found = least_squares(
             problem.rows,
-            np.clip(start, lower + margin, upper - margin),
+            start,
             problem.slopes,
             bounds=(lower, upper),
             x_scale="jac",

@@ -14,7 +14,9 @@ from plant_emulator.diagnosis.execution.pool import InProcess, TaskRunner, build
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.missing_law.hypothesis_test import DraftedLaw, compare_laws
 from plant_emulator.diagnosis.wording import percent, size
+from plant_emulator.errors import InputError
 from plant_emulator.parameter_sets import DEFAULT, with_effects
+from plant_emulator.recordings.recording import IMPOSSIBLE
 from plant_emulator.workflows.diagnosis.runs import bench_runs
 
 if TYPE_CHECKING:
@@ -66,7 +68,8 @@ def draft_check(
 ) -> DraftCheck:
     """Fit the effect of a file to logs, and predict each log from the others with it.
 
-    Raises InputError for a file, a log or a set that cannot be used.
+    Raises InputError for a file, a log or a set that cannot be used, and for an effect that cannot
+    be simulated.
     """
     (own,) = effects.from_files([Path(file)])
     runs = bench_runs(
@@ -78,6 +81,11 @@ def draft_check(
         null = fit_null(model, runs.plan.fitted)
         draft = DraftedLaw(effect=own.name, values={}, null=null, runs=runs.plan.fitted)
         (found,) = compare_laws(runner, runs.plan, [draft])
+    if found.fit.mean_square >= IMPOSSIBLE**2:
+        raise InputError(
+            f"{file}: the bench cannot be simulated with the plausible values of {own.name}; "
+            "smaller ones are expected"
+        )
     candidate = model.candidates[own.name]
     return DraftCheck(
         effect=own.name,

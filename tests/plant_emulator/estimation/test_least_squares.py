@@ -171,6 +171,14 @@ def test_prior_alone_gives_back_itself() -> None:
     assert found.data_errors[0] == np.inf
 
 
+def test_fit_does_not_begin_where_nothing_changes_the_residual() -> None:
+    """As where no run can be simulated: every sample is the same large number."""
+    free = number("a", 2.0)
+    found = estimate([free], [lambda _: np.full((1, 50), 100.0)])
+    assert not found.converged
+    assert found.parameters() == {"a": pytest.approx(2.0)}
+
+
 def test_prior_and_data_are_weighed_by_their_precision() -> None:
     # 100 samples of 1.0 with unit noise: standard error 0.1; prior 0.0 +- 0.1: the middle
     found = estimate(
