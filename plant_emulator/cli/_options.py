@@ -6,14 +6,15 @@ import json
 import os
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
+from click.core import ParameterSource
 
 from register_maps.command_line.parameters import PICTURES, OutputFile
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
 parameters = click.option(
     "--parameters",
@@ -28,6 +29,13 @@ model = click.option(
     default="bench",
     show_default=True,
     help="The machine: the bench, or a single motor-driven axis.",
+)
+columns = click.option(
+    "--column",
+    "columns",
+    multiple=True,
+    metavar="NAME=COLUMN[*FACTOR][:UNIT]",
+    help="Column of an axis's files, as in position=enc:deg; may be repeated.",
 )
 effect = click.option(
     "--effect",
@@ -70,6 +78,17 @@ def workers(text: str) -> Callable[[Any], Any]:
         metavar="N",
         help=text,
     )
+
+
+def refuse_of_another(
+    model: Literal["bench", "axis"], of_bench: Mapping[str, str], of_axis: Mapping[str, str]
+) -> None:
+    """Refuse options that this model would ignore, given by their arguments."""
+    given = click.get_current_context().get_parameter_source
+    other = "axis" if model == "bench" else "bench"
+    for name, option in (of_axis if model == "bench" else of_bench).items():
+        if given(name) is not ParameterSource.DEFAULT:
+            raise click.UsageError(f"{option} belongs to --model {other}")
 
 
 def write_json(answer: Any, target: str) -> None:

@@ -7,7 +7,6 @@ import sys
 from typing import TYPE_CHECKING, Literal
 
 import click
-from click.core import ParameterSource
 
 from plant_emulator.cli import _options
 from register_maps.command_line.parameters import Command, OutputFile
@@ -55,13 +54,7 @@ part of a file in time [s].
     metavar="FILE.py",
     help="File of your own effect beside the library; may be repeated.",
 )
-@click.option(
-    "--column",
-    "columns",
-    multiple=True,
-    metavar="NAME=COLUMN[*FACTOR][:UNIT]",
-    help="Column of an axis's files, as in position=enc:deg; may be repeated. See below.",
-)
+@_options.columns
 @click.option(
     "--one-run",
     is_flag=True,
@@ -114,7 +107,9 @@ def command(
     from plant_emulator.cli._progress import progress
     from plant_emulator.workflows.diagnosis.diagnose import diagnose
 
-    _refuse_options_of_another(model)
+    of_bench = {"next_program": "--next-program", "parameters": "--parameters"}
+    of_axis = {"columns": "--column", "one_run": "--one-run"}
+    _options.refuse_of_another(model, {**of_bench, "reference": "--reference"}, of_axis)
     with progress() as tell:
         found = diagnose(
             logs,
@@ -144,18 +139,6 @@ def command(
         _options.write_json(found.to_json(), json_file)
     if json_file != "-":
         click.echo(found.to_text())
-
-
-def _refuse_options_of_another(model: Literal["bench", "axis"]) -> None:
-    """Refuse options that this model would ignore."""
-    given = click.get_current_context().get_parameter_source
-    of_bench = {"save": "--save", "next_program": "--next-program", "effect_files": "--effects"}
-    of_bench |= {"parameters": "--parameters", "reference": "--reference"}
-    of_axis = {"columns": "--column", "one_run": "--one-run"}
-    other = "axis" if model == "bench" else "bench"
-    for name, option in (of_axis if model == "bench" else of_bench).items():
-        if given(name) is not ParameterSource.DEFAULT:
-            raise click.UsageError(f"{option} belongs to --model {other}")
 
 
 def _write_next_program(found: Diagnosis, path: str) -> None:

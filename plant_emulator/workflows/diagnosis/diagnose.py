@@ -15,7 +15,7 @@ from plant_emulator.diagnosis.report.document import to_json
 from plant_emulator.diagnosis.report.html.page import html
 from plant_emulator.diagnosis.report.terminal import lines
 from plant_emulator.diagnosis.wording import KINDS, percent
-from plant_emulator.errors import DiagnosisError, InputError, report_unwritable
+from plant_emulator.errors import InputError, report_unwritable
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.parameter_sets import DEFAULT, with_effects
 from plant_emulator.simulation.programs import describe
@@ -31,7 +31,7 @@ from plant_emulator.workflows.diagnosis.calibration import load_model_form_error
 from plant_emulator.workflows.diagnosis.drafting import Drafted
 from plant_emulator.workflows.diagnosis.drafting import draft as draft_law
 from plant_emulator.workflows.diagnosis.runs import axis_runs, bench_runs
-from plant_emulator.workflows.diagnosis.saved_set import parameter_set
+from plant_emulator.workflows.diagnosis.saved_set import axis_parameter_set, parameter_set
 from plant_emulator.workflows.workers import make_pool
 
 if TYPE_CHECKING:
@@ -53,6 +53,7 @@ class Diagnosis:
     """The result of a diagnosis; `print` shows it as the command `diagnose` does.
 
     given : the parameter set that was diagnosed; None: the machine is a single axis
+    rotary : whether a single axis turns
     fitted : the runs of the bench that were not held out
     effect_files : of the user's own effects, absolute
     drafted : drafts of a missing law, with their fits; None: nobody asked, or it cannot be done
@@ -61,6 +62,7 @@ class Diagnosis:
     findings: Findings
     given: ParameterSet | None
     fitted: tuple[Recording, ...]
+    rotary: bool = False
     effect_files: tuple[str, ...] = ()
     drafted: Drafted | None = None
 
@@ -78,11 +80,11 @@ class Diagnosis:
     def parameter_set(self) -> ParameterSet:
         """The given set with the fitted values and the accepted effects, or else the best draft.
 
-        Raises DiagnosisError for a single axis, which has no parameter set.
+        The set of a single axis holds its own parameters.
         """
-        if self.given is None:
-            raise DiagnosisError("a single axis has no parameter set")
         findings, files = self.findings, {Path(file).stem: file for file in self.effect_files}
+        if self.given is None:
+            return axis_parameter_set(findings, files, rotary=self.rotary)
         if self.drafted and self.drafted.fits and not self.answer.verdict.effects:
             file, fit = self.drafted.drafts[0].file, self.drafted.fits[0]
             files[Path(file).stem] = file
@@ -167,7 +169,14 @@ def diagnose(
     given = None if model == "axis" else _set(parameters, effect_files)
     runs: Runs[Any]
     if given is None:
-        runs = axis_runs(logs, hold_out, without=without, columns=columns, one_run=one_run)
+        runs = axis_runs(
+            logs,
+            hold_out,
+            without=without,
+            effect_files=effect_files,
+            columns=columns,
+            one_run=one_run,
+        )
     else:
         runs = bench_runs(
             logs,
@@ -190,6 +199,7 @@ def diagnose(
         findings=findings,
         given=given,
         fitted=runs.fitted,
+        rotary=isinstance(runs.recipe, AxisRuns) and runs.recipe.logs[0].rotary,
         effect_files=tuple(str(Path(file).absolute()) for file in effect_files),
         drafted=drafted,
     )

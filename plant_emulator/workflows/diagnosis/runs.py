@@ -19,6 +19,7 @@ from plant_emulator.recordings.axis_preflight import axis_notes
 from plant_emulator.recordings.wheel_torque import deviation
 from plant_emulator.signals.axis_log import AxisLog
 from plant_emulator.signals.log import WHEEL_TORQUE, Log
+from plant_emulator.workflows.axis_files.own_effects import own_effects
 from plant_emulator.workflows.diagnosis.axis_parts import file_of, read_runs
 from plant_emulator.workflows.diagnosis.plan import plan_of_runs, plan_recordings
 from plant_emulator.workflows.loading import (
@@ -84,7 +85,7 @@ def bench_runs(
     named = [effect.name for effect in effects.from_files(files)]
     _check_names(without, [*effects.names(), *named])
     recordings, notes = load_recordings(
-        [_bench_source(one) for one in (*logs, *held_out)],
+        [bench_source(one) for one in (*logs, *held_out)],
         parameters,
         reference,
         common_channels=True,
@@ -111,6 +112,7 @@ def axis_runs(
     held_out: Sequence[Source],
     *,
     without: Sequence[str] = (),
+    effect_files: Sequence[str | Path] = (),
     columns: Sequence[str] | Mapping[str, str] = (),
     one_run: bool = False,
 ) -> Runs[AxisRuns]:
@@ -119,7 +121,8 @@ def axis_runs(
     columns : NAME=COLUMN[*FACTOR][:UNIT] for columns of files without an accepted name
     one_run : the files of `logs` are one run
     """
-    _check_names(without, AXIS_EFFECTS)
+    own = own_effects(effect_files)
+    _check_names(without, [*AXIS_EFFECTS, *(effect.name for effect in own)])
     sources = [_axis_source(one) for one in (*logs, *held_out)]
     fitted, predicted = read_runs(
         sources[: len(logs)], sources[len(logs) :], columns, one_run=one_run
@@ -135,13 +138,14 @@ def axis_runs(
         "columns": ", ".join(words) or "-",
         "files": "parts of one run" if one_run else "a run each",
         "without": ", ".join(without) or "-",
+        "own effects": ", ".join(map(str, effect_files)) or "-",
     }
     files = dict.fromkeys(file_of(one) for one in sources if not isinstance(one, AxisLog))
     return Runs(
-        recipe=AxisRuns(tuple(runs), tuple(without)),
+        recipe=AxisRuns(tuple(runs), tuple(without), own),
         plan=plan,
         notes=tuple(axis_notes(runs)),
-        settings=_settings(settings, list(files)),
+        settings=_settings(settings, [*files, *effect_files]),
     )
 
 
@@ -172,7 +176,8 @@ def describe_sampling(time: Array) -> str:
     return f"every {found['periods']}; {found['skipped samples']} samples skipped"
 
 
-def _bench_source(source: Source) -> str | Path | Log:
+def bench_source(source: Source) -> str | Path | Log:
+    """A source of a log of the bench; DiagnosisError for a log of an axis."""
     if isinstance(source, AxisLog):
         raise DiagnosisError(f"{source.source}: a log of a single axis needs the model axis")
     return source

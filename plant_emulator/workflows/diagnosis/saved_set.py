@@ -1,4 +1,7 @@
-"""The parameter set that a diagnosis leaves: fitted parameters, and the accepted effects."""
+"""The parameter set that a diagnosis leaves: fitted parameters, and the accepted effects.
+
+The set of an axis has the form of a bench's set, with the parameters of the axis.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.diagnosis.axis.quantities import UNITS
 from plant_emulator.estimation.initial_states import with_logged_values
+from plant_emulator.model.parameters import Parameter, ParameterSet
 from plant_emulator.solver.kernel import kernel
 from plant_emulator.workflows.provenance import program_version, today
 
@@ -16,8 +21,9 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.diagnose import Findings
     from plant_emulator.effects import Effect
-    from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
+
+SYMBOLS = {"inertia": "M", "viscous_friction": "F_v", "coulomb_friction": "F_c", "offset": "F_0"}
 
 
 def parameter_set(
@@ -45,13 +51,7 @@ def parameter_set(
         name: replace(p, standard_error=final.standard_errors.get(name)) if name in changed else p
         for name, p in new.parameters.items()
     }
-    origin = {
-        "date": today(),
-        "version": program_version(),
-        "before": parameters.name,
-        "logs": list(findings.answer.logs.estimation),
-        "verdict": findings.answer.verdict.statement,
-    }
+    origin = {**_origin(findings), "before": parameters.name}
     used = {name: file for name, file in files.items() if name in own}
     return replace(
         new,
@@ -60,6 +60,53 @@ def parameter_set(
         effects={**parameters.effects, **own},
         effect_files={**parameters.effect_files, **used},
     )
+
+
+def axis_parameter_set(
+    findings: Findings, files: Mapping[str, str], *, rotary: bool
+) -> ParameterSet:
+    """The fitted values of an axis, and the effects that the answer names.
+
+    files : of the user's own effects, by effect
+    """
+    final, units = findings.final, UNITS[rotary]
+    parameters = {
+        name: Parameter(
+            name=name,
+            symbol=SYMBOLS[name],
+            value=final.values[name],
+            unit=unit,
+            kind="estimated",
+            source="diagnosis",
+            standard_error=final.standard_errors.get(name),
+        )
+        for name, unit in units.items()
+    }
+    named = {one.effect: one for one in findings.answer.ranking if one.accepted}
+    effects = {
+        name: {
+            q.name.removeprefix(f"{name}_"): q.value
+            for q in one.parameters
+            if q.name.startswith(f"{name}_")
+        }
+        for name, one in named.items()
+    }
+    return ParameterSet(
+        name="axis",
+        parameters=parameters,
+        origin={**_origin(findings), "model": "axis"},
+        effects=effects,
+        effect_files={name: file for name, file in files.items() if name in named},
+    )
+
+
+def _origin(findings: Findings) -> dict[str, object]:
+    return {
+        "date": today(),
+        "version": program_version(),
+        "logs": list(findings.answer.logs.estimation),
+        "verdict": findings.answer.verdict.statement,
+    }
 
 
 def _of_runs(

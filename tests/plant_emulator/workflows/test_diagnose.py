@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from typing import Any, cast
 
 import pytest
 from click.testing import CliRunner
@@ -94,12 +93,6 @@ def test_log_of_another_machine_is_refused(log: Log) -> None:
 def test_no_log_is_refused() -> None:
     with pytest.raises(InputError, match="at least one is needed"):
         diagnose([])
-
-
-def test_axis_has_no_parameter_set() -> None:
-    found = Diagnosis(findings=cast("Any", None), given=None, fitted=())
-    with pytest.raises(DiagnosisError, match="no parameter set"):
-        _ = found.parameter_set
 
 
 def test_each_of_several_logs_is_predicted_from_the_others() -> None:
