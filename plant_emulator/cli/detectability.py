@@ -14,18 +14,23 @@ EXAMPLE = """
 Examples:
   plant-emulator detectability program1 program2 program3
   plant-emulator detectability run1.csv.gz program4 --json plan.json
+  plant-emulator detectability --model axis run.csv --column position=enc:deg
 """
 
 
 @click.command(cls=Command, epilog=EXAMPLE)
 @click.argument("runs", nargs=-1, required=True, metavar="LOG|PROGRAM...")
+@_options.model
 @_options.parameters
 @_options.reference
+@_options.columns
 @_options.json_file
 def command(
     runs: tuple[str, ...],
+    model: Literal["bench", "axis"],
     parameters: str,
     reference: Literal["linear", "staircase"] | None,
+    columns: tuple[str, ...],
     json_file: str | None,
 ) -> None:
     """Tell the smallest size of every effect that recorded or planned RUNS show together.
@@ -35,7 +40,11 @@ def command(
     """
     from plant_emulator.workflows.detectability import detectability
 
-    found = detectability(runs, parameters=parameters, reference=reference)
+    of_bench = {"parameters": "--parameters", "reference": "--reference"}
+    _options.refuse_of_another(model, of_bench, {"columns": "--column"})
+    found = detectability(
+        runs, model=model, parameters=parameters, reference=reference, columns=columns
+    )
     for note in found.notes:
         click.echo(f"note: {note}", err=True)
     if json_file:

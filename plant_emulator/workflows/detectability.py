@@ -5,17 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
+from threadpoolctl import threadpool_limits
+
+from plant_emulator.diagnosis.axis.detectability import detection_limits as axis_limits
 from plant_emulator.diagnosis.design.detectability import detection_limits, effect_detectability
+from plant_emulator.errors import InputError
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.parameter_sets import DEFAULT, with_effects
-from plant_emulator.workflows.arguments import check_reference, list_logs
+from plant_emulator.workflows.arguments import check_choice, check_reference, list_logs
+from plant_emulator.workflows.diagnosis.runs import axis_runs, bench_source
 from plant_emulator.workflows.planned_runs import prepare
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from plant_emulator.diagnosis.design.detectability import EffectDetectability
+    from plant_emulator.signals.axis_log import AxisLog
     from plant_emulator.signals.log import Log
 
 SCHEMA = "detectability/1"
@@ -52,27 +58,44 @@ class Detectability:
 
 
 def detectability(
-    runs: str | Path | Log | Sequence[str | Path | Log],
+    runs: str | Path | Log | AxisLog | Sequence[str | Path | Log | AxisLog],
     *,
+    model: Literal["bench", "axis"] = "bench",
     parameters: ParameterSet | str | Path = DEFAULT,
     reference: Literal["linear", "staircase"] | None = None,
+    columns: Sequence[str] | Mapping[str, str] = (),
 ) -> Detectability:
     """Find what recorded and planned runs show together of every effect.
 
-    runs : logs, paths of log files, or names of drive programs
+    runs : logs, paths of log files, or names of drive programs; of an axis logs, or parts in time
+        of their files, FILE@12.5:20 [s]
+    model : the roller bench, or a single motor-driven axis
     parameters : a parameter set, the name of a shipped one, or the path of its file
     reference : what holds between samples of the speed reference; None: as the log says
+    columns : of the files of an axis, as {"position": "enc:deg", "force": "iq*0.40:Nm"}
     Raises InputError for a log, a program or a set that cannot be used.
     """
     runs = list_logs(runs)
+    check_choice("model", model, ("bench", "axis"))
     check_reference(reference)
+    if model == "axis":
+        return _of_axis(runs, columns)
+    if columns:
+        raise InputError("columns belong to the model axis")
     if not isinstance(parameters, ParameterSet):
         parameters = with_effects.load(parameters)
-    model, fitted, notes = prepare(runs, parameters, reference)
-    found = detection_limits(model, fitted, range(len(runs)))
+    bench, fitted, notes = prepare([bench_source(one) for one in runs], parameters, reference)
+    found = detection_limits(bench, fitted, range(len(runs)))
     found.sort(key=lambda limit: -limit.orthogonal_norm)
-    effects = [effect_detectability(limit, model.candidates[limit.effect]) for limit in found]
+    effects = [effect_detectability(limit, bench.candidates[limit.effect]) for limit in found]
     return Detectability(effects=tuple(effects), notes=notes)
+
+
+def _of_axis(runs: Sequence[Any], columns: Sequence[str] | Mapping[str, str]) -> Detectability:
+    with threadpool_limits(1):
+        found = axis_runs(runs, (), columns=columns)
+        limits = axis_limits(found.recipe.logs)
+    return Detectability(effects=tuple(limits), notes=found.notes)
 
 
 def _line(found: EffectDetectability) -> str:
