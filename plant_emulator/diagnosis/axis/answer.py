@@ -139,7 +139,7 @@ def _location(f: AxisFindings) -> Location:
     if f.decision.kind == "effect":
         subsystem = max((t.effect.subsystem for t in f.terms), key=lambda s: shares.get(s, 0.0))
     elif f.decision.kind == "parameter":
-        subsystem = "drum"
+        subsystem = "load"
     elif f.decision.kind == "unknown":
         subsystem = next(iter(shares), "gear")
     return Location(subsystem=subsystem, channel=None, phase=None, shares=shares, cells=())

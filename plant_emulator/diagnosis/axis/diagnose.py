@@ -30,6 +30,7 @@ from plant_emulator.errors import LogError
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from plant_emulator.diagnosis.axis.effects import Effect
     from plant_emulator.diagnosis.axis.regression import Term
     from plant_emulator.diagnosis.execution.progress import Progress
     from plant_emulator.diagnosis.prediction.held_out import Plan
@@ -48,10 +49,14 @@ THRESHOLDS = {
 
 @dataclass(frozen=True)
 class AxisRuns:
-    """The runs of an axis, the fitted ones first; without : effects to take out of the library."""
+    """The runs of an axis, the fitted ones first.
+
+    without : effects to take out of the library; own : the user's effects beside it
+    """
 
     logs: tuple[AxisLog, ...]
     without: tuple[str, ...] = ()
+    own: tuple[Effect, ...] = ()
 
 
 def diagnose_axis(
@@ -70,7 +75,8 @@ def diagnose_axis(
     logs = runs.logs
     check_alike(logs)
     tell = progress or (lambda _label, _share: None)
-    effects = [e for e in LIBRARY if e.name not in runs.without]
+    # Who writes an effect knows the machine: of two that do as well, the user's own is named.
+    effects = [e for e in (*runs.own, *LIBRARY) if e.name not in runs.without]
     tell("reading the motion", 0.0)
     prepared_runs, scale = prepared(logs)
     own = prepared_runs[: len(plan.fitted)]
@@ -89,8 +95,9 @@ def diagnose_axis(
     tell("predicting held-out runs", 0.8)
     held_out = HeldOut(rows=rows, regression=regression, folds=plan.folds)
     repeats = repeat_floor(held_out)
-    floor = max(sensor_floor(rows, regression.base.inertia), repeats or 0.0)
-    decision = decide(search, held_out, floor)
+    noise = sensor_floor(rows, regression.base.inertia)
+    floor = max(noise, repeats or 0.0)
+    decision = decide(search, held_out, noise, floor)
     found = findings.AxisFindings(
         search=search,
         held_out=held_out,

@@ -26,14 +26,15 @@ ALIKE_SIZE = 0.75
 
 def sensor_floor(rows: Sequence[Rows], inertia: float) -> float:
     """Rms of the force's error that the sensors' noise makes in these rows [N or N m]."""
-    squares, count = 0.0, 0
-    for one in rows:
-        run, kernel = one.run, one.run.kernel
-        chance = run.position_noise * np.random.default_rng(1).standard_normal(len(kernel.time))
-        moved = inertia * kernel.acceleration(chance)[one.use]
-        squares += one.noise(()) + float(moved @ moved)
-        count += int(one.use.sum())
-    return float(np.sqrt(squares / max(1, count)))
+    squares = sum(one.noise(()) + float(np.sum(moved(one, inertia) ** 2)) for one in rows)
+    return float(np.sqrt(squares / sum(len(one.time) for one in rows)))
+
+
+def moved(rows: Rows, inertia: float) -> Array:
+    """The force that the position's noise feigns in these rows, as chance has it."""
+    kernel = rows.run.kernel
+    chance = rows.run.position_noise * np.random.default_rng(2).standard_normal(len(kernel.time))
+    return np.asarray(inertia * kernel.acceleration(chance)[rows.use])
 
 
 def repeat_floor(held_out: HeldOut) -> float | None:

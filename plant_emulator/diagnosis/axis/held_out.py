@@ -75,15 +75,16 @@ class HeldOut:
     ) -> Share:
         """Share by which the rms of the error falls from a reference to these terms."""
         after, before = (self.errors(t, timing=timing) for t in (terms, reference))
-        lengths = [block_bootstrap.block_length(e[None]) for e in before]
-        drawn = [
-            block_bootstrap.resampled_sums([e[None] ** 2 for e in errors], lengths)[0]
-            for errors in (after, before)
+        return _share(after, before)
+
+    def own_inertia(self) -> Share:
+        """Share by which the error falls where each predicted run has an inertia of its own."""
+        before = self.errors(())
+        accelerations = [self.rows[run].nominal()[:, 0] for run in self.runs]
+        after = [
+            e - a * float(a @ e) / float(a @ a) for e, a in zip(before, accelerations, strict=True)
         ]
-        low, high = np.quantile(1.0 - np.sqrt(drawn[0] / drawn[1]), [0.025, 0.975])
-        whole = [sum(float(e @ e) for e in errors) for errors in (after, before)]
-        value = 1.0 - float(np.sqrt(whole[0] / whole[1]))
-        return Share(value=value, low=float(low), high=float(high))
+        return _share(after, before)
 
     def _fold(
         self, fitted: Sequence[int], predicted: Sequence[int], terms: Sequence[Term]
@@ -94,3 +95,16 @@ class HeldOut:
             residual(self.rows[k], found, own.base, own.own_level(self.rows[k], found))
             for k in predicted
         ]
+
+
+def _share(after: Sequence[Array], before: Sequence[Array]) -> Share:
+    """Share by which the rms of errors falls, one array of rows a run."""
+    lengths = [block_bootstrap.block_length(e[None]) for e in before]
+    drawn = [
+        block_bootstrap.resampled_sums([e[None] ** 2 for e in errors], lengths)[0]
+        for errors in (after, before)
+    ]
+    low, high = np.quantile(1.0 - np.sqrt(drawn[0] / drawn[1]), [0.025, 0.975])
+    whole = [sum(float(e @ e) for e in errors) for errors in (after, before)]
+    value = 1.0 - float(np.sqrt(whole[0] / whole[1]))
+    return Share(value=value, low=float(low), high=float(high))

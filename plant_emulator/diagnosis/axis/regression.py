@@ -109,19 +109,24 @@ class Rows:
         """Averaged law, shape (rows,)."""
         return self.run.kernel.average(law)[self.use]
 
-    def noise(self, terms: Sequence[Term]) -> float:
-        """Squares of the force's noise in these rows: a lag takes a part of the noise away."""
-        key = ("noise", *_replacing(terms))
+    def chance(self, terms: Sequence[Term]) -> Array:
+        """White noise of the force, of deviation 1: a delay or lag takes a part of it away."""
+        key = ("chance", *_replacing(terms))
         if key not in self.cache:
             from scipy.interpolate import make_interp_spline
 
-            run = self.run
-            chance = np.random.default_rng(1).standard_normal(len(run.kernel.time))
-            noise = make_interp_spline(run.kernel.time, run.force_noise * chance, k=5)
-            white = replace(run, force=noise, net=noise)
-            force = Rows(run=white, scale=self.scale, use=self.use).force(terms)
-            self.cache[key] = np.array(force @ force)
-        return float(self.cache[key])
+            time = self.run.kernel.time
+            noise = make_interp_spline(
+                time, np.random.default_rng(1).standard_normal(len(time)), k=5
+            )
+            white = replace(self.run, force=noise, net=noise)
+            self.cache[key] = Rows(run=white, scale=self.scale, use=self.use).force(terms)
+        return self.cache[key]
+
+    def noise(self, terms: Sequence[Term]) -> float:
+        """Squares of the force's noise in these rows."""
+        chance = self.chance(terms)
+        return float(self.run.force_noise**2 * (chance @ chance))
 
     def force(self, terms: Sequence[Term]) -> Array:
         """Averaged force that acts on the axis, less the load."""

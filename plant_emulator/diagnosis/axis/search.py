@@ -2,13 +2,12 @@
 
 The evidence of a set is n/2 log(rows' variance without / with it), n the independent rows, less
 log(n)/2 for each of its constants (G. Schwarz, Annals of Statistics 6 (1978) 461), and less
-`needed` for each effect. A set with a size that physics forbids has none.
+`needed` for each effect. A set with a size or a nominal parameter that physics forbids has none.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +16,7 @@ from plant_emulator.diagnosis.answer import SearchStep
 from plant_emulator.diagnosis.axis.motion import UNCERTAIN
 from plant_emulator.diagnosis.axis.regression import Term
 from plant_emulator.diagnosis.axis.settings import SETTINGS
+from plant_emulator.diagnosis.axis.start import grid
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -81,7 +81,7 @@ class AxisSearch:
 
     def value(self, found: Fit) -> float:
         """Negative log evidence of a fit."""
-        if any(self._forbidden(found, t) for t in found.terms):
+        if any(self._forbidden(found, t) or _is_negative(found) for t in found.terms):
             return float("inf")
         count = self.regression.independent * found.count
         constants = sum(len(t.effect.sizes) + len(t.effect.shapes) for t in found.terms)
@@ -139,15 +139,10 @@ class AxisSearch:
 
     def _added(self, base: Fit, effect: Effect) -> Fit:
         """The best fit with one more effect, over the grid of its shapes."""
-        fits = [self.regression.fit((*base.terms, Term(effect, s))) for s in self._grid(effect)]
+        fits = [
+            self.regression.fit((*base.terms, Term(effect, s))) for s in grid(effect, self.scale)
+        ]
         return min(fits, key=lambda f: f.cost)
-
-    def _grid(self, effect: Effect) -> list[tuple[float, ...]]:
-        axes = []
-        for shape in effect.shapes:
-            low, high = shape.bounds(self.scale)
-            axes.append(np.geomspace(low, high, SETTINGS.grid).tolist())
-        return list(product(*axes))
 
     def refined(self, found: Fit) -> Fit:
         """The fit with its shapes refined one after the other, within their bounds."""
@@ -183,6 +178,12 @@ class AxisSearch:
             gain=self.gain(found),
             mean_square=found.cost / found.count,
         )
+
+
+def _is_negative(found: Fit) -> bool:
+    """Whether inertia, viscous or Coulomb friction is below 0, beyond its error."""
+    errors = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
+    return bool(np.any(found.values[:3] < -UNCERTAIN * errors[:3]))
 
 
 def _moved(terms: Sequence[Term], k: int, j: int, value: float) -> tuple[Term, ...]:

@@ -19,8 +19,9 @@ class Settings:
         some per cent a kelvin
     sure : standard errors from which on two runs differ, among some ten runs
     grid : values of a shape that are tried before it is refined; neighbours differ by about half
-    memory : samples that the noise remembers at most
-    noisy : mean square over the sensors' noise from which on a gap is more than noise
+    noisy : ratio of mean squares, of what is left and of the sensors' noise, within which the two
+        are alike: noise of force and position has other spectra in a relation, and how much of it
+        is of either is known to a factor of about two
     """
 
     worth: float = 0.03
@@ -31,8 +32,7 @@ class Settings:
     friction_spread: float = 0.1
     sure: float = 4.0
     grid: int = 9
-    memory: int = 30
-    noisy: float = 1.5
+    noisy: float = 2.0
 
 
 SETTINGS = Settings()

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.diagnosis.axis.effects import LIBRARY
 from plant_emulator.diagnosis.axis.effects.effect import Scale
+from plant_emulator.diagnosis.axis.floor import moved
 from plant_emulator.diagnosis.axis.motion import Base, prepare, with_width
 from plant_emulator.diagnosis.axis.regression import Regression, Rows, Term, rows_of
 from plant_emulator.diagnosis.axis.settings import SETTINGS
+from plant_emulator.signals.noise import noise
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from plant_emulator.diagnosis.axis.effects.effect import Effect
     from plant_emulator.diagnosis.axis.motion import Run
+    from plant_emulator.diagnosis.axis.regression import Fit
     from plant_emulator.signals.axis_log import AxisLog
+    from plant_emulator.signals.log import Array
 
 # Widths of the Coulomb friction that are tried, in the highest speed.
 WIDTHS = (0.0003, 0.1)
@@ -69,16 +75,63 @@ def start(
     library = [e for e in effects if all(e.applies(r.motion, scale) for r in runs)]
     begun = Regression(rows=rows[:fitted], base=NOTHING)
     around = begun.around(begun.fit(()))
-    return around.in_noise_of(around.fit(rich_terms(library, scale))), rows, library
+    rich = richest(around, library, scale)
+    force, position = sensor_noise(around, rich)
+    for one in rows:
+        one.run = replace(
+            one.run, force_noise=force, position_noise=position * one.run.position_noise
+        )
+    # A delay that only takes noise away is no part of the reference of other effects.
+    base = around.fit(rich_terms(library, scale))
+    return around.in_noise_of(rich).around(base), rows, library
+
+
+def richest(around: Regression, library: Sequence[Effect], scale: Scale) -> Fit:
+    """The fit of all linear effects, beside the delay or lag with which least noise is left.
+
+    The library may lack delay and lag; the noise does not depend on that.
+    """
+    linear = rich_terms(library, scale)
+    late = [(Term(e, s),) for e in LIBRARY if e.replaced for s in grid(e, scale)]
+    fits = [around.fit([*linear, *terms]) for terms in ((), *late)]
+    return min(fits, key=lambda fit: sensor_noise(around, fit)[0])
+
+
+def sensor_noise(around: Regression, rich: Fit) -> tuple[float, float]:
+    """Deviation of the force's noise, and share of the position's noise, in what a fit leaves.
+
+    Noise is what changes from row to row beside a rich model. A force that changes quickly is none
+    where the axis follows it, nor is a quick motion where a force makes it.
+    """
+    left = force = position = 0.0
+    for k, one in enumerate(around.rows):
+        left += _rough(one, around.residual(rich, k)) ** 2
+        force += _rough(one, one.chance(rich.terms)) ** 2
+        position += _rough(one, moved(one, rich.base.inertia)) ** 2
+    share = min(1.0, np.sqrt(left / max(position, 1e-300)))
+    return float(np.sqrt(max(0.0, left - position) / force)), float(share)
+
+
+def _rough(rows: Rows, values: Array) -> float:
+    """Deviation of what changes from row to row, of values at the rows that count."""
+    whole = np.zeros(len(rows.use))
+    whole[rows.use] = values
+    return noise(whole, rows.use)
 
 
 def rich_terms(library: Sequence[Effect], scale: Scale) -> list[Term]:
     """Every effect that enters linearly, its shapes in the middle of their bounds."""
-    return [
-        Term(e, tuple(float(np.sqrt(np.prod(s.bounds(scale)))) for s in e.shapes))
-        for e in library
-        if e.columns is not None
-    ]
+    return [middle_term(e, scale) for e in library if e.columns is not None]
+
+
+def grid(effect: Effect, scale: Scale) -> list[tuple[float, ...]]:
+    """Shapes of an effect that are tried first."""
+    return list(product(*(np.geomspace(*s.bounds(scale), SETTINGS.grid) for s in effect.shapes)))
+
+
+def middle_term(effect: Effect, scale: Scale) -> Term:
+    """An effect with its shapes in the middle of their bounds."""
+    return Term(effect, tuple(float(np.sqrt(np.prod(s.bounds(scale)))) for s in effect.shapes))
 
 
 def scale_of(runs: Sequence[Run]) -> Scale:

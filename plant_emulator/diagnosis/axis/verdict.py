@@ -37,11 +37,19 @@ class Decision:
     inertia: tuple[tuple[int, float, float], ...] = ()
 
 
-def decide(search: AxisSearch, held_out: HeldOut, floor: float) -> Decision:
-    """Decide by the held-out runs; floor : rms of the force's error that noise or repeats leave."""
+def decide(search: AxisSearch, held_out: HeldOut, noise: float, floor: float) -> Decision:
+    """Decide by the held-out runs.
+
+    noise, floor : rms of the force's error that the sensors' noise leaves, and repeats
+    """
     found, reason = _confirmed(search, held_out)
+    other = other_inertia(held_out.regression, held_out.rows)
+    closed = held_out.share(found.terms, ()).value
+    # Another inertia of a run looks like an effect, if it may not differ.
+    if other and (not found.terms or held_out.own_inertia().value > closed):
+        return Decision(kind="parameter", found=search.null, inertia=other)
     if not found.terms:
-        return _without_a_name(search, held_out, floor, reason)
+        return _without_a_name(search, held_out, noise, floor, reason)
     reason = _insufficient(found, held_out)
     if reason:
         return Decision(kind="unknown", found=search.null, reason=reason)
@@ -54,8 +62,9 @@ def _insufficient(found: Fit, held_out: HeldOut) -> str:
     error = held_out.relative(found.terms)
     if error > 1.0:
         return f"with {told} the error is {100.0 * error:.0f} % of the force"
-    if wrong := forbidden_parameter(found):
-        return wrong
+    inertia, deviation = found.values[0], np.sqrt(found.covariance[0, 0])
+    if inertia <= UNCERTAIN * deviation:
+        return f"no inertia is certain: {inertia:.3g} +- {deviation:.2g}"
     # A name stands for the gap only if it closes more than a law that nobody has named yet.
     rest, closed = rest_of(held_out, found.terms), held_out.share(found.terms, ()).value
     if rest.share.low > SETTINGS.worth and rest.share.value > closed:
@@ -63,18 +72,23 @@ def _insufficient(found: Fit, held_out: HeldOut) -> str:
     return ""
 
 
-def _without_a_name(search: AxisSearch, held_out: HeldOut, floor: float, reason: str) -> Decision:
+def _without_a_name(
+    search: AxisSearch, held_out: HeldOut, noise: float, floor: float, reason: str
+) -> Decision:
     """The verdict where no effect is confirmed; reason : why the best one is not."""
     found = search.null
-    # Beside an effect the inertia of a single run is not certain enough to be told.
-    if other := other_inertia(held_out.regression, held_out.rows):
-        return Decision(kind="parameter", found=found, inertia=other)
     rest = rest_of(held_out, ())
     if rest.share.low > SETTINGS.worth:
         return Decision(kind="unknown", found=found, reason=reason or _described(rest))
-    left = np.concatenate(held_out.errors((), timing=True))
-    small = float(np.mean(left**2)) <= SETTINGS.noisy * floor**2
-    if small or held_out.relative((), timing=True) <= SETTINGS.worth:
+    plain, left = (
+        float(np.mean(np.concatenate(held_out.errors((), timing=timing)) ** 2))
+        for timing in (False, True)
+    )
+    if held_out.relative((), timing=True) <= SETTINGS.worth:
+        return Decision(kind="none", found=found)
+    if plain * SETTINGS.noisy < noise**2:
+        reason = "what is left changes more from sample to sample than noise does"
+    elif left <= SETTINGS.noisy * floor**2:
         return Decision(kind="none", found=found)
     reason = reason or "no effect of the library closes a share of it on the held-out runs"
     return Decision(kind="unknown", found=found, reason=reason)
@@ -144,18 +158,6 @@ def implausible(search: AxisSearch, found: Fit, term: Term) -> str:
         low, high = np.log(shape.bounds(search.scale))
         if not low + AT_BOUND < np.log(value) < high - AT_BOUND:
             return f"{name} would do, but its {shape.name} lies at its bound"
-    return ""
-
-
-def forbidden_parameter(found: Fit) -> str:
-    """Which nominal parameter physics forbids, as a sentence; empty where none is."""
-    errors = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
-    inertia, error = float(found.values[0]), float(errors[0])
-    if inertia <= UNCERTAIN * error:
-        return f"no inertia is certain: {inertia:.3g} +- {error:.2g}"
-    for k, name in ((1, "viscous friction"), (2, "Coulomb friction")):
-        if found.values[k] < -UNCERTAIN * errors[k]:
-            return f"the {name} would be negative: {found.values[k]:.3g} +- {errors[k]:.2g}"
     return ""
 
 

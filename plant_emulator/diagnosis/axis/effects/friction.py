@@ -136,7 +136,7 @@ FRICTION = (
     Effect(
         name="quadratic_drag",
         title="a drag grows with the square of the speed",
-        subsystem="drum",
+        subsystem="load",
         equation="F + k q' |q'|",
         needs="high speeds",
         sizes=(Size(name="coefficient", unit=("N s^2/m^2", "N m s^2/rad^2"), lowest=0.0),),

@@ -125,7 +125,7 @@ MOTION = (
     Effect(
         name="gravity",
         title="gravity pulls with the angle",
-        subsystem="drum",
+        subsystem="load",
         equation="F + a sin q + b cos q; of a lift it is the offset",
         needs="an axis that swings",
         sizes=(Size(name="sine", unit=FORCE), Size(name="cosine", unit=FORCE)),
