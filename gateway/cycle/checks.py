@@ -47,7 +47,7 @@ def check(
     if other_age <= QUIET:
         return Reason.OTHER_MASTER
     if running:
-        return _running(config, overruns, echo_age)
+        return _check_run(config, overruns, echo_age)
     return None if Status.READY in measurement.status else Reason.PLC_NOT_READY
 
 
@@ -75,7 +75,7 @@ def _alarm(measurement: Measurement, *, running: bool) -> Reason | None:
     return None
 
 
-def _running(config: Config, overruns: int, echo_age: float) -> Reason | None:
+def _check_run(config: Config, overruns: int, echo_age: float) -> Reason | None:
     if overruns >= config.loop.overruns:
         return Reason.OVERRUN
     return Reason.NOT_ECHOED if echo_age > config.loop.stale else None

@@ -112,12 +112,12 @@ def find_later_parts(first: Path) -> Iterator[Path]:
     """Parts that follow the first part of a run, compressed or not."""
     plain = first.with_name(first.name.removesuffix(COMPRESSED))
     number = 2
-    while (found := _existing(part_path(plain, number))) is not None:
+    while (found := _find_existing(part_path(plain, number))) is not None:
         yield found
         number += 1
 
 
-def _existing(path: Path) -> Path | None:
+def _find_existing(path: Path) -> Path | None:
     packed = path.with_name(path.name + COMPRESSED)
     return next((one for one in (path, packed) if one.exists()), None)
 

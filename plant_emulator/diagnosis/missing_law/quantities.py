@@ -12,7 +12,7 @@ from plant_emulator.diagnosis.missing_law.drum_quantities import (
     drum_weight,
     speed_sensor,
 )
-from plant_emulator.diagnosis.missing_law.quantity import LawQuantity, acting, time_of
+from plant_emulator.diagnosis.missing_law.quantity import LawQuantity, rows_in_relations, time_of
 from plant_emulator.diagnosis.missing_law.states import FILTER_TIMES, WARMING_TIMES, LawState
 from plant_emulator.model.array_laws import gear_friction
 
@@ -68,7 +68,7 @@ def _gear(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
         unit="N m",
         hook="gear_speed_friction",
         states=(speed, load, direction, time_of(q), angle),
-        rows=acting({GEAR: [-one.moving / xi for one in q]}),
+        rows=rows_in_relations({GEAR: [-one.moving / xi for one in q]}),
         model=r.model,
     )
 
@@ -84,7 +84,7 @@ def _motor(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
         unit="N m",
         hook="motor_coulomb_friction",
         states=(speed, time_of(q)),
-        rows=acting({MOTOR: [-one.moving for one in q]}),
+        rows=rows_in_relations({MOTOR: [-one.moving for one in q]}),
         model=r.model,
     )
 
@@ -111,7 +111,7 @@ def _flux(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
         unit="N m/A",
         hook="flux",
         states=(current, speed, time_of(q), flux),
-        rows=acting(weights),
+        rows=rows_in_relations(weights),
         model=r.model,
     )
 
@@ -129,7 +129,7 @@ def _torque_sensor(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuant
         unit="N m",
         hook="measured_shaft_torque",
         states=(torque, time_of(q)),
-        rows=acting({MOTOR: -1.0, GEAR: 1.0}),
+        rows=rows_in_relations({MOTOR: -1.0, GEAR: 1.0}),
         model=r.model,
     )
 
@@ -150,7 +150,7 @@ def _reference(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
         unit="rad/s",
         hook="reference",
         states=(reference, current, time_of(q)),
-        rows=acting({DRIVE: 1.0}),
+        rows=rows_in_relations({DRIVE: 1.0}),
         model=r.model,
     )
 
@@ -166,6 +166,6 @@ def _voltage(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
         unit="V",
         hook="converter_voltage_drop",
         states=(current, time_of(q)),
-        rows=acting({ARMATURE: 1.0}),
+        rows=rows_in_relations({ARMATURE: 1.0}),
         model=r.model,
     )

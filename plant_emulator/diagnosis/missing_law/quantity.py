@@ -44,7 +44,7 @@ class LawQuantity:
     model: LinearModel
 
 
-def acting(
+def rows_in_relations(
     weights: Mapping[int, float | Sequence[Array]],
 ) -> Callable[[int, Array], tuple[Array, None]]:
     """Rows of a law that acts in these relations only; weights : one, or those of every run."""
