@@ -41,7 +41,7 @@ class Memory:
 
     @property
     def toml(self) -> str:
-        """The same as a file that `learned` names; an unseen cycle has no crossings."""
+        """This memory as a file that `learned` names; an unseen cycle has no crossings."""
         lines = [
             "# What the learned regulator remembers of a cycle: times in s from the truck's start.",
             f"duration = {self.duration!r}",
