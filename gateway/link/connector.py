@@ -2,7 +2,7 @@
 
 `poll` is called once a tick and returns at once. The constructor resolves a host name, because a
 name server may take seconds. A name with several addresses is tried at one after the other. The
-delay is 0.1 s after all of them have failed, and doubles up to 2 s; `succeeded` resets it.
+delay is 0.1 s after all of them have failed, and doubles up to 2 s; `note_success` resets it.
 """
 
 import contextlib

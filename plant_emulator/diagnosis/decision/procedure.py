@@ -3,8 +3,8 @@
 1. The noise of measured inputs is made part of the noise (`fitting.input_noise_model`).
 2. The fit without effects leaves the gap. Where the gap is random, a random effect may explain it
    (`fitting.random_effects`); it is then made part of the noise.
-3. The search finds the set of effects that the logs ask for (`parity.search`).
-4. The evidence decides (`selection.verdict`). Where no effect is named, the runs are fitted one by
+3. The search finds the set of effects that the logs ask for (`search.search`).
+4. The evidence decides (`decision.verdict`). Where no effect is named, the runs are fitted one by
    one: they may each agree with the equations, but not with each other.
 """
 

@@ -1,4 +1,4 @@
-"""The command on two real axes, read from where REAL_DATA says; see test_axis_on_real_machines."""
+"""The command on two real axes, whose logs are read from where REAL_DATA says."""
 
 import json
 import os
