@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -38,7 +38,6 @@ class FitResult(FitValues):
     ljung_box_excess : Ljung-Box statistic of the residuals beyond its expected value, summed over
         the channels; see `covariance.structure`
     occam_penalty : part of the cost that charges the choice of the states
-    relative_sizes : largest size of each effect, in plausible sizes
     insignificant : effects with states of their own and no size that differs from neutral for
         certain; such an effect can follow anything that differs from run to run
     """
@@ -51,7 +50,6 @@ class FitResult(FitValues):
     converged: bool
     ljung_box_excess: float = 0.0
     occam_penalty: float = 0.0
-    relative_sizes: Mapping[str, float] = field(default_factory=dict)
     insignificant: tuple[str, ...] = ()
 
     @property

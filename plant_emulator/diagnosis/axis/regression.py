@@ -19,7 +19,7 @@ from plant_emulator.diagnosis.axis.settings import SETTINGS
 from plant_emulator.estimation.covariance import correlation_time
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
@@ -288,11 +288,6 @@ def _solved(information: Array, projected: Array) -> tuple[Array, Array]:
     kept = values > 1e-11 * values[-1]
     inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T / np.outer(scale, scale)
     return inverse @ projected, inverse
-
-
-def by_name(found: Fit) -> Mapping[str, float]:
-    """Nominal parameters by name."""
-    return dict(zip(NAMES, map(float, found.values), strict=False))
 
 
 def _replacing(terms: Sequence[Term]) -> list[object]:

@@ -112,18 +112,8 @@ def fit(
     candidates = {name: model.candidates[name] for name in effects}
     return replace(
         reached,
-        relative_sizes={n: _relative_size(c, reached.values) for n, c in candidates.items()},
         insignificant=tuple(n for n, c in candidates.items() if not _significant(c, reached)),
     )
-
-
-def _relative_size(candidate: Candidate, values: Mapping[str, float]) -> float:
-    """The largest of an effect's sizes [plausible sizes]; 0 for an effect without sizes."""
-    neutral = candidate.neutral
-    sizes = (
-        (values[u.name] - neutral[u.name]) / (u.start - neutral[u.name]) for u in candidate.sizes
-    )
-    return max(map(abs, sizes), default=0.0)
 
 
 def _significant(candidate: Candidate, found: FitResult) -> bool:

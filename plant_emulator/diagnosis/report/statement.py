@@ -10,11 +10,8 @@ from plant_emulator.diagnosis.wording import in_words, percent, quantity
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.answer import Quantity
     from plant_emulator.diagnosis.decision.verdict import Decision
     from plant_emulator.diagnosis.machine import Candidate
-
-    Terms = Mapping[str, Sequence[Quantity]]
 
 
 def verdict(
