@@ -182,7 +182,10 @@ def _new(folder: Path, before: set[Path]) -> set[Path]:
 
 
 def diagnose(logs: list[Path], out: Path, console: Console) -> dict[str, Any]:
-    """Answer of `plant-emulator diagnose` on these logs; it leaves set and report in `out`."""
+    """Answer of `plant-emulator diagnose` on these logs; it leaves set and report in `out`.
+
+    Raises GatewayError where the command fails.
+    """
     console.print("plant-emulator diagnose")
     files = {"--json": "diagnosis.json", "--report": "diagnosis.html", "--save": "set.toml"}
     options = [word for option, name in files.items() for word in (option, str(out / name))]

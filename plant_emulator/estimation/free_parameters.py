@@ -58,6 +58,8 @@ def free_parameters(
     """The names given, or all that the set calls estimated but those of NOT_FREE and zeros.
 
     voltage : whether a log has it: what only the voltage shows is then free as well
+
+    Raises IdentificationError for a name that is unknown, calculated from others, or 0 in the set.
     """
     for name in names:
         if name not in parameters.values():

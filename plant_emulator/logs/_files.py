@@ -29,7 +29,10 @@ def read(path: Path, parse: Callable[[bytes], LogTable]) -> Log:
 
 
 def write(log: Log, path: Path, encode: Callable[[Sequence[Column]], bytes]) -> None:
-    """Write the signals with their names and units, in full precision."""
+    """Write the signals with their names and units, in full precision.
+
+    Raises LogError where the format cannot hold the log.
+    """
     columns = [
         Column(name=column.signal, unit=column.unit, values=values)
         for column, values in in_units(log)

@@ -158,7 +158,7 @@ def reference_nodes(log: Log) -> tuple[Array, Array]:
 
 
 def finer(time: Array) -> Array:
-    """Samples at most LAG_STEP apart, those of `time` among them."""
+    """Times at most LAG_STEP apart, those of `time` among them [s]."""
     pieces = np.maximum(1, np.ceil(np.diff(time) / LAG_STEP - TIME_ROUNDING)).astype(int)
     rows = np.concatenate([[0], np.cumsum(pieces)])
     found = np.interp(np.arange(rows[-1] + 1), rows, time)

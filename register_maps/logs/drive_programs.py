@@ -12,7 +12,10 @@ from math import pi, sin
 
 
 def interpolate(times: Sequence[float], values: Sequence[float], time: float) -> float:
-    """Value at a time, linear between the times, constant before the first and after the last."""
+    """Value at a time, linear between the times, constant before the first and after the last.
+
+    times : ascending, shape (n,); values : in any unit, which is that of the result, shape (n,)
+    """
     after = bisect_right(times, time)
     if after in (0, len(times)):
         return values[max(after - 1, 0)]

@@ -31,7 +31,10 @@ def sensor_floor(rows: Sequence[Rows], inertia: float) -> float:
 
 
 def moved(rows: Rows, inertia: float) -> Array:
-    """The force that the position's noise feigns in these rows, as chance has it."""
+    """Force that noise of the position feigns in these rows, one draw, shape (rows,) [N or N m].
+
+    inertia : of the axis [kg or kg m^2]
+    """
     kernel = rows.run.kernel
     chance = rows.run.position_noise * np.random.default_rng(2).standard_normal(len(kernel.time))
     return np.asarray(inertia * kernel.acceleration(chance)[rows.use])

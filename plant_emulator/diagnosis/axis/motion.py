@@ -207,7 +207,10 @@ def _rough(kernel: Kernel, motion: _Curve, measured: Array, force: Any) -> Base:
 
 
 def averaged_force(kernel: Kernel, force: Any) -> Array:
-    """Average of a spline, exactly: the kernel is a difference of its integral."""
+    """Exact average of a spline of the force, shape (rows,) [N or N m].
+
+    The kernel is a difference of the spline's integral.
+    """
     order = 1 if kernel.of_velocity else 2
     return kernel.acceleration(force.antiderivative(order)(kernel.time))
 

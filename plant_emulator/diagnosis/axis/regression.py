@@ -275,7 +275,10 @@ class Regression:
 
 
 def residual(rows: Rows, found: Fit, base: Base, level: Array) -> Array:
-    """Averaged force less what a fit explains, shape (rows,); level : the run's own values."""
+    """Averaged force less what a fit explains, shape (rows,) [N or N m].
+
+    level : the run's own values
+    """
     predicted = rows.design(found.terms, base) @ found.values
     own = rows.own(base)[:, : len(level)] @ level
     return np.asarray(rows.force(found.terms) - predicted - own)

@@ -44,7 +44,7 @@ class Smooth:
 
 
 def smooth(time: Array, value: Array) -> Smooth:
-    """The smooth curve of samples, shape (n,)."""
+    """The smooth curve of samples, shape (n,). Raises ValueError for too few samples."""
     from scipy.interpolate import make_lsq_spline
 
     count, period = len(time), float(np.median(np.diff(time)))

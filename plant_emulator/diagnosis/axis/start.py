@@ -46,7 +46,10 @@ def prepared(logs: Sequence[AxisLog]) -> tuple[list[Run], Scale]:
 
 
 def best_width(runs: Sequence[Run], scale: Scale, terms: Sequence[Term]) -> float:
-    """Width of the Coulomb friction that leaves least of these runs beside these effects."""
+    """Width of the Coulomb friction that leaves least of these runs beside these effects.
+
+    The width is a speed [m/s or rad/s].
+    """
     from scipy.optimize import minimize_scalar
 
     least = max(run.motion.deviation for run in runs)

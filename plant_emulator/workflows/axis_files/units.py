@@ -65,7 +65,10 @@ def _base(unit: Any) -> Any:
 
 
 def convert_unit(values: Array, text: str, own: str) -> Array:
-    """Values in that unit as values in the unit of a log, shape (n,)."""
+    """Values in the unit `text` as values in the unit `own` of a log, shape (n,).
+
+    Raises LogError where a converted value is not finite.
+    """
     found = _registry().Quantity(values, unit_of(text)).to(unit_of(own)).magnitude
     if not np.isfinite(found).all():
         raise LogError(f"{text}: values that cannot be converted to {own}")

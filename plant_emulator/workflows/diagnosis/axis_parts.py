@@ -130,7 +130,10 @@ def _without_held_out(
 
 
 def cut(log: AxisLog, part: Part) -> AxisLog:
-    """The samples of a log from the start of a part on [s], before its end."""
+    """The samples of a log from the start of a part on [s], before its end.
+
+    Raises LogError where fewer than two samples lie in the part.
+    """
     kept = (log.time >= part[0]) & (log.time < part[1])
     if kept.all():
         return log
