@@ -1,4 +1,4 @@
-"""What would each regulator have asked of the motor in this run?
+"""What would the regulators thesis and compensated have asked of the motor in this run?
 
     python compare_regulators.py program6.csv.gz regulators.png
 

@@ -2,8 +2,8 @@
 
     python identify_two_logs.py
 
-The logs are simulated with a drum that is 5 % heavier than nominal; logs of your bench are given
-as paths. Writes identified.toml and identify_two_logs.png.
+The logs are simulated with a drum that is 5 % heavier than nominal. For your bench, put the paths
+of its logs into `logs`. Writes identified.toml and identify_two_logs.png.
 """
 
 import plant_emulator as pe
