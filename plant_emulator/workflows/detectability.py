@@ -101,7 +101,7 @@ def _of_axis(runs: Sequence[Any], columns: Sequence[str] | Mapping[str, str]) ->
 def _line(found: EffectDetectability) -> str:
     sizes = ", ".join(_size(found, name) for name in found.smallest_size)
     remark = ", ".join(found.indistinguishable[1:]) or found.needs or ""
-    return f"{found.effect:28}{sizes:42}{remark}".rstrip()
+    return f"{found.effect:28}{sizes:41} {remark}".rstrip()
 
 
 def _size(found: EffectDetectability, name: str) -> str:

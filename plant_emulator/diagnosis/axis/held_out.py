@@ -75,7 +75,7 @@ class HeldOut:
     ) -> Share:
         """Share by which the rms of the error falls from a reference to these terms."""
         after, before = (self.errors(t, timing=timing) for t in (terms, reference))
-        return _share(after, before)
+        return _share(after, before, self._removed(terms) - self._removed(reference))
 
     def own_inertia(self) -> Share:
         """Share by which the error falls where each predicted run has an inertia of its own."""
@@ -85,6 +85,10 @@ class HeldOut:
             e - a * float(a @ e) / float(a @ a) for e, a in zip(before, accelerations, strict=True)
         ]
         return _share(after, before)
+
+    def _removed(self, terms: Sequence[Term]) -> float:
+        """Squares of the force's noise that a delay or lag takes away, which explains nothing."""
+        return sum(self.rows[k].noise(()) - self.rows[k].noise(terms) for k in self.runs)
 
     def _fold(
         self, fitted: Sequence[int], predicted: Sequence[int], terms: Sequence[Term]
@@ -97,14 +101,18 @@ class HeldOut:
         ]
 
 
-def _share(after: Sequence[Array], before: Sequence[Array]) -> Share:
-    """Share by which the rms of errors falls, one array of rows a run."""
+def _share(after: Sequence[Array], before: Sequence[Array], removed: float = 0.0) -> Share:
+    """Share by which the rms of errors falls, one array of rows a run.
+
+    removed : squares that are missing after, and count as left
+    """
     lengths = [block_bootstrap.block_length(e[None]) for e in before]
     drawn = [
         block_bootstrap.resampled_sums([e[None] ** 2 for e in errors], lengths)[0]
         for errors in (after, before)
     ]
-    low, high = np.quantile(1.0 - np.sqrt(drawn[0] / drawn[1]), [0.025, 0.975])
+    left = np.maximum(drawn[0] + removed, 0.0)
+    low, high = np.quantile(1.0 - np.sqrt(left / drawn[1]), [0.025, 0.975])
     whole = [sum(float(e @ e) for e in errors) for errors in (after, before)]
-    value = 1.0 - float(np.sqrt(whole[0] / whole[1]))
+    value = 1.0 - float(np.sqrt(max(whole[0] + removed, 0.0) / whole[1]))
     return Share(value=value, low=float(low), high=float(high))

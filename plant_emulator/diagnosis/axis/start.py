@@ -96,8 +96,14 @@ def richest(around: Regression, library: Sequence[Effect], scale: Scale) -> Fit:
     """
     linear = rich_terms(library, scale)
     late = [(Term(e, s),) for e in LIBRARY if e.replaced for s in grid(e, scale)]
-    fits = [around.fit([*linear, *terms]) for terms in ((), *late)]
-    return min(fits, key=lambda fit: sensor_noise(around, fit)[0])
+    first = around.fit(linear)
+    best = min(
+        (around.fit([*linear, *terms]) for terms in late),
+        key=lambda fit: sensor_noise(around, fit)[0],
+    )
+    # The least of many estimates is too small: it counts where it is another one.
+    both = [sensor_noise(around, fit)[0] ** 2 for fit in (first, best)]
+    return best if SETTINGS.noisy * both[1] < both[0] else first
 
 
 def sensor_noise(around: Regression, rich: Fit) -> tuple[float, float]:
