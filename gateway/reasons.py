@@ -4,6 +4,7 @@ Recordings hold the numbers, so that a number never changes its meaning.
 """
 
 from enum import IntEnum
+from typing import Final
 
 
 class Reason(IntEnum):
@@ -74,5 +75,7 @@ class Reason(IntEnum):
     EXCEPTION_11 = 111, "exception 11, gateway target device failed to respond"
 
 
-BY_OPERATOR = frozenset({Reason.STOP_REQUESTED, Reason.REMOTE_OFF})
+REASONS: Final = {int(reason): reason for reason in Reason}
+"""Each reason by its code."""
+BY_OPERATOR: Final = frozenset({Reason.STOP_REQUESTED, Reason.REMOTE_OFF})
 """Reasons for which an operator ends a run; any other is a trip."""

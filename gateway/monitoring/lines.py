@@ -8,11 +8,10 @@ from typing import Final
 from gateway.cycle.record import NOTHING
 from gateway.cycle.supervisor import State
 from gateway.monitoring.block import Change
-from gateway.reasons import Reason
+from gateway.reasons import REASONS
 
 WARNED: Final = frozenset({State.RAMPDOWN, State.SAFE})
 """States whose line is a warning."""
-REASONS: Final = {int(reason): reason for reason in Reason}
 HINTS: Final = {
     State.ARMED: "to start: turn remote on at the PLC, from off",
     State.SAFE: "to acknowledge: turn remote off and on at the PLC",

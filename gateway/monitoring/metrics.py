@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Final
 from gateway.cycle.supervisor import State
 from gateway.errors import ConfigError
 from gateway.monitoring.block import BOUNDS, Snapshot
-from gateway.monitoring.lines import REASONS
 from gateway.monitoring.shared import Identity
-from gateway.reasons import Reason
+from gateway.reasons import REASONS, Reason
 
 if TYPE_CHECKING:
     from prometheus_client.metrics_core import HistogramMetricFamily, Metric

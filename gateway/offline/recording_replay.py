@@ -7,7 +7,7 @@ for bit. A difference comes from other parameters, or from a mistake in this sof
 import struct
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 from gateway.configuration.config import Config
 from gateway.cycle.cycle import Observation, Output, initial, step
@@ -22,14 +22,13 @@ from gateway.cycle.record import (
     values,
 )
 from gateway.cycle.supervisor import State
-from gateway.reasons import Reason
+from gateway.reasons import REASONS
 from register_maps.codec import CodecError, decode_measurement, encode_setpoint
 from register_maps.register_map import RegisterMap
 from register_maps.signals import Measurement
 
 Row = dict[str, Any]
 """A tick as recorded: gateway.recordings.recording.Recording.rows()."""
-REASONS: Final = {int(reason): reason for reason in Reason}
 
 
 @dataclass(frozen=True, kw_only=True)
