@@ -246,9 +246,10 @@ def test_resistance_is_free_where_the_voltage_shows_it(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("logged", [True, False])
-def test_warm_armature_shows_in_the_voltage_and_only_there(
+def test_warm_armature_shows_in_the_voltage_only_and_there_as_another_resistance(
     bench_log: Reader, nominal: ParameterSet, logged: bool
 ) -> None:
+    """In runs of 20 s a winding that takes 5 kJ/K hardly warms: it is warm from the start."""
     effects = {HEATING: kernel().effects[HEATING]}
     runs = runs_of(bench_log, nominal, programs=(1, 2, 3))
     if not logged:
@@ -258,11 +259,12 @@ def test_warm_armature_shows_in_the_voltage_and_only_there(
     entry = effect_detectability(found, model.candidates[HEATING])
     if logged:
         assert found.total_norm > 20.0
-        assert found.smallest_size < 2.0
+        assert found.orthogonal_norm < 1.0
+        assert found.confounded_with == "armature_resistance"
     else:
         assert found.total_norm < 7.0
-        assert found.smallest_size == float("inf")
         assert "armature_voltage_V" in str(entry.needs)
+    assert found.smallest_size == float("inf")
 
 
 @pytest.mark.slow
