@@ -30,11 +30,13 @@ if TYPE_CHECKING:
 
 # Forward differences: a change of the residual vector of this norm, within these steps of z. It is
 # small against what the noise hides (1), far above the simulation's own jitter (1e-5), and wide
-# enough to look over the kinks that contact and limits leave in the cost. Over a thousandth, the
-# slope of a weak parameter was that of the one sample in which a contact fell: its standard error
-# was wrong by four, and which sample that was, the last bits of the linear algebra decided.
+# enough to look over the kinks that contact and limits leave in the cost.
 DIFFERENCE_NORM = 0.3
-SMALLEST_DIFFERENCE, LARGEST_DIFFERENCE = 1e-6, 1e-2
+SMALLEST_DIFFERENCE, LARGEST_DIFFERENCE = 1e-6, 1e-3
+# Largest step of the slopes that standard errors come from. Over a thousandth, the slope of a weak
+# parameter was that of the one sample in which a contact fell: its standard error was wrong by
+# four, and which sample that was, the last bits of the linear algebra decided.
+WIDEST_DIFFERENCE = 1e-2
 # Step of the first differences, before any slope is known.
 FIRST_DIFFERENCE = 1e-5
 MAX_ITERATIONS = 60
@@ -89,20 +91,32 @@ class _Problem:
         base = self.residual(z)
         self.based = z.tobytes(), base
         jacobians = [np.zeros((*r.shape, len(z))) for r in base]
-        for j, unknown in enumerate(self.unknowns):
-            if self.follow is not None and self.follow.has[j]:
-                continue
-            step = self.steps[j]
-            if z[j] + step > unknown.scaled(unknown.upper):
-                step = -step
-            changed = z.copy()
-            changed[j] += step
-            runs = range(len(base)) if unknown.run is None else (unknown.run,)
-            for k in runs:
-                jacobians[k][..., j] = (self._run(k, changed) - base[k]) / (changed[j] - z[j])
+        for j in range(len(z)):
+            if self.follow is None or not self.follow.has[j]:
+                self._difference(z, j, jacobians)
         if self.follow is not None:
             self.follow.fill(z, base, jacobians)
         self.steps = _steps(jacobians, self.difference)
+        return jacobians
+
+    def _difference(self, z: Array, j: int, jacobians: Sequence[Array]) -> None:
+        """Fill in the column of one unknown."""
+        unknown, base, step = self.unknowns[j], self.residual(z), self.steps[j]
+        if z[j] + step > unknown.scaled(unknown.upper):
+            step = -step
+        changed = z.copy()
+        changed[j] += step
+        for k in range(len(base)) if unknown.run is None else (unknown.run,):
+            jacobians[k][..., j] = (self._run(k, changed) - base[k]) / (changed[j] - z[j])
+
+    def wide_jacobian(self, z: Array) -> list[Array]:
+        """Jacobian of every run at z, with the columns of weak unknowns over wider differences."""
+        jacobians = [j.copy() for j in self.jacobian(z)]
+        if self.follow is not None:
+            return jacobians
+        narrow, self.steps = self.steps, _steps(jacobians, self.difference, WIDEST_DIFFERENCE)
+        for j in np.flatnonzero(self.steps > narrow):
+            self._difference(z, int(j), jacobians)
         return jacobians
 
     def rows(self, z: Array) -> Array:
@@ -158,11 +172,13 @@ def _values(unknowns: Sequence[Unknown], z: Array, run: int) -> dict[str, float]
     return {u.name: u.value(float(z[j])) for j, u in enumerate(unknowns) if u.run in {None, run}}
 
 
-def _steps(jacobians: Sequence[Array], difference: float) -> Array:
+def _steps(
+    jacobians: Sequence[Array], difference: float, most: float = LARGEST_DIFFERENCE
+) -> Array:
     """Steps of z that change the residual vector by a norm, within their bounds."""
     squares = np.sum([np.einsum("cnj,cnj->j", j, j) for j in jacobians], axis=0)
     wanted = difference / np.sqrt(np.maximum(squares, 1e-300))
-    largest = LARGEST_DIFFERENCE * max(1.0, difference)
+    largest = most * max(1.0, difference)
     return np.asarray(np.clip(wanted, SMALLEST_DIFFERENCE, largest))
 
 
@@ -242,7 +258,7 @@ def linearise_at(
 
 
 def _estimate(problem: _Problem, z: Array, converged: bool, message: str) -> Estimate:
-    residuals, jacobians = problem.residual(z), problem.jacobian(z)
+    residuals, jacobians = problem.residual(z), problem.wide_jacobian(z)
     information = sum(np.einsum("cni,cnj->ij", j, j) for j in jacobians)
     precision = np.diag([u.scaled_std**-2.0 for u in problem.unknowns])
     return Estimate(
