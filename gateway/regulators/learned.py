@@ -25,16 +25,14 @@ from math import copysign, exp, sqrt
 
 from gateway.configuration.config import Config
 from gateway.configuration.memory import NOTHING, Crossing, Memory
-from gateway.physics.virtual_truck import START_SPEED, VirtualTruck, move, truck_torque
+from gateway.physics import following
+from gateway.physics.following import FollowedTruck, Following, advance, follow, lead_and_trim
+from gateway.physics.virtual_truck import truck_torque
 from gateway.physics.window import Window
 from gateway.regulators.demand import Demand
 
-TRIM_MOST = 0.8
-"""[rad/s] Largest trim, at the drum."""
-SMOOTH = 0.05
-"""[s] Time constant of the drum's acceleration in the slope: noise of one sample is no slope."""
-LEAD_MOST = 0.5
-"""rho above which the lead is reduced, because it feeds back rho times the acceleration."""
+__all__ = ["Params", "State", "follow", "seed", "update"]
+
 TORQUE_SMOOTH, TORQUE_MARGIN = 0.1, 100.0
 """[s], [N m] Smoothing of the torque between gear and drum, and the torque that makes a flank sure:
 three standard deviations of the smoothed torque with a noise of 0.01 rad/s at the drum."""
@@ -47,17 +45,14 @@ SAME = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
-class Params(VirtualTruck):
+class Params(FollowedTruck):
     """Parameters of the regulator in SI.
 
-    lead [s], trim [1] : as those of the compensated regulator
     preview : time by which a planned crossing leads [s]
     backlash : whole width at the gear output [rad]; approach : relative acceleration [rad/s^2]
     memory : of the repeats before this run
     """
 
-    lead: float
-    trim: float
     preview: float
     backlash: float
     approach: float
@@ -66,11 +61,9 @@ class Params(VirtualTruck):
     @classmethod
     def of(cls, config: Config) -> "Params":
         """Parameters out of the configuration."""
-        truck, own, limits = VirtualTruck.of(config), config.regulator, config.limits
+        truck, own, limits = FollowedTruck.of(config), config.regulator, config.limits
         return cls(
             **vars(truck),
-            lead=own.lead * min(1.0, LEAD_MOST * truck.inertia / truck.drum_inertia),
-            trim=own.trim,
             preview=own.lead,
             backlash=2.0 * config.bench.backlash_half_gap,
             approach=min(limits.rate_up, limits.rate_down) / truck.gear_ratio,
@@ -103,48 +96,31 @@ class Repeat:
 
 
 @dataclass(frozen=True, kw_only=True)
-class State:
-    """Speed of the virtual truck [rad/s of the drum], whether it has started, what it has learned.
+class State(Following):
+    """The followed virtual truck, and what the regulator has learned.
 
-    drum_acceleration : of the drum itself, smoothed [rad/s^2]
     repeat : None before the first start of the truck
     """
 
-    virtual_speed: float
-    moving: bool
-    drum_acceleration: float = 0.0
     memory: Memory = NOTHING
     repeat: Repeat | None = None
 
 
 def seed(params: Params, motor_speed: float, drum_speed: float) -> State:
-    """State whose demand is the measured motor speed."""
-    gear_speed = motor_speed / params.gear_ratio
-    behind = (gear_speed - drum_speed) / (1.0 + params.trim)
-    virtual = gear_speed - _clip(params.trim * behind, TRIM_MOST)
-    return State(
-        virtual_speed=max(virtual, 0.0), moving=gear_speed > START_SPEED, memory=params.memory
-    )
+    """State whose demand is the measured motor speed [rad/s]."""
+    return State(**vars(following.seed(params, motor_speed, drum_speed)), memory=params.memory)
 
 
 def update(params: Params, state: State, window: Window) -> tuple[State, Demand]:
     """State and demand after one new sample."""
     torque = truck_torque(_known_friction(params, state), window)
-    moving, speed = move(params, state.moving, state.virtual_speed, torque, window.duration)
-    rise = window.drum_speed_change / window.duration
-    smoothed = rise + (state.drum_acceleration - rise) * exp(-window.duration / SMOOTH)
-    after = replace(state, virtual_speed=speed, moving=moving, drum_acceleration=smoothed)
-    if not moving:
+    after, acceleration = advance(params, state, torque, window)
+    if not after.moving:
         return (_remember(after) if state.moving else after), Demand(speed=0.0)
-    after = replace(after, repeat=_watch(params, state, torque, speed, window))
-    acceleration = (speed - state.virtual_speed) / window.duration if state.moving else 0.0
-    return after, _demand(params, after, acceleration, window)
-
-
-def follow(params: Params, state: State, demand: float, setpoint: float) -> State:
-    """State whose demand would have been the setpoint that the limits passed."""
-    change = (setpoint - demand) / params.gear_ratio / (1.0 + params.trim)
-    return replace(state, virtual_speed=max(state.virtual_speed + change, 0.0))
+    after = replace(after, repeat=_watch(params, state, torque, after.virtual_speed, window))
+    planned = _planned(params, after)
+    speed, rate = lead_and_trim(params, after, acceleration, window, planned)
+    return after, Demand(speed=speed, rate=rate)
 
 
 def _known_friction(params: Params, state: State) -> Params:
@@ -152,19 +128,6 @@ def _known_friction(params: Params, state: State) -> Params:
     if state.repeat is None or state.repeat.time >= state.memory.duration:
         return params
     return replace(params, under_compensation=0.0, under_compensation_slow=0.0)
-
-
-def _demand(params: Params, state: State, acceleration: float, window: Window) -> Demand:
-    """Motor speed that virtual truck, lead, trim and planned crossing ask for."""
-    speed = state.virtual_speed
-    trim = _clip(params.trim * (speed - window.drum_speed), TRIM_MOST)
-    ahead, turning = _planned(params, state)
-    wanted = params.gear_ratio * (speed + params.lead * acceleration + trim + ahead)
-    demanded = min(max(wanted, 0.0), params.speed_max)
-    if abs(trim) < TRIM_MOST:
-        turning += params.trim * (acceleration - state.drum_acceleration)
-    rate = params.gear_ratio * (acceleration + turning) if demanded == wanted else 0.0
-    return Demand(speed=demanded, rate=rate)
 
 
 def _planned(params: Params, state: State) -> tuple[float, float]:
@@ -233,7 +196,3 @@ def _improve(memory: Memory, repeat: Repeat, time: float, direction: float) -> C
         cost=0.0,
         step=STEP,
     )
-
-
-def _clip(value: float, most: float) -> float:
-    return min(max(value, -most), most)
