@@ -31,7 +31,11 @@ TARGETS = {
     "gateway.cycle.checks": ("tests/gateway/cycle/test_checks.py",),
     "gateway.cycle.command": ("tests/gateway/cycle/test_command.py",),
     "gateway.regulators.thesis": (EVERY, "tests/gateway/regulators/test_thesis.py"),
-    "gateway.physics.following": (EVERY, "tests/gateway/regulators/test_compensated.py"),
+    "gateway.physics.following": (
+        EVERY,
+        "tests/gateway/regulators/test_compensated.py",
+        "tests/gateway/regulators/test_learned.py",
+    ),
     "gateway.physics.virtual_truck": (EVERY, "tests/gateway/regulators/test_compensated.py"),
     "gateway.regulators.compensated": (EVERY, "tests/gateway/regulators/test_compensated.py"),
     "gateway.regulators.learned": (EVERY, "tests/gateway/regulators/test_learned.py"),

@@ -127,7 +127,8 @@ def _known_friction(params: Params, state: State) -> Params:
     """Parameters with the whole friction while a known cycle repeats."""
     if state.repeat is None or state.repeat.time >= state.memory.duration:
         return params
-    return replace(params, under_compensation=0.0, under_compensation_slow=0.0)
+    none = 0.0
+    return replace(params, under_compensation=none, under_compensation_slow=none)
 
 
 def _planned(params: Params, state: State) -> tuple[float, float]:
@@ -153,7 +154,7 @@ def _watch(
     if last is None:
         return None  # the run began with a rolling truck: nobody saw its start
     rho, r_d = params.drum_inertia / params.inertia, params.drum_radius
-    road = r_d * params.road.force(r_d * max(speed, 1e-9))
+    road = r_d * params.road.force(r_d * speed)
     between = (1.0 - rho) * truck + rho * road
     torque = between + (last.torque - between) * exp(-window.duration / TORQUE_SMOOTH)
     time = last.time + window.duration

@@ -111,6 +111,104 @@ def test_a_torque_that_only_touches_zero_is_no_reversal():
     assert driven(torque, begun).repeat.found == ()
 
 
+PLAIN = replace(
+    PARAMS, gear_ratio=1.0, drum_inertia=0.0, under_compensation=1.0, under_compensation_slow=1.0
+)
+"""A bench that shows the truck's torque as it is, without gear, inertia and friction."""
+
+
+def watched(last, torque=0.0, *, params=PLAIN, crossings=(), duration=TICK, drum=3.0):
+    """The repeat after one more window; `last` : before it."""
+    memory = Memory(crossings=crossings)
+    state = learned.State(virtual_speed=3.2, moving=True, memory=memory, repeat=last)
+    seen = Window(
+        duration=duration,
+        shaft_torque=torque,
+        motor_speed=3.2,
+        drum_speed=drum,
+        drum_speed_change=0.0,
+    )
+    state, _ = learned.update(params, state, seen)
+    return state
+
+
+def test_torque_between_gear_and_drum_is_that_of_truck_and_road_by_their_inertias():
+    """rho = 312.71242 / (3640 x 0.645^2); smoothed over 0.1 s, of which 10 ms pass."""
+    rho = 312.71242 / (3640.0 * 0.645**2)
+    params = replace(PLAIN, drum_inertia=PARAMS.drum_inertia)
+    after = watched(learned.Repeat(torque=200.0), 50.0, params=params)
+    road = 0.645 * params.road.force(0.645 * after.virtual_speed)
+    between = (1.0 - rho) * 50.0 + rho * road
+    assert after.repeat.torque == pytest.approx(between + (200.0 - between) * np.exp(-0.1))
+
+
+@pytest.mark.parametrize(("torque", "side"), [(100.0, 0.0), (100.5, 1.0), (-100.5, -1.0)])
+def test_a_flank_is_sure_above_100_newton_metres(torque, side):
+    assert watched(learned.Repeat(torque=torque), torque).repeat.side == side
+
+
+@pytest.mark.parametrize(
+    ("before", "torque", "crossed"),
+    [(0.0, 5.0, 3.0), (0.5, 0.5, 3.0), (-0.1, 5.0, 7.0 + TICK - 0.1)],
+)
+def test_torque_crosses_zero_where_its_sign_changes(before, torque, crossed):
+    last = learned.Repeat(time=7.0, torque=before, crossed=3.0)
+    assert watched(last, torque).repeat.crossed == pytest.approx(crossed)
+
+
+@pytest.mark.parametrize(
+    ("time", "counts"), [(9.375, False), (9.5, True), (10.875, True), (11.0, False)]
+)
+def test_error_of_the_drum_counts_from_600_ms_before_a_crossing_to_1_s_after(time, counts):
+    last = learned.Repeat(time=time - 0.125, costs=(0.5,))
+    after = watched(last, crossings=(KNOWN,), duration=0.125)
+    error = 0.125 * (after.virtual_speed - 3.0) ** 2
+    assert after.repeat.costs == pytest.approx((0.5 + error * counts,))
+
+
+def test_the_time_600_ms_before_a_crossing_does_not_count_yet():
+    last = learned.Repeat(time=-0.125, costs=(0.5,))
+    after = watched(last, crossings=(replace(KNOWN, time=0.6),), duration=0.125)
+    assert after.repeat.costs == (0.5,)
+
+
+def test_a_repeat_belongs_to_the_crossings_of_its_memory():
+    with pytest.raises(ValueError, match="longer|shorter"):
+        watched(learned.Repeat(), crossings=(KNOWN,))
+    with pytest.raises(ValueError, match="longer|shorter"):
+        stopped((), ((10.0, 1.0),), Memory(duration=23.0, crossings=(KNOWN,)))
+
+
+def test_a_repeat_begins_with_nothing_seen():
+    memory = Memory(duration=30.0, crossings=(KNOWN,))
+    standing = learned.State(virtual_speed=0.02, moving=False, memory=memory)
+    begun, _ = learned.update(PLAIN, standing, window(torque=1000.0, motor=0.0, drum=0.0))
+    assert begun.moving
+    expected = learned.Repeat(time=0.0, torque=0.0, side=0.0, crossed=0.0, costs=(0.0,))
+    assert begun.repeat == expected
+
+
+def test_the_gear_is_accelerated_at_the_lesser_slope_of_the_limits():
+    """100 rpm/s = 10.472 rad/s^2 of the motor."""
+    slow = {"limits.rate_down_rpm_s": "100"}
+    found = learned.Params.of(CONFIG.with_values(slow))
+    assert found.approach == pytest.approx(10.472 / 62.6, rel=1e-4)
+
+
+def test_a_planned_crossing_has_ended_where_its_half_time_is_over():
+    """Width 1 rad at 4 rad/s^2: 0.5 s from the middle at 10 s to the end."""
+    params = replace(PLAIN, backlash=1.0, approach=4.0, preview=0.0, trim=0.0, lead=0.0)
+    one = replace(KNOWN, delay=0.0)
+    rates = []
+    for crossings in ((one,), ()):
+        memory = Memory(crossings=crossings)
+        last = learned.Repeat(time=10.375, costs=(0.0,) * len(crossings))
+        state = learned.State(virtual_speed=3.2, moving=True, memory=memory, repeat=last)
+        seen = replace(window(motor=3.2, drum=3.2), duration=0.125)
+        rates.append(learned.update(params, state, seen)[1].rate)
+    assert rates[0] == rates[1]
+
+
 def stopped(costs, found, memory):
     """State after a repeat that showed these costs and reversals."""
     repeat = learned.Repeat(time=24.0, costs=costs, found=found)
@@ -121,7 +219,8 @@ def stopped(costs, found, memory):
 
 
 @pytest.mark.parametrize(
-    ("cost", "delay", "best", "step"), [(0.005, 0.08, 0.05, 0.03), (0.02, 0.005, 0.02, -0.015)]
+    ("cost", "delay", "best", "step"),
+    [(0.005, 0.08, 0.05, 0.03), (0.01, 0.08, 0.05, 0.03), (0.02, 0.005, 0.02, -0.015)],
 )
 def test_a_step_that_helped_is_repeated_and_another_taken_back_by_half(cost, delay, best, step):
     memory = Memory(duration=23.0, crossings=(KNOWN,))
@@ -140,6 +239,12 @@ def test_a_new_reversal_is_remembered_and_one_that_did_not_come_is_forgotten():
         (14.0, 1.0, 0.0),
         (10.0, -1.0, 0.0),
     ]
+
+
+def test_a_reversal_half_a_second_from_a_known_one_is_another():
+    memory = Memory(duration=23.0, crossings=(KNOWN,))
+    [after] = stopped((0.01,), ((10.5, 1.0),), memory).crossings
+    assert (after.delay, after.best, after.cost, after.step) == (0.04, 0.04, 0.0, 0.03)
 
 
 def test_the_whole_friction_is_compensated_only_while_a_known_cycle_lasts():
