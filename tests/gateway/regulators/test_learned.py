@@ -173,9 +173,9 @@ def test_the_time_600_ms_before_a_crossing_does_not_count_yet():
 
 
 def test_a_repeat_belongs_to_the_crossings_of_its_memory():
-    with pytest.raises(ValueError, match="longer|shorter"):
+    with pytest.raises(ValueError, match=r"longer|shorter"):
         watched(learned.Repeat(), crossings=(KNOWN,))
-    with pytest.raises(ValueError, match="longer|shorter"):
+    with pytest.raises(ValueError, match=r"longer|shorter"):
         stopped((), ((10.0, 1.0),), Memory(duration=23.0, crossings=(KNOWN,)))
 
 
