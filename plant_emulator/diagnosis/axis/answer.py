@@ -214,8 +214,8 @@ def _evidence(f: AxisFindings, found: Fit, name: str) -> float:
 
 def _undetectable(f: AxisFindings) -> tuple[Undetectable, ...]:
     """Effects that need what these runs do not have."""
-    there = {e.name for e in f.search.library}
-    missing = {e.name: e.needs for e in f.library if e.name not in there}
+    there = {e.name for e in f.search.candidates}
+    missing = {e.name: e.needs for e in f.candidates if e.name not in there}
     return tuple(
         Undetectable(effect=name, reason=f"needs {needs}" if needs else "not in these runs")
         for name, needs in missing.items()

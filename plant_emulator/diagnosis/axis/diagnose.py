@@ -89,7 +89,7 @@ def diagnose_axis(
             break
         scale = replace(scale, width=width)
         regression, rows, library = start(prepared_runs, scale, len(own), effects, width)
-        search = AxisSearch(regression=regression, library=library, scale=scale)
+        search = AxisSearch(regression=regression, candidates=library, scale=scale)
         search.run()
         terms = search.best.terms
     tell("predicting held-out runs", 0.8)
@@ -105,7 +105,7 @@ def diagnose_axis(
         floor=floor,
         sources=tuple(log.source for log in logs),
         fitted=plan.fitted,
-        library=effects,
+        candidates=effects,
     )
     told = answer(found)
     tell("done", 1.0)

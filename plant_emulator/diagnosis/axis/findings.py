@@ -37,7 +37,7 @@ class AxisFindings:
     floor: float
     sources: tuple[str, ...]
     fitted: tuple[int, ...]
-    library: Sequence[Effect]
+    candidates: Sequence[Effect]
 
     @property
     def rotary(self) -> bool:

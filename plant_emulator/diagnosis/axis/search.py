@@ -33,7 +33,7 @@ class AxisSearch:
     """The search in a regression; library : effects that apply to the runs."""
 
     regression: Regression
-    library: Sequence[Effect]
+    candidates: Sequence[Effect]
     scale: Scale
     sets: dict[frozenset[str], Fit] = field(default_factory=dict)
     trace: list[SearchStep] = field(default_factory=list)
@@ -65,7 +65,7 @@ class AxisSearch:
         Laws of physics stand before descriptions in the library.
         """
         best = min(found, key=self.value)
-        order = [effect.name for effect in self.library]
+        order = [effect.name for effect in self.candidates]
         near = {id(one) for one in self.near(best)}
         alike = [best, *(one for one in found if id(one) in near)]
         return min(alike, key=lambda one: sum(map(order.index, one.names)))
@@ -116,7 +116,7 @@ class AxisSearch:
         key = frozenset(names)
         if key not in self.sets:
             found = self.null
-            for effect in self.library:
+            for effect in self.candidates:
                 if effect.name in key:
                     found = self._added(found, effect)
             self.sets[key] = self.refined(found)
@@ -125,7 +125,7 @@ class AxisSearch:
     def _expand(self, base: Fit) -> None:
         """Add each effect to a set; refine what comes near the best."""
         found = []
-        for effect in self.library:
+        for effect in self.candidates:
             key = frozenset((*base.names, effect.name))
             if effect.name in base.names or key in self.sets:
                 continue

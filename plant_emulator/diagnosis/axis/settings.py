@@ -11,7 +11,7 @@ class Settings:
 
     worth : share of what is left that an effect has to close on held-out runs; the position's noise
         in a relation is kept below the same share of the force
-    needed : gain of log evidence of an effect: odds of exp(10), against a library of twenty
+    needed : gain of log evidence of an effect: odds of exp(10), against a library of sixteen
     margin : of log evidence within which sets are alternatives: odds of 150 to 1
     most_effects : in a set
     beam : sets that are expanded by one more effect
