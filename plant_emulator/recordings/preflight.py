@@ -46,6 +46,9 @@ CERTAINLY_FROZEN = 50
 NOISY = 2.0 * FLOOR
 # A channel that repeats more than this share of its samples while it moves is sampled and held.
 HELD_SHARE = 0.4
+# The value of a held channel waits for the next task: a change after a change is rarer there than
+# any change, by this factor. Noise that crosses a coarse quantum changes the value in bursts.
+HELD_SPACING = 0.75
 # More than this share of a channel left out, and the channel cannot be used.
 USELESS_SHARE = 0.5
 # A hole is bridged by the reference from both sides. A longer one hides too much of what the bench
@@ -246,12 +249,21 @@ def _find_repeated(channel: Array) -> Use:
 
 
 def _is_held(channel: Array, repeated: Use) -> bool:
-    """Whether most samples repeat the one before while the channel moves."""
+    """Whether samples repeat the one before while the channel moves, at the beat of a task.
+
+    A channel with a coarse quantum repeats values as well, but at no beat.
+    """
     reach = 5
     moving = np.zeros(len(channel), bool)
     span = np.abs(channel[2 * reach :] - channel[: -2 * reach])
     moving[reach:-reach] = span > 0.02 * np.ptp(channel)
-    return bool(moving.sum() > 20 and np.mean(repeated[moving]) > HELD_SHARE)
+    if moving.sum() <= 20 or np.mean(repeated[moving]) <= HELD_SHARE:
+        return False
+    fresh = ~repeated
+    after_fresh = fresh[1:][moving[1:] & fresh[:-1]]
+    if len(after_fresh) == 0:
+        return True
+    return bool(np.mean(after_fresh) < HELD_SPACING * np.mean(fresh[moving]))
 
 
 def _find_frozen(repeated: Use, others: Array, share: float) -> Use:

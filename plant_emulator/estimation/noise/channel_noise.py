@@ -129,13 +129,14 @@ def line_columns(time: Array, lines: Sequence[float]) -> Array:
 def ljung_box_excess(runs: Sequence[Array]) -> float:
     """Ljung-Box statistic of innovations beyond its expected value [chi squared].
 
-    All runs together (Ljung and Box, Biometrika 65 (1978) 297).
+    All runs together (Ljung and Box, Biometrika 65 (1978) 297). A run of at most LAGS samples does
+    not count, because it has no product at the largest lag.
     """
     total, square, count = np.zeros(LAGS), 0.0, 0
-    for v in runs:
+    for v in (run for run in runs if len(run) > LAGS):
         total += [float(v[k:] @ v[: len(v) - k]) for k in range(1, LAGS + 1)]
         square, count = square + float(v @ v), count + len(v)
-    if square == 0.0 or count <= LAGS:
+    if square == 0.0:
         return 0.0
     terms = (total / square) ** 2 / (count - np.arange(1, LAGS + 1))
     return float(count * (count + 2.0) * terms.sum() - LAGS)

@@ -106,6 +106,21 @@ def test_held_channel_counts_where_it_is_fresh(good: Log, period: int) -> None:
     assert checked.use["motor_speed"].all()
 
 
+@pytest.mark.parametrize("quantum", [2.0, 3.0])
+def test_coarse_channel_counts_everywhere(good: Log, quantum: float) -> None:
+    """Rounding repeats more than half of the values, but it holds none: each is measured anew."""
+    noise = {"drum_speed": 0.01, "armature_current": 0.25, "shaft_torque": 0.25}
+    coarse = good
+    for name, deviation in noise.items():
+        step = quantum * deviation
+        coarse = with_channel(coarse, name, np.round(good[name] / step) * step)
+    checked = preflight(coarse, RATIO)
+    assert not any("held" in note for note in checked.notes)
+    for name in noise:
+        assert np.mean(np.diff(coarse[name]) == 0.0) > 0.4
+        assert np.mean(checked.use[name]) > 0.97
+
+
 def test_frozen_stretch_is_left_out_and_nothing_else(good: Log) -> None:
     current = good["armature_current"].copy()
     current[500:560] = current[500]

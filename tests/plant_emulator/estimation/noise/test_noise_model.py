@@ -10,7 +10,7 @@ from plant_emulator.estimation.noise.autoregression import (
     levinson,
     samples_since_break,
 )
-from plant_emulator.estimation.noise.channel_noise import LAGS, NoiseSeries
+from plant_emulator.estimation.noise.channel_noise import LAGS, NoiseSeries, ljung_box_excess
 from plant_emulator.estimation.noise.disturbances import outlying
 from plant_emulator.estimation.noise.estimate import estimate_channel_noise
 
@@ -189,3 +189,11 @@ def test_levinson_ends_where_no_process_has_such_an_autocovariance() -> None:
     predictors, variances = levinson(np.array([1.0, 0.5, -1.0, 0.3]))
     assert variances == pytest.approx([1.0, 0.75])
     assert len(predictors) == 2
+
+
+def test_whiteness_is_told_beside_a_run_that_is_too_short_for_its_lags() -> None:
+    """A run of fewer samples than lags has no product at the largest one; the others tell all."""
+    long = np.random.default_rng(5).normal(size=2000)
+    short = long[: LAGS - 3]
+    assert ljung_box_excess([long, short]) == ljung_box_excess([long])
+    assert ljung_box_excess([short]) == 0.0
