@@ -183,7 +183,7 @@ class BenchRelations:
             for name, whitener in zip(names, own, strict=bool(own)):
                 noise = whitener.noise
                 level = LINE_PRIOR * noise.deviation * m.noise[NOISES.index(name)]
-                for column in line_columns(m.time, noise.lines).T:
+                for column in line_columns(m.time, whitener.lines).T:
                     yield self._perturb(k, name, level * column)[:, None]
 
     def _perturb(self, k: int, name: str, change: Array) -> Array:

@@ -126,4 +126,7 @@ class WhitenedRecipe:
         """Hash of the plain recipe and of the noise."""
         own = hashlib.sha256(self.recipe.digest().encode())
         own.update(pickle.dumps(dict(self.noise.channels)))
+        for run, whiteners in sorted(self.noise.whiteners.items()):
+            for one in whiteners:
+                own.update(f"{run} {one.lines}".encode() + one.use.tobytes())
         return own.hexdigest()

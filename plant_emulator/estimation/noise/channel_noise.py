@@ -50,7 +50,7 @@ class NoiseSeries:
 class ChannelNoise:
     """The noise of a channel, in units of its declared noise.
 
-    lines : frequencies [Hz]; disturbance : their mean square
+    lines : frequencies of all runs [Hz]; disturbance : their mean square
     outliers : share of the samples [1]
     ljung_box_excess : of the innovations beyond white noise [chi squared, 0 +- sqrt(2 LAGS)]
     unsteady : share of the blocks whose innovations are louder than noise of one spectrum makes [1]
@@ -88,12 +88,13 @@ class ChannelNoise:
 class Whitener:
     """The linear map that makes a residual of one channel in one run white.
 
-    use : samples that count; time : of all samples [s]
+    use : samples that count; time : of all samples [s]; lines : frequencies in this run [Hz]
     """
 
     noise: ChannelNoise
     use: NDArray[np.bool_]
     time: Array
+    lines: tuple[float, ...] = ()
 
     @cached_property
     def _places(self) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
@@ -104,7 +105,7 @@ class Whitener:
     @cached_property
     def _lines(self) -> Array:
         """Whitened columns of the lines, scaled to unit priors, shape (n, k)."""
-        columns = line_columns(self.time, self.noise.lines) * LINE_PRIOR * self.noise.deviation
+        columns = line_columns(self.time, self.lines) * LINE_PRIOR * self.noise.deviation
         return np.stack([self.innovations(c) for c in columns.T], axis=-1)
 
     def innovations(self, value: Array) -> Array:
@@ -117,13 +118,19 @@ class Whitener:
     def white(self, value: Array) -> Array:
         """Whitened residual, shape (n,): white where the noise is all that the residual holds."""
         left = self.innovations(value)
-        return whiten_sensor_errors(left, self._lines) if self.noise.lines else left
+        return whiten_sensor_errors(left, self._lines) if self.lines else left
 
 
 def line_columns(time: Array, lines: Sequence[float]) -> Array:
-    """Cosine and sine of every line, shape (n, 2 k)."""
+    """Cosine and sine of every line, and their drift over the run, shape (n, 4 k).
+
+    The mains wander within a run as well, and a run of a minute does not tell its frequency
+    exactly: amplitude and phase of a line change linearly.
+    """
     turns = 2.0 * np.pi * np.outer(time, np.asarray(lines))
-    return np.concatenate([np.cos(turns), np.sin(turns)], axis=1)
+    waves = np.concatenate([np.cos(turns), np.sin(turns)], axis=1)
+    drift = 2.0 * (time - time[0]) / np.ptp(time) - 1.0
+    return np.concatenate([waves, waves * drift[:, None]], axis=1)
 
 
 def ljung_box_excess(runs: Sequence[Array]) -> float:

@@ -56,57 +56,68 @@ def subtract_lines(s: NoiseSeries, use: NDArray[np.bool_], lines: Sequence[float
 
 def likely_lines(
     series: Sequence[NoiseSeries], uses: Sequence[NDArray[np.bool_]], deviation: float
-) -> tuple[float, ...]:
-    """Frequencies of the mains and their double [Hz], beside white noise; empty: not likely.
+) -> list[tuple[float, ...]]:
+    """Frequencies of the mains and their double in each run [Hz]; empty where not likely.
 
-    An autoregression that was fitted to a line hides the line, hence the white noise.
+    The mains wander by hundredths of a hertz between runs, and a run of a minute shows that: each
+    run has a frequency of its own. All runs together decide whether there are lines.
+    An autoregression that was fitted to a line hides the line, hence the gain beside white noise.
     deviation : of the noise
     """
-    longest = max(float(np.ptp(s.time)) for s in series)
-    best: tuple[float, float] = (EVIDENCE, 0.0)
+    best: tuple[float, list[tuple[float, ...]]] = (EVIDENCE, [() for _ in series])
     for mains in MAINS:
-        frequencies = np.arange(mains - MAINS_OFF, mains + MAINS_OFF, 0.25 / longest)
-        gains = np.zeros(len(frequencies))
-        for s, use in zip(series, uses, strict=True):
-            value = s.value[use] - s.value[use].mean()
-            power = periodogram(s.time[use], value, frequencies)
-            gains += power / deviation**2 - np.log(max(2, len(value)))
-        k = int(np.argmax(gains))
-        best = max(best, (float(gains[k]), float(frequencies[k])))
-    if not best[1]:
-        return ()
-    frequency = _refine_line(series, uses, best[1], longest)
-    return (frequency, 2.0 * frequency)
+        of_runs = [_largest(s, use, mains, deviation) for s, use in zip(series, uses, strict=True)]
+        total = sum(gain for gain, _ in of_runs if gain > 0.0)
+        if total > best[0]:
+            best = (total, [(f, 2.0 * f) if gain > 0.0 else () for gain, f in of_runs])
+    return [
+        _refine_lines(s, use, found) if found else ()
+        for s, use, found in zip(series, uses, best[1], strict=True)
+    ]
 
 
-def _refine_line(
-    series: Sequence[NoiseSeries],
-    uses: Sequence[NDArray[np.bool_]],
-    frequency: float,
-    longest: float,
-) -> float:
-    """The frequency nearby whose line and double leave the least squares [Hz].
+def _largest(
+    s: NoiseSeries, use: NDArray[np.bool_], mains: float, deviation: float
+) -> tuple[float, float]:
+    """Gain of log evidence of the likeliest line near the mains in a run, and its frequency [Hz].
 
-    Sampling folds the double to nearly 0: half a turn missed in a run would look like a drift.
+    Amplitude, phase and frequency each take half the logarithm of the samples (Schwarz).
+    """
+    count = int(use.sum())
+    if count < 2:
+        return 0.0, mains
+    step = 0.25 / float(np.ptp(s.time))
+    frequencies = np.arange(mains - MAINS_OFF, mains + MAINS_OFF, step)
+    power = periodogram(s.time[use], s.value[use] - s.value[use].mean(), frequencies)
+    k = int(np.argmax(power))
+    return float(power[k]) / deviation**2 - 1.5 * float(np.log(count)), float(frequencies[k])
 
-    frequency : largest of the periodogram, which the line's mirror image at half the sampling rate
-        moves; longest : run [s]
+
+def _refine_lines(
+    s: NoiseSeries, use: NDArray[np.bool_], lines: tuple[float, ...]
+) -> tuple[float, ...]:
+    """The line nearby that leaves the least squares, and its double [Hz].
+
+    Sampling folds the double to nearly 0: half a turn missed in a run would look like a drift. The
+    line alone tells the frequency, because near 0 a misfit of the model passes for the double.
+
+    lines : largest of the periodogram, which the line's mirror image at half the sampling rate
+        moves, and its double
     """
     from scipy.optimize import minimize_scalar
 
     def left(found: float) -> float:
-        return sum(
-            float(np.sum(subtract_lines(s, use, (found, 2.0 * found))[use] ** 2))
-            for s, use in zip(series, uses, strict=True)
-        )
+        turns = 2.0 * np.pi * found * s.time[use]
+        waves = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+        amplitudes = np.linalg.lstsq(waves, s.value[use], rcond=None)[0]
+        return float(np.sum((s.value[use] - waves @ amplitudes) ** 2))
 
-    step = STEP / longest
-    near = frequency + step * np.arange(-5.0, 6.0)
+    step = STEP / float(np.ptp(s.time))
+    near = lines[0] + step * np.arange(-10.0, 11.0)
     best = float(near[int(np.argmin([left(f) for f in near]))])
     around = (best - step, best + step)
-    return float(
-        minimize_scalar(left, bounds=around, method="bounded", options={"xatol": 1e-3 * step}).x
-    )
+    found = minimize_scalar(left, bounds=around, method="bounded", options={"xatol": 1e-3 * step})
+    return (float(found.x), 2.0 * float(found.x))
 
 
 def periodogram(time: Array, value: Array, frequencies: Array) -> Array:

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
     Uses = Sequence[NDArray[np.bool_]]
+    # Frequencies of the lines of each run [Hz].
+    Lines = Sequence[tuple[float, ...]]
 
 # Memory of the noise [samples]: 0.3 s of correlation at 100 Hz is told by 12 poles, and slow wander
 # beside white noise by 60.
@@ -66,54 +68,64 @@ def estimate_channel_noise(
         counted = sum(int(s.use.sum()) for s in series)
         left_out = 1.0 - sum(int(u.sum()) for u in uses) / max(1, counted)
         noise = ChannelNoise(outliers=left_out)
-    noise = _fit_colour(noise, series, uses, ORDER)
+    lines: Lines = [() for _ in series]
+    noise = _fit_colour(noise, series, uses, lines, ORDER)
     if disturbed:
-        noise = _with_lines(noise, series, uses)
-    found = _whiteners(noise, series, uses)
+        noise, lines = _with_lines(noise, series, uses)
+    found = _whiteners(noise, series, uses, lines)
     if found[0].noise.ljung_box_excess > COLOURED:
-        found = _whiteners(_fit_colour(noise, series, uses, LONG_ORDER), series, uses)
+        longer = _fit_colour(noise, series, uses, lines, LONG_ORDER)
+        found = _whiteners(longer, series, uses, lines)
     return found[0].noise, found
 
 
-def _whiteners(noise: ChannelNoise, series: Sequence[NoiseSeries], uses: Uses) -> list[Whitener]:
+def _whiteners(
+    noise: ChannelNoise, series: Sequence[NoiseSeries], uses: Uses, lines: Lines
+) -> list[Whitener]:
     """Whiteners of all runs, their noise with the result of its tests."""
-    found = [Whitener(noise, u, s.time) for s, u in zip(series, uses, strict=True)]
+    found = [Whitener(noise, u, s.time, own) for s, u, own in zip(series, uses, lines, strict=True)]
     left = [w.white(s.value) for w, s in zip(found, series, strict=True)]
     squares, _ = _block_squares(left, uses)
     tested = replace(
         noise,
-        disturbance=_disturbance(noise, series, uses),
+        disturbance=_disturbance(series, uses, lines),
         ljung_box_excess=ljung_box_excess([v[u] for v, u in zip(left, uses, strict=True)]),
         unsteady=float(np.mean(np.concatenate(squares) > LOUD)),
     )
     return [replace(w, noise=tested) for w in found]
 
 
-def _disturbance(noise: ChannelNoise, series: Sequence[NoiseSeries], uses: Uses) -> float:
+def _disturbance(series: Sequence[NoiseSeries], uses: Uses, lines: Lines) -> float:
     """Mean square of the lines over the samples that count."""
     parts = [
-        (s.value - subtract_lines(s, use, noise.lines))[use] ** 2
-        for s, use in zip(series, uses, strict=True)
+        (s.value - subtract_lines(s, use, own))[use] ** 2
+        for s, use, own in zip(series, uses, lines, strict=True)
     ]
     return float(np.mean(np.concatenate(parts)))
 
 
-def _with_lines(noise: ChannelNoise, series: Sequence[NoiseSeries], uses: Uses) -> ChannelNoise:
-    """The noise with its lines, where they shrink the innovations."""
+def _with_lines(
+    noise: ChannelNoise, series: Sequence[NoiseSeries], uses: Uses
+) -> tuple[ChannelNoise, Lines]:
+    """The noise with the lines of each run, where they shrink the innovations."""
+    none: Lines = [() for _ in series]
     lines = likely_lines(series, uses, noise.deviation)
-    if not lines:
-        return noise
-    found = _fit_colour(replace(noise, lines=lines), series, uses, ORDER)
+    told = tuple(sorted(f for own in lines for f in own))
+    if not told:
+        return noise, none
+    found = _fit_colour(replace(noise, lines=told), series, uses, lines, ORDER)
     count = sum(int(u.sum()) for u in uses)
     shrunk = noise.colour.innovation_deviation / found.colour.innovation_deviation
-    return found if count * np.log(shrunk) > EVIDENCE + 4.0 * len(series) else noise
+    if count * np.log(shrunk) > EVIDENCE + 4.0 * len(series):
+        return found, lines
+    return noise, none
 
 
 def _fit_colour(
-    noise: ChannelNoise, series: Sequence[NoiseSeries], uses: Uses, longest: int
+    noise: ChannelNoise, series: Sequence[NoiseSeries], uses: Uses, lines: Lines, longest: int
 ) -> ChannelNoise:
     """The noise with the autoregression of its quiet blocks; longest : memory [samples]."""
-    values = [subtract_lines(s, use, noise.lines) for s, use in zip(series, uses, strict=True)]
+    values = [subtract_lines(s, use, own) for s, use, own in zip(series, uses, lines, strict=True)]
     # From white noise on: an autoregression that was fitted to a cause would predict the cause.
     found = Autoregression()
     for _ in range(PASSES):

@@ -10,7 +10,7 @@ import numpy as np
 from plant_emulator.estimation.noise.estimate import estimate_channel_noise
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Mapping, Sequence
 
     from plant_emulator.estimation.noise.channel_noise import ChannelNoise, NoiseSeries, Whitener
     from plant_emulator.estimation.unknowns import Residual
@@ -43,7 +43,7 @@ class LoggedNoise:
         return all(
             abs(np.log(a.colour.innovation_deviation / b.colour.innovation_deviation)) < KNOWN
             and abs(np.log(a.deviation / b.deviation)) < 2.0 * KNOWN
-            and a.lines == b.lines
+            and _same_lines(a.lines, b.lines)
             for a, b in ((one, other.channels[name]) for name, one in self.channels.items())
         )
 
@@ -56,6 +56,11 @@ class LoggedNoise:
             return np.stack([w.white(row) for w, row in zip(whiteners, rows, strict=True)])
 
         return white
+
+
+def _same_lines(first: Sequence[float], second: Sequence[float]) -> bool:
+    """Whether two noises have the same lines, each within what a run of a minute tells apart."""
+    return len(first) == len(second) and bool(np.allclose(first, second, rtol=0.0, atol=0.02))
 
 
 def noise_of_runs(series: Iterable[tuple[int, str, NoiseSeries]]) -> LoggedNoise:

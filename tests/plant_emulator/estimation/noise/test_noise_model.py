@@ -13,6 +13,7 @@ from plant_emulator.estimation.noise.autoregression import (
 from plant_emulator.estimation.noise.channel_noise import LAGS, NoiseSeries, ljung_box_excess
 from plant_emulator.estimation.noise.disturbances import outlying
 from plant_emulator.estimation.noise.estimate import estimate_channel_noise
+from plant_emulator.estimation.noise.logged_noise import outliers_of_runs
 
 RATE = 100.0
 
@@ -197,3 +198,33 @@ def test_whiteness_is_told_beside_a_run_that_is_too_short_for_its_lags() -> None
     short = long[: LAGS - 3]
     assert ljung_box_excess([long, short]) == ljung_box_excess([long])
     assert ljung_box_excess([short]) == 0.0
+
+
+def test_each_run_has_mains_of_its_own() -> None:
+    """At 100 Hz the double folds to 0.06 and 0.04 Hz: five waves in one run, three in the other."""
+    runs, t = [], np.arange(8000) / RATE
+    for seed, mains in ((23, 50.03), (24, 49.98)):
+        value = white(8000, seed) + 1.5 * np.cos(2 * np.pi * mains * t + 1.0)
+        runs.append(series(value + 0.75 * np.cos(4 * np.pi * mains * t + 2.0)))
+    noise, whiteners = estimate_channel_noise(runs)
+    folded = [abs(w.lines[0] - 50.0) for w in whiteners]
+    assert folded == pytest.approx([0.03, 0.02], abs=0.002)
+    assert noise.colour.order == 0
+    left = np.concatenate([w.white(s.value) for w, s in zip(whiteners, runs, strict=True)])
+    assert np.mean(left**2) == pytest.approx(1.0, abs=0.05)
+
+
+def test_outliers_leave_the_declared_noise() -> None:
+    value = white(4000, 25)
+    value[100::400] += 25.0
+    found = outliers_of_runs([(0, "torque", series(value))])
+    assert found.channels["torque"].outliers == pytest.approx(10 / 4000)
+    (left,) = found.whitened(0, lambda _: value[None])({})
+    assert not left[100::400].any()
+    assert left[1] == value[1]
+
+
+def test_what_shakes_often_is_no_outlier() -> None:
+    value = white(4000, 26)
+    value[10::20] += 25.0
+    assert outliers_of_runs([(0, "torque", series(value))]).channels["torque"].outliers == 0.0
