@@ -18,7 +18,7 @@ from plant_emulator.diagnosis.search.rich_model import rich_columns
 from plant_emulator.diagnosis.search.simulation_columns import SimulationColumns
 from plant_emulator.estimation.noise.channel_noise import NoiseSeries
 from plant_emulator.estimation.noise.disturbances import outlying
-from plant_emulator.estimation.noise.logged_noise import noise_of_runs
+from plant_emulator.estimation.noise.logged_noise import noise_of_runs, outliers_of_runs
 from plant_emulator.estimation.regression import Regression
 
 if TYPE_CHECKING:
@@ -41,6 +41,19 @@ def estimate_noise(model: Model, task: Task) -> LoggedNoise:
     """Estimate the noise around the fit `task.base` (a step)."""
     simulation = SimulationColumns(model, task.base, task.runs)
     return noise_of_runs(_series(model, simulation))
+
+
+def mark_outliers(model: Model, task: Task) -> LoggedNoise:
+    """Mark the outliers around the fit `task.base`, beside the noise that is declared (a step)."""
+    series = []
+    for k, states in zip(task.runs, task.base.states, strict=True):
+        rows, run = (
+            model.residual(k, task.base.effects)({**task.base.values, **states}),
+            model.runs[k],
+        )
+        for name, row in zip(run.channels, rows, strict=True):
+            series.append((k, name, NoiseSeries(time=run.time, value=row, use=row != 0.0)))
+    return outliers_of_runs(series)
 
 
 def _series(model: Model, simulation: SimulationColumns) -> Iterator[tuple[int, str, NoiseSeries]]:

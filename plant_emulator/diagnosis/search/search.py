@@ -48,10 +48,12 @@ KEPT = 2
 class Search:
     """The search of one diagnosis; see the module's text.
 
-    runner : in the noise that the sensors declare; null : fit without effects there
+    declared : in the noise that the sensors declare
+    runner : beside the outliers; null : fit without effects there
     random_evidence : of a random effect that is part of that noise [chi squared]
     """
 
+    declared: TaskRunner
     runner: TaskRunner
     null: FitResult
     random_evidence: float = 0.0
@@ -70,7 +72,6 @@ class Search:
         The noise is estimated around the fit without effects where that is near the noise, and
         around the best set. Where that shows another noise, the queue starts again.
         """
-        self.declared = self.runner
         self.sets = {frozenset(): self.null}
         if self.null.mean_square <= SETTINGS.linear_mean_square:
             self._estimate_noise(self.null)

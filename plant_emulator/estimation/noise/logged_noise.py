@@ -7,17 +7,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.estimation.noise.channel_noise import ChannelNoise, Whitener
+from plant_emulator.estimation.noise.disturbances import outlying
 from plant_emulator.estimation.noise.estimate import estimate_channel_noise
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
-    from plant_emulator.estimation.noise.channel_noise import ChannelNoise, NoiseSeries, Whitener
+    from plant_emulator.estimation.noise.channel_noise import NoiseSeries
     from plant_emulator.estimation.unknowns import Residual
     from plant_emulator.signals.log import Array
 
 # Deviations up to this much off the declared one are the declared one's own error [1].
 KNOWN = 0.03
+# Share of the samples up to which outliers are faults of a transmission, not a machine that shakes.
+MOST_OUTLIERS = 0.02
 
 
 @dataclass(frozen=True)
@@ -68,12 +72,39 @@ def noise_of_runs(series: Iterable[tuple[int, str, NoiseSeries]]) -> LoggedNoise
 
     series : run, channel and residual, for every channel of every run, in the channels' order
     """
+    return _by_channel(estimate_channel_noise, series)
+
+
+def outliers_of_runs(series: Iterable[tuple[int, str, NoiseSeries]]) -> LoggedNoise:
+    """Leave out the outliers of each channel; all else is the noise that is declared.
+
+    series : see `noise_of_runs`
+    """
+    return _by_channel(_without_outliers, series)
+
+
+def _without_outliers(series: Sequence[NoiseSeries]) -> tuple[ChannelNoise, list[Whitener]]:
+    """Declared noise of a channel beside outliers, and each run's whitener."""
+    uses = [s.use & ~outlying(s.value, s.use) for s in series]
+    counted = sum(int(s.use.sum()) for s in series)
+    share = 1.0 - sum(int(u.sum()) for u in uses) / max(1, counted)
+    if share > MOST_OUTLIERS:
+        share, uses = 0.0, [s.use for s in series]
+    noise = ChannelNoise(outliers=share)
+    return noise, [Whitener(noise, u, s.time) for s, u in zip(series, uses, strict=True)]
+
+
+def _by_channel(
+    estimate: Callable[[Sequence[NoiseSeries]], tuple[ChannelNoise, list[Whitener]]],
+    series: Iterable[tuple[int, str, NoiseSeries]],
+) -> LoggedNoise:
+    """Estimate the noise of each channel from its residuals in all runs together."""
     given = list(series)
     channels: dict[str, ChannelNoise] = {}
     found: dict[tuple[int, str], Whitener] = {}
     for name in dict.fromkeys(name for _, name, _ in given):
         pairs = [(k, one) for k, other, one in given if other == name]
-        channels[name], whiteners = estimate_channel_noise([one for _, one in pairs])
+        channels[name], whiteners = estimate([one for _, one in pairs])
         found |= {(k, name): one for (k, _), one in zip(pairs, whiteners, strict=True)}
     runs = dict.fromkeys(k for k, _, _ in given)
     ordered = {k: tuple(found[k, name] for other, name, _ in given if other == k) for k in runs}

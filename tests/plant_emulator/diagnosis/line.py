@@ -150,4 +150,4 @@ def noisy(y: Array, seed: int = 0) -> Array:
 def explained(model: Line) -> Explanation:
     """The search over all runs."""
     there = runner(model)
-    return Search(runner=there, null=fit_null(model, there.runs)).explain()
+    return Search(declared=there, runner=there, null=fit_null(model, there.runs)).explain()

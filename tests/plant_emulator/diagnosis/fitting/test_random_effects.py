@@ -188,6 +188,15 @@ def test_unrest_alone_is_an_effect() -> None:
     assert procedure.run()[1].effects == ("shake",)
 
 
+def test_spikes_of_a_transmission_are_no_unrest() -> None:
+    """A few values are far off where the slope is steep; without the mark that is unrest."""
+    y = noisy(2.0 + 3.0 * TIME)
+    spikes = np.where(np.arange(len(TIME)) % 28 == 0, shaken(8.0), 0.0)
+    procedure = Procedure(runner=runner(Shaken([y + spikes])))
+    assert procedure.run()[1].effects == ("shake",)
+    assert procedure.with_outliers_marked().run()[1].kind != "effect"
+
+
 def test_weighted_model_is_another_recipe() -> None:
     model = Shaken([noisy(2.0 + 3.0 * TIME)])
     halves = WeightedRecipe(Given(model), (np.full((1, len(TIME)), 0.5),))

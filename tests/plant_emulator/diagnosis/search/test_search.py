@@ -63,7 +63,9 @@ def test_effect_that_leaves_most_of_what_the_others_leave_is_not_the_cause() -> 
     rest = np.sqrt(0.4) * np.random.default_rng(7).standard_normal(len(TIME))
     gap = 2.15 * np.sin(20.0 * TIME) + 4.05 * TIME**3 + rest
     model = Line([noisy(2.0 + 3.0 * TIME + gap)], ["wave", "cube"])
-    found = KnownNoise(runner=runner(model), null=fit_null(model, [0])).explain()
+    found = KnownNoise(
+        declared=runner(model), runner=runner(model), null=fit_null(model, [0])
+    ).explain()
     assert found.final.effects == ("wave",)
     assert decide(model, found).kind == "unknown"
 
