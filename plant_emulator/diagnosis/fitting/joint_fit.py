@@ -20,12 +20,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fit_result import FitResult
+from plant_emulator.estimation import least_squares
 from plant_emulator.estimation.covariance import correlation_time, structure
-from plant_emulator.estimation.least_squares import (
-    SUSPECT_MEAN_SQUARE,
-    estimate,
-    linearise_at,
-)
+from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE, estimate, linearise_at
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -40,6 +37,8 @@ COST_TOLERANCE = 1e-6
 SECANT_COST_TOLERANCE = 1e-4
 # Iterations after which a fit shows whether it leads to a lower cost.
 TRIAL_ITERATIONS = 10
+# Iterations of the way to the data.
+APPROACH_ITERATIONS = 15
 # A size differs from neutral for certain from so many of its standard errors on.
 SIGNIFICANT_ERRORS = 3.0
 # Share of the largest size allowed from which on an effect stands for something else. An effect
@@ -113,6 +112,34 @@ def fit(
     return replace(
         reached,
         insignificant=tuple(n for n, c in candidates.items() if not _significant(c, reached)),
+    )
+
+
+def approach(
+    model: Model,
+    effects: Sequence[str],
+    runs: Sequence[int],
+    values: Mapping[str, float],
+    states: Sequence[Mapping[str, float]],
+) -> tuple[Mapping[str, float], Sequence[Mapping[str, float]]]:
+    """Values and states near the data, from which a fit of these effects may begin.
+
+    They are the given ones where these are near: a fit from far off ends in a local minimum.
+    """
+    rows = [
+        model.residual(k, effects)({**values, **own}) for k, own in zip(runs, states, strict=True)
+    ]
+    squares = sum(float(np.sum(r**2)) for r in rows)
+    if squares <= SUSPECT_MEAN_SQUARE * sum(np.count_nonzero(r) for r in rows):
+        return values, states
+    near = least_squares.approach(
+        with_starts(joint_unknowns(model, effects, runs), values, states),
+        [model.rough().residual(k, effects) for k in runs],
+        iterations=APPROACH_ITERATIONS,
+    )
+    return (
+        {**values, **{u.name: u.start for u in near if u.run is None}},
+        [{**own, **{u.name: u.start for u in near if u.run == k}} for k, own in enumerate(states)],
     )
 
 
@@ -197,14 +224,5 @@ def effective_fraction(found: Estimate) -> float:
 
 
 def fit_null(model: Model, runs: Sequence[int]) -> FitResult:
-    """Fit without effects from the model's own start values.
-
-    A fit that leaves much starts again from the nominal parameters; the better fit counts.
-    """
-    found = fit(model, (), runs, *model.start_values(runs))
-    if found.mean_square <= SUSPECT_MEAN_SQUARE:
-        return found
-    nominal = {u.name: u.prior for u in model.parameters}
-    states = [model.initial_states(k, (), nominal) for k in runs]
-    other = fit(model, (), runs, nominal, states, TRIAL_ITERATIONS)
-    return found if found.cost <= other.cost else fit_from(model, (), runs, other)
+    """Fit without effects from the model's own start values."""
+    return fit(model, (), runs, *approach(model, (), runs, *model.start_values(runs)))

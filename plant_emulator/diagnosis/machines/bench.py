@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import pickle
+from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -194,8 +195,10 @@ class BenchModel:
         runs: Sequence[int],
         whiteners: Mapping[int, Sequence[Whitener]] | None = None,
     ) -> BenchRelations | None:
-        """See `Model`; None with effects of the set, which the relations do not know."""
-        return None if self._given else BenchRelations(self.rough(), where, runs, whiteners)
+        """See `Model`; None with effects of the set, and where the fit cannot be simulated."""
+        with suppress(UnsettledError):
+            return None if self._given else BenchRelations(self.rough(), where, runs, whiteners)
+        return None
 
     def input_noise(
         self, run: int, where: FitResult, state: Mapping[str, float]

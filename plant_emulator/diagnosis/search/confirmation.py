@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fit_result import FitValues
-from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_from, linearise
+from plant_emulator.diagnosis.fitting.joint_fit import approach, fit, fit_from, linearise
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.estimation.robust_scan import cauchy_loss
 from plant_emulator.model.stage import GAP_POSITION
@@ -45,7 +45,8 @@ def confirm(model: Model, trial: Trial) -> FitResult:
     loss, best = min(placed, key=lambda pair: pair[0])
     if trial.effects:
         best = _scan_size(model, trial, loss, best)
-    return fit(model, trial.effects, trial.runs, best.values, best.states, SETTINGS.iterations)
+    near = approach(model, trial.effects, trial.runs, best.values, best.states)
+    return fit(model, trial.effects, trial.runs, *near, SETTINGS.iterations)
 
 
 def look(model: Model, trial: Trial) -> FitResult:

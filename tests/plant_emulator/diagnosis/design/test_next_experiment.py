@@ -98,6 +98,10 @@ class Slope:
         x, y = self.speeds[run], self.measured[run]
         return lambda v: ((y - self.foretold(x, effects, v)) / 0.01)[None, :]
 
+    def rough(self) -> "Slope":
+        """See `Model`."""
+        return self
+
     def input_noise(
         self, run: int, where: FitResult, state: Mapping[str, float]
     ) -> NoiseDirections | None:
