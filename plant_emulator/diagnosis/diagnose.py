@@ -178,7 +178,7 @@ class Diagnose:
         )
 
     def _test(self) -> _Tests:
-        procedure = Procedure(runner=self.runner).with_input_noise().with_outliers_marked()
+        procedure = Procedure(runner=self.runner).with_input_noise().with_disturbances()
         explained, decision, runner = procedure.run()
         return _Tests(explained=explained, decision=decision, runner=runner)
 

@@ -26,12 +26,12 @@ from plant_emulator.estimation import least_squares
 from plant_emulator.estimation.equation_error import start_values
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
 from plant_emulator.estimation.initial_states import GAP, states_of, with_logged_values
-from plant_emulator.estimation.noise.channel_noise import NoiseSeries
 from plant_emulator.estimation.noise.logged_noise import noise_of_runs
 from plant_emulator.estimation.residuals import residual_functions, whiten_functions
 from plant_emulator.estimation.start_search import FINE_SCANS, StartSearch
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.signals.log import VOLTAGE
+from plant_emulator.signals.noise import NoiseSeries
 from plant_emulator.simulation.simulate import TOLERANCE, values_of
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 from plant_emulator.errors import IdentificationError, UnsettledError
 from plant_emulator.recordings.wheel_torque import is_estimated
 from plant_emulator.signals.log import VOLTAGE, Array, Log, compared_channels, without_voltage
-from plant_emulator.signals.noise import noise
+from plant_emulator.signals.mains import noise_beside_lines
 from plant_emulator.simulation.simulate import TOLERANCE, Hold, RunInputs, inputs_of, simulate
 
 if TYPE_CHECKING:
@@ -156,7 +156,7 @@ def recording(
         counted &= np.stack([inputs.sensing.has_new_reading(name) for name in channels])
     known = {name: sensor.noise for name, sensor in (sensors or {}).items()}
     levels = [
-        known.get(name) or noise(log[name], use)
+        known.get(name) or noise_beside_lines(log.time, log[name], use)
         for name, use in zip(channels, counted, strict=True)
     ]
     if not all(level > 0.0 for level in levels):

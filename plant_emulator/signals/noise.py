@@ -9,6 +9,7 @@ level with a quantised sensor.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +24,18 @@ CLIP = 3.0
 TRUNCATED_DEVIATION = 0.986578
 # Least noise as a share of the channel's range: a log without noise still has rounding.
 FLOOR = 2e-4
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoiseSeries:
+    """The residual of a channel in one run, in units of the channel's declared noise.
+
+    time : [s], value : residual, use : samples that count, shape (n,) each
+    """
+
+    time: Array
+    value: Array
+    use: NDArray[np.bool_]
 
 
 def noise(channel: Array, use: NDArray[np.bool_] | None = None) -> float:
@@ -40,6 +53,11 @@ def noise(channel: Array, use: NDArray[np.bool_] | None = None) -> float:
     floor = FLOOR * float(np.ptp(channel))
     if len(differences) == 0:
         return floor
+    return max(deviation_without_outliers(differences) / float(np.sqrt(20.0)), floor)
+
+
+def deviation_without_outliers(differences: Array) -> float:
+    """Standard deviation of normal values among outliers [their unit], shape (n,)."""
     deviation = 1.4826 * float(np.median(np.abs(differences)))
     for _ in range(50):
         inner = differences[np.abs(differences) <= CLIP * deviation]
@@ -47,4 +65,4 @@ def noise(channel: Array, use: NDArray[np.bool_] | None = None) -> float:
         if abs(renewed - deviation) <= 1e-6 * deviation:
             break
         deviation = renewed
-    return max(float(deviation / np.sqrt(20.0)), floor)
+    return deviation

@@ -1,7 +1,7 @@
 """The diagnosis procedure: from the logs to a decision.
 
-1. The noise of measured inputs is made part of the noise (`fitting.input_noise_model`), and the
-   outliers are left out (`search.logged_noise`).
+1. The noise of measured inputs (`fitting.input_noise_model`) and the lines of the mains are made
+   part of the noise, and the outliers are left out (`search.logged_noise`).
 2. The fit without effects leaves the gap. Where the gap is random, a random effect may explain it
    (`fitting.random_effects`); it is then made part of the noise.
 3. The search finds the set of effects that the logs ask for (`search.search`).
@@ -23,7 +23,7 @@ from plant_emulator.diagnosis.fitting.fit_steps import refit, start
 from plant_emulator.diagnosis.fitting.input_noise_model import whiten_inputs
 from plant_emulator.diagnosis.fitting.random_effects import WeightedRecipe, fit_random_effect
 from plant_emulator.diagnosis.fitting.task import Task
-from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, mark_outliers
+from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, find_disturbances
 from plant_emulator.diagnosis.search.search import Search
 
 if TYPE_CHECKING:
@@ -45,73 +45,72 @@ class Procedure:
     """One diagnosis up to its decision.
 
     null : fit without effects; None where it has not been made yet
-    outliers : samples that the residual of that fit leaves out; None where there are none
+    lines : of the mains beside the declared noise; disturbances : lines and the outliers, which are
+        left out; None where there are none
     """
 
     runner: TaskRunner
     null: FitResult | None = None
-    outliers: LoggedNoise | None = None
+    lines: LoggedNoise | None = None
+    disturbances: LoggedNoise | None = None
 
     def with_input_noise(self) -> Procedure:
         """Give the procedure with the noise of measured inputs as part of the noise."""
         runner, null = whiten_inputs(self.runner)
         return replace(self, runner=runner, null=null)
 
-    def with_outliers_marked(self) -> Procedure:
-        """Give the procedure with the fit without effects and the outliers that it leaves."""
+    def with_disturbances(self) -> Procedure:
+        """Give the procedure with the fit without effects and the disturbances that it leaves."""
         runs = self.runner.runs
         (null,) = [self.null] if self.null else self.runner.map(start, [runs])
-        (noise,) = self.runner.map(mark_outliers, [Task(base=null, runs=runs)])
-        spiky = any(channel.outliers for channel in noise.channels.values())
-        return replace(self, null=null, outliers=noise if spiky else None)
+        ((lines, found),) = self.runner.map(find_disturbances, [Task(base=null, runs=runs)])
+        if lines is not None:
+            (null,) = _whitened(self.runner, lines).map(refit, [Task(base=null, runs=runs)])
+        return replace(self, null=null, lines=lines, disturbances=found)
 
     def run(self) -> tuple[Explanation, Decision, TaskRunner]:
         """Test the hypotheses and decide; give also the runner in whose noise the costs count."""
         model, runs = self.runner.model, self.runner.runs
         (null,) = [self.null] if self.null else self.runner.map(start, [runs])
         found = self._test_random_gap(null)
-        if found is None:
-            if self.outliers is not None:
-                (null,) = self._cleared(self.runner).map(refit, [Task(base=null, runs=runs)])
-            found = self._test_effects(self.runner, null)
-        if decide(model, found[0]).kind == "unknown" and not found[0].random_effects:
-            found = self._test_random_effects(found[0].final, found[0].null) or found
+        if found is None or decide(model, found[0]).kind == "unknown":
+            plain = self._test_effects(null)
+            if found is None or decide(model, plain[0]).kind != "unknown":
+                found = plain
+        explained = found[0]
+        left = decide(model, explained).kind == "unknown" or _is_random(explained.final)
+        if left and not explained.random_effects:
+            found = self._test_random_effects(explained.final, explained.null) or found
         explained, runner = found
         decision = decide(model, explained)
         if decision.kind == "unknown":
             decision = self._check_consistency(explained, decision)
         return explained, decision, runner
 
-    def _cleared(self, runner: TaskRunner) -> TaskRunner:
-        """Give a runner whose model leaves the outliers out."""
-        if self.outliers is None:
-            return runner
-        return replace(runner, recipe=WhitenedRecipe(runner.recipe, self.outliers))
-
-    def _test_effects(
-        self, runner: TaskRunner, null: FitResult, random_evidence: float = 0.0
-    ) -> tuple[Explanation, TaskRunner]:
-        """Search the library; random_evidence : see `Search`.
-
-        Give also the runner in whose noise the costs count.
-        """
-        search = Search(
-            declared=runner,
-            runner=runner if random_evidence else self._cleared(runner),
-            null=null,
-            random_evidence=random_evidence,
-        )
+    def _test_effects(self, null: FitResult) -> tuple[Explanation, TaskRunner]:
+        """Search the library; give also the runner in whose noise the costs count."""
+        runner = self._cleared
+        if self.disturbances is not None:
+            (null,) = runner.map(refit, [Task(base=null, runs=runner.runs)])
+        search = Search(declared=self.runner, runner=runner, null=null, noise=self.disturbances)
         return search.explain(), search.runner
+
+    @property
+    def _beside_lines(self) -> TaskRunner:
+        """A runner whose model has the lines of the mains in its noise."""
+        return _whitened(self.runner, self.lines)
+
+    @property
+    def _cleared(self) -> TaskRunner:
+        """A runner whose model leaves the outliers out as well."""
+        return _whitened(self.runner, self.disturbances)
 
     def _test_random_gap(self, null: FitResult) -> tuple[Explanation, TaskRunner] | None:
         """Test the random effects first where the gap is large and random.
 
-        Other effects would be tested in vain there. None: the gap is small or not random
+        None: the gap is small or not random
         """
-        small = null.mean_square <= NOISE_MEAN_SQUARE
-        if small or null.ljung_box_excess > RANDOM_SHARE * excess(null):
-            return None
-        return self._test_random_effects(null, null)
+        return self._test_random_effects(null, null) if _is_random(null) else None
 
     def _test_random_effects(
         self, base: FitResult, null: FitResult
@@ -129,11 +128,19 @@ class Procedure:
             return None
         weights = dict(zip(runs, best.weights, strict=True))
         every = tuple(weights.get(k, np.ones(1)) for k in range(len(model.runs)))
-        runner = replace(self.runner, recipe=WeightedRecipe(self.runner.recipe, every))
+        plain = self._beside_lines
+        runner = replace(plain, recipe=WeightedRecipe(plain.recipe, every))
         (null,) = runner.map(refit, [Task(base=null, runs=runs)])
-        explained, runner = self._test_effects(runner, null, best.evidence)
+        search = Search(
+            declared=runner,
+            runner=runner,
+            null=null,
+            random_evidence=best.evidence,
+            noise=self.lines,
+        )
+        explained = search.explain()
         last = self._fit_random_effects(explained.final, [best.effect])
-        return (replace(explained, random_effects=tuple(last)), runner) if last else None
+        return (replace(explained, random_effects=tuple(last)), search.runner) if last else None
 
     def _fit_random_effects(self, base: FitResult, names: Iterable[str]) -> list[VarianceComponent]:
         """Fit the random effects among these on top of a fit; give those that count.
@@ -145,10 +152,8 @@ class Procedure:
             for name in names
             if self.runner.model.candidates[name].stochastic
         ]
-        found = list(self.runner.map(fit_random_effect, tasks))
-        beside = (
-            self._cleared(self.runner).map(fit_random_effect, tasks) if self.outliers else found
-        )
+        found = list(self._beside_lines.map(fit_random_effect, tasks))
+        beside = self._cleared.map(fit_random_effect, tasks) if self.disturbances else found
         return [
             one
             for one, other in zip(found, beside, strict=True)
@@ -161,6 +166,17 @@ class Procedure:
         if explained.unconverged or len(runs) < 2:
             return decision
         tasks = [Task(base=explained.null, runs=(run,)) for run in runs]
-        fits = list(self._cleared(self.runner).map(run_consistency.fit_alone, tasks))
+        fits = list(self._cleared.map(run_consistency.fit_alone, tasks))
         reason = run_consistency.inconsistency(self.runner.model, runs, fits)
         return replace(decision, kind="unknown", effects=(), reason=reason) if reason else decision
+
+
+def _is_random(found: FitResult) -> bool:
+    """Whether a fit leaves more than the noise, and that may be random."""
+    large = found.mean_square > NOISE_MEAN_SQUARE
+    return large and found.ljung_box_excess <= RANDOM_SHARE * excess(found)
+
+
+def _whitened(runner: TaskRunner, noise: LoggedNoise | None) -> TaskRunner:
+    """A runner whose model is whitened for this noise."""
+    return runner if noise is None else replace(runner, recipe=WhitenedRecipe(runner.recipe, noise))

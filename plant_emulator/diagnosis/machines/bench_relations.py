@@ -20,11 +20,13 @@ from plant_emulator.diagnosis.localisation.parity_relations import DRIVE, relati
 from plant_emulator.diagnosis.machines.thinning import thin
 from plant_emulator.diagnosis.search.rich_model import rich_columns
 from plant_emulator.errors import UnsettledError
-from plant_emulator.estimation.noise.channel_noise import LINE_PRIOR, NoiseSeries, line_columns
+from plant_emulator.estimation.noise.channel_noise import LINE_PRIOR
 from plant_emulator.estimation.noise.estimate import estimate_channel_noise
 from plant_emulator.estimation.regression import Regression
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.signals.log import Log
+from plant_emulator.signals.mains import line_columns
+from plant_emulator.signals.noise import NoiseSeries
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

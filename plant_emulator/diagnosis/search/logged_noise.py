@@ -16,10 +16,10 @@ import numpy as np
 
 from plant_emulator.diagnosis.search.rich_model import rich_columns
 from plant_emulator.diagnosis.search.simulation_columns import SimulationColumns
-from plant_emulator.estimation.noise.channel_noise import NoiseSeries
 from plant_emulator.estimation.noise.disturbances import outlying
-from plant_emulator.estimation.noise.logged_noise import noise_of_runs, outliers_of_runs
+from plant_emulator.estimation.noise.logged_noise import disturbances_of_runs, noise_of_runs
 from plant_emulator.estimation.regression import Regression
+from plant_emulator.signals.noise import NoiseSeries
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -43,8 +43,11 @@ def estimate_noise(model: Model, task: Task) -> LoggedNoise:
     return noise_of_runs(_series(model, simulation))
 
 
-def mark_outliers(model: Model, task: Task) -> LoggedNoise:
-    """Mark the outliers around the fit `task.base`, beside the noise that is declared (a step)."""
+def find_disturbances(model: Model, task: Task) -> tuple[LoggedNoise | None, LoggedNoise | None]:
+    """Find the lines around the fit `task.base`, and lines and outliers (a step).
+
+    None where there are none.
+    """
     series = []
     for k, states in zip(task.runs, task.base.states, strict=True):
         rows, run = (
@@ -53,7 +56,7 @@ def mark_outliers(model: Model, task: Task) -> LoggedNoise:
         )
         for name, row in zip(run.channels, rows, strict=True):
             series.append((k, name, NoiseSeries(time=run.time, value=row, use=row != 0.0)))
-    return outliers_of_runs(series)
+    return disturbances_of_runs(series, marked=False), disturbances_of_runs(series)
 
 
 def _series(model: Model, simulation: SimulationColumns) -> Iterator[tuple[int, str, NoiseSeries]]:

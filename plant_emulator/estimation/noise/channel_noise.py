@@ -15,6 +15,7 @@ import numpy as np
 
 from plant_emulator.estimation.noise.autoregression import Autoregression, samples_since_break
 from plant_emulator.recordings.recording import whiten_sensor_errors
+from plant_emulator.signals.mains import line_columns
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,18 +33,6 @@ COLOURED = 5.0 * float(np.sqrt(2.0 * LAGS))
 # Share of the variance that the past predicts from which on a residual is no noise of a sensor [1].
 # Noise that is correlated over 30 ms at 100 Hz has 0.5; a wave that a model misses has 0.95.
 MOST_PREDICTABLE = 0.7
-
-
-@dataclass(frozen=True, kw_only=True)
-class NoiseSeries:
-    """The residual of a channel in one run, in units of the channel's declared noise.
-
-    time : [s], value : residual, use : samples that count, shape (n,) each
-    """
-
-    time: Array
-    value: Array
-    use: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,18 +108,6 @@ class Whitener:
         """Whitened residual, shape (n,): white where the noise is all that the residual holds."""
         left = self.innovations(value)
         return whiten_sensor_errors(left, self._lines) if self.lines else left
-
-
-def line_columns(time: Array, lines: Sequence[float]) -> Array:
-    """Cosine and sine of every line, and their drift over the run, shape (n, 4 k).
-
-    The mains wander within a run as well, and a run of a minute does not tell its frequency
-    exactly: amplitude and phase of a line change linearly.
-    """
-    turns = 2.0 * np.pi * np.outer(time, np.asarray(lines))
-    waves = np.concatenate([np.cos(turns), np.sin(turns)], axis=1)
-    drift = 2.0 * (time - time[0]) / np.ptp(time) - 1.0
-    return np.concatenate([waves, waves * drift[:, None]], axis=1)
 
 
 def ljung_box_excess(runs: Sequence[Array]) -> float:

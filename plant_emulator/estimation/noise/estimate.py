@@ -20,20 +20,16 @@ from plant_emulator.estimation.noise.channel_noise import (
     Whitener,
     ljung_box_excess,
 )
-from plant_emulator.estimation.noise.disturbances import (
-    EVIDENCE,
-    likely_lines,
-    outlying,
-    subtract_lines,
-)
+from plant_emulator.estimation.noise.disturbances import outlying
+from plant_emulator.signals.mains import EVIDENCE, likely_lines, subtract_lines
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from plant_emulator.estimation.noise.channel_noise import NoiseSeries
     from plant_emulator.signals.log import Array
+    from plant_emulator.signals.noise import NoiseSeries
 
     Uses = Sequence[NDArray[np.bool_]]
     # Frequencies of the lines of each run [Hz].
@@ -74,8 +70,10 @@ def estimate_channel_noise(
         noise, lines = _with_lines(noise, series, uses)
     found = _whiteners(noise, series, uses, lines)
     if found[0].noise.ljung_box_excess > COLOURED:
+        # Few quiet blocks say little of long lags: the innovations tell which memory is right.
         longer = _fit_colour(noise, series, uses, lines, LONG_ORDER)
-        found = _whiteners(longer, series, uses, lines)
+        other = _whiteners(longer, series, uses, lines)
+        found = min(found, other, key=lambda one: one[0].noise.ljung_box_excess)
     return found[0].noise, found
 
 
@@ -109,7 +107,7 @@ def _with_lines(
 ) -> tuple[ChannelNoise, Lines]:
     """The noise with the lines of each run, where they shrink the innovations."""
     none: Lines = [() for _ in series]
-    lines = likely_lines(series, uses, noise.deviation)
+    lines = likely_lines(series, uses, lambda _: noise.deviation)
     told = tuple(sorted(f for own in lines for f in own))
     if not told:
         return noise, none

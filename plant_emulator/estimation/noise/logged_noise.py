@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,13 +11,14 @@ import numpy as np
 from plant_emulator.estimation.noise.channel_noise import ChannelNoise, Whitener
 from plant_emulator.estimation.noise.disturbances import outlying
 from plant_emulator.estimation.noise.estimate import estimate_channel_noise
+from plant_emulator.signals.mains import lines_in_differences
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
-    from plant_emulator.estimation.noise.channel_noise import NoiseSeries
     from plant_emulator.estimation.unknowns import Residual
     from plant_emulator.signals.log import Array
+    from plant_emulator.signals.noise import NoiseSeries
 
 # Deviations up to this much off the declared one are the declared one's own error [1].
 KNOWN = 0.03
@@ -75,23 +77,37 @@ def noise_of_runs(series: Iterable[tuple[int, str, NoiseSeries]]) -> LoggedNoise
     return _by_channel(estimate_channel_noise, series)
 
 
-def outliers_of_runs(series: Iterable[tuple[int, str, NoiseSeries]]) -> LoggedNoise:
-    """Leave out the outliers of each channel; all else is the noise that is declared.
+def disturbances_of_runs(
+    series: Iterable[tuple[int, str, NoiseSeries]], *, marked: bool = True
+) -> LoggedNoise | None:
+    """Find the lines of each channel, and mark its outliers; None where there is neither.
 
-    series : see `noise_of_runs`
+    They show beside any misfit of a model, and before anything is known of its cause. All else is
+    the noise as declared.
+
+    series : see `noise_of_runs`; marked : whether outliers are left out
     """
-    return _by_channel(_without_outliers, series)
+    found = _by_channel(partial(_disturbances, marked=marked), series)
+    disturbed = any(c.lines or c.outliers for c in found.channels.values())
+    return found if disturbed else None
 
 
-def _without_outliers(series: Sequence[NoiseSeries]) -> tuple[ChannelNoise, list[Whitener]]:
-    """Declared noise of a channel beside outliers, and each run's whitener."""
-    uses = [s.use & ~outlying(s.value, s.use) for s in series]
-    counted = sum(int(s.use.sum()) for s in series)
-    share = 1.0 - sum(int(u.sum()) for u in uses) / max(1, counted)
-    if share > MOST_OUTLIERS:
-        share, uses = 0.0, [s.use for s in series]
-    noise = ChannelNoise(outliers=share)
-    return noise, [Whitener(noise, u, s.time) for s, u in zip(series, uses, strict=True)]
+def _disturbances(
+    series: Sequence[NoiseSeries], *, marked: bool
+) -> tuple[ChannelNoise, list[Whitener]]:
+    """Declared noise of a channel beside lines and outliers, and each run's whitener."""
+    uses, share = [s.use for s in series], 0.0
+    if marked:
+        kept = [s.use & ~outlying(s.value, s.use) for s in series]
+        counted = sum(int(use.sum()) for use in uses)
+        share = 1.0 - sum(int(use.sum()) for use in kept) / max(1, counted)
+        uses, share = (kept, share) if share <= MOST_OUTLIERS else (uses, 0.0)
+    lines, _ = lines_in_differences(series, uses)
+    told = tuple(sorted(f for own in lines for f in own))
+    noise = ChannelNoise(lines=told, outliers=share)
+    return noise, [
+        Whitener(noise, use, s.time, own) for s, use, own in zip(series, uses, lines, strict=True)
+    ]
 
 
 def _by_channel(

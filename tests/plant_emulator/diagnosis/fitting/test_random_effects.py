@@ -194,7 +194,7 @@ def test_spikes_of_a_transmission_are_no_unrest() -> None:
     spikes = np.where(np.arange(len(TIME)) % 28 == 0, shaken(8.0), 0.0)
     procedure = Procedure(runner=runner(Shaken([y + spikes])))
     assert procedure.run()[1].effects == ("shake",)
-    assert procedure.with_outliers_marked().run()[1].kind != "effect"
+    assert procedure.with_disturbances().run()[1].kind != "effect"
 
 
 def test_weighted_model_is_another_recipe() -> None:

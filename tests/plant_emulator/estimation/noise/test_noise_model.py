@@ -10,10 +10,11 @@ from plant_emulator.estimation.noise.autoregression import (
     levinson,
     samples_since_break,
 )
-from plant_emulator.estimation.noise.channel_noise import LAGS, NoiseSeries, ljung_box_excess
+from plant_emulator.estimation.noise.channel_noise import LAGS, ljung_box_excess
 from plant_emulator.estimation.noise.disturbances import outlying
 from plant_emulator.estimation.noise.estimate import estimate_channel_noise
-from plant_emulator.estimation.noise.logged_noise import outliers_of_runs
+from plant_emulator.estimation.noise.logged_noise import disturbances_of_runs
+from plant_emulator.signals.noise import NoiseSeries
 
 RATE = 100.0
 
@@ -217,7 +218,7 @@ def test_each_run_has_mains_of_its_own() -> None:
 def test_outliers_leave_the_declared_noise() -> None:
     value = white(4000, 25)
     value[100::400] += 25.0
-    found = outliers_of_runs([(0, "torque", series(value))])
+    found = disturbances_of_runs([(0, "torque", series(value))])
     assert found.channels["torque"].outliers == pytest.approx(10 / 4000)
     (left,) = found.whitened(0, lambda _: value[None])({})
     assert not left[100::400].any()
@@ -227,4 +228,4 @@ def test_outliers_leave_the_declared_noise() -> None:
 def test_what_shakes_often_is_no_outlier() -> None:
     value = white(4000, 26)
     value[10::20] += 25.0
-    assert outliers_of_runs([(0, "torque", series(value))]).channels["torque"].outliers == 0.0
+    assert disturbances_of_runs([(0, "torque", series(value))]).channels["torque"].outliers == 0.0
