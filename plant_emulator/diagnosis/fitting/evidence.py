@@ -21,12 +21,10 @@ EVIDENCE_THRESHOLD = 25.0
 CLASS_MARGIN = 10.0
 # An effect is detectable from this norm of its orthogonal signature on, at its plausible size [1].
 DETECTABLE_NORM = 7.0
-# Relative uncertainty of the noise's variance.
-NOISE_UNCERTAINTY = 0.02
 # Share of the gap that an adequate model may leave. Laws slightly other than the library's left up
 # to 0.17. Where the true effect was not in the library, the best one left 0.4 and more.
 UNEXPLAINED_SHARE = 0.2
-# Mean square up to which a fit leaves nothing but noise.
+# Mean square up to which a fit leaves nothing but noise: its variance is known to 5 %.
 NOISE_MEAN_SQUARE = 1.05
 # Ljung-Box excess from which on a residual is not white noise [chi squared].
 LJUNG_BOX_LIMIT = 200.0
@@ -48,7 +46,7 @@ def evidence_of(fall: float, better: FitResult, null: FitResult) -> float:
 
 def excess(found: FitResult) -> float:
     """Sum of squares beyond what the noise explains [chi squared]."""
-    return max(0.0, found.sum_of_squares - (1.0 + NOISE_UNCERTAINTY) * found.samples)
+    return max(0.0, found.sum_of_squares - NOISE_MEAN_SQUARE * found.samples)
 
 
 def significant(found: FitResult, null: FitResult) -> bool:

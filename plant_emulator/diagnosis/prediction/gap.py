@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.evidence import NOISE_UNCERTAINTY
 from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
 from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
 from plant_emulator.diagnosis.prediction import block_bootstrap
@@ -27,6 +26,8 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.machine import MeasuredRun, Model
     from plant_emulator.signals.log import Array
 
+# Relative uncertainty of the noise's variance.
+NOISE_UNCERTAINTY = 0.02
 # A channel counts in the closed fraction from this gap on, in the noise [1].
 OPEN_GAP = 1.1
 # A fit that ran out of iterations is continued at most so many times.

@@ -89,8 +89,11 @@ class Search:
         return self._explanation(final)
 
     def _estimate_noise(self, where: FitResult) -> bool:
-        """Take the noise around a fit for the logs' own; give whether it is another one now."""
-        if self.noise_at == where.key:
+        """Take the noise around a fit for the logs' own; give whether it is another one now.
+
+        The weights of a random effect fit the noise as it was declared.
+        """
+        if self.noise_at == where.key or self.random_evidence:
             return False
         self.noise_at = where.key
         (noise,) = self.declared.map(estimate_noise, [self._task(where)])
@@ -164,7 +167,8 @@ class Search:
 
     def _expand(self, base: FitResult) -> None:
         """Fit the effect of the largest predicted gain on top of a set, then its rivals."""
-        found = [p for p in self._screen(base) if p.gain > self._needed(base)]
+        needed = self._needed(base) if base.effects else SETTINGS.promising
+        found = [p for p in self._screen(base) if p.gain > needed]
         if not found:
             return
         (best,) = self._confirm(base, found[:1])

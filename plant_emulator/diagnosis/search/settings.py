@@ -21,6 +21,9 @@ class Settings:
     linear_mean_square: float = 1.5
     # Gain that an effect needs: odds of e^15, one of 30 effects by chance in 100 000 logs.
     needed: float = 15.0
+    # Predicted gain from which on a first effect is fitted: parameters that bend together make the
+    # gain of a weak effect several times the predicted one.
+    promising: float = 5.0
     # Gain that one more effect needs: by chance such gains came to 20.
     needed_again: float = 30.0
     # Most effects of a set: nobody has told more than three causes apart in one set of logs.

@@ -295,7 +295,7 @@ def test_excess_is_what_the_noise_does_not_explain() -> None:
         standard_errors={},
         converged=True,
     )
-    assert excess(point) == pytest.approx(1500 - 1020)
+    assert excess(point) == pytest.approx(1500 - 1050)
     assert excess(replace(point, sum_of_squares=900.0)) == 0.0
 
 
