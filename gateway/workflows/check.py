@@ -30,9 +30,12 @@ def check(
     found = review(settings, register_map)
     if not live:
         return found
-    compared = compare_with_device(settings.plc, register_map)
-    if not any(one.where == "plc.host" for one in compared):
+    try:
+        compared = compare_with_device(settings.plc, register_map)
         compared.append(compare_pace(settings, register_map))
+    except LinkError as error:
+        place = f"{settings.plc.host}:{settings.plc.port}"
+        compared = [_error("plc.host", str(error), place, "a PLC that answers")]
     return Review(findings=(*compared, *found.findings))
 
 
@@ -64,12 +67,12 @@ def _peer(plc: PlcConfig) -> device.Device:
 
 
 def compare_with_device(plc: PlcConfig, register_map: RegisterMap) -> list[Finding]:
-    """Errors that the registers of the live device show in the register map."""
-    try:
-        readings = device.two_readings(_peer(plc), register_map)
-        rows = inspection.verify(register_map, readings).rows
-    except LinkError as error:
-        return [_error("plc.host", str(error), f"{plc.host}:{plc.port}", "a PLC that answers")]
+    """Errors that the registers of the live device show in the register map.
+
+    Raises LinkError where it does not answer.
+    """
+    readings = device.two_readings(_peer(plc), register_map)
+    rows = inspection.verify(register_map, readings).rows
     findings = [
         _error(row.register.name, row.finding, _value(row), row.register.description)
         for row in rows

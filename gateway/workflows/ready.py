@@ -13,7 +13,7 @@ from gateway.commissioning import readiness
 from gateway.commissioning.check import Check, page
 from gateway.configuration.config import Config
 from gateway.cycle.record import Layout
-from gateway.errors import GatewayError
+from gateway.errors import GatewayError, PlcError
 from gateway.recordings import step_runs
 from gateway.workflows.check import compare_with_device
 from gateway.workflows.live_program import run_program
@@ -61,7 +61,7 @@ def ready(
     warm_up : time at one speed [s]; view : show the run on standard output
     report : takes lines for the operator
 
-    Raises GatewayError where the run did not come to its end.
+    Raises GatewayError where the PLC does not answer, or the run did not come to its end.
     """
     register_map = register_maps.load(config.plc.map)
     standing = [_registers(config, register_map), _disk(config, register_map)]
@@ -82,8 +82,12 @@ def ready(
 
 
 def _registers(config: Config, register_map: RegisterMap) -> Check:
-    """Registers of the live device that do not fit the map."""
-    found = compare_with_device(config.plc, register_map)
+    """Registers of the live device that do not fit the map. Raises PlcError without a reply."""
+    plc = config.plc
+    try:
+        found = compare_with_device(plc, register_map)
+    except PlcError as error:
+        raise PlcError(f"{plc.host}:{plc.port}: {error}; expected a PLC that answers") from error
     names = ", ".join(one.where for one in found) or "all fit"
     return Check(
         name="map",

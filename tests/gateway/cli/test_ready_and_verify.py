@@ -54,6 +54,18 @@ def test_a_day_begins_with_one_page_and_a_line_in_the_history(tmp_path):
     assert [row["name"] for row in rows] == [one["name"] for one in told["checks"]]
 
 
+def test_a_plc_that_does_not_answer_is_told_before_anything_is_asked_of_the_operator(tmp_path):
+    """The port is that of an emulator which has ended."""
+    with EmulatorProcess(truck_mass=None, speed=None) as emulator:
+        port = emulator.port
+    (tmp_path / "bench.toml").write_text(f"[plc]\nport = {port}\n")
+    result = CliRunner().invoke(main, ["ready", "-c", str(tmp_path / "bench.toml")])
+    assert result.exit_code == 1
+    assert f"127.0.0.1:{port}" in result.stderr
+    assert "expected a PLC that answers" in result.stderr
+    assert "remote" not in result.stderr
+
+
 def recorded(folder: Path, names: list[str]) -> Path:
     """The recording of a verification up to 1500 rpm, without waiting for the clock."""
     with EmulatorProcess(truck_mass=None, speed=None) as emulator:
