@@ -12,6 +12,17 @@ TEMPLATE: Final = Path(__file__).with_suffix(".html")
 DOCUMENT: Final = re.compile(
     r'<script type="application/json" id="certificate">(.*?)</script>', re.DOTALL
 )
+INDICES: Final = {
+    "er_percent": "energy rating ER [%]",
+    "dr_percent": "distance rating DR [%]",
+    "eer_percent": "energy economy rating EER [%]",
+    "ascr_percent": "absolute speed change rating ASCR [%]",
+    "iwr_percent": "inertia work rating IWR [%]; for comparison -2 .. +4, second-hand",
+    "rmsse_km_h": "speed error RMSSE [km/h]; for comparison 1.3, second-hand",
+    "braking_road_joule": "work of braking on the road [J]",
+    "braking_bench_joule": "work of braking on the bench [J]",
+}
+"""Indices of a document `j2951` in words; the limits were not read in the standard."""
 RIGHT: Final = "+-0123456789"
 """First characters of a cell that stands at the right."""
 
@@ -76,7 +87,7 @@ def _section(number: int, run: dict[str, Any]) -> str:
         head = ("check", "value of", "value", "limit", "", "source of the limit", "")
         parts.append(_table(head, map(_check, run["checks"])))
     if run["j2951"] is not None:
-        indices = [(key, _number(value)) for key, value in run["j2951"].items()]
+        indices = [(INDICES[key], _number(value)) for key, value in run["j2951"].items()]
         parts += ["<h3>Indices of SAE J2951, drum over demand</h3>", _table((), indices)]
     if run["budget"] is not None:
         columns = ("cause", "force [N]", "energy [%]", "speed [km/h]")
@@ -100,7 +111,11 @@ def _budget(budget: dict[str, Any]) -> Iterable[tuple[str, ...]]:
 
 
 def _number(value: float | None) -> str:
-    return "missing" if value is None else f"{value:+.3f}"
+    """Value with four digits, at most three of them decimals."""
+    if value is None:
+        return "missing"
+    whole = len(str(int(abs(value))))
+    return f"{value:+.{max(4 - whole, 0)}f}"
 
 
 def _text(value: Any) -> str:

@@ -52,12 +52,23 @@ def test_the_page_holds_its_document_and_a_changed_word_on_it_is_noticed():
     assert is_written(json.dumps(DOCUMENT), DOCUMENT)
 
 
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [(1205.0, "+1205"), (-545.25, "-545.2"), (-0.0004, "-0.000")],
+)
+def test_a_value_has_four_digits_and_at_most_three_decimals(value, shown):
+    check = {**CHECK, "value": value, "source": "own", "holds": False}
+    page = html({**DOCUMENT, "runs": [{**RUN, "checks": [check]}]})
+    assert f'<td class="number">{shown}</td><td class="number">9</td>' in page
+
+
 def test_the_page_shows_values_limits_digests_and_what_lies_outside():
     page = html(DOCUMENT)
     assert '<p class="fails">Outside: losses.</p>' in page
     for cell in ("a &lt;worst&gt; &amp; b", "own &lt;/script&gt; limit", "lag", "dead time"):
         assert f"<td>{cell}</td>" in page
     assert '<td class="number">+9.500</td><td class="number">9</td><td>N</td>' in page
+    assert "<td>inertia work rating IWR [%]; for comparison -2 .. +4, second-hand</td>" in page
     assert '<td class="outside">OUTSIDE</td>' in page
     assert f"sha256 {'0' * 64}" in page
 
