@@ -36,7 +36,9 @@ from plant_emulator import effects, parameter_sets
 from plant_emulator.emulator.process import EmulatorProcess
 from plant_emulator.model.sensors import Sensor
 
-PROGRAMS: Final = ("program1", "program2")
+PROGRAMS: Final = ("program1", "program2", "program3")
+"""Two others predict each run. The levels and stops of program 3 show what ramps do not: a friction
+of the drum, 32 N m for instance, is not named without them."""
 NOISE: Final = {
     "motor_speed": 0.15,
     "drum_speed": 0.01,
