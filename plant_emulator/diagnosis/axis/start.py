@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 # Widths of the Coulomb friction that are tried, in the highest speed.
 WIDTHS = (0.0003, 0.1)
+# White noise of the rows over that of third differences, for a noise with a memory of five samples:
+# r = exp(-1/5), sqrt((1 + r) / (1 - r)) over sqrt((20 - 30 r + 12 r^2 - 2 r^3) / 20).
+LASTING = 9.2
 # Nominal parameters before the first fit.
 NOTHING = Base(inertia=0.0, viscous=0.0, coulomb=0.0)
 
@@ -110,15 +113,18 @@ def sensor_noise(around: Regression, rich: Fit) -> tuple[float, float]:
     """Deviation of the force's noise, and share of the position's noise, in what a fit leaves.
 
     Noise is what changes from row to row beside a rich model. A force that changes quickly is none
-    where the axis follows it, nor is a quick motion where a force makes it.
+    where the axis follows it, nor is a quick motion where a force makes it. A force that the logs
+    lack changes from row to row too, but not from sample to sample: noise of the force is at most
+    what its samples show, if it remembers few of them.
     """
+    most = LASTING * np.sqrt(np.mean([noise(one.run.log.force) ** 2 for one in around.rows]))
     left = force = position = 0.0
     for k, one in enumerate(around.rows):
         left += _rough(one, around.residual(rich, k)) ** 2
         force += _rough(one, one.chance(rich.terms)) ** 2
         position += _rough(one, moved(one, rich.base.inertia)) ** 2
     share = min(1.0, np.sqrt(left / max(position, 1e-300)))
-    return float(np.sqrt(max(0.0, left - position) / force)), float(share)
+    return float(min(most, np.sqrt(max(0.0, left - position) / force))), float(share)
 
 
 def _rough(rows: Rows, values: Array) -> float:

@@ -1,6 +1,7 @@
 """A diagnosis of an axis of which everything is known."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -128,6 +129,24 @@ def test_a_load_that_is_not_logged_is_asked_for() -> None:
     found = diagnosed(*pair(lambda q, v, a: load))
     assert found.answer.verdict.kind == "unknown"
     assert "load_force_N" in (found.answer.verdict.next_experiment or "")
+
+
+@pytest.mark.slow
+def test_a_load_that_is_not_logged_is_no_noise_of_a_coarse_encoder() -> None:
+    """Rows of a coarse encoder are wide: the load changes from row to row, as noise does."""
+    found = diagnosed(*(coarse(seed) for seed in (1, 2)))
+    assert found.answer.verdict.kind == "unknown"
+    assert "load_force_N" in (found.answer.verdict.next_experiment or "")
+
+
+def coarse(seed: int) -> AxisLog:
+    """A run at 100 Hz with steps of 0.1 mm, and a load of four tones that is not logged."""
+    time, phases = truth.motion()[0], np.random.default_rng(seed).uniform(0.0, 6.0, (4, 1))
+    tones = 2.0 * np.pi * np.array([[3.0], [4.3], [5.1], [6.7]])
+    load = 10.0 * np.sin(tones * time + phases).sum(axis=0)
+    whole = truth.log(lambda q, v, a: load, phase=float(seed), seed=seed)
+    steps = 1e-4 * np.round(whole.position[::10] / 1e-4)
+    return replace(whole, time=whole.time[::10], position=steps, force=whole.force[::10])
 
 
 def test_a_short_log_is_refused() -> None:
