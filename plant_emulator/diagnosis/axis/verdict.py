@@ -46,7 +46,8 @@ def decide(search: AxisSearch, held_out: HeldOut, noise: float, floor: float) ->
     other = other_inertia(held_out.regression, held_out.rows)
     closed = held_out.share(found.terms, ()).value
     # Another inertia of a run looks like an effect, if it may not differ.
-    if other and (not found.terms or held_out.own_inertia().value > closed):
+    own = held_out.own_inertia()
+    if other and own.low > 0.0 and own.value > closed:
         return Decision(kind="parameter", found=search.null, inertia=other)
     if not found.terms:
         return _without_a_name(search, held_out, noise, floor, reason)
@@ -175,7 +176,7 @@ def other_inertia(
     for k, one in enumerate(rows):
         value, error = inertia([one])
         apart = abs(value - common[0])
-        certain = apart > SETTINGS.sure * np.hypot(error, common[1])
+        certain = apart > SETTINGS.sure * np.hypot(error, common[1]) and value > UNCERTAIN * error
         if certain and apart > SETTINGS.friction_spread * abs(common[0]):
             found.append((k, value, error))
     return tuple(found)
