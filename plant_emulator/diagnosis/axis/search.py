@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 # Steps of a refinement of one shape, and rounds over all shapes.
 STEPS, ROUNDS = 12, 2
+# Distance from a bound of a shape, in the logarithm, within which it lies at the bound.
+AT_BOUND = 0.02
 
 
 @dataclass
@@ -42,11 +44,10 @@ class AxisSearch:
         """Go through the queue; `best` then gives the best set."""
         self.sets[frozenset()] = self.regression.fit(())
         for size in range(SETTINGS.most_effects):
-            ranked = sorted((f for f in self.sets.values() if len(f.terms) == size), key=self.value)
-            before = min(map(self.value, self.sets.values()))
-            for found in ranked[: SETTINGS.beam]:
+            before = self.believed()
+            for found in [f for f in before if len(f.terms) == size][: SETTINGS.beam]:
                 self._expand(found)
-            if min(map(self.value, self.sets.values())) >= before:
+            if self.value(self.believed()[0]) >= self.value(before[0]):
                 break
 
     @property
@@ -54,30 +55,33 @@ class AxisSearch:
         """The fit without effects."""
         return self.sets[frozenset()]
 
+    def believed(self) -> list[Fit]:
+        """The sets whose sizes can be believed, the largest evidence first."""
+        found = [
+            f
+            for f in self.sets.values()
+            if np.isfinite(self.value(f)) and not any(self.doubt(f, t) for t in f.terms)
+        ]
+        return sorted(found, key=self.value)
+
     @property
     def best(self) -> Fit:
-        """The set of the largest evidence; see `preferred`."""
-        return self.preferred(list(self.sets.values()))
+        """The set of the largest evidence, or one that comes near and is more physical."""
+        return self.alike(self.believed()[0])[0]
 
-    def preferred(self, found: Sequence[Fit]) -> Fit:
-        """The set of the largest evidence, or one as large that comes near and is more physical.
+    def alike(self, found: Fit) -> list[Fit]:
+        """Sets of as many effects whose evidence is not less by the margin, the set itself too.
 
-        Laws of physics stand before descriptions in the library.
+        Laws of physics stand before descriptions in the library: their sets come first.
         """
-        best = min(found, key=self.value)
-        order = [effect.name for effect in self.candidates]
-        near = {id(one) for one in self.near(best)}
-        alike = [best, *(one for one in found if id(one) in near)]
-        return min(alike, key=lambda one: sum(map(order.index, one.names)))
-
-    def near(self, found: Fit) -> list[Fit]:
-        """Other sets of the same number of effects, whose evidence is not less by the margin."""
         least = self.value(found) + SETTINGS.margin
-        return [
+        order = [effect.name for effect in self.candidates]
+        near = [
             one
-            for one in self.sets.values()
-            if one is not found and len(one.terms) == len(found.terms) and self.value(one) <= least
+            for one in self.believed()
+            if len(one.terms) == len(found.terms) and self.value(one) <= least
         ]
+        return sorted(near, key=lambda one: sum(map(order.index, one.names)))
 
     def value(self, found: Fit) -> float:
         """Negative log evidence of a fit."""
@@ -87,6 +91,20 @@ class AxisSearch:
         constants = sum(len(t.effect.sizes) + len(t.effect.shapes) for t in found.terms)
         spent = 0.5 * constants * np.log(count) + SETTINGS.needed * len(found.terms)
         return float(0.5 * count * np.log(found.cost / found.count) + spent)
+
+    def doubt(self, found: Fit, term: Term) -> str:
+        """Why the sizes of an effect cannot be believed; empty where they can."""
+        name = term.effect.name
+        sizes, errors = found.sizes(term)
+        if self._forbidden(found, term):
+            return f"{name} would do, but with a sign that physics forbids"
+        if len(sizes) and np.all(errors > np.abs(sizes)):
+            return f"{name} would do, but no size of it is certain"
+        for shape, value in zip(term.effect.shapes, term.shapes, strict=True):
+            low, high = np.log(shape.bounds(self.scale))
+            if not low + AT_BOUND < np.log(value) < high - AT_BOUND:
+                return f"{name} would do, but its {shape.name} lies at its bound"
+        return ""
 
     @staticmethod
     def _forbidden(found: Fit, term: Term) -> bool:
@@ -133,7 +151,7 @@ class AxisSearch:
             found.append(key)
         found.sort(key=lambda k: self.value(self.sets[k]))
         for key in found[: SETTINGS.beam]:
-            if self.value(self.sets[key]) < self.value(base):
+            if self.value(self.sets[key]) < self.value(base) + SETTINGS.margin:
                 self.sets[key] = self.refined(self.sets[key])
                 self.trace.append(self._step("confirmed", self.sets[key]))
 

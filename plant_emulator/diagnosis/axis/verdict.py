@@ -17,11 +17,8 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.answer import Kind
     from plant_emulator.diagnosis.axis.held_out import HeldOut
     from plant_emulator.diagnosis.axis.leftover import Rest
-    from plant_emulator.diagnosis.axis.regression import Fit, Regression, Rows, Term
+    from plant_emulator.diagnosis.axis.regression import Fit, Regression, Rows
     from plant_emulator.diagnosis.axis.search import AxisSearch
-
-# Distance from a bound of a shape, in the logarithm, within which it lies at the bound.
-AT_BOUND = 0.02
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,11 +94,9 @@ def _without_a_name(
 
 def _confirmed(search: AxisSearch, held_out: HeldOut) -> tuple[Fit, str]:
     """The best set of which the held-out runs need every effect; else why the best one fails."""
-    best = search.best
-    ranked = [best, *(f for f in sorted(search.sets.values(), key=search.value) if f is not best)]
     confirmed: dict[frozenset[str], Fit] = {}
     reasons = []
-    for found in ranked[: SETTINGS.beam]:
+    for found in _ranked(search)[: SETTINGS.beam]:
         names, why = found, ""
         while names.terms:
             failing = _failing(search, held_out, names)
@@ -113,12 +108,25 @@ def _confirmed(search: AxisSearch, held_out: HeldOut) -> tuple[Fit, str]:
         if not names.terms:
             reasons.append(why)
     if not confirmed:
-        return search.null, reasons[0] if reasons else ""
-    winner = search.preferred(list(confirmed.values()))
-    alternative = search.preferred([winner, *search.near(winner)])
-    if alternative is not winner and _failing(search, held_out, alternative) is None:
-        return alternative, ""
-    return winner, ""
+        return search.null, reasons[0] or _doubted(search)
+    # Sets of like evidence differ by what the held-out runs say, and these need every effect.
+    least = min(map(search.value, confirmed.values())) + SETTINGS.margin
+    like = [f for f in confirmed.values() if search.value(f) <= least]
+    winner = min(like, key=lambda f: (-len(f.terms), search.value(f)))
+    alike = search.alike(winner)
+    return next(f for f in alike if f is winner or _failing(search, held_out, f) is None), ""
+
+
+def _ranked(search: AxisSearch) -> list[Fit]:
+    """The sets that can be believed, the best first."""
+    best = search.best
+    return [best, *(f for f in search.believed() if f is not best)]
+
+
+def _doubted(search: AxisSearch) -> str:
+    """Why the single effect of the largest evidence cannot be believed; empty: there is none."""
+    found = min((f for f in search.sets.values() if len(f.terms) == 1), key=search.value)
+    return search.doubt(found, found.terms[0]) if search.gain(found) > 0.0 else ""
 
 
 def _failing(search: AxisSearch, held_out: HeldOut, found: Fit) -> tuple[str, str] | None:
@@ -131,7 +139,7 @@ def _failing(search: AxisSearch, held_out: HeldOut, found: Fit) -> tuple[str, st
         if term.effect.replaced is None:
             shares.append(held_out.share(found.terms, rest, timing=True))
         share = min(shares, key=lambda s: s.low)
-        why = implausible(search, found, term)
+        why = search.doubt(found, term)
         if min(s.value for s in shares) < SETTINGS.worth or share.low <= 0.0:
             why = f"the held-out runs do not confirm {name} ({describe(share.value)} closed)"
         if why and (worst is None or share.low < worst[0]):
@@ -147,19 +155,6 @@ def _described(rest: Rest) -> str:
 def describe(share: float) -> str:
     """A share in percent."""
     return f"{100.0 * share:.1f} %"
-
-
-def implausible(search: AxisSearch, found: Fit, term: Term) -> str:
-    """Why the sizes of an effect cannot be believed; empty where they can."""
-    name = term.effect.name
-    sizes, errors = found.sizes(term)
-    if len(sizes) and np.all(errors > np.abs(sizes)):
-        return f"{name} would do, but no size of it is certain"
-    for shape, value in zip(term.effect.shapes, term.shapes, strict=True):
-        low, high = np.log(shape.bounds(search.scale))
-        if not low + AT_BOUND < np.log(value) < high - AT_BOUND:
-            return f"{name} would do, but its {shape.name} lies at its bound"
-    return ""
 
 
 def other_inertia(

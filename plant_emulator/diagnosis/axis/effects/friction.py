@@ -149,7 +149,8 @@ FRICTION = (
         equation="F + F_p (z - sgn q'), dz/dq = (1 - z sgn q') / x",
         needs="reversals",
         sizes=(Size(name="force", unit=FORCE, lowest=0.0),),
-        shapes=(Shape(name="displacement", unit=TRAVEL, lower=0.002, upper=0.5, of="travel"),),
+        # Over a large displacement a bristle is a spring.
+        shapes=(Shape(name="displacement", unit=TRAVEL, lower=0.002, upper=0.1, of="travel"),),
         columns=_presliding,
     ),
     Effect(
