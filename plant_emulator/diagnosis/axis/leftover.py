@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 ORDER = 4
 # Displacements over which a friction may build up, in half of the travel.
 DISPLACEMENTS = (0.003, 0.01, 0.03, 0.1, 0.3)
+# Samples ago at which a force may still act.
+AGO = (0, 2, 4, 8, 16)
 
 
 def _powers(x: Array) -> list[Array]:
@@ -76,6 +78,11 @@ def _past(c: Context, _: Shapes) -> Sequence[Array]:
     return [bristle(m.position, d * c.scale.travel) for d in DISPLACEMENTS]
 
 
+def _filter(c: Context, _: Shapes) -> Sequence[Array]:
+    m = c.motion
+    return [np.interp(m.time - k * c.scale.period, m.time, m.slope) for k in AGO]
+
+
 def _state(name: str, columns: Callable[[Context, Shapes], Sequence[Array]], count: int) -> Effect:
     return Effect(
         name=name,
@@ -87,6 +94,7 @@ def _state(name: str, columns: Callable[[Context, Shapes], Sequence[Array]], cou
     )
 
 
+FORCE_BEFORE = _state("the force before", _filter, len(AGO))
 ANGLE = _state("the angle", _angle, 4)
 LOAD = _state("the load", _load, 4)
 STATES = (
@@ -116,6 +124,10 @@ def rest_of(held_out: HeldOut, terms: Sequence[Term]) -> Rest:
     states = [*STATES, *([ANGLE] if first.scale.rotary else [])]
     if all(r.run.motion.load is not None for r in held_out.rows):
         states.append(LOAD)
+    if terms:
+        # A lag may stand for a delay, or a spring for a load that is not logged. Without a name the
+        # friction of an axis that sticks, which is as large as the force, would look like one.
+        states.append(FORCE_BEFORE)
     found = []
     for state in states:
         both = (

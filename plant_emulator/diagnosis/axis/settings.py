@@ -11,6 +11,8 @@ class Settings:
 
     worth : share of what is left that an effect has to close on held-out runs; the position's noise
         in a relation is kept below the same share of the force
+    systematic : share of what a name leaves that a law may close beside it; laws of a library are
+        simple, and a real machine leaves some per cent
     needed : gain of log evidence of an effect: odds of exp(10), against a library of sixteen
     margin : of log evidence within which sets are alternatives: odds of 150 to 1
     most_effects : in a set
@@ -25,6 +27,7 @@ class Settings:
     """
 
     worth: float = 0.03
+    systematic: float = 0.1
     needed: float = 10.0
     margin: float = 5.0
     most_effects: int = 3

@@ -63,9 +63,10 @@ def _insufficient(found: Fit, held_out: HeldOut) -> str:
     inertia, deviation = found.values[0], np.sqrt(found.covariance[0, 0])
     if inertia <= UNCERTAIN * deviation:
         return f"no inertia is certain: {inertia:.3g} +- {deviation:.2g}"
-    # A name stands for the gap only if it closes more than a law that nobody has named yet.
+    # A cause leaves noise, and a neighbour of the cause leaves a law.
     rest, closed = rest_of(held_out, found.terms), held_out.share(found.terms, ()).value
-    if rest.share.low > SETTINGS.worth and rest.share.value > closed:
+    more = rest.share.low > SETTINGS.worth and rest.share.value > closed
+    if more or rest.share.low > SETTINGS.systematic:
         return f"{told} closes {describe(closed)}, and {_described(rest)} beside it"
     return ""
 

@@ -113,6 +113,13 @@ def test_without_its_effect_the_cause_is_unknown() -> None:
 
 
 @pytest.mark.slow
+def test_a_lag_does_not_stand_for_a_delay_that_the_library_lacks() -> None:
+    found = diagnosed(*pair(late=0.005), without=("delay",))
+    assert found.answer.verdict.kind == "unknown"
+    assert "a law over the force before" in found.answer.verdict.statement
+
+
+@pytest.mark.slow
 def test_another_inertia_is_a_parameter() -> None:
     heavier = truth.log(lambda q, v, a: 0.3 * truth.MASS * a, phase=1.0, seed=2)
     found = diagnosed(truth.log(), heavier)
