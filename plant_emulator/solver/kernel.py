@@ -6,9 +6,9 @@ The functions of `model` and `solver` are ordinary Python. For one list of effec
  3. compile `stepper.run` and `stepper.advance` with numba and keep them on disk (`compiler`).
 
 Values of parameters are data. A changed value compiles nothing, nor does an effect that is switched
-on, once four kernels exist (`kernel_for`): without effects, with the effects that have memories,
-with those that have none, and with all. With NUMBA_DISABLE_JIT=1 step 3 is left out, and the same
-functions run as plain Python.
+on, once the kernels exist (`kernel_for`): without effects, with the effects that have memories,
+with those that have none, with the user's own alone, and with all. With NUMBA_DISABLE_JIT=1 step 3
+is left out, and the same functions run as plain Python.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property, wraps
-from math import nan
 from types import ModuleType, SimpleNamespace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -169,10 +168,16 @@ def partial_kernel(*, remembering: bool) -> Kernel:
 
 
 @cache
+def own_kernel(user_effects: tuple[Effect, ...]) -> Kernel:
+    """The kernel with a user's own effects alone: soon compiled, and without shipped effects."""
+    return build({effect.name: effect for effect in user_effects})
+
+
+@cache
 def _neutral(user_effects: tuple[Effect, ...]) -> dict[str, tuple[float, bool | None]]:
     """Neutral value of each effect parameter, and whether its effect has memories, by name.
 
-    The second is None for a user's own effects, which no partial kernel has.
+    The second is None for a user's own effects, which have a kernel of their own.
     """
     remembering = {name: bool(effect.memories) for name, effect in shipped_effects().items()}
     return {
@@ -190,12 +195,19 @@ def kernel_for(values: Mapping[str, float]) -> tuple[Kernel, Mapping[str, float]
     others = [name for name in values if name not in UNITS]
     if not others:
         return plain_kernel(), values
-    table = _neutral(_own_effects())
-    neutral = {name: table.get(name, (nan, None)) for name in others}
-    kinds = {kind for name, (value, kind) in neutral.items() if values[name] != value}
-    if None in kinds or len(kinds) > 1:
+    own = _own_effects()
+    table = _neutral(own)
+    if not table.keys() >= set(others):
         return kernel(), values
-    model = partial_kernel(remembering=bool(kinds.pop())) if kinds else plain_kernel()
+    kinds = {table[name][1] for name in others if values[name] != table[name][0]}
+    if len(kinds) > 1:
+        return kernel(), values
+    if not kinds:
+        model = plain_kernel()
+    elif (remembering := kinds.pop()) is None:
+        model = own_kernel(own)
+    else:
+        model = partial_kernel(remembering=remembering)
     names = frozenset(model.parameters)
     return model, {name: value for name, value in values.items() if name in names}
 

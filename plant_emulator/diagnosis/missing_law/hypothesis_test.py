@@ -1,7 +1,9 @@
 """The hypothesis test of drafted laws: joint fits, and predictions of held-out runs.
 
 Every draft is an effect of the model by now. A fit starts where the regression with the law lies,
-and from the nominal parameters: the fit without effects has bent the parameters to the gap.
+and from the nominal parameters: the fit without effects has bent the parameters to the gap. A few
+rough iterations tell the better start. A law that explains no part of the runs that it is fitted to
+predicts none of the others, and is not followed further.
 """
 
 from __future__ import annotations
@@ -9,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.joint_fit import TRIAL_ITERATIONS, fit, fit_from
+from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_from
 from plant_emulator.diagnosis.prediction.gap import (
     Fold,
     block_lengths,
@@ -25,13 +27,18 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.machine import Model
+    from plant_emulator.diagnosis.machine import MeasuredRun, Model
+    from plant_emulator.diagnosis.prediction.gap import Prediction
     from plant_emulator.diagnosis.prediction.held_out import Plan
     from plant_emulator.diagnosis.prediction.trace import Trace
 
 
 # Share of the gap that each term of a law has to close more than a law without the term.
 WORTH_A_TERM = 0.02
+# Share of what the best law explains from which on another law is followed.
+RIVAL_SHARE = 0.5
+# Iterations after which a start shows whether the law explains a part of the runs.
+ROUGH_ITERATIONS = 4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +59,8 @@ class DraftedLaw:
 class LawResult:
     """A drafted law after the test.
 
-    fit : joint fit; gain : share of the held-out gap that the draft closes [1], None: there is none
+    fit : joint fit; gain : share of the held-out gap that the draft closes [1]
+    gain None : there is no gap, or the law explains too little of the runs that it was fitted to
     interval : 95 % interval of the gain
     traces : held-out runs, measured and predicted without and with the draft
     """
@@ -70,13 +78,32 @@ class LawResult:
         return self.interval[0] > 0.0 and self.gain > WORTH_A_TERM * terms
 
 
-def fit_law(model: Model, law: DraftedLaw) -> FitResult:
-    """Fit a draft to all runs from its starts (a task)."""
+def try_law(model: Model, law: DraftedLaw) -> FitResult:
+    """Fit a draft roughly to all runs, and give the better one of its starts (a task)."""
     nominal = model.nominal(law.runs)
     starts = [{**law.null.values, **law.values}, {**law.null.values, **nominal}]
-    trials = [_fit_from_start(model, law, start) for start in starts]
-    best = min(trials, key=lambda found: found.cost)
-    return best if best.converged else fit_from(model, (law.effect,), law.runs, best)
+    trials = [_fit_from_start(model.rough(), law, start) for start in starts]
+    return min(trials, key=lambda found: found.cost)
+
+
+def finish_law(model: Model, trial: tuple[DraftedLaw, FitResult]) -> FitResult:
+    """Fit a draft to all runs from a trial (a task)."""
+    law, found = trial
+    return fit_from(model, (law.effect,), law.runs, found)
+
+
+def explains(found: FitResult, null: FitResult) -> bool:
+    """Whether a fit with a law leaves a worthwhile part less than the fit without one."""
+    return null.mean_square - found.mean_square > WORTH_A_TERM * (null.mean_square - 1.0)
+
+
+def _followed(trials: Sequence[FitResult], null: FitResult) -> list[bool]:
+    """Which trials explain the runs, and enough beside the best one."""
+    most = null.mean_square - min(one.mean_square for one in trials)
+    return [
+        explains(one, null) and null.mean_square - one.mean_square >= RIVAL_SHARE * most
+        for one in trials
+    ]
 
 
 def _fit_from_start(model: Model, law: DraftedLaw, start: Mapping[str, float]) -> FitResult:
@@ -86,34 +113,52 @@ def _fit_from_start(model: Model, law: DraftedLaw, start: Mapping[str, float]) -
     values = {**known, **own}
     effects = (law.effect,)
     states = [model.initial_states(run, effects, values) for run in law.runs]
-    return fit(model, effects, law.runs, values, states, TRIAL_ITERATIONS)
+    return fit(model, effects, law.runs, values, states, ROUGH_ITERATIONS)
 
 
 def compare_laws(runner: TaskRunner, plan: Plan, laws: Sequence[DraftedLaw]) -> list[LawResult]:
-    """Fit every draft, and predict the held-out runs with and without it."""
-    fits = list(runner.map(fit_law, laws))
+    """Fit every draft, and predict the held-out runs with and without those that explain."""
     null = laws[0].null
+    trials = list(runner.map(try_law, laws))
+    chosen = _followed(trials, null)
+    pairs = [
+        pair for pair, follow in zip(zip(laws, trials, strict=True), chosen, strict=True) if follow
+    ]
+    fits = list(runner.map(finish_law, pairs))
     folds = [
         _fold(plan, start, fitted, predicted)
-        for start in (null, *fits)
+        for start in ((null, *fits) if fits else ())
         for fitted, predicted in plan.folds
     ]
     found = list(runner.map(predict, folds))
     count = len(plan.folds)
     parts = [found[k : k + count] for k in range(0, len(found), count)]
     held_out = [runner.model.runs[run] for _, predicted in plan.folds for run in predicted]
-    lengths = block_lengths(parts[0])
-    gaps = [measure_gap(held_out, part, lengths) for part in parts]
+    finished = iter(zip(fits, parts[1:], strict=True))
     return [
-        LawResult(
-            effect=law.effect,
-            fit=one,
-            gain=closed_fraction(gaps[0], gap),
-            interval=closed_fraction_interval(gaps[0], gap),
-            traces=traces(held_out, parts[0], part),
-        )
-        for law, one, gap, part in zip(laws, fits, gaps[1:], parts[1:], strict=True)
+        _result(law, *next(finished), held_out, parts[0])
+        if follow
+        else LawResult(effect=law.effect, fit=trial, gain=None, interval=None, traces=())
+        for law, trial, follow in zip(laws, trials, chosen, strict=True)
     ]
+
+
+def _result(
+    law: DraftedLaw,
+    fitted: FitResult,
+    after: Sequence[Prediction],
+    held_out: Sequence[MeasuredRun],
+    before: Sequence[Prediction],
+) -> LawResult:
+    lengths = block_lengths(before)
+    without, gap = (measure_gap(held_out, part, lengths) for part in (before, after))
+    return LawResult(
+        effect=law.effect,
+        fit=fitted,
+        gain=closed_fraction(without, gap),
+        interval=closed_fraction_interval(without, gap),
+        traces=traces(held_out, before, after),
+    )
 
 
 def _fold(

@@ -12,7 +12,7 @@ from plant_emulator import effects
 from plant_emulator.diagnosis.answer import Quantity
 from plant_emulator.diagnosis.execution.pool import InProcess, TaskRunner, build_model
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
-from plant_emulator.diagnosis.missing_law.hypothesis_test import DraftedLaw, compare_laws
+from plant_emulator.diagnosis.missing_law.hypothesis_test import DraftedLaw, compare_laws, explains
 from plant_emulator.diagnosis.wording import percent, size
 from plant_emulator.errors import InputError
 from plant_emulator.parameter_sets import DEFAULT, with_effects
@@ -30,11 +30,14 @@ class DraftCheck:
     """Share of the held-out gap that an effect file closes; each log is held out in turn.
 
     mean_square : of the residual that the joint fit leaves, over the noise [1]
+    explains : whether the effect explains a part of the logs that it was fitted to; else it is not
+        tried on held-out logs
     """
 
     effect: str
     parameters: tuple[Quantity, ...]
     mean_square: float
+    explains: bool
     held_out_gain: float | None
     held_out_gain_ci95: tuple[float, float] | None
 
@@ -52,6 +55,8 @@ class DraftCheck:
     def to_text(self) -> str:
         """A line for the share of the gap, and one for every size."""
         closed = "no gap that it could close"
+        if not self.explains:
+            closed = "explains no part of the logs that it was fitted to"
         if self.held_out_gain is not None and self.held_out_gain_ci95 is not None:
             low, high = map(percent, self.held_out_gain_ci95)
             closed = f"closes {percent(self.held_out_gain)} ({low} to {high}) of the held-out gap"
@@ -99,6 +104,7 @@ def draft_check(
             for u in (*candidate.sizes, *candidate.shapes)
         ),
         mean_square=found.fit.mean_square,
+        explains=explains(found.fit, null),
         held_out_gain=found.gain,
         held_out_gain_ci95=found.interval,
     )

@@ -27,6 +27,7 @@ from plant_emulator.solver.kernel import (
     kernel_for,
     partial_kernel,
     plain_kernel,
+    use_own_effects,
 )
 from tests.plant_emulator.runs import linear, needs_compiler, simulate
 
@@ -101,6 +102,23 @@ def test_switching_an_effect_on_compiles_nothing(nominal: ParameterSet) -> None:
     assert compiled() == [1, 1, 1]
 
 
+AMPLIFIER = '''"""The torque amplifier: T (1 + e)."""
+
+from plant_emulator.effects import EffectParameter
+
+SUBSYSTEM = "torque_sensor"
+PARAMETERS = {
+    "error": EffectParameter(
+        neutral=0.0, lower=-0.1, upper=0.1, plausible=0.01, unit="1", meaning="error"
+    )
+}
+
+
+def measured_shaft_torque(value, s, p):
+    return value * (1.0 + p.amplifier_error)
+'''
+
+
 def test_kernel_is_built_once_a_process() -> None:
     assert kernel() is kernel()
 
@@ -127,6 +145,26 @@ def test_least_kernel_with_the_effects_that_are_there(nominal: ParameterSet) -> 
     assert model is partial_kernel(remembering=False)
     assert values == {**nominal.values(), **gain}
     assert kernel_for({**nominal.values(), **lag, **gain})[0] is kernel()
+
+
+@pytest.mark.slow
+def test_own_effect_alone_changes_the_same_bits_as_beside_the_library(
+    nominal: ParameterSet, tmp_path: Path
+) -> None:
+    """A gain of a user's own, in the kernel without the library and in that with it."""
+    file = tmp_path / "amplifier.py"
+    file.write_text(AMPLIFIER, encoding="utf-8")
+    use_own_effects(effects.from_file(file))
+    try:
+        values = {**nominal.values(), "amplifier_error": 0.01, "torque_sensor_gain_error": 0.0}
+        least, whole = simulate(INPUTS, values), simulate(INPUTS, values, kernel=kernel())
+        assert [*kernel_for(values)[0].effects] == ["amplifier"]
+    finally:
+        use_own_effects()
+    for channel in whole.signals:
+        np.testing.assert_array_equal(least[channel], whole[channel])
+    library = simulate(INPUTS, {**nominal.values(), "torque_sensor_gain_error": 0.01})
+    np.testing.assert_allclose(least["shaft_torque"], library["shaft_torque"], rtol=1e-9)
 
 
 def test_value_of_no_effect_is_refused(nominal: ParameterSet) -> None:
