@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.axis.effects import Effect
-    from plant_emulator.diagnosis.axis.regression import Term
+    from plant_emulator.diagnosis.axis.regression import Fit, Regression, Term
     from plant_emulator.diagnosis.execution.progress import Progress
     from plant_emulator.diagnosis.prediction.held_out import Plan
     from plant_emulator.signals.axis_log import AxisLog
@@ -118,7 +118,7 @@ def diagnose_axis(
             notes=(*notes, describe_floor(floor, repeats, UNITS[scale.rotary]["offset"])),
             remainder=findings.remainder(found),
         ),
-        final=_final(found),
+        final=fit_result(decision.found, regression),
         fixed={},
     )
 
@@ -134,12 +134,11 @@ def check_alike(logs: Sequence[AxisLog]) -> None:
             )
 
 
-def _final(found: findings.AxisFindings) -> FitResult:
-    """The fit behind the answer, as every diagnosis has one."""
-    fit, regression = found.decision.found, found.search.regression
+def fit_result(fit: Fit, regression: Regression) -> FitResult:
+    """A fit of the regression as every diagnosis has one."""
     errors = fit.covariance.diagonal() ** 0.5
     return FitResult(
-        effects=tuple(t.effect.name for t in found.terms),
+        effects=fit.names,
         values=dict(zip(NAMES, map(float, fit.values), strict=False)),
         states=tuple({} for _ in regression.rows),
         cost=fit.cost,

@@ -22,7 +22,7 @@ import numpy as np
 from plant_emulator.diagnosis.localisation.linear_splines import linear_splines
 from plant_emulator.diagnosis.missing_law.curve import knots_of
 from plant_emulator.diagnosis.missing_law.grammar import factors
-from plant_emulator.diagnosis.missing_law.reduced import WIDE_PRIOR, columns_of, products, run_rows
+from plant_emulator.diagnosis.missing_law.reduced import WIDE_PRIOR, products, run_rows
 from plant_emulator.diagnosis.prediction import block_bootstrap
 
 if TYPE_CHECKING:
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
     from plant_emulator.diagnosis.missing_law.law_search import LawSearch
-    from plant_emulator.diagnosis.missing_law.quantity import LawQuantity
     from plant_emulator.diagnosis.missing_law.reduced import NuisanceProducts, RunRows
     from plant_emulator.diagnosis.missing_law.states import LawState
     from plant_emulator.signals.log import Array
@@ -81,21 +80,17 @@ def estimate_bound(regression: BlockRegression, searches: Sequence[LawSearch]) -
 
 def _candidates(regression: BlockRegression, one: LawSearch) -> Iterator[list[Array]]:
     """Squares that each candidate of a quantity leaves in the held-out runs."""
-    quantity = one.quantity
-    rows = run_rows(regression, quantity.model)
+    rows = one.rows.runs
     law = [one.terms[j] for j in one.list_nested()[-1]]
     own = [term.own for term in law for _ in range(2 if term.own else 1)]
-    columns = [
-        columns_of(
-            regression,
-            quantity,
-            k,
-            np.concatenate([term.values(k, len(q.time)) for term in law], axis=1),
-        )
-        for k, q in enumerate(regression.quantities)
-    ]
+    columns = one.rows.of(
+        [
+            np.concatenate([term.values(k, len(values)) for term in law], axis=1)
+            for k, values in enumerate(one.quantity.states[0].values)
+        ]
+    )
     yield _squares(regression, rows, columns, products(rows, columns, own), range(len(own)))
-    columns, own, ends = _curves(regression, quantity)
+    columns, own, ends = _curves(one)
     p = products(rows, columns, own)
     begins = [0, *ends[:-1]]
     groups = [range(a, b) for a, b in zip(begins, ends, strict=True)]
@@ -104,21 +99,16 @@ def _candidates(regression: BlockRegression, one: LawSearch) -> Iterator[list[Ar
             yield _squares(regression, rows, columns, replace(p, width=width), chosen)
 
 
-def _curves(
-    regression: BlockRegression, quantity: LawQuantity
-) -> tuple[list[Array], list[bool], list[int]]:
+def _curves(one: LawSearch) -> tuple[list[Array], list[bool], list[int]]:
     """Columns of the curves over all states, which are of a run's own, and each state's end."""
-    runs = range(len(regression.signals))
+    runs, quantity = range(len(one.rows.runs)), one.quantity
     bases = [[_basis(state, k) for k in runs] for state in quantity.states]
     own = [
         state.kind == "angle"
         for state, basis in zip(quantity.states, bases, strict=True)
         for _ in range(basis[0].shape[1])
     ]
-    columns = [
-        columns_of(regression, quantity, k, np.concatenate([basis[k] for basis in bases], axis=1))
-        for k in runs
-    ]
+    columns = one.rows.of([np.concatenate([basis[k] for basis in bases], axis=1) for k in runs])
     return columns, own, np.cumsum([basis[0].shape[1] for basis in bases]).tolist()
 
 

@@ -12,11 +12,11 @@ import numpy as np
 
 from plant_emulator.diagnosis.answer import Curve
 from plant_emulator.diagnosis.localisation.linear_splines import linear_splines
-from plant_emulator.diagnosis.missing_law.reduced import columns_of, products, run_rows
+from plant_emulator.diagnosis.missing_law.reduced import products
 
 if TYPE_CHECKING:
-    from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
     from plant_emulator.diagnosis.missing_law.quantity import LawQuantity
+    from plant_emulator.diagnosis.missing_law.reduced import LawRows
     from plant_emulator.diagnosis.missing_law.states import LawState
     from plant_emulator.signals.log import Array
 
@@ -26,18 +26,15 @@ KNOTS = 9
 HALF_INTERVAL = 1.96
 
 
-def curve(regression: BlockRegression, quantity: LawQuantity, state: LawState) -> Curve:
+def curve(rows: LawRows, quantity: LawQuantity, state: LawState) -> Curve:
     """The curve of a quantity over a state, fitted to all runs."""
     knots = knots_of(state)
-    columns = [
-        columns_of(regression, quantity, k, linear_splines(own, knots))
-        for k, own in enumerate(state.values)
-    ]
-    p = products(run_rows(regression, quantity.model), columns)
+    columns = rows.of([linear_splines(own, knots) for own in state.values])
+    p = products(rows.runs, columns)
     every, chosen = range(len(columns)), range(len(knots))
     found = p.coefficients(chosen, every)
     left = 2.0 * sum(p.run_loss(chosen, found, k) for k in every)
-    excess = max(1.0, left / len(quantity.model.y))
+    excess = max(1.0, left / sum(len(own.y) for own in rows.runs))
     errors = np.sqrt(excess * np.diag(p.covariance(chosen, every)))
     return Curve(
         quantity=quantity.name,

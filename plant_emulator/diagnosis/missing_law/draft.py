@@ -6,17 +6,18 @@ to. A test by simulation then decides among few of them (`hypothesis_test`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
 from plant_emulator.diagnosis.missing_law.bound import estimate_bound
 from plant_emulator.diagnosis.missing_law.curve import curve
-from plant_emulator.diagnosis.missing_law.law_search import DRAFTED_GAIN, null_loss, search
+from plant_emulator.diagnosis.missing_law.law_search import DRAFTED_GAIN, search
 from plant_emulator.diagnosis.missing_law.quantities import quantities
+from plant_emulator.diagnosis.missing_law.reduced import law_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.answer import Curve
     from plant_emulator.diagnosis.fit_result import FitResult
@@ -36,10 +37,12 @@ class Sketch:
     """A law that is worth a test by simulation.
 
     curve : the same quantity over the law's first state, without a formula
+    parameters : what the regression with the law says of the bench's free parameters [SI]
     """
 
     law: Law
     curve: Curve
+    parameters: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,13 +67,36 @@ def sketch(
 
     with threadpool_limits(1):
         regression = BlockRegression(recordings, parameters, null)
-        before = null_loss(regression)
-        searches = [search(regression, one, before) for one in quantities(regression)]
-        found = tuple(_sketch(regression, *pair) for pair in _best_laws(searches))
+        every = [(one, law_rows(regression, one)) for one in quantities(regression)]
+        before = every[0][1].null_loss()
+        searches = [search(rows, one, before) for one, rows in every]
+        found = tuple(
+            replace(one, parameters=_parameters(regression, one.law))
+            for one in sketches(searches, DRAFTED_GAIN)
+        )
         return Sketchbook(sketches=found, bound=estimate_bound(regression, searches))
 
 
-def _best_laws(searches: Sequence[LawSearch]) -> list[tuple[LawSearch, Law]]:
+def _parameters(regression: BlockRegression, law: Law) -> dict[str, float]:
+    """Values of the free parameters that the relations contain."""
+    r = regression
+    return {
+        name: r.values[name] + (away + offset) * std
+        for (name, std), away, offset in zip(
+            r.stds.items(), law.nuisance, r.prior_offsets, strict=False
+        )
+    }
+
+
+def sketches(searches: Sequence[LawSearch], least_gain: float) -> tuple[Sketch, ...]:
+    """Sketch the best laws of these searches, each with its curve; the best one first.
+
+    least_gain : held-out gain from which on a law is drafted [twice the log of the odds]
+    """
+    return tuple(_sketch(one, law) for one, law in _best_laws(searches, least_gain))
+
+
+def _best_laws(searches: Sequence[LawSearch], least_gain: float) -> list[tuple[LawSearch, Law]]:
     """The best law, its shorter or longer form, and its alternatives, of all quantities.
 
     A short law and a long one that resemble each other are both tested: a simulation decides
@@ -80,7 +106,7 @@ def _best_laws(searches: Sequence[LawSearch]) -> list[tuple[LawSearch, Law]]:
     for one in searches:
         nested = one.list_nested()
         every += [(one, chosen) for chosen in {nested[0], nested[-1], *one.singles()}]
-    every = [pair for pair in every if pair[0].gain(pair[1]) >= DRAFTED_GAIN]
+    every = [pair for pair in every if pair[0].gain(pair[1]) >= least_gain]
     every.sort(key=lambda pair: -pair[0].score(pair[1]))
     found: list[tuple[LawSearch, Law]] = []
     for one, chosen in every:
@@ -95,7 +121,7 @@ def _best_laws(searches: Sequence[LawSearch]) -> list[tuple[LawSearch, Law]]:
     return found
 
 
-def _sketch(regression: BlockRegression, one: LawSearch, law: Law) -> Sketch:
+def _sketch(one: LawSearch, law: Law) -> Sketch:
     smooth = [state for term in law.terms for state in term.states if state.kind != "angle"]
     state = smooth[0] if smooth else one.quantity.states[0]
-    return Sketch(law=law, curve=curve(regression, one.quantity, state))
+    return Sketch(law=law, curve=curve(one.rows, one.quantity, state))

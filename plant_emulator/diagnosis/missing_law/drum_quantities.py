@@ -10,7 +10,7 @@ import numpy as np
 from plant_emulator.diagnosis.localisation.drum_subsystem import LAWS_OF_ANGLE, is_torque_size
 from plant_emulator.diagnosis.localisation.measured_signals import NOISES
 from plant_emulator.diagnosis.localisation.parity_relations import GEAR
-from plant_emulator.diagnosis.missing_law.quantity import LawQuantity, in_relations, time_of
+from plant_emulator.diagnosis.missing_law.quantity import BenchQuantity, in_relations, time_of
 from plant_emulator.diagnosis.missing_law.states import FILTER_TIMES, LawState
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 SMALL_TORQUE = 5.0
 
 
-def drum_friction(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
+def drum_friction(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQuantity:
     """Friction on the drum.
 
     The drum's flight through its gap is far from linear in such a torque. The response is therefore
@@ -44,7 +44,7 @@ def drum_friction(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuanti
         slopes = fitted.jacobians[run][0][:, is_torque_size(fitted)][:, :-LAWS_OF_ANGLE]
         return in_relations({GEAR: 1.0 / xi}, torque), -slopes @ sizes
 
-    return LawQuantity(
+    return BenchQuantity(
         place="drum",
         name="friction on the drum",
         unit="N m",
@@ -55,7 +55,7 @@ def drum_friction(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuanti
     )
 
 
-def drum_weight(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
+def drum_weight(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQuantity:
     """Torque on the drum that does not follow the direction of the motion, as a weight's."""
     xi = r.values["gear_ratio"]
     angle = LawState(
@@ -66,7 +66,7 @@ def drum_weight(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity
     def rows(run: int, values: Array) -> tuple[Array, Array]:
         return in_relations({GEAR: 1.0 / xi}, values), _drum_response(r, r.drum_fit, run, values)
 
-    return LawQuantity(
+    return BenchQuantity(
         place="drum",
         name="torque on the drum",
         unit="N m",
@@ -96,7 +96,7 @@ def _drum_response(r: BlockRegression, fitted: Estimate, run: int, torque: Array
     return np.stack(columns, axis=-1)
 
 
-def speed_sensor(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
+def speed_sensor(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQuantity:
     """Error of the drum's speed sensor, which also shows in the gear's relation."""
     xi, inertia = r.values["gear_ratio"], r.values["drum_inertia"]
     speed = LawState(
@@ -116,7 +116,7 @@ def speed_sensor(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantit
         level = m.noise[NOISES.index("drum_speed")]
         return in_relations({GEAR: inertia / xi}, slope), samples / level
 
-    return LawQuantity(
+    return BenchQuantity(
         place="speed_sensor",
         name="error of the drum's speed sensor",
         unit="rad/s",

@@ -53,7 +53,7 @@ def effect_text(name: str, law: Law) -> str:
     return TEXT.format(
         name=law.quantity.name,
         states="by " + ", ".join(law.over) if law.over else "a constant",
-        formula=_formula(law),
+        formula=formula(law),
         unit=law.quantity.unit,
         place=law.quantity.place,
         parameters="".join(_parameters(law)),
@@ -62,7 +62,8 @@ def effect_text(name: str, law: Law) -> str:
     )
 
 
-def _formula(law: Law) -> str:
+def formula(law: Law) -> str:
+    """The law with letters in place of its coefficients."""
     parts = []
     for k, term in enumerate(law.terms, 1):
         parts.append(f"a{k} {term.text}".strip())
@@ -76,7 +77,7 @@ def _parameters(law: Law) -> list[str]:
         found.append(
             f'    "a{k}": EffectParameter(\n'
             f"        neutral=0.0, lower={-bound:.4g}, upper={bound:.4g}, plausible={size:.4g},\n"
-            f'        unit="{_unit(law, term)}", meaning="a{k}",\n    ),\n'
+            f'        unit="{unit_of(law, term)}", meaning="a{k}",\n    ),\n'
         )
         for j, factor in enumerate(term.factors, 1):
             if factor.function in {"bell", "delay", "lag"}:
@@ -86,7 +87,7 @@ def _parameters(law: Law) -> list[str]:
     return found
 
 
-def _unit(law: Law, term: Term) -> str:
+def unit_of(law: Law, term: Term) -> str:
     """Unit of a term's coefficient: that of the quantity over those of the factors."""
     powers = {"linear": "{}", "size": "{}", "delay": "{}", "lag": "{}", "square": "({})^2"}
     powers["root"] = "({})^0.5"

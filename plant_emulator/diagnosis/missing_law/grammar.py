@@ -43,6 +43,7 @@ FUNCTIONS: dict[str, tuple[Function, ...]] = {
     "signed": ("linear", "size", "square", "root", "sign", "bell"),
     "smooth": ("linear", "size", "square", "bell"),
     "level": ("linear", "square", "root", "bell"),
+    "curved": ("size", "square"),
     "direction": ("linear",),
     "time": ("linear", "bell"),
     "angle": ("turn",),
@@ -135,8 +136,8 @@ def terms(states: Sequence[LawState]) -> list[Term]:
     products = [
         Term((one, other))
         for first, second in combinations(states, 2)
-        for one in _simple(first)
-        for other in _simple(second)
+        for one in _paired(first, second)
+        for other in _paired(second, first)
     ]
     return [Term(()), *single, *products]
 
@@ -152,6 +153,14 @@ def factors(state: LawState) -> Iterator[Factor]:
             yield Factor(function, state)
     follows = state.kind in {"followed", "signed"}
     yield from (Factor("delay" if follows else "lag", state, tau) for tau in state.lags)
+
+
+def _paired(state: LawState, other: LawState) -> Iterator[Factor]:
+    """Factors of a state in a product with another one; a direction takes any bell of a speed."""
+    if state.kind == "signed" and other.kind == "direction":
+        yield from (f for f in factors(state) if f.function in {"size", "root", "square", "bell"})
+    else:
+        yield from _simple(state)
 
 
 def _simple(state: LawState) -> Iterator[Factor]:

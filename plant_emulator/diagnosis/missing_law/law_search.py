@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.missing_law.grammar import Term, terms
-from plant_emulator.diagnosis.missing_law.reduced import columns_of, products, run_rows
+from plant_emulator.diagnosis.missing_law.reduced import products
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
     from plant_emulator.diagnosis.missing_law.quantity import LawQuantity
-    from plant_emulator.diagnosis.missing_law.reduced import NuisanceProducts
+    from plant_emulator.diagnosis.missing_law.reduced import LawRows, NuisanceProducts
     from plant_emulator.signals.log import Array
 
 # Most terms of a law.
@@ -44,7 +43,7 @@ class Law:
 
     coefficients, errors : of each term [unit of the quantity over that of the term]
     gain : fall of twice the loss of every run, with the law fitted to the other runs
-    parameters : what the regression with the law says of the free parameters [SI]
+    nuisance : coefficients of the columns that all runs share beside the law
     """
 
     quantity: LawQuantity
@@ -52,7 +51,7 @@ class Law:
     coefficients: tuple[float, ...]
     errors: tuple[float, ...]
     gain: float
-    parameters: dict[str, float]
+    nuisance: tuple[float, ...]
 
     def over_state(self, name: str, knots: Array) -> Array | None:
         """Values of the law at values of this state; None: it depends on more than the state."""
@@ -142,8 +141,8 @@ class Law:
 class LawSearch:
     """The search in one quantity; null : sum of the held-out losses of all runs without a law."""
 
-    regression: BlockRegression
     quantity: LawQuantity
+    rows: LawRows
     terms: Sequence[Term]
     products: NuisanceProducts
     null: float
@@ -208,48 +207,16 @@ class LawSearch:
             coefficients=tuple(sizes),
             errors=tuple(deviations),
             gain=self.gain(chosen),
-            parameters=self._parameters(found),
+            nuisance=tuple(found[: p.shared].tolist()),
         )
 
-    def _parameters(self, found: Array) -> dict[str, float]:
-        """Values of the free parameters that the relations contain."""
-        r = self.regression
-        return {
-            name: r.values[name] + (away + offset) * std
-            for (name, std), away, offset in zip(
-                r.stds.items(), found, r.prior_offsets, strict=False
-            )
-        }
 
-
-def search(regression: BlockRegression, quantity: LawQuantity, null: float) -> LawSearch:
+def search(rows: LawRows, quantity: LawQuantity, null: float) -> LawSearch:
     """Prepare the search in a quantity; null : see `LawSearch`."""
     every = terms(quantity.states)
-    counts = [len(q.time) for q in regression.quantities]
-    columns = [
-        columns_of(
-            regression,
-            quantity,
-            k,
-            np.concatenate([term.values(k, count) for term in every], axis=1),
-        )
-        for k, count in enumerate(counts)
+    values = [
+        np.concatenate([term.values(k, len(own)) for term in every], axis=1)
+        for k, own in enumerate(quantity.states[0].values)
     ]
-    return LawSearch(
-        regression,
-        quantity,
-        every,
-        products(
-            run_rows(regression, quantity.model),
-            columns,
-            [term.own for term in every for _ in range(2 if term.own else 1)],
-        ),
-        null,
-    )
-
-
-def null_loss(regression: BlockRegression) -> float:
-    """Sum of the held-out losses of all runs without a law."""
-    rows = run_rows(regression, regression.model)
-    nothing = [np.zeros((len(own.y), 0)) for own in rows]
-    return float(products(rows, nothing).held_out_losses(()).sum())
+    own = [term.own for term in every for _ in range(2 if term.own else 1)]
+    return LawSearch(quantity, rows, every, products(rows.runs, rows.of(values), own), null)

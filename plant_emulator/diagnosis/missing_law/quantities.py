@@ -12,7 +12,7 @@ from plant_emulator.diagnosis.missing_law.drum_quantities import (
     drum_weight,
     speed_sensor,
 )
-from plant_emulator.diagnosis.missing_law.quantity import LawQuantity, rows_in_relations, time_of
+from plant_emulator.diagnosis.missing_law.quantity import BenchQuantity, rows_in_relations, time_of
 from plant_emulator.diagnosis.missing_law.states import FILTER_TIMES, WARMING_TIMES, LawState
 from plant_emulator.model.array_laws import gear_friction
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
 
 
-def quantities(regression: BlockRegression) -> list[LawQuantity]:
+def quantities(regression: BlockRegression) -> list[BenchQuantity]:
     """All quantities of the bench that its logs can tell of."""
     q = regression.quantities
     found = [
@@ -41,7 +41,7 @@ def quantities(regression: BlockRegression) -> list[LawQuantity]:
     return found
 
 
-def _gear(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
+def _gear(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQuantity:
     xi = r.values["gear_ratio"]
     speed = LawState(
         values=[np.abs(one.speed) / xi for one in q], time=[one.time for one in q],
@@ -62,7 +62,7 @@ def _gear(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
         values=[one.moving for one in q], time=[one.time for one in q],
         name="direction", symbol="d", unit="", code="s.gear_direction", kind="direction",
     )  # fmt: skip
-    return LawQuantity(
+    return BenchQuantity(
         place="gear",
         name="friction of the gear at its output",
         unit="N m",
@@ -73,12 +73,12 @@ def _gear(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
     )
 
 
-def _motor(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
+def _motor(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQuantity:
     speed = LawState(
         values=[np.abs(one.speed) for one in q], time=[one.time for one in q],
         name="motor speed", symbol="w", unit="rad/s", code="abs(s.motor_speed)", kind="level",
     )  # fmt: skip
-    return LawQuantity(
+    return BenchQuantity(
         place="motor",
         name="friction of the motor",
         unit="N m",
@@ -89,7 +89,7 @@ def _motor(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
     )
 
 
-def _flux(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
+def _flux(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQuantity:
     current = LawState(
         values=[np.abs(one.current) for one in q], time=[one.time for one in q],
         name="size of the armature current", symbol="i", unit="A", code="abs(s.armature_current)",
@@ -105,7 +105,7 @@ def _flux(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
         start="p.flux_constant",
     )  # fmt: skip
     weights = {MOTOR: [one.current for one in q], ARMATURE: [one.speed for one in q]}
-    return LawQuantity(
+    return BenchQuantity(
         place="motor",
         name="flux of the motor",
         unit="N m/A",
@@ -116,14 +116,14 @@ def _flux(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
     )
 
 
-def _torque_sensor(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
+def _torque_sensor(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQuantity:
     xi = r.values["gear_ratio"]
     torque = LawState(
         values=[-(one.load + gear_friction(one.speed / xi, r.values)) / xi for one in q],
         time=[one.time for one in q],
         name="shaft torque", symbol="T", unit="N m", code="value", kind="signed", lags=FILTER_TIMES,
     )  # fmt: skip
-    return LawQuantity(
+    return BenchQuantity(
         place="torque_sensor",
         name="error of the torque sensor",
         unit="N m",
@@ -134,7 +134,7 @@ def _torque_sensor(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuant
     )
 
 
-def _reference(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
+def _reference(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQuantity:
     reference = LawState(
         values=[one.demand for one in q], time=[one.time for one in q],
         name="speed reference", symbol="r", unit="rad/s", code="value", kind="signed",
@@ -144,7 +144,7 @@ def _reference(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
         values=[one.current for one in q], time=[one.time for one in q],
         name="armature current", symbol="i", unit="A", code="s.armature_current", kind="smooth",
     )  # fmt: skip
-    return LawQuantity(
+    return BenchQuantity(
         place="drive",
         name="speed reference inside the drive",
         unit="rad/s",
@@ -155,12 +155,12 @@ def _reference(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
     )
 
 
-def _voltage(r: BlockRegression, q: Sequence[BlockQuantities]) -> LawQuantity:
+def _voltage(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQuantity:
     current = LawState(
         values=[one.current for one in q], time=[one.time for one in q],
         name="armature current", symbol="i", unit="A", code="s.armature_current", kind="smooth",
     )  # fmt: skip
-    return LawQuantity(
+    return BenchQuantity(
         place="drive",
         name="voltage between drive and armature",
         unit="V",

@@ -27,12 +27,9 @@ class LawQuantity:
     """A quantity that a law may be missing of.
 
     place : subsystem; name : in words; unit : of the law
-    hook : law of the bench that an effect changes (`model/laws.py`)
+    hook : what an effect with the law changes: a law of the bench (`model/laws.py`); of an axis
+        the columns of its regression
     states : that a law may depend on
-    rows : run and values of laws over its intervals, shape (n - 1, k), to their columns in the
-        relations, shape (ROWS, n - 1, k), and in the drum speed over its noise, shape (n, k), or
-        None
-    model : linear model that the columns belong to
     """
 
     place: str
@@ -40,6 +37,18 @@ class LawQuantity:
     unit: str
     hook: str
     states: tuple[LawState, ...]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BenchQuantity(LawQuantity):
+    """A quantity of the bench.
+
+    rows : run and values of laws over its intervals, shape (n - 1, k), to their columns in the
+        relations, shape (ROWS, n - 1, k), and in the drum speed over its noise, shape (n, k), or
+        None
+    model : linear model that the columns belong to
+    """
+
     rows: Callable[[int, Array], tuple[Array, Array | None]]
     model: LinearModel
 

@@ -19,13 +19,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
     from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
     from plant_emulator.diagnosis.localisation.marginal_likelihood import LinearModel
-    from plant_emulator.diagnosis.missing_law.quantity import LawQuantity
+    from plant_emulator.diagnosis.missing_law.quantity import BenchQuantity
     from plant_emulator.signals.log import Array
 
 # Prior standard deviation of a coefficient whose column was scaled to the length 1: none to speak
@@ -94,16 +94,38 @@ def run_slices(regression: BlockRegression) -> list[Array]:
     return [np.concatenate([parts[k], parts[runs + k]]) for k in range(runs)]
 
 
-def columns_of(
-    regression: BlockRegression, quantity: LawQuantity, run: int, values: Array
-) -> Array:
-    """Rows of laws of a quantity in a run; values : of the laws, shape (n - 1, k)."""
-    relation, speed = quantity.rows(run, values)
-    above = regression.relations[run].whiten(relation)
-    weight = regression.weights[run]
-    if speed is None:
-        return np.concatenate([above, np.zeros((len(weight), above.shape[1]))])
-    return np.concatenate([above, speed * weight[:, None]])
+@dataclass(frozen=True, eq=False)
+class LawRows:
+    """The rows of all runs, and how laws of one quantity show in them.
+
+    columns : run and values of laws at its states, shape (n, k), to their rows, shape (rows, k)
+    """
+
+    runs: Sequence[RunRows]
+    columns: Callable[[int, Array], Array]
+
+    def of(self, values: Sequence[Array]) -> list[Array]:
+        """Rows of laws; values : in each run."""
+        return [self.columns(k, own) for k, own in enumerate(values)]
+
+    def null_loss(self) -> float:
+        """Sum of the held-out losses of all runs without a law."""
+        nothing = [np.zeros((len(own.y), 0)) for own in self.runs]
+        return float(products(self.runs, nothing).held_out_losses(()).sum())
+
+
+def law_rows(regression: BlockRegression, quantity: BenchQuantity) -> LawRows:
+    """The rows of laws of a quantity of the bench."""
+
+    def columns(run: int, values: Array) -> Array:
+        relation, speed = quantity.rows(run, values)
+        above = regression.relations[run].whiten(relation)
+        weight = regression.weights[run]
+        if speed is None:
+            return np.concatenate([above, np.zeros((len(weight), above.shape[1]))])
+        return np.concatenate([above, speed * weight[:, None]])
+
+    return LawRows(run_rows(regression, quantity.model), columns)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.signals.log import Array
 
-    Kind = Literal["signed", "smooth", "level", "direction", "time", "angle", "followed"]
+    Kind = Literal["signed", "smooth", "level", "curved", "direction", "time", "angle", "followed"]
 
 # Time constants of a lag that a law may have [s]: of a filter, and of something that warms up.
 FILTER_TIMES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
@@ -26,7 +26,8 @@ class LawState:
     symbol : letter in a formula; unit : of the state, empty for a pure number
     code : expression in an effect's law
     values : over the intervals of each run [SI], shape (n - 1,) each; time : likewise [s]
-    kind : which functions make sense; `followed` is a state that has a lag only
+    kind : which functions make sense; `followed` is a state that has a lag only, `curved` one whose
+        multiple is no law, as that of an acceleration, which is an inertia
     lags : time constants that a lag of the state may have [s]; empty: none
     start : expression of a lag's value at the start of a run
     """

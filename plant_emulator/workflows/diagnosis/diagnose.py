@@ -83,12 +83,15 @@ class Diagnosis:
         The set of a single axis holds its own parameters.
         """
         findings, files = self.findings, {Path(file).stem: file for file in self.effect_files}
-        if self.given is None:
-            return axis_parameter_set(findings, files, rotary=self.rotary)
         if self.drafted and self.drafted.fits and not self.answer.verdict.effects:
             file, fit = self.drafted.drafts[0].file, self.drafted.fits[0]
             files[Path(file).stem] = file
             findings = replace(findings, final=fit, fixed={Path(file).stem: {}})
+            if self.drafted.of_axis:
+                answer = replace(self.answer, ranking=self.drafted.of_axis[:1])
+                findings = replace(findings, answer=answer)
+        if self.given is None:
+            return axis_parameter_set(findings, files, rotary=self.rotary)
         return parameter_set(findings, self.given, self.fitted, files)
 
     def to_json(self) -> dict[str, Any]:

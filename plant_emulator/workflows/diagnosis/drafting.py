@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from plant_emulator import effects
 from plant_emulator.diagnosis.answer import Draft
+from plant_emulator.diagnosis.axis.diagnose import AxisRuns
 from plant_emulator.diagnosis.execution.pool import TaskRunner, build_model
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.machines.bench import BenchModel, BenchRecipe
@@ -21,13 +23,14 @@ from plant_emulator.diagnosis.missing_law.hypothesis_test import (
     compare_laws,
 )
 from plant_emulator.diagnosis.missing_law.next_run import best_separation
-from plant_emulator.errors import report_unwritable
 from plant_emulator.simulation.simulate import values_of
+from plant_emulator.workflows.diagnosis.axis_drafting import draft_axis
+from plant_emulator.workflows.diagnosis.draft_files import effect_files, present, remove_rejected
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
+    from plant_emulator.diagnosis.answer import RankedEffect
     from plant_emulator.diagnosis.execution.pool import Pool
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.missing_law.draft import Sketch, Sketchbook
@@ -36,6 +39,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.prediction.trace import Trace
     from plant_emulator.recordings.recording import Recording
     from plant_emulator.simulation.programs import SpeedProgram
+    from plant_emulator.workflows.diagnosis.axis_drafting import AxisDrafts
     from plant_emulator.workflows.diagnosis.runs import Runs
 
 
@@ -45,7 +49,9 @@ class Drafted:
 
     bound : how much of the gap any law could close; None: the relations show no gap
     traces : held-out runs, predicted without and with the best draft
-    next_program : the drive program that separates the two best drafts; None: there is one draft
+    next_program : the drive program that separates the two best drafts; None: there is one draft,
+        or the machine is an axis
+    of_axis : the drafts of an axis as effects
     """
 
     drafts: tuple[Draft, ...] = ()
@@ -53,18 +59,21 @@ class Drafted:
     bound: Bound | None = None
     traces: tuple[Trace, ...] = ()
     next_program: SpeedProgram | None = None
+    of_axis: tuple[RankedEffect, ...] = ()
 
 
 def draft(runs: Runs[Any], null: FitResult | None, pool: Pool, folder: Path) -> Drafted | None:
-    """Draft the missing law of these runs of the bench; no drafts where no law closes a gap.
+    """Draft the missing law of these runs; no drafts where no law closes a gap.
 
-    null : converged fit without effects; None: it is made here
+    null : converged fit of the bench without effects; None: it is made here
     folder : of the effect files, one a draft
     None: it cannot be done. The relations know the nominal equations of the bench only, without
     effects of a set; and other runs judge a law, so that a single run is not enough.
     Raises InputError where a file cannot be written.
     """
     recipe = runs.recipe
+    if isinstance(recipe, AxisRuns):
+        return _of_axis(draft_axis(recipe, runs.plan, folder))
     if not isinstance(recipe, BenchRecipe) or recipe.parameters.effects or len(runs.fitted) < 2:
         return None
     if null is None:
@@ -73,14 +82,16 @@ def draft(runs: Runs[Any], null: FitResult | None, pool: Pool, folder: Path) -> 
     found = book.sketches
     if not found:
         return Drafted(bound=book.bound)
-    files = _write(found, folder)
+    before = present(folder)
+    files = effect_files([one.law for one in found], effect_text, folder)
     own = replace(recipe, without=_library(recipe), own=(*recipe.own, *files))
     runner = TaskRunner(pool=pool, recipe=own, model=build_model(own), runs=runs.plan.fitted)
     alternatives = [
-        DraftedLaw(effect=file.stem, values=one.law.parameters, null=null, runs=runs.plan.fitted)
+        DraftedLaw(effect=file.stem, values=one.parameters, null=null, runs=runs.plan.fitted)
         for one, file in zip(found, files, strict=True)
     ]
     drafted = _rank(book, files, compare_laws(runner, runs.plan, alternatives))
+    remove_rejected(files, [Path(one.file) for one in drafted.drafts], before)
     return replace(drafted, next_program=_next_program(runs.fitted, recipe, drafted.fits))
 
 
@@ -101,16 +112,24 @@ def _library(recipe: BenchRecipe) -> tuple[str, ...]:
     return (*effects.names(), *(file.stem for file in recipe.own))
 
 
-def _write(found: Sequence[Sketch], folder: Path) -> list[Path]:
-    """Write the effect file of every sketch."""
-    files = []
-    for number, one in enumerate(found, 1):
-        file = (folder / f"draft_{one.law.quantity.place}_{number}.py").absolute()
-        with report_unwritable(file):
-            folder.mkdir(parents=True, exist_ok=True)
-            file.write_text(effect_text(file.stem, one.law), encoding="utf-8")
-        files.append(file)
-    return files
+def _of_axis(found: AxisDrafts) -> Drafted:
+    """The drafts of an axis."""
+    texts = [one.law.text for one in found.drafts]
+    return Drafted(
+        drafts=tuple(
+            _draft(
+                (one.sketch, one.law, one.file),
+                (one.gain, one.interval),
+                found.bound,
+                (*texts[:k], *texts[k + 1 :]),
+            )
+            for k, one in enumerate(found.drafts)
+        ),
+        fits=tuple(one.fit for one in found.drafts),
+        bound=found.bound,
+        traces=found.traces,
+        of_axis=tuple(one.ranked for one in found.drafts),
+    )
 
 
 def _rank(book: Sketchbook, files: Sequence[Path], results: Sequence[LawResult]) -> Drafted:
@@ -131,7 +150,12 @@ def _rank(book: Sketchbook, files: Sequence[Path], results: Sequence[LawResult])
     best = _with_drafts(book.bound, [result for *_, result in kept])
     return Drafted(
         drafts=tuple(
-            _draft(row, best, tuple(other[1].text for other in kept if other is not row))
+            _draft(
+                row[:3],
+                (row[3].gain, row[3].interval),
+                best,
+                tuple(other[1].text for other in kept if other is not row),
+            )
             for row in kept
         ),
         fits=tuple(result.fit for *_, result in kept),
@@ -162,9 +186,12 @@ def _insert_fitted_values(one: Sketch, result: LawResult) -> Law:
 
 
 def _draft(
-    row: tuple[Sketch, Law, Path, LawResult], bound: Bound | None, rivals: tuple[str, ...]
+    told: tuple[Sketch, Law, Path],
+    gain: tuple[float | None, tuple[float, float] | None],
+    bound: Bound | None,
+    rivals: tuple[str, ...],
 ) -> Draft:
-    one, law, file, result = row
+    one, law, file = told
     drawn = law.over_state(one.curve.over, np.array(one.curve.knots))
     return Draft(
         place=law.quantity.place,
@@ -172,8 +199,8 @@ def _draft(
         over=", ".join(law.over) or "nothing",
         form=law.text,
         file=str(file),
-        held_out_gain=result.gain,
-        held_out_gain_ci95=result.interval,
+        held_out_gain=gain[0],
+        held_out_gain_ci95=gain[1],
         bound=None if bound is None else bound.interval[1],
         bound_ci95=None if bound is None else bound.interval,
         rivals=rivals,

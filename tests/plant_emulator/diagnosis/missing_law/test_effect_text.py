@@ -35,8 +35,6 @@ def written(folder: Path, hook: str, *terms: tuple[float, Term]) -> Effect:
         unit="N m",
         hook=hook,
         states=(DRUM_SPEED,),
-        rows=lambda run, values: (values, None),
-        model=None,  # type: ignore[arg-type]  # no regression here
     )
     law = Law(
         quantity=quantity,
@@ -44,7 +42,7 @@ def written(folder: Path, hook: str, *terms: tuple[float, Term]) -> Effect:
         coefficients=tuple(size for size, _ in terms),
         errors=(0.0,) * len(terms),
         gain=1.0,
-        parameters={},
+        nuisance=(),
     )
     path = folder / "draft.py"
     path.write_text(effect_text("draft", law))

@@ -28,8 +28,6 @@ def law(*terms: tuple[float, Term], name: str = "friction") -> Law:
         unit="N m",
         hook="gear_speed_friction",
         states=(SPEED,),
-        rows=lambda run, values: (values, None),
-        model=None,  # type: ignore[arg-type]  # no regression here
     )
     return Law(
         quantity=quantity,
@@ -37,7 +35,7 @@ def law(*terms: tuple[float, Term], name: str = "friction") -> Law:
         coefficients=tuple(size for size, _ in terms),
         errors=(0.0,) * len(terms),
         gain=1.0,
-        parameters={},
+        nuisance=(),
     )
 
 

@@ -1,0 +1,198 @@
+"""The drafts of an axis: missing laws, written as effect files and judged by held-out runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.diagnosis.answer import RankedEffect
+from plant_emulator.diagnosis.axis.diagnose import fit_result
+from plant_emulator.diagnosis.axis.effects import LIBRARY
+from plant_emulator.diagnosis.axis.held_out import HeldOut
+from plant_emulator.diagnosis.axis.leftover import STATES
+from plant_emulator.diagnosis.axis.quantities import quantities
+from plant_emulator.diagnosis.axis.regression import Term
+from plant_emulator.diagnosis.axis.search import AxisSearch
+from plant_emulator.diagnosis.axis.settings import SETTINGS
+from plant_emulator.diagnosis.axis.start import best_width, prepared, start
+from plant_emulator.diagnosis.missing_law.axis_effect_text import axis_effect_text
+from plant_emulator.diagnosis.missing_law.axis_quantities import SMOOTHED_INERTIA, axis_laws
+from plant_emulator.diagnosis.missing_law.bound import Bound
+from plant_emulator.diagnosis.missing_law.draft import sketches
+from plant_emulator.diagnosis.missing_law.law_search import search
+from plant_emulator.diagnosis.prediction.trace import Trace
+from plant_emulator.workflows.axis_files.own_effects import own_effects
+from plant_emulator.workflows.diagnosis.draft_files import effect_files, present, remove_rejected
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from plant_emulator.diagnosis.axis.diagnose import AxisRuns
+    from plant_emulator.diagnosis.axis.held_out import Share
+    from plant_emulator.diagnosis.axis.regression import Regression, Rows
+    from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.missing_law.draft import Sketch
+    from plant_emulator.diagnosis.missing_law.law_search import Law
+    from plant_emulator.diagnosis.prediction.held_out import Plan
+
+# Held-out gain from which on a law is drafted: as much as an effect of the library needs.
+LEAST_GAIN = 2.0 * SETTINGS.needed
+
+
+@dataclass(frozen=True, kw_only=True)
+class AxisDraft:
+    """A drafted law of an axis after its test.
+
+    law : with the values of the fit to all fitted runs; terms, fit : of that fit
+    ranked : the law as an effect, with sizes and shapes
+    share : of the rms of the held-out error that the law closes, the least certain of those with
+        and without a shift of the stamps, and beside another inertia
+    """
+
+    sketch: Sketch
+    law: Law
+    file: Path
+    terms: tuple[Term, ...]
+    fit: FitResult
+    ranked: RankedEffect
+    share: Share
+
+    @property
+    def gain(self) -> float:
+        """Share of the held-out squares that the law closes [1]."""
+        return of_squares(self.share.value)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of the gain."""
+        return of_squares(self.share.low), of_squares(self.share.high)
+
+
+def of_squares(share: float) -> float:
+    """Share of the squares, of a share of the rms [1]."""
+    return float(1.0 - (1.0 - share) * abs(1.0 - share))
+
+
+@dataclass(frozen=True, kw_only=True)
+class AxisDrafts:
+    """The drafts of an axis, the best one first.
+
+    bound : how much of the gap a curve or a draft closes
+    traces : held-out runs, predicted without and with the best draft
+    """
+
+    drafts: tuple[AxisDraft, ...]
+    bound: Bound
+    traces: tuple[Trace, ...]
+
+
+def draft_axis(runs: AxisRuns, plan: Plan, folder: Path) -> AxisDrafts:
+    """Draft the missing law of an axis; its effect files land in the folder.
+
+    Raises InputError where a file cannot be written.
+    """
+    regression, rows = _begin(runs, plan)
+    held_out = HeldOut(rows=rows, regression=regression, folds=plan.folds)
+    every = axis_laws(regression)
+    before = every[0][1].null_loss()
+    found = sketches([search(own, quantity, before) for quantity, own in every], LEAST_GAIN)
+    already = present(folder)
+    files = effect_files([one.law for one in found], lambda _, law: axis_effect_text(law), folder)
+    tested = [_tested(one, file, held_out) for one, file in zip(found, files, strict=True)]
+    drafts = [one for one in tested if one.share.low > 0.0 and one.share.value > SETTINGS.worth]
+    drafts.sort(key=lambda one: SETTINGS.worth * len(one.law.terms) - one.share.value)
+    kept: list[AxisDraft] = []
+    for one in drafts:
+        if not any(one.law.resembles(other.law) for other in kept):
+            kept.append(one)
+    remove_rejected(files, [one.file for one in kept], already)
+    sources = [log.source for log in runs.logs]
+    return AxisDrafts(
+        drafts=tuple(kept),
+        bound=_bound(held_out, kept),
+        traces=_traces(held_out, sources, kept[0].terms) if kept else (),
+    )
+
+
+def _begin(runs: AxisRuns, plan: Plan) -> tuple[Regression, list[Rows]]:
+    """The regression of the fitted runs without effects, and the rows of all runs."""
+    every, scale = prepared(runs.logs)
+    own = every[: len(plan.fitted)]
+    width = best_width(own, scale, ())
+    library = [one for one in (*runs.own, *LIBRARY) if one.name not in runs.without]
+    regression, rows, _ = start(every, replace(scale, width=width), len(own), library, width)
+    return regression, rows
+
+
+def _tested(one: Sketch, file: Path, held_out: HeldOut) -> AxisDraft:
+    """Fit the effect of a file, shapes and sizes, and predict the held-out runs with it."""
+    (effect,) = own_effects([file])
+    regression = held_out.regression
+    contest = AxisSearch(regression=regression, candidates=[effect], scale=regression.rows[0].scale)
+    contest.sets[frozenset()] = regression.fit(())
+    fit = contest.fit_set([effect.name])
+    (term,) = fit.terms
+    sizes, _ = fit.sizes(term)
+    values = dict(zip((s.name for s in effect.sizes), map(float, sizes), strict=True))
+    shares = [
+        held_out.share((*fit.terms, *beside), beside, timing=shifted)
+        for beside in ((), (SMOOTHED_INERTIA,))
+        for shifted in (False, True)
+    ]
+    share = min(shares, key=lambda share: share.low)
+    ranked = RankedEffect(
+        effect=effect.name,
+        subsystem=effect.subsystem,
+        evidence=2.0 * contest.gain(fit),
+        held_out_gain=of_squares(share.value),
+        parameters=quantities(regression, fit, term),
+        accepted=True,
+    )
+    return AxisDraft(
+        sketch=one,
+        law=one.law.with_fitted_sizes({**values, **term.values}),
+        file=file,
+        terms=fit.terms,
+        fit=fit_result(fit, regression),
+        ranked=ranked,
+        share=share,
+    )
+
+
+def _bound(held_out: HeldOut, drafts: Sequence[AxisDraft]) -> Bound:
+    """The largest share of the held-out squares that a curve over a state, or a draft, closes."""
+    curves = [*((Term(state),) for state in STATES), tuple(map(Term, STATES))]
+    shares = [held_out.share(terms, ()) for terms in curves] + [one.share for one in drafts]
+    low, high = (
+        float(max(of_squares(getattr(share, end)) for share in shares)) for end in ("low", "high")
+    )
+    best = max(of_squares(share.value) for share in shares)
+    return Bound(share=best, interval=(low, high))
+
+
+def _traces(held_out: HeldOut, sources: Sequence[str], terms: Sequence[Term]) -> tuple[Trace, ...]:
+    """The held-out runs, predicted without and with a draft."""
+    first = held_out.rows[0]
+    parts = zip(
+        held_out.runs,
+        held_out.measured(),
+        held_out.errors(()),
+        held_out.errors(terms),
+        strict=True,
+    )
+    return tuple(
+        Trace(
+            source=sources[run],
+            channel="torque" if first.scale.rotary else "force",
+            unit="N m" if first.scale.rotary else "N",
+            time=held_out.rows[run].time,
+            measured=measured,
+            recalibrated=measured - before,
+            explained=measured - after,
+            noise=float(np.sqrt(held_out.regression.variance)),
+        )
+        for run, measured, before, after in parts
+    )
