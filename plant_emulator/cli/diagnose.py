@@ -73,6 +73,14 @@ part of a file in time [s].
     is_flag=True,
     help="Draft a missing law whatever the verdict; it is drafted where the cause is unknown.",
 )
+@click.option(
+    "--drafts",
+    "draft_folder",
+    default="drafts",
+    show_default=True,
+    metavar="DIR",
+    help="Folder of the effect files of drafted laws; none of other contents is replaced.",
+)
 @click.option("--report", type=OutputFile(), help="Write a report as one HTML file.")
 @click.option(
     "--next-program",
@@ -94,6 +102,7 @@ def command(
     scheduler: str | None,
     save: str | None,
     draft: bool,
+    draft_folder: str,
     report: str | None,
     next_program: str | None,
     json_file: str | None,
@@ -125,10 +134,13 @@ def command(
             scheduler=scheduler,
             progress=tell,
             draft="always" if draft else "unknown",
+            draft_folder=draft_folder,
             settings={"command": f"plant-emulator {shlex.join(sys.argv[1:])}"},
         )
     for note in found.notes:
         click.echo(f"note: {note}", err=True)
+    for one in found.answer.drafts or ():
+        click.echo(f"note: {one.file}: draft {one.form}", err=True)
     if save:
         _save(found, save)
     if report:

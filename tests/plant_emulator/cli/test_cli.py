@@ -231,6 +231,36 @@ def test_bad_input_is_refused_in_one_line(
     assert not any(tmp_path.iterdir())
 
 
+BREAKS_DOWN = '''"""A torque on the drum that no number is."""
+
+from plant_emulator.effects import EffectParameter
+
+SUBSYSTEM = "drum"
+PARAMETERS = {
+    "a": EffectParameter(
+        neutral=0.0, lower=-5.0, upper=5.0, plausible=1.0, unit="N m", meaning="a"
+    )
+}
+
+
+def drum_torque(value, s, p):
+    return value if p.hopeless_a == 0.0 else value + p.hopeless_a * 1e300 * 1e300
+'''
+
+
+@pytest.mark.slow
+def test_effect_that_cannot_be_simulated_is_refused_in_one_line(
+    command: Command, tmp_path: Path
+) -> None:
+    file = tmp_path / "hopeless.py"
+    file.write_text(BREAKS_DOWN, encoding="utf-8")
+    said = refusal(command("draft-check", file, NOISY, NOISY.replace("program2", "program1")))
+    assert said == (
+        f"{file}: the bench cannot be simulated with the plausible values of hopeless; "
+        "smaller ones are expected"
+    )
+
+
 def test_faulty_log_is_refused_with_file_line_and_column(command: Command, tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
     rows = logs.csv.text(logs.read(PROGRAM1)).splitlines()
