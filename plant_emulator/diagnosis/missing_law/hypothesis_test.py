@@ -97,7 +97,7 @@ def explains(found: FitResult, null: FitResult) -> bool:
     return null.mean_square - found.mean_square > WORTH_A_TERM * (null.mean_square - 1.0)
 
 
-def _followed(trials: Sequence[FitResult], null: FitResult) -> list[bool]:
+def laws_to_follow(trials: Sequence[FitResult], null: FitResult) -> list[bool]:
     """Which trials explain the runs, and enough beside the best one."""
     most = null.mean_square - min(one.mean_square for one in trials)
     return [
@@ -120,7 +120,7 @@ def compare_laws(runner: TaskRunner, plan: Plan, laws: Sequence[DraftedLaw]) -> 
     """Fit every draft, and predict the held-out runs with and without those that explain."""
     null = laws[0].null
     trials = list(runner.map(try_law, laws))
-    chosen = _followed(trials, null)
+    chosen = laws_to_follow(trials, null)
     pairs = [
         pair for pair, follow in zip(zip(laws, trials, strict=True), chosen, strict=True) if follow
     ]

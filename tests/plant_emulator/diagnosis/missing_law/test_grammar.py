@@ -72,3 +72,16 @@ def test_formula_names_state_function_and_scale() -> None:
     assert Term((Factor("bell", speed, 0.4),)).text == "exp(-(w/0.4)^2)"
     assert Factor("lag", speed, 30.0).text == "lag(w, 30 s)"
     assert Factor("square", speed).text == "w^2"
+
+
+def test_no_multiple_of_a_curved_state_is_a_law() -> None:
+    """A force along the acceleration is an inertia."""
+    found = [term.text for term in terms([state("curved", [-1.0, 0.0, 2.0])])]
+    assert found == ["", "|w|", "w |w|"]
+
+
+def test_direction_takes_a_narrow_bell_of_a_speed() -> None:
+    """Friction that rises towards standstill, against the motion."""
+    speed, direction = state("signed", [-10.0, 5.0]), state("direction", [-1.0, 1.0])
+    found = {term.text for term in terms([speed, direction])}
+    assert "exp(-(w/0.2)^2) w" in found  # both states have the letter w

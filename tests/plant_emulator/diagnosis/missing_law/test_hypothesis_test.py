@@ -2,7 +2,36 @@
 
 import pytest
 
-from plant_emulator.diagnosis.missing_law.hypothesis_test import LawResult
+from plant_emulator.diagnosis.fit_result import FitResult
+from plant_emulator.diagnosis.missing_law.hypothesis_test import LawResult, laws_to_follow
+
+
+def fitted(mean_square: float) -> FitResult:
+    return FitResult(
+        effects=(),
+        values={},
+        states=(),
+        cost=100.0 * mean_square,
+        sum_of_squares=100.0 * mean_square,
+        samples=100,
+        effective_fraction=1.0,
+        standard_errors={},
+        converged=True,
+    )
+
+
+@pytest.mark.parametrize(
+    ("null", "trials", "expected"),
+    [
+        (11.0, [1.0, 5.9, 6.1], [True, True, False]),  # of the 10 that the best one explains, half
+        (11.0, [10.9, 12.0], [False, False]),  # 2 % of the gap are 0.2
+        (11.0, [10.7], [True]),
+    ],
+)
+def test_law_is_followed_if_it_explains_enough_of_the_runs_that_it_is_fitted_to(
+    null: float, trials: list[float], expected: list[bool]
+) -> None:
+    assert laws_to_follow([fitted(one) for one in trials], fitted(null)) == expected
 
 
 @pytest.mark.parametrize(
