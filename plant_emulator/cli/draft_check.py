@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import click
 
 from plant_emulator.cli import _options
@@ -18,8 +20,17 @@ Example:
 @click.argument("file", metavar="FILE.py")
 @click.argument("logs", nargs=-1, required=True, metavar="LOG...")
 @_options.parameters
+@_options.model
+@_options.columns
 @_options.json_file
-def command(file: str, logs: tuple[str, ...], parameters: str, json_file: str | None) -> None:
+def command(
+    file: str,
+    logs: tuple[str, ...],
+    parameters: str,
+    model: Literal["bench", "axis"],
+    columns: tuple[str, ...],
+    json_file: str | None,
+) -> None:
     """Fit the effect of FILE.py to LOGs, and predict each of them from the others with it.
 
     The share of the gap that closes says what the effect explains, alone and with all parameters
@@ -27,7 +38,8 @@ def command(file: str, logs: tuple[str, ...], parameters: str, json_file: str | 
     """
     from plant_emulator.workflows.diagnosis.draft_check import draft_check
 
-    found = draft_check(file, logs, parameters=parameters)
+    _options.refuse_of_another(model, {"parameters": "--parameters"}, {"columns": "--column"})
+    found = draft_check(file, logs, parameters=parameters, model=model, columns=columns)
     if json_file:
         _options.write_json(found.to_json(), json_file)
     if json_file != "-":

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from plant_emulator.diagnosis.axis.diagnose import AxisRuns
+    from plant_emulator.diagnosis.axis.effects import Effect
     from plant_emulator.diagnosis.axis.held_out import Share
-    from plant_emulator.diagnosis.axis.regression import Regression, Rows
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.missing_law.draft import Sketch
     from plant_emulator.diagnosis.missing_law.law_search import Law
@@ -43,32 +43,38 @@ LEAST_GAIN = 2.0 * SETTINGS.needed
 
 
 @dataclass(frozen=True, kw_only=True)
-class AxisDraft:
-    """A drafted law of an axis after its test.
+class AxisTest:
+    """An effect of an axis after its test.
 
-    law : with the values of the fit to all fitted runs; terms, fit : of that fit
-    ranked : the law as an effect, with sizes and shapes
-    share : of the rms of the held-out error that the law closes, the least certain of those with
+    ranked : the effect with sizes and shapes; terms, fit : of the fit to all fitted runs
+    share : of the rms of the held-out error that the effect closes, the least certain of those with
         and without a shift of the stamps, and beside another inertia
     """
 
-    sketch: Sketch
-    law: Law
-    file: Path
+    ranked: RankedEffect
     terms: tuple[Term, ...]
     fit: FitResult
-    ranked: RankedEffect
     share: Share
 
     @property
     def gain(self) -> float:
-        """Share of the held-out squares that the law closes [1]."""
+        """Share of the held-out squares that the effect closes [1]."""
         return of_squares(self.share.value)
 
     @property
     def interval(self) -> tuple[float, float]:
         """95 % interval of the gain."""
         return of_squares(self.share.low), of_squares(self.share.high)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AxisDraft:
+    """A drafted law of an axis, with the values of its fit, and its test."""
+
+    sketch: Sketch
+    law: Law
+    file: Path
+    test: AxisTest
 
 
 def of_squares(share: float) -> float:
@@ -94,16 +100,17 @@ def draft_axis(runs: AxisRuns, plan: Plan, folder: Path) -> AxisDrafts:
 
     Raises InputError where a file cannot be written.
     """
-    regression, rows = _begin(runs, plan)
-    held_out = HeldOut(rows=rows, regression=regression, folds=plan.folds)
-    every = axis_laws(regression)
+    held_out = begin(runs, plan)
+    every = axis_laws(held_out.regression)
     before = every[0][1].null_loss()
     found = sketches([search(own, quantity, before) for quantity, own in every], LEAST_GAIN)
     already = present(folder)
     files = effect_files([one.law for one in found], lambda _, law: axis_effect_text(law), folder)
-    tested = [_tested(one, file, held_out) for one, file in zip(found, files, strict=True)]
-    drafts = [one for one in tested if one.share.low > 0.0 and one.share.value > SETTINGS.worth]
-    drafts.sort(key=lambda one: SETTINGS.worth * len(one.law.terms) - one.share.value)
+    tested = [_drafted(one, file, held_out) for one, file in zip(found, files, strict=True)]
+    drafts = [
+        one for one in tested if one.test.share.low > 0.0 and one.test.share.value > SETTINGS.worth
+    ]
+    drafts.sort(key=lambda one: SETTINGS.worth * len(one.law.terms) - one.test.share.value)
     kept: list[AxisDraft] = []
     for one in drafts:
         if not any(one.law.resembles(other.law) for other in kept):
@@ -113,30 +120,35 @@ def draft_axis(runs: AxisRuns, plan: Plan, folder: Path) -> AxisDrafts:
     return AxisDrafts(
         drafts=tuple(kept),
         bound=_bound(held_out, kept),
-        traces=_traces(held_out, sources, kept[0].terms) if kept else (),
+        traces=_traces(held_out, sources, kept[0].test.terms) if kept else (),
     )
 
 
-def _begin(runs: AxisRuns, plan: Plan) -> tuple[Regression, list[Rows]]:
-    """The regression of the fitted runs without effects, and the rows of all runs."""
+def begin(runs: AxisRuns, plan: Plan) -> HeldOut:
+    """The held-out runs of an axis, and the regression of the fitted ones."""
     every, scale = prepared(runs.logs)
     own = every[: len(plan.fitted)]
     width = best_width(own, scale, ())
     library = [one for one in (*runs.own, *LIBRARY) if one.name not in runs.without]
     regression, rows, _ = start(every, replace(scale, width=width), len(own), library, width)
-    return regression, rows
+    return HeldOut(rows=rows, regression=regression, folds=plan.folds)
 
 
-def _tested(one: Sketch, file: Path, held_out: HeldOut) -> AxisDraft:
-    """Fit the effect of a file, shapes and sizes, and predict the held-out runs with it."""
+def _drafted(one: Sketch, file: Path, held_out: HeldOut) -> AxisDraft:
+    """The law of a sketch after its test; file : with its effect."""
     (effect,) = own_effects([file])
+    found = try_effect(effect, held_out)
+    values = {q.name.removeprefix(f"{effect.name}_"): q.value for q in found.ranked.parameters}
+    return AxisDraft(sketch=one, law=one.law.with_fitted_sizes(values), file=file, test=found)
+
+
+def try_effect(effect: Effect, held_out: HeldOut) -> AxisTest:
+    """Fit an effect, shapes and sizes, and predict the held-out runs with it."""
     regression = held_out.regression
     contest = AxisSearch(regression=regression, candidates=[effect], scale=regression.rows[0].scale)
     contest.sets[frozenset()] = regression.fit(())
     fit = contest.fit_set([effect.name])
     (term,) = fit.terms
-    sizes, _ = fit.sizes(term)
-    values = dict(zip((s.name for s in effect.sizes), map(float, sizes), strict=True))
     shares = [
         held_out.share((*fit.terms, *beside), beside, timing=shifted)
         for beside in ((), (SMOOTHED_INERTIA,))
@@ -151,21 +163,13 @@ def _tested(one: Sketch, file: Path, held_out: HeldOut) -> AxisDraft:
         parameters=quantities(regression, fit, term),
         accepted=True,
     )
-    return AxisDraft(
-        sketch=one,
-        law=one.law.with_fitted_sizes({**values, **term.values}),
-        file=file,
-        terms=fit.terms,
-        fit=fit_result(fit, regression),
-        ranked=ranked,
-        share=share,
-    )
+    return AxisTest(ranked=ranked, terms=fit.terms, fit=fit_result(fit, regression), share=share)
 
 
 def _bound(held_out: HeldOut, drafts: Sequence[AxisDraft]) -> Bound:
     """The largest share of the held-out squares that a curve over a state, or a draft, closes."""
     curves = [*((Term(state),) for state in STATES), tuple(map(Term, STATES))]
-    shares = [held_out.share(terms, ()) for terms in curves] + [one.share for one in drafts]
+    shares = [held_out.share(terms, ()) for terms in curves] + [one.test.share for one in drafts]
     low, high = (
         float(max(of_squares(getattr(share, end)) for share in shares)) for end in ("low", "high")
     )

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from threadpoolctl import threadpool_limits
 
@@ -17,10 +17,15 @@ from plant_emulator.diagnosis.wording import percent, size
 from plant_emulator.errors import InputError
 from plant_emulator.parameter_sets import DEFAULT, with_effects
 from plant_emulator.recordings.recording import IMPOSSIBLE
-from plant_emulator.workflows.diagnosis.runs import bench_runs
+from plant_emulator.workflows.arguments import check_choice
+from plant_emulator.workflows.axis_files.own_effects import own_effects
+from plant_emulator.workflows.diagnosis.axis_drafting import begin, try_effect
+from plant_emulator.workflows.diagnosis.runs import axis_runs, bench_runs
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.workflows.diagnosis.runs import Source
 
 SCHEMA = "draft-check/1"
 
@@ -29,7 +34,8 @@ SCHEMA = "draft-check/1"
 class DraftCheck:
     """Share of the held-out gap that an effect file closes; each log is held out in turn.
 
-    mean_square : of the residual that the joint fit leaves, over the noise [1]
+    mean_square : of the residual that the joint fit leaves, over the noise [1]; of an axis over
+        what a rich model leaves
     explains : whether the effect explains a part of the logs that it was fitted to; else it is not
         tried on held-out logs
     """
@@ -69,13 +75,45 @@ class DraftCheck:
 
 
 def draft_check(
-    file: str | Path, logs: Sequence[str | Path], *, parameters: str | Path = DEFAULT
+    file: str | Path,
+    logs: Sequence[Source],
+    *,
+    parameters: str | Path = DEFAULT,
+    model: Literal["bench", "axis"] = "bench",
+    columns: Sequence[str] | Mapping[str, str] = (),
 ) -> DraftCheck:
     """Fit the effect of a file to logs, and predict each log from the others with it.
 
+    parameters : set of the bench; columns : of the files of an axis, see `diagnose`
     Raises InputError for a file, a log or a set that cannot be used, and for an effect that cannot
     be simulated.
     """
+    check_choice("model", model, ("bench", "axis"))
+    if model == "axis":
+        return _of_axis(file, logs, columns)
+    return _of_bench(file, logs, parameters)
+
+
+def _of_axis(
+    file: str | Path, logs: Sequence[Source], columns: Sequence[str] | Mapping[str, str]
+) -> DraftCheck:
+    (own,) = own_effects([file])
+    runs = axis_runs(logs, (), columns=columns)
+    held_out = begin(runs.recipe, runs.plan)
+    found = try_effect(own, held_out)
+    return DraftCheck(
+        effect=own.name,
+        parameters=tuple(
+            replace(q, name=q.name.removeprefix(f"{own.name}_")) for q in found.ranked.parameters
+        ),
+        mean_square=found.fit.mean_square / held_out.regression.variance,
+        explains=True,
+        held_out_gain=found.gain,
+        held_out_gain_ci95=found.interval,
+    )
+
+
+def _of_bench(file: str | Path, logs: Sequence[Source], parameters: str | Path) -> DraftCheck:
     (own,) = effects.from_files([Path(file)])
     runs = bench_runs(
         logs, (), with_effects.load(parameters), without=effects.names(), effect_files=[file]

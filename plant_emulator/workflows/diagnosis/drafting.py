@@ -119,16 +119,16 @@ def _of_axis(found: AxisDrafts) -> Drafted:
         drafts=tuple(
             _draft(
                 (one.sketch, one.law, one.file),
-                (one.gain, one.interval),
+                (one.test.gain, one.test.interval),
                 found.bound,
                 (*texts[:k], *texts[k + 1 :]),
             )
             for k, one in enumerate(found.drafts)
         ),
-        fits=tuple(one.fit for one in found.drafts),
+        fits=tuple(one.test.fit for one in found.drafts),
         bound=found.bound,
         traces=found.traces,
-        of_axis=tuple(one.ranked for one in found.drafts),
+        of_axis=tuple(one.test.ranked for one in found.drafts),
     )
 
 

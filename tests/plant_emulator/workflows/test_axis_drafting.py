@@ -8,6 +8,7 @@ import pytest
 
 from plant_emulator.signals.axis_log import AxisLog
 from plant_emulator.workflows.diagnosis.diagnose import diagnose
+from plant_emulator.workflows.diagnosis.draft_check import draft_check
 from tests.plant_emulator.diagnosis.axis_truth import log
 
 ASYMMETRY = 30.0
@@ -41,6 +42,10 @@ def test_friction_by_direction_is_drafted_saved_and_named(tmp_path: Path) -> Non
     assert {Path(one.file) for one in found.answer.drafts} == {*folder.iterdir()}
     assert found.parameter_set.effects[file.stem]["a1"] == pytest.approx(ASYMMETRY, rel=0.05)
     assert found.parameter_set.effect_files == {file.stem: str(file)}
+
+    checked = draft_check(file, logs, model="axis")
+    assert checked.parameters[0].value == pytest.approx(ASYMMETRY, rel=0.05)
+    assert checked.held_out_gain == pytest.approx(best.held_out_gain, abs=0.01)
 
     again = diagnose(logs, model="axis", without="viscous_asymmetry", effect_files=file)
     assert again.answer.verdict.effects == (file.stem,)
