@@ -39,7 +39,7 @@ def test_friction_by_direction_is_drafted_saved_and_named(tmp_path: Path) -> Non
     assert best.curve.over == "velocity"
 
     file = Path(best.file)
-    assert {Path(one.file) for one in found.answer.drafts} == {*folder.iterdir()}
+    assert {Path(one.file) for one in found.answer.drafts} == {*folder.glob("*.py")}
     assert found.parameter_set.effects[file.stem]["a1"] == pytest.approx(ASYMMETRY, rel=0.05)
     assert found.parameter_set.effect_files == {file.stem: str(file)}
 
