@@ -30,4 +30,7 @@ def main(log: str, picture: str) -> None:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 3:
+        print("usage: python compare_regulators.py LOG PICTURE", file=sys.stderr)
+        sys.exit(2)
     main(*sys.argv[1:])

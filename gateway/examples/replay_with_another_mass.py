@@ -27,4 +27,7 @@ def main(log: str, *loads: str) -> None:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) < 2:
+        print("usage: python replay_with_another_mass.py LOG [LOAD...]", file=sys.stderr)
+        sys.exit(2)
     main(*sys.argv[1:])

@@ -26,6 +26,14 @@ def test_every_example_is_short_and_says_how_it_is_called(script: Path) -> None:
     assert f"python {script.name}" in text
 
 
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
+def test_example_without_its_arguments_says_its_usage_in_one_line(script: Path) -> None:
+    called = [sys.executable, str(script)]
+    told = subprocess.run(called, capture_output=True, text=True, check=False)
+    assert (told.returncode, told.stdout) == (2, "")
+    assert re.fullmatch(rf"usage: python {script.name} LOG .+\n", told.stderr)
+
+
 @pytest.mark.slow
 def test_a_heavier_truck_gains_less_speed_from_the_same_torque() -> None:
     told = run("replay_with_another_mass", LOG, 0, 800, 1600)
