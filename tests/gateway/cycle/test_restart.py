@@ -4,6 +4,8 @@ A PLC takes enable for a rising edge when the first command after its start has 
 does so as well, with remote still on.
 """
 
+from dataclasses import replace
+
 import pytest
 
 from gateway.configuration.config import Config
@@ -54,6 +56,36 @@ def test_restart_in_run_ends_it_with_its_reason_and_starts_nothing(running):
     assert (running.last.state, running.last.reason) == (State.RAMPDOWN, Reason.PLC_RESTARTED)
     nothing_starts(running)
     assert (running.last.state, running.last.reason) == (State.SAFE, Reason.PLC_RESTARTED)
+
+
+def driving_by_a_clock_of(span):
+    """A loop in RUN whose clock starts again at 0 s of its span in 1 s [s]."""
+    loop = ClosedLoop(CONFIG)
+    loop.disturb = lambda _, reading: replace(reading, plc_time=(reading.plc_time - 5.9) % span)
+    loop.start()
+    loop.run(4.5)
+    assert loop.drum_speed[-1] > 1.0
+    assert span - loop.observations[-1].measurement.plc_time == pytest.approx(1.0, abs=0.03)
+    return loop
+
+
+def test_clock_that_wraps_at_the_end_of_its_register_does_not_end_a_run():
+    """32 bits of 0.1 ms."""
+    loop = driving_by_a_clock_of(2.0**32 * 1e-4)
+    loop.run(2.0)
+    assert loop.observations[-1].measurement.plc_time < 1.1
+    assert (loop.last.state, loop.last.reason) == (State.RUN, None)
+
+
+def test_clock_that_starts_again_at_midnight_ends_a_run_as_a_restart_does():
+    """No map can declare this wrap: it lies before the end of the register."""
+    loop = driving_by_a_clock_of(86400.0)
+    loop.run(0.9)
+    assert loop.last.state is State.RUN
+    loop.run(0.2)
+    assert (loop.last.state, loop.last.reason) == (State.RAMPDOWN, Reason.PLC_RESTARTED)
+    loop.run(4.0)
+    assert (loop.last.state, loop.last.reason) == (State.SAFE, Reason.PLC_RESTARTED)
 
 
 def test_restart_in_the_rampdown_starts_nothing(running):
