@@ -149,14 +149,15 @@ def linearise_at(
 ) -> Estimate:
     """Linearise the residuals at the starts of the unknowns, and return it as an estimate there.
 
-    near : a linearisation nearby, whose slopes set the steps of the differences. Without it every
-        step is FIRST_DIFFERENCE: a residual that hardly changes over it, such as that of a weak
-        parameter, is then lost in the jitter of the simulation
+    near : a linearisation nearby, whose slopes set the steps of the differences. Without it they
+        follow from a first differencing
     """
     problem = SimulatedProblem(tuple(unknowns), residuals, None)
-    if near is not None:
-        problem.lengths = column_lengths(near.jacobians)
     z = np.array([u.scaled(u.start) for u in unknowns])
+    if near is None:
+        problem.learn_steps(z)
+    else:
+        problem.lengths = column_lengths(near.jacobians)
     return _estimate(problem, z, True, "not fitted")
 
 

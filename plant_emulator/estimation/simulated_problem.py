@@ -76,6 +76,13 @@ class SimulatedProblem:
             self.slopes_known = key, self._jacobian(z)
         return self.slopes_known[1]
 
+    def learn_steps(self, z: Array) -> None:
+        """Take the steps of the differences at z from first slopes.
+
+        Over FIRST_DIFFERENCE the slope of a weak parameter is lost in the jitter of the simulation.
+        """
+        self._jacobian(z)
+
     def _jacobian(self, z: Array) -> list[Array]:
         base = self.residual(z)
         self.based = z.tobytes(), base
