@@ -24,7 +24,8 @@ DETECTABLE_NORM = 7.0
 # Share of the gap that an adequate model may leave. Laws slightly other than the library's left up
 # to 0.17. Where the true effect was not in the library, the best one left 0.4 and more.
 UNEXPLAINED_SHARE = 0.2
-# Mean square up to which a fit leaves nothing but noise: its variance is known to 5 %.
+# Mean square up to which a fit leaves nothing but noise: its variance is uncertain by 2 % (one
+# standard deviation), and the noise of real logs is no exact model of theirs.
 NOISE_MEAN_SQUARE = 1.05
 # Ljung-Box excess from which on a residual is not white noise [chi squared].
 LJUNG_BOX_LIMIT = 200.0

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.machine import MeasuredRun, Model
     from plant_emulator.signals.log import Array
 
-# Relative uncertainty of the noise's variance.
+# Relative uncertainty of the noise's variance, one standard deviation.
 NOISE_UNCERTAINTY = 0.02
 # A channel counts in the closed fraction from this gap on, in the noise [1].
 OPEN_GAP = 1.1
