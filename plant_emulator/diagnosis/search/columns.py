@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     States = Sequence[Mapping[str, float]]
 
 
+# Norm of a change that the noise hides [1]: a limit that is only touched says nothing of its size.
+HIDDEN_NORM = 1.0
+
+
 @dataclass(frozen=True, kw_only=True)
 class Column:
     """A column of an effect: change of the data at one size.
@@ -56,7 +60,7 @@ class Score:
 def best_score(
     fidelity: Fidelity, candidate: Candidate, sizes: Sequence[float], states: States
 ) -> Score | None:
-    """Score of an effect at the size that gains most; None: it does nothing here.
+    """Score of an effect at the size that gains most; None: it shows nothing here.
 
     states : of the effect in each run, but for an angle
     """
@@ -72,13 +76,13 @@ def best_score(
 def _columns(
     fidelity: Fidelity, candidate: Candidate, size: float, states: States
 ) -> Iterator[Column]:
-    """Columns of the size parameters that change anything at this size."""
+    """Columns of the size parameters that change the data visibly at this size."""
     angle = next((u.name for u in candidate.states if u.angle), None)
     single = len(candidate.sizes) == 1
     for u in candidate.sizes:
         values = values_at_size(candidate, size, None if single else u.name)
         change = fidelity.column(candidate.name, values, states)
-        if change is None or not change.any():
+        if change is None or np.linalg.norm(change) < HIDDEN_NORM:
             continue
         turned = None
         if angle is not None:
