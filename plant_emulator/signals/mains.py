@@ -92,7 +92,7 @@ def lines_in_differences(
     """
     differences, levels = [], []
     for s, use in zip(series, uses, strict=True):
-        level = noise(s.value, use) * DIFFERENCED
+        level = noise(s.value, use) * DIFFERENCED or 1.0  # of a channel that stands still
         whole = use[3:] & use[2:-1] & use[1:-2] & use[:-3]
         clipped = np.clip(np.diff(s.value, 3), -CLIP * level, CLIP * level) / level
         differences.append(replace(s, time=s.time[3:], value=clipped, use=whole))
