@@ -87,8 +87,8 @@ def estimate(
 
 def approach(
     unknowns: Sequence[Unknown], residuals: Sequence[Residual], *, iterations: int
-) -> tuple[Unknown, ...]:
-    """Unknowns that start near the data, where the cost is rough between here and there.
+) -> tuple[float, tuple[Unknown, ...]]:
+    """The least loss and unknowns that start there, where the cost is rough on the way.
 
     The loss of large residuals is linear (soft l1), and slopes are taken over a share of what
     exceeds the noise.
@@ -99,9 +99,8 @@ def approach(
     problem = SimulatedProblem(unknowns, residuals, None, share=APPROACH_SHARE)
     start, lower, upper = _start(unknowns)
     found = _minimise(problem, start, (lower, upper), APPROACH_SETTLED, iterations, loss="soft_l1")
-    return tuple(
-        replace(u, start=u.value(float(z))) for u, z in zip(unknowns, found.x, strict=True)
-    )
+    starts = zip(unknowns, found.x, strict=True)
+    return float(found.cost), tuple(replace(u, start=u.value(float(z))) for u, z in starts)
 
 
 def _start(unknowns: Sequence[Unknown]) -> tuple[Array, Array, Array]:

@@ -19,17 +19,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.fit_result import FitResult
+from plant_emulator.diagnosis.fit_result import FitResult, FitValues
 from plant_emulator.estimation import least_squares
 from plant_emulator.estimation.covariance import correlation_time, structure
+from plant_emulator.estimation.kinks import WORTH, beyond_kink
 from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE, estimate, linearise_at
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.fit_result import FitValues
     from plant_emulator.diagnosis.machine import Candidate, Model
-    from plant_emulator.estimation.unknowns import Estimate, Unknown
+    from plant_emulator.estimation.unknowns import Estimate, Residual, Unknown
 
 # Relative fall of the cost that ends a fit: a few hundredths in units of chi squared.
 COST_TOLERANCE = 1e-6
@@ -37,8 +37,8 @@ COST_TOLERANCE = 1e-6
 SECANT_COST_TOLERANCE = 1e-4
 # Iterations after which a fit shows whether it leads to a lower cost.
 TRIAL_ITERATIONS = 10
-# Iterations of the way to the data.
-APPROACH_ITERATIONS = 15
+# Iterations of the way to the data that tell the best start, and those of the rest of its way.
+FIRST_ITERATIONS, APPROACH_ITERATIONS = 4, 15
 # A size differs from neutral for certain from so many of its standard errors on.
 SIGNIFICANT_ERRORS = 3.0
 # Share of the largest size allowed from which on an effect stands for something else. An effect
@@ -100,13 +100,17 @@ def fit(
     unknowns = with_starts(
         joint_unknowns(model, effects, runs, shrinkage=shrinkage), values, states
     )
+    residuals = [model.residual(k, effects) for k in runs]
     found = estimate(
         unknowns,
-        [model.residual(k, effects) for k in runs],
+        residuals,
         settled=COST_TOLERANCE if near is None else SECANT_COST_TOLERANCE,
         iterations=iterations,
         follow=near,
     )
+    if near is None:
+        rough = [model.rough().residual(k, effects) for k in runs]
+        found = _led_over_kinks(found, residuals, rough, iterations)
     reached = to_result(effects, found, len(runs))
     candidates = {name: model.candidates[name] for name in effects}
     return replace(
@@ -115,32 +119,62 @@ def fit(
     )
 
 
-def approach(
-    model: Model,
-    effects: Sequence[str],
-    runs: Sequence[int],
-    values: Mapping[str, float],
-    states: Sequence[Mapping[str, float]],
-) -> tuple[Mapping[str, float], Sequence[Mapping[str, float]]]:
+def _led_over_kinks(
+    found: Estimate,
+    residuals: Sequence[Residual],
+    rough: Sequence[Residual],
+    iterations: int | None,
+) -> Estimate:
+    """The fit, led over the kinks of its cost as long as that is worth it."""
+    while found.cost > SUSPECT_MEAN_SQUARE * found.samples:
+        beyond = beyond_kink(found.started, rough)
+        if beyond is None:
+            break
+        other = estimate(beyond, residuals, settled=COST_TOLERANCE, iterations=iterations)
+        if other.cost > (1.0 - WORTH) * found.cost:
+            return min(found, other, key=lambda one: one.cost + one.penalty)
+        found = other
+    return found
+
+
+def approach(model: Model, starts: Sequence[FitValues], runs: Sequence[int]) -> FitValues:
     """Values and states near the data, from which a fit of these effects may begin.
 
-    They are the given ones where these are near: a fit from far off ends in a local minimum.
+    They are those of the first start where this is near: a fit from far off ends in a local
+    minimum. Elsewhere each start is led a part of the way, and the one of least loss all the way.
+
+    starts : all with the same effects
     """
+    first = starts[0]
     rows = [
-        model.residual(k, effects)({**values, **own}) for k, own in zip(runs, states, strict=True)
+        model.residual(k, first.effects)({**first.values, **own})
+        for k, own in zip(runs, first.states, strict=True)
     ]
     squares = sum(float(np.sum(r**2)) for r in rows)
     if squares <= SUSPECT_MEAN_SQUARE * sum(np.count_nonzero(r) for r in rows):
-        return values, states
-    near = least_squares.approach(
-        with_starts(joint_unknowns(model, effects, runs), values, states),
-        [model.rough().residual(k, effects) for k in runs],
-        iterations=APPROACH_ITERATIONS,
+        return first
+    best = first
+    if len(starts) > 1:
+        led = [_approach_from(model, one, runs, FIRST_ITERATIONS) for one in starts]
+        _, best = min(led, key=lambda pair: pair[0])
+    return _approach_from(model, best, runs, APPROACH_ITERATIONS)[1]
+
+
+def _approach_from(
+    model: Model, start: FitValues, runs: Sequence[int], iterations: int
+) -> tuple[float, FitValues]:
+    """The loss near the data, and the values and states there."""
+    loss, near = least_squares.approach(
+        with_starts(joint_unknowns(model, start.effects, runs), start.values, start.states),
+        [model.rough().residual(k, start.effects) for k in runs],
+        iterations=iterations,
     )
-    return (
-        {**values, **{u.name: u.start for u in near if u.run is None}},
-        [{**own, **{u.name: u.start for u in near if u.run == k}} for k, own in enumerate(states)],
+    values = {**start.values, **{u.name: u.start for u in near if u.run is None}}
+    states = tuple(
+        {**own, **{u.name: u.start for u in near if u.run == k}}
+        for k, own in enumerate(start.states)
     )
+    return loss, FitValues(effects=start.effects, values=values, states=states)
 
 
 def _significant(candidate: Candidate, found: FitResult) -> bool:
@@ -225,4 +259,7 @@ def effective_fraction(found: Estimate) -> float:
 
 def fit_null(model: Model, runs: Sequence[int]) -> FitResult:
     """Fit without effects from the model's own start values."""
-    return fit(model, (), runs, *approach(model, (), runs, *model.start_values(runs)))
+    values, states = model.start_values(runs)
+    start = FitValues(effects=(), values=values, states=tuple(states))
+    near = approach(model, [start], runs)
+    return fit(model, (), runs, near.values, near.states)

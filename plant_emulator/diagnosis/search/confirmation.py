@@ -1,7 +1,7 @@
 """Fits a hypothesis by simulation, from the linear estimate of its effects.
 
-Each start is tried at some positions in the gap, and the best one at some sizes. A loss judges them
-that bears spikes at the wrong time.
+Each start is tried at some positions in the gap and at some sizes. A loss judges them that bears
+spikes at the wrong time.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.fit_result import FitValues
 from plant_emulator.diagnosis.fitting.joint_fit import approach, fit, fit_from, linearise
+from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.estimation.robust_scan import cauchy_loss
 from plant_emulator.model.stage import GAP_POSITION
@@ -36,17 +37,25 @@ class Trial:
 def confirm(model: Model, trial: Trial) -> FitResult:
     """Fit a hypothesis for a few iterations from its best start (a step).
 
-    The nominal parameters are one more start.
+    The nominal parameters are one more start. Far from the data the linear estimate of a size says
+    little, and the plausible size at the nominal parameters is another.
     """
     nominal = [
         replace(one, values={**one.values, **model.nominal(trial.runs)}) for one in trial.starts[:1]
     ]
     placed = [_scan_gap_positions(model, trial, one) for one in (*trial.starts, *nominal)]
-    loss, best = min(placed, key=lambda pair: pair[0])
     if trial.effects:
-        best = _scan_size(model, trial, loss, best)
-    near = approach(model, trial.effects, trial.runs, best.values, best.states)
-    return fit(model, trial.effects, trial.runs, *near, SETTINGS.iterations)
+        placed = [_scan_size(model, trial, *pair) for pair in placed]
+        placed += [(np.inf, _plausible(model, trial, one)) for one in nominal]
+    near = approach(
+        model,
+        [
+            FitValues(effects=trial.effects, values=one.values, states=one.states)
+            for _, one in sorted(placed, key=lambda pair: pair[0])
+        ],
+        trial.runs,
+    )
+    return fit(model, trial.effects, trial.runs, near.values, near.states, SETTINGS.iterations)
 
 
 def look(model: Model, trial: Trial) -> FitResult:
@@ -89,8 +98,25 @@ def _scan_gap_positions(model: Model, trial: Trial, start: Start) -> tuple[float
     return total, replace(start, states=tuple(states))
 
 
-def _scan_size(model: Model, trial: Trial, loss: float, start: Start) -> Start:
-    """Scan the size of the last effect; return the start of least loss."""
+def _plausible(model: Model, trial: Trial, start: Start) -> Start:
+    """The start with the plausible size of the last effect, and the states that suit it.
+
+    The size is on the start's side of neutral.
+    """
+    candidate = model.candidates[trial.effects[-1]]
+    neutral = candidate.neutral
+    sides = [
+        (start.values[u.name] - neutral[u.name]) * (u.start - neutral[u.name])
+        for u in candidate.sizes
+    ]
+    size = -1.0 if sum(sides) < 0.0 else 1.0
+    values = {**start.values, **values_at_size(candidate, size)}
+    states = tuple(model.initial_states(k, trial.effects, values) for k in trial.runs)
+    return replace(start, values=values, states=states)
+
+
+def _scan_size(model: Model, trial: Trial, loss: float, start: Start) -> tuple[float, Start]:
+    """Scan the size of the last effect; return the least loss and its start."""
     candidate = model.candidates[trial.effects[-1]]
     residuals = [model.rough().residual(k, trial.effects) for k in trial.runs]
     neutral, plausible = candidate.neutral, {u.name: u.start for u in candidate.sizes}
@@ -107,4 +133,4 @@ def _scan_size(model: Model, trial: Trial, loss: float, start: Start) -> Start:
             for residual, own in zip(residuals, start.states, strict=True)
         )
         best = min(best, (total, replace(start, values=values)), key=lambda pair: pair[0])
-    return best[1]
+    return best

@@ -296,6 +296,7 @@ def test_approach_passes_over_the_steps_that_instants_of_contact_make() -> None:
     starts = [number("slope", 1.1), number("contact", 0.896)]
     stuck = estimate(starts, [residual])
     assert stuck.parameters()["contact"] < 0.898
-    near = {u.name: u.start for u in approach(starts, [residual], iterations=30)}
+    _, found = approach(starts, [residual], iterations=30)
+    near = {u.name: u.start for u in found}
     assert near["slope"] == pytest.approx(1.0, abs=0.01)
     assert near["contact"] == pytest.approx(0.9, abs=0.0025)  # two samples at the last pulse
