@@ -14,7 +14,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.answer import SearchStep
 from plant_emulator.diagnosis.axis.motion import UNCERTAIN
-from plant_emulator.diagnosis.axis.regression import Term
+from plant_emulator.diagnosis.axis.rows import Term
 from plant_emulator.diagnosis.axis.settings import SETTINGS
 from plant_emulator.diagnosis.axis.start import grid
 

@@ -16,8 +16,10 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.answer import Kind
     from plant_emulator.diagnosis.axis.held_out import HeldOut, Share
+    from plant_emulator.diagnosis.axis.known import KnownAxis
     from plant_emulator.diagnosis.axis.leftover import Rest
-    from plant_emulator.diagnosis.axis.regression import Fit, Regression, Rows
+    from plant_emulator.diagnosis.axis.regression import Fit, Regression
+    from plant_emulator.diagnosis.axis.rows import Rows
     from plant_emulator.diagnosis.axis.search import AxisSearch
 
 
@@ -34,10 +36,17 @@ class Decision:
     inertia: tuple[tuple[int, float, float], ...] = ()
 
 
-def decide(search: AxisSearch, held_out: HeldOut, noise: float, floor: float) -> Decision:
+def decide(
+    search: AxisSearch,
+    held_out: HeldOut,
+    noise: float,
+    floor: float,
+    known: KnownAxis | None = None,
+) -> Decision:
     """Decide by the held-out runs.
 
     noise, floor : rms of the force's error that the sensors' noise leaves, and repeats
+    known : the parameter set, if there is one
     """
     found, reason = _confirmed(search, held_out)
     other = other_inertia(held_out.regression, held_out.rows)
@@ -47,11 +56,20 @@ def decide(search: AxisSearch, held_out: HeldOut, noise: float, floor: float) ->
     if other and own.low > 0.0 and own.value > closed:
         return Decision(kind="parameter", found=search.null, inertia=other)
     if not found.terms:
-        return _without_a_name(search, held_out, noise, floor, reason)
+        decision = _without_a_name(search, held_out, noise, floor, reason)
+        if decision.kind == "none" and known and _has_other_values(known, search, held_out):
+            return replace(decision, kind="parameter")
+        return decision
     reason = _insufficient(found, held_out)
     if reason:
         return Decision(kind="unknown", found=search.null, reason=reason)
     return Decision(kind="effect", found=found)
+
+
+def _has_other_values(known: KnownAxis, search: AxisSearch, held_out: HeldOut) -> bool:
+    """Whether parameters differ from those of the set, and this closes a share of the error."""
+    closed = held_out.recalibrated(known.values)
+    return bool(known.deviating(search.null)) and _is_found(closed)
 
 
 def _insufficient(found: Fit, held_out: HeldOut) -> str:
