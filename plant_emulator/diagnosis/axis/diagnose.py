@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.axis.effects import Effect
     from plant_emulator.diagnosis.axis.effects.effect import Scale
     from plant_emulator.diagnosis.axis.known import KnownAxis
-    from plant_emulator.diagnosis.axis.motion import Base
+    from plant_emulator.diagnosis.axis.motion import Base, Motion
     from plant_emulator.diagnosis.axis.regression import Fit, Regression
     from plant_emulator.diagnosis.axis.rows import KnownEffect, Term
     from plant_emulator.diagnosis.execution.progress import Progress
@@ -99,11 +99,11 @@ def diagnose_axis(
     """
     logs = runs.logs
     check_alike(logs)
-    _check_known(runs)
     tell = progress or (lambda _label, _share: None)
     effects, known = runs.library, runs.known_effects
     tell("reading the motion", 0.0)
     prepared_runs, scale = prepared(logs)
+    _check_known(runs, prepared_runs[0].motion, scale)
     own = prepared_runs[: len(plan.fitted)]
     tell("testing effects", 0.3)
     width = 0.0
@@ -162,13 +162,23 @@ def check_alike(logs: Sequence[AxisLog]) -> None:
             )
 
 
-def _check_known(runs: AxisRuns) -> None:
-    """Refuse a parameter set of the other kind of axis."""
-    if runs.known and runs.known.rotary != runs.logs[0].rotary:
+def _check_known(runs: AxisRuns, motion: Motion, scale: Scale) -> None:
+    """Refuse a parameter set of the other kind of axis, and of logs with other channels."""
+    source = runs.logs[0].source
+    if runs.known and runs.known.rotary != scale.rotary:
         raise LogError(
-            f"{runs.logs[0].source}: a {'rotary' if runs.logs[0].rotary else 'linear'} axis, while "
-            "the parameter set is that of the other kind; a set of this axis is needed"
+            f"{source}: a {'rotary' if scale.rotary else 'linear'} axis, while the parameter set "
+            "is that of the other kind; a set of this axis is needed"
         )
+    for one in (known.term.effect for known in runs.known_effects):
+        rival = any(
+            e is not one and e.name == one.name and e.applies(motion, scale) for e in LIBRARY
+        )
+        if rival and not one.applies(motion, scale):
+            raise LogError(
+                f"{source}: {one.name} of the parameter set ({one.title}) was found in logs with "
+                "other channels; a log with the same channels is needed"
+            )
 
 
 def fit_result(fit: Fit, regression: Regression) -> FitResult:

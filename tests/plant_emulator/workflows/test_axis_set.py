@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from plant_emulator import parameter_sets
 from plant_emulator.cli import main
-from plant_emulator.errors import ParameterError
+from plant_emulator.errors import LogError, ParameterError
 from plant_emulator.signals.axis_log import AxisLog
 from plant_emulator.workflows.diagnosis import axis_set
 from plant_emulator.workflows.diagnosis.diagnose import Diagnosis, diagnose
@@ -100,6 +100,17 @@ def test_a_set_of_the_bench_is_refused_in_one_line(tmp_path: Path) -> None:
     assert result.exit_code == 2
     assert len(result.output.strip().splitlines()) == 1
     assert "bench.toml: no set of an axis" in result.output
+
+
+@pytest.mark.slow
+def test_an_effect_over_a_temperature_that_is_not_logged_is_refused(
+    saved: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "warm.toml"
+    text = saved.read_text().replace("concave_friction", "warm_up").replace("rise =", "ratio =")
+    path.write_text(text)
+    with pytest.raises(LogError, match=r"axis 1: warm_up of the parameter set .* other channels"):
+        again(path, runs(concave))
 
 
 @pytest.mark.slow
