@@ -53,12 +53,13 @@ class Context:
 class Size:
     """A linear constant.
 
-    unit : of a linear and of a rotary axis; lowest : that physics allows
+    unit : of a linear and of a rotary axis; lowest, highest : that physics allows
     """
 
     name: str
     unit: tuple[str, str]
     lowest: float = float("-inf")
+    highest: float = float("inf")
 
 
 @dataclass(frozen=True, kw_only=True)

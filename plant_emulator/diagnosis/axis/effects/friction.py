@@ -160,7 +160,8 @@ FRICTION = (
         subsystem="gear",
         equation="F + mu |T| sgn q', T the logged load, else M q''",
         needs="several loads, or accelerations",
-        sizes=(Size(name="ratio", unit=NONE, lowest=0.0),),
+        # A friction as large as the force that it grows with holds the axis.
+        sizes=(Size(name="ratio", unit=NONE, lowest=0.0, highest=1.0),),
         columns=_load_friction,
     ),
     Effect(
