@@ -89,7 +89,8 @@ def start(
     width : of the Coulomb friction; known : effects of the parameter set
     """
     rows = [rows_of(with_width(run, width), scale, known) for run in runs]
-    library = [e for e in effects if all(e.applies(r.motion, scale) for r in runs)]
+    usable = [e for e in effects if e.has_room(scale)]
+    library = [e for e in usable if all(e.applies(r.motion, scale) for r in runs)]
     begun = Regression(rows=rows[:fitted], base=NOTHING)
     around = begun.around(begun.fit(()))
     rich = richest(around, library, scale)

@@ -108,6 +108,10 @@ class Effect:
         """Sizes, then shapes."""
         return [*self.sizes, *self.shapes]
 
+    def has_room(self, scale: Scale) -> bool:
+        """Whether the bounds of every shape leave room between them."""
+        return all(low < high for low, high in (s.bounds(scale) for s in self.shapes))
+
     def to_json(self) -> dict[str, Any]:
         """The effect as an entry of the document `effects/1`; units of a linear, a rotary axis."""
         return {
