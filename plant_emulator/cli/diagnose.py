@@ -116,7 +116,7 @@ def command(
     from plant_emulator.cli._progress import progress
     from plant_emulator.workflows.diagnosis.diagnose import diagnose
 
-    of_bench = {"next_program": "--next-program", "parameters": "--parameters"}
+    of_bench = {"next_program": "--next-program"}
     of_axis = {"columns": "--column", "one_run": "--one-run"}
     _options.refuse_of_another(model, {**of_bench, "reference": "--reference"}, of_axis)
     with progress() as tell:

@@ -181,21 +181,30 @@ def check_value(place: str, parameter: Parameter) -> None:
 
 
 def parameter_set(name: str, table: Mapping[str, Any]) -> ParameterSet:
-    """The parameter set that the tables of a file hold; ParameterError names file and key."""
-    unknown = sorted(set(table) - set(UNITS) - {ORIGIN, EFFECTS, SENSORS})
+    """The set of a bench that the tables of a file hold; ParameterError names file and key."""
+    return set_of(name, table, UNITS).with_values({})
+
+
+def set_of(name: str, table: Mapping[str, Any], units: Mapping[str, str]) -> ParameterSet:
+    """The set of these parameters that the tables of a file hold, their values as they are.
+
+    units : of the parameters, by name
+    Raises ParameterError with file and key.
+    """
+    unknown = sorted(set(table) - set(units) - {ORIGIN, EFFECTS, SENSORS})
     if unknown:
-        raise ParameterError(f"{name}: {unknown[0]} is no parameter; known: {', '.join(UNITS)}")
-    missing = sorted(set(UNITS) - set(table))
+        raise ParameterError(f"{name}: {unknown[0]} is no parameter; known: {', '.join(units)}")
+    missing = sorted(set(units) - set(table))
     if missing:
         raise ParameterError(f"{name}: parameter {missing[0]} is missing")
-    given = {key: _parameter(name, key, table[key]) for key in UNITS}
+    given = {key: _parameter(name, key, table[key], unit) for key, unit in units.items()}
     origin = table.get(ORIGIN)
     if origin is not None and not isinstance(origin, Mapping):
         raise ParameterError(f"{name}: {ORIGIN}: a table that says where the values come from")
     effects = _effects(name, table.get(EFFECTS, {}))
     sensors = sensors_of(name, table.get(SENSORS, {}))
     files = {key: str(own[FILE]) for key, own in table.get(EFFECTS, {}).items() if FILE in own}
-    return ParameterSet(name, given, origin, effects, sensors, files).with_values({})
+    return ParameterSet(name, given, origin, effects, sensors, files)
 
 
 def _effects(place: str, table: object) -> dict[str, dict[str, float]]:
@@ -215,8 +224,8 @@ def _effects(place: str, table: object) -> dict[str, dict[str, float]]:
 KEYS = {"symbol", "value", "unit", "kind", "source", "std", "standard_error"}
 
 
-def _parameter(place: str, name: str, entry: object) -> Parameter:
-    """The Parameter that one table of the file holds."""
+def _parameter(place: str, name: str, entry: object, unit: str) -> Parameter:
+    """The Parameter that one table of the file holds; unit : that it must have."""
     if not isinstance(entry, Mapping):
         raise ParameterError(f"{place}: {name}: a table with value, unit, symbol, source, kind")
     unknown = sorted(set(entry) - KEYS)
@@ -227,15 +236,13 @@ def _parameter(place: str, name: str, entry: object) -> Parameter:
     kind = entry.get("kind")
     if kind not in KINDS:
         raise ParameterError(f"{place}: {name}.kind: {kind!r}; one of {', '.join(KINDS)}")
-    if entry.get("unit") != UNITS[name]:
-        raise ParameterError(
-            f"{place}: {name}.unit: {entry.get('unit')!r}; must be {UNITS[name]!r}"
-        )
+    if entry.get("unit") != unit:
+        raise ParameterError(f"{place}: {name}.unit: {entry.get('unit')!r}; must be {unit!r}")
     return Parameter(
         name=name,
         symbol=str(entry.get("symbol", "")),
         value=_value(place, name, entry, kind),
-        unit=UNITS[name],
+        unit=unit,
         kind=kind,
         source=str(entry.get("source", "")),
         std=_optional(place, name, entry, "std"),

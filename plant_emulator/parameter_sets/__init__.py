@@ -8,7 +8,7 @@ import tomllib
 from dataclasses import replace
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from plant_emulator.errors import ParameterError, report_unwritable
 from plant_emulator.model.parameters import EFFECTS, FILE, ORIGIN, ParameterSet, parameter_set
@@ -31,6 +31,12 @@ def load(name: str | Path = DEFAULT) -> ParameterSet:
 
     Raises ParameterError with file and key for a set that cannot be used.
     """
+    path, table = read(name)
+    return with_files_from(path, parameter_set(str(name), table))
+
+
+def read(name: str | Path) -> tuple[Path, dict[str, Any]]:
+    """Path and tables of a set; ParameterError where there is no such file, or none in TOML."""
     shipped = FOLDER / f"{name}.toml"
     path = shipped if str(name) in names() else Path(name)
     if not path.is_file():
@@ -38,11 +44,13 @@ def load(name: str | Path = DEFAULT) -> ParameterSet:
             f"{name}: no such parameter set; a file, or one of {', '.join(names())}"
         )
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        return path, tomllib.loads(path.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:  # no TOML or UTF-8, or a number too long
         raise ParameterError(f"{path}: {error}") from error
-    found = parameter_set(str(name), table)
-    # A set names the files of its effects from its own folder on.
+
+
+def with_files_from(path: Path, found: ParameterSet) -> ParameterSet:
+    """The set of that path, which names the files of its effects from its own folder on."""
     files = {key: str(path.parent / file) for key, file in found.effect_files.items()}
     return replace(found, effect_files=files)
 

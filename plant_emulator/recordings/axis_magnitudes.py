@@ -2,7 +2,8 @@
 
 A position in degrees under `position_rad` shows in two ways: the steps of its encoder divide 360
 evenly, not 2 pi, and the axis turns faster than motors do. A torque in mN m gives a power that few
-axes have. A user who names the unit with the column has the last word.
+axes have, or at least that of a machine of a hundred watts and more, which a note then doubts. A
+user who names the unit with the column has the last word.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ class Kind:
 
     doubtful_speed, refused_speed : [SI]; servo motors turn at 300 to 600 rad/s, few at up to
         1000 rad/s (9550 rpm); linear motors move at up to 20 m/s
-    doubtful_power, refused_power : [W]; a drive of 5 kW is the largest of many series
+    refused_power : [W]; a drive of 5 kW is the largest of many series
     """
 
     position: str
@@ -38,7 +39,6 @@ class Kind:
     other_force: str
     doubtful_speed: float
     refused_speed: float
-    doubtful_power: float
     refused_power: float
 
 
@@ -52,7 +52,6 @@ KINDS = {
         other_force="mNm",
         doubtful_speed=600.0,
         refused_speed=1200.0,
-        doubtful_power=2e3,
         refused_power=5e3,
     ),
     False: Kind(
@@ -64,11 +63,12 @@ KINDS = {
         other_force="mN",
         doubtful_speed=10.0,
         refused_speed=50.0,
-        doubtful_power=5e3,
         refused_power=2e4,
     ),
 }
 TURN = 2.0 * np.pi
+# In thousandths of the unit, this power [W] is that of the smallest drives with an encoder.
+DOUBTFUL_POWER = 100.0
 # Speed and power are means over this share of the run, and so many samples at least.
 MEAN_SHARE, FEWEST_MEAN_SAMPLES = 1.0 / 500.0, 5
 # Counts a revolution of encoders.
@@ -92,8 +92,11 @@ def magnitude_note(logs: Sequence[AxisLog]) -> str:
     if speed > kind.doubtful_speed:
         fast += f", which is much: are the values in {other}?"
     strong = f"{power:.3g} W"
-    if power > kind.doubtful_power:
-        strong += f", which is much: are the values in {kind.other_force}?"
+    if power > DOUBTFUL_POWER and not all("force" in log.confirmed for log in logs):
+        strong += (
+            f", or {power / 1e3:.3g} W if the values are in {kind.other_force}: "
+            f"--column force=COLUMN:{kind.force} or :{kind.other_force} tells which"
+        )
     return f"the axis moves over up to {moves}, at up to {fast}, with up to {strong}"
 
 

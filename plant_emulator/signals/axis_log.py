@@ -19,6 +19,7 @@ class AxisLog:
     temperature : of the axis [degC]; None: not measured
     source : name of the log in messages and answers
     other : columns of its file that were not used
+    confirmed : quantities whose unit the user, or the format of the file, named
     """
 
     time: Array
@@ -30,3 +31,4 @@ class AxisLog:
     load: Array | None = None
     temperature: Array | None = None
     other: tuple[str, ...] = ()
+    confirmed: frozenset[str] = frozenset()

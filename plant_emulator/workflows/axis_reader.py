@@ -68,14 +68,15 @@ def read(path: str | Path, columns: Sequence[str] | Mapping[str, str] = ()) -> A
     elif rotary:
         values["position"] = _unwrap(values["position"])
     used = {choice.column for choice in chosen.values()}
+    sure = frozenset(choice.quantity for choice in (*given, *table.known) if choice.unit)
     log = AxisLog(
         time=time,
         **values,
         rotary=rotary,
         source=str(path),
         other=(*(name for name in table.names if name not in used), *table.others),
+        confirmed=sure,
     )
-    sure = {choice.quantity for choice in (*given, *table.known) if choice.unit}
     check_magnitudes(log, {name: c.column for name, c in chosen.items() if name not in sure})
     return log
 

@@ -17,15 +17,17 @@ from plant_emulator.diagnosis.answer import (
     Undetectable,
     Verdict,
 )
-from plant_emulator.diagnosis.axis.findings import remainder
+from plant_emulator.diagnosis.axis.findings import nominal_errors, remainder
 from plant_emulator.diagnosis.axis.quantities import UNITS, quantities
+from plant_emulator.diagnosis.axis.regression import NAMES
 from plant_emulator.diagnosis.prediction.gap import OPEN_GAP
 from plant_emulator.diagnosis.prediction.remainder import describe_band, describe_fall
 from plant_emulator.diagnosis.wording import number
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.axis.findings import AxisFindings
-    from plant_emulator.diagnosis.axis.regression import Fit, Term
+    from plant_emulator.diagnosis.axis.regression import Fit
+    from plant_emulator.diagnosis.axis.rows import Term
     from plant_emulator.diagnosis.axis.search import AxisSearch
 
 # Effects of a ranking that are predicted and shown.
@@ -73,15 +75,27 @@ def _next(f: AxisFindings) -> str | None:
 
 
 def _deviations(f: AxisFindings) -> tuple[ParameterDeviation, ...]:
-    """Inertias of single runs that differ from that of the fitted runs."""
-    unit = UNITS[f.rotary]["inertia"]
-    return tuple(
+    """Parameters that differ from the set, and inertias of single runs from the fitted runs'."""
+    units, fit = UNITS[f.rotary], f.decision.found
+    other = f.known.deviating(fit) if f.known else ()
+    shifted = tuple(
+        ParameterDeviation(
+            name=name,
+            nominal=f.known.values[k],
+            estimated=float(fit.values[k]),
+            standard_error=float(np.sqrt(fit.covariance[k, k])),
+            unit=units[name],
+        )
+        for k, name in enumerate(NAMES)
+        if f.known and name in other
+    )
+    return shifted + tuple(
         ParameterDeviation(
             name="inertia",
             nominal=float(f.search.null.values[0]),
             estimated=value,
             standard_error=error,
-            unit=unit,
+            unit=units["inertia"],
         )
         for _, value, error in f.decision.inertia
     )
@@ -96,6 +110,15 @@ def _statement(f: AxisFindings) -> str:
             return (
                 f"The machine has what the model lacks: {named}; with {them} "
                 f"{describe_fall(rest)}; {describe_band(rest)}."
+            )
+        case "parameter" if not d.inertia:
+            told = ", ".join(
+                f"{p.name} {number(p.nominal, 4)} -> {number(p.estimated, 4)} {p.unit}"
+                for p in _deviations(f)
+            )
+            return (
+                f"The equations hold with other values than the set: {told}; no further effect is "
+                "needed."
             )
         case "parameter":
             first = d.inertia[0]
@@ -163,10 +186,10 @@ def _gap(f: AxisFindings) -> HeldOutGap:
         closed = _closed(before, after, f.floor)
         ends = [_closed(before, before * (1.0 - s), f.floor) for s in (share.low, share.high)]
         interval = (ends[0], ends[1])
-    at = {f.channel: before / span}
+    nominal = float(np.sqrt(np.mean(np.concatenate(nominal_errors(f)) ** 2)))
     return HeldOutGap(
-        nominal=at,
-        recalibrated=at,
+        nominal={f.channel: nominal / span},
+        recalibrated={f.channel: before / span},
         explained={f.channel: after / span},
         noise_floor={f.channel: f.floor / span},
         closed_fraction=closed,

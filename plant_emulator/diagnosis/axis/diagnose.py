@@ -31,7 +31,11 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.axis.effects import Effect
-    from plant_emulator.diagnosis.axis.regression import Fit, Regression, Term
+    from plant_emulator.diagnosis.axis.effects.effect import Scale
+    from plant_emulator.diagnosis.axis.known import KnownAxis
+    from plant_emulator.diagnosis.axis.motion import Base, Motion
+    from plant_emulator.diagnosis.axis.regression import Fit, Regression
+    from plant_emulator.diagnosis.axis.rows import KnownEffect, Term
     from plant_emulator.diagnosis.execution.progress import Progress
     from plant_emulator.diagnosis.prediction.held_out import Plan
     from plant_emulator.signals.axis_log import AxisLog
@@ -52,11 +56,32 @@ class AxisRuns:
     """The runs of an axis, the fitted ones first.
 
     without : effects to take out of the library; own : the user's effects beside it
+    known : the parameter set that is diagnosed, if there is one
     """
 
     logs: tuple[AxisLog, ...]
     without: tuple[str, ...] = ()
     own: tuple[Effect, ...] = ()
+    known: KnownAxis | None = None
+
+    @property
+    def known_effects(self) -> tuple[KnownEffect, ...]:
+        """Effects of the parameter set."""
+        return self.known.effects if self.known else ()
+
+    @property
+    def library(self) -> list[Effect]:
+        """Effects that are tested: the user's own first, who knows the machine."""
+        taken = (*self.without, *(one.term.effect.name for one in self.known_effects))
+        return [one for one in (*self.own, *LIBRARY) if one.name not in taken]
+
+
+@dataclass(frozen=True, kw_only=True)
+class AxisResult(Findings):
+    """The findings on an axis; base, scale : what the sizes of effects refer to."""
+
+    base: Base
+    scale: Scale
 
 
 def diagnose_axis(
@@ -66,7 +91,7 @@ def diagnose_axis(
     settings: Mapping[str, str],
     notes: Sequence[str] = (),
     progress: Progress | None = None,
-) -> Findings:
+) -> AxisResult:
     """Test the effects, predict the held-out runs; give the findings.
 
     progress : called with the label of each step and its done share [1]
@@ -75,20 +100,20 @@ def diagnose_axis(
     logs = runs.logs
     check_alike(logs)
     tell = progress or (lambda _label, _share: None)
-    # Who writes an effect knows the machine: of two that do as well, the user's own is named.
-    effects = [e for e in (*runs.own, *LIBRARY) if e.name not in runs.without]
+    effects, known = runs.library, runs.known_effects
     tell("reading the motion", 0.0)
     prepared_runs, scale = prepared(logs)
+    _check_known(runs, prepared_runs[0].motion, scale)
     own = prepared_runs[: len(plan.fitted)]
     tell("testing effects", 0.3)
     width = 0.0
     terms: tuple[Term, ...] = ()
     for _ in range(ROUNDS):
-        before, width = width, best_width(own, scale, terms)
+        before, width = width, best_width(own, scale, terms, known)
         if abs(width - before) <= CLOSE * width:
             break
         scale = replace(scale, width=width)
-        regression, rows, library = start(prepared_runs, scale, len(own), effects, width)
+        regression, rows, library = start(prepared_runs, scale, len(own), effects, width, known)
         search = AxisSearch(regression=regression, candidates=library, scale=scale)
         search.run()
         terms = search.best.terms
@@ -97,7 +122,7 @@ def diagnose_axis(
     repeats = repeat_floor(held_out)
     noise = sensor_floor(rows, regression.base.inertia)
     floor = max(noise, repeats or 0.0)
-    decision = decide(search, held_out, noise, floor)
+    decision = decide(search, held_out, noise, floor, runs.known)
     found = findings.AxisFindings(
         search=search,
         held_out=held_out,
@@ -106,10 +131,11 @@ def diagnose_axis(
         sources=tuple(log.source for log in logs),
         fitted=plan.fitted,
         candidates=effects,
+        known=runs.known,
     )
     told = answer(found)
     tell("done", 1.0)
-    return Findings(
+    return AxisResult(
         answer=told,
         details=Details(
             traces=findings.traces(found),
@@ -120,6 +146,8 @@ def diagnose_axis(
         ),
         final=fit_result(decision.found, regression),
         fixed={},
+        base=regression.base,
+        scale=scale,
     )
 
 
@@ -131,6 +159,25 @@ def check_alike(logs: Sequence[AxisLog]) -> None:
             raise LogError(
                 f"{log.source}: {kinds[log.rotary]}, while {logs[0].source} is "
                 f"{kinds[logs[0].rotary]}; logs of one axis are needed"
+            )
+
+
+def _check_known(runs: AxisRuns, motion: Motion, scale: Scale) -> None:
+    """Refuse a parameter set of the other kind of axis, and of logs with other channels."""
+    source = runs.logs[0].source
+    if runs.known and runs.known.rotary != scale.rotary:
+        raise LogError(
+            f"{source}: a {'rotary' if scale.rotary else 'linear'} axis, while the parameter set "
+            "is that of the other kind; a set of this axis is needed"
+        )
+    for one in (known.term.effect for known in runs.known_effects):
+        rival = any(
+            e is not one and e.name == one.name and e.applies(motion, scale) for e in LIBRARY
+        )
+        if rival and not one.applies(motion, scale):
+            raise LogError(
+                f"{source}: {one.name} of the parameter set ({one.title}) was found in logs with "
+                "other channels; a log with the same channels is needed"
             )
 
 

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.axis.effects.effect import Effect
     from plant_emulator.diagnosis.axis.held_out import HeldOut
-    from plant_emulator.diagnosis.axis.regression import Term
+    from plant_emulator.diagnosis.axis.known import KnownAxis
+    from plant_emulator.diagnosis.axis.rows import Term
     from plant_emulator.diagnosis.axis.search import AxisSearch
     from plant_emulator.diagnosis.axis.verdict import Decision
     from plant_emulator.signals.log import Array
@@ -29,6 +30,7 @@ class AxisFindings:
     """The results of the search and of the held-out runs of an axis.
 
     floor : rms of the force's error [N or N m]; see `floor`
+    known : the parameter set, if there is one
     """
 
     search: AxisSearch
@@ -38,6 +40,7 @@ class AxisFindings:
     sources: tuple[str, ...]
     fitted: tuple[int, ...]
     candidates: Sequence[Effect]
+    known: KnownAxis | None = None
 
     @property
     def rotary(self) -> bool:
@@ -75,6 +78,11 @@ def traces(f: AxisFindings) -> tuple[Trace, ...]:
     )
 
 
+def nominal_errors(f: AxisFindings) -> list[Array]:
+    """Force that the parameter set misses on the predicted runs, else the recalibrated model."""
+    return f.held_out.nominal_errors(f.known.values) if f.known else f.held_out.errors(())
+
+
 def remainder(f: AxisFindings) -> Remainder:
     """The unmodelled remainder beside the named effects, by frequency."""
     regression, found = f.search.regression, f.decision.found
@@ -95,6 +103,9 @@ def remainder(f: AxisFindings) -> Remainder:
 def waterfall(f: AxisFindings) -> tuple[Step, ...]:
     """The waterfall of the held-out gap, in multiples of the floor."""
     found = []
+    if f.known:
+        gap = float(np.sqrt(np.mean(np.concatenate(nominal_errors(f)) ** 2))) / f.floor
+        found.append(Step(label="nominal", gap=gap, low=gap, high=gap))
     names = [t.effect.name for t in f.terms]
     for k in range(len(f.terms) + 1):
         label = (

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from plant_emulator.diagnosis.axis.held_out import HeldOut
-    from plant_emulator.diagnosis.axis.regression import Rows
+    from plant_emulator.diagnosis.axis.rows import Rows
     from plant_emulator.signals.log import Array
 
 # Correlation of force and position from which on two runs are repeats [1]: nine tenths of the

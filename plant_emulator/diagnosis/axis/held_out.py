@@ -12,13 +12,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.axis.effects import TIMING
-from plant_emulator.diagnosis.axis.regression import Term, residual
+from plant_emulator.diagnosis.axis.regression import residual
+from plant_emulator.diagnosis.axis.rows import Term
 from plant_emulator.diagnosis.prediction import block_bootstrap
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from plant_emulator.diagnosis.axis.regression import Regression, Rows
+    from plant_emulator.diagnosis.axis.regression import Regression
+    from plant_emulator.diagnosis.axis.rows import Rows
     from plant_emulator.signals.log import Array
 
     Folds = Sequence[tuple[tuple[int, ...], tuple[int, ...]]]
@@ -62,8 +64,16 @@ class HeldOut:
         return self.known[key]
 
     def measured(self) -> list[Array]:
-        """Averaged force of the predicted runs."""
-        return [self.rows[run].force(()) for run in self.runs]
+        """Averaged force of the predicted runs, as it was logged."""
+        return [self.rows[run].logged() for run in self.runs]
+
+    def nominal_errors(self, values: Sequence[float]) -> list[Array]:
+        """Force that nominal parameters as they are given miss, one array of rows a run."""
+        return [self.rows[run].force(()) - self.rows[run].nominal() @ values for run in self.runs]
+
+    def recalibrated(self, values: Sequence[float]) -> Share:
+        """Share by which the error falls where given nominal parameters are estimated again."""
+        return _share(self.errors(()), self.nominal_errors(values))
 
     def relative(self, terms: Sequence[Term], *, timing: bool = False) -> float:
         """norm(e) / norm(y) over all predicted runs [1]."""

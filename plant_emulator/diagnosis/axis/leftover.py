@@ -14,7 +14,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.axis.effects.effect import FORCE, Effect, Size
 from plant_emulator.diagnosis.axis.effects.friction import bristle
-from plant_emulator.diagnosis.axis.regression import Term
+from plant_emulator.diagnosis.axis.rows import Term
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -115,24 +115,25 @@ class Rest:
 
 
 def rest_of(held_out: HeldOut, terms: Sequence[Term]) -> Rest:
-    """What a law over one state would close on the held-out runs beside these effects.
-
-    A command is held for a sample, so that the stamps of force and motion may differ. The law has
-    to close its share with and without such a shift.
-    """
+    """What a law over one state would close on the held-out runs beside these effects."""
     first = held_out.rows[0]
     states = [*STATES, *([ANGLE] if first.scale.rotary else [])]
     if all(r.run.motion.load is not None for r in held_out.rows):
         states.append(LOAD)
     if terms:
-        # A lag may stand for a delay, or a spring for a load that is not logged. Without a name the
-        # friction of an axis that sticks, which is as large as the force, would look like one.
+        # A lag may stand for a delay, or a spring for a load that is not logged.
         states.append(FORCE_BEFORE)
-    found = []
-    for state in states:
-        both = (
-            held_out.share((*terms, Term(state)), terms, timing=shifted)
-            for shifted in (False, True)
-        )
-        found.append(Rest(state=state.name, share=min(both, key=lambda one: one.low)))
+    found = [rest_over(state, held_out, terms) for state in states]
     return max(found, key=lambda one: one.share.low)
+
+
+def rest_over(state: Effect, held_out: HeldOut, terms: Sequence[Term]) -> Rest:
+    """What a law over this state would close on the held-out runs beside these effects.
+
+    A command is held for a sample, so that the stamps of force and motion may differ. The law has
+    to close its share with and without such a shift.
+    """
+    both = (
+        held_out.share((*terms, Term(state)), terms, timing=shifted) for shifted in (False, True)
+    )
+    return Rest(state=state.name, share=min(both, key=lambda one: one.low))

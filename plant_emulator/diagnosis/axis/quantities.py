@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.answer import Quantity
-from plant_emulator.diagnosis.axis.regression import NAMES, Term, residual
+from plant_emulator.diagnosis.axis.regression import NAMES, residual
+from plant_emulator.diagnosis.axis.rows import Term
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.axis.regression import Fit, Regression

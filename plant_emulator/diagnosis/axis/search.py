@@ -14,7 +14,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.answer import SearchStep
 from plant_emulator.diagnosis.axis.motion import UNCERTAIN
-from plant_emulator.diagnosis.axis.regression import Term
+from plant_emulator.diagnosis.axis.rows import Term
 from plant_emulator.diagnosis.axis.settings import SETTINGS
 from plant_emulator.diagnosis.axis.start import grid
 
@@ -97,7 +97,7 @@ class AxisSearch:
         name = term.effect.name
         sizes, errors = found.sizes(term)
         if self._forbidden(found, term):
-            return f"{name} would do, but with a sign that physics forbids"
+            return f"{name} would do, but with a size that physics forbids"
         if len(sizes) and np.all(errors > np.abs(sizes)):
             return f"{name} would do, but no size of it is certain"
         for shape, value in zip(term.effect.shapes, term.shapes, strict=True):
@@ -111,8 +111,9 @@ class AxisSearch:
         """Whether a size is one that physics forbids, beyond its error."""
         sizes, errors = found.sizes(term)
         lowest = np.array([s.lowest for s in term.effect.sizes])
-        certain = np.any(sizes + UNCERTAIN * errors < lowest)
-        return bool(len(sizes) and (certain or np.all(sizes < lowest)))
+        highest = np.array([s.highest for s in term.effect.sizes])
+        beyond = np.maximum(lowest - sizes, sizes - highest)
+        return bool(len(sizes) and (np.any(beyond > UNCERTAIN * errors) or np.all(beyond > 0.0)))
 
     def gain(self, found: Fit) -> float:
         """Log evidence of a set over that of none."""

@@ -12,7 +12,8 @@ from plant_emulator.diagnosis.axis.effects import LIBRARY
 from plant_emulator.diagnosis.axis.effects.effect import Scale
 from plant_emulator.diagnosis.axis.floor import moved
 from plant_emulator.diagnosis.axis.motion import Base, prepare, with_width
-from plant_emulator.diagnosis.axis.regression import Regression, Rows, Term, rows_of
+from plant_emulator.diagnosis.axis.regression import Regression
+from plant_emulator.diagnosis.axis.rows import KnownEffect, Rows, Term, rows_of
 from plant_emulator.diagnosis.axis.settings import SETTINGS
 from plant_emulator.signals.noise import noise
 
@@ -48,7 +49,12 @@ def prepared(logs: Sequence[AxisLog]) -> tuple[list[Run], Scale]:
     return runs, scale_of(runs)
 
 
-def best_width(runs: Sequence[Run], scale: Scale, terms: Sequence[Term]) -> float:
+def best_width(
+    runs: Sequence[Run],
+    scale: Scale,
+    terms: Sequence[Term],
+    known: tuple[KnownEffect, ...] = (),
+) -> float:
     """Width of the Coulomb friction that leaves least of these runs beside these effects.
 
     The width is a speed [m/s or rad/s].
@@ -58,7 +64,7 @@ def best_width(runs: Sequence[Run], scale: Scale, terms: Sequence[Term]) -> floa
     least = max(run.motion.deviation for run in runs)
 
     def cost(width: float) -> float:
-        rows = [rows_of(with_width(run, width), scale) for run in runs]
+        rows = [rows_of(with_width(run, width), scale, known) for run in runs]
         begun = Regression(rows=rows, base=NOTHING)
         return begun.around(begun.fit(())).fit(terms).cost
 
@@ -71,14 +77,20 @@ def best_width(runs: Sequence[Run], scale: Scale, terms: Sequence[Term]) -> floa
 
 
 def start(
-    runs: Sequence[Run], scale: Scale, fitted: int, effects: Sequence[Effect], width: float
+    runs: Sequence[Run],
+    scale: Scale,
+    fitted: int,
+    effects: Sequence[Effect],
+    width: float,
+    known: tuple[KnownEffect, ...] = (),
 ) -> tuple[Regression, list[Rows], list[Effect]]:
     """Regression of the first `fitted` runs, rows of all runs, and the effects that apply.
 
-    width : of the Coulomb friction
+    width : of the Coulomb friction; known : effects of the parameter set
     """
-    rows = [rows_of(with_width(run, width), scale) for run in runs]
-    library = [e for e in effects if all(e.applies(r.motion, scale) for r in runs)]
+    rows = [rows_of(with_width(run, width), scale, known) for run in runs]
+    usable = [e for e in effects if e.has_room(scale)]
+    library = [e for e in usable if all(e.applies(r.motion, scale) for r in runs)]
     begun = Regression(rows=rows[:fitted], base=NOTHING)
     around = begun.around(begun.fit(()))
     rich = richest(around, library, scale)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.axis.leftover import rest_of
+from plant_emulator.diagnosis.axis.leftover import FORCE_BEFORE, rest_of, rest_over
 from plant_emulator.diagnosis.axis.motion import UNCERTAIN
 from plant_emulator.diagnosis.axis.settings import SETTINGS
 
@@ -15,9 +15,11 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from plant_emulator.diagnosis.answer import Kind
-    from plant_emulator.diagnosis.axis.held_out import HeldOut
+    from plant_emulator.diagnosis.axis.held_out import HeldOut, Share
+    from plant_emulator.diagnosis.axis.known import KnownAxis
     from plant_emulator.diagnosis.axis.leftover import Rest
-    from plant_emulator.diagnosis.axis.regression import Fit, Regression, Rows
+    from plant_emulator.diagnosis.axis.regression import Fit, Regression
+    from plant_emulator.diagnosis.axis.rows import Rows
     from plant_emulator.diagnosis.axis.search import AxisSearch
 
 
@@ -34,10 +36,17 @@ class Decision:
     inertia: tuple[tuple[int, float, float], ...] = ()
 
 
-def decide(search: AxisSearch, held_out: HeldOut, noise: float, floor: float) -> Decision:
+def decide(
+    search: AxisSearch,
+    held_out: HeldOut,
+    noise: float,
+    floor: float,
+    known: KnownAxis | None = None,
+) -> Decision:
     """Decide by the held-out runs.
 
     noise, floor : rms of the force's error that the sensors' noise leaves, and repeats
+    known : the parameter set, if there is one
     """
     found, reason = _confirmed(search, held_out)
     other = other_inertia(held_out.regression, held_out.rows)
@@ -47,11 +56,20 @@ def decide(search: AxisSearch, held_out: HeldOut, noise: float, floor: float) ->
     if other and own.low > 0.0 and own.value > closed:
         return Decision(kind="parameter", found=search.null, inertia=other)
     if not found.terms:
-        return _without_a_name(search, held_out, noise, floor, reason)
+        decision = _without_a_name(search, held_out, noise, floor, reason)
+        if decision.kind == "none" and known and _has_other_values(known, search, held_out):
+            return replace(decision, kind="parameter")
+        return decision
     reason = _insufficient(found, held_out)
     if reason:
         return Decision(kind="unknown", found=search.null, reason=reason)
     return Decision(kind="effect", found=found)
+
+
+def _has_other_values(known: KnownAxis, search: AxisSearch, held_out: HeldOut) -> bool:
+    """Whether parameters differ from those of the set, and this closes a share of the error."""
+    closed = held_out.recalibrated(known.values)
+    return bool(known.deviating(search.null)) and _is_found(closed)
 
 
 def _insufficient(found: Fit, held_out: HeldOut) -> str:
@@ -66,6 +84,10 @@ def _insufficient(found: Fit, held_out: HeldOut) -> str:
     # A cause leaves noise, and a neighbour of the cause leaves a law.
     rest, closed = rest_of(held_out, found.terms), held_out.share(found.terms, ()).value
     more = rest.share.low > SETTINGS.worth and rest.share.value > closed
+    # A delay and a lag are exact laws: beside them the force before has nothing left to say.
+    if any(term.effect.replaced for term in found.terms):
+        before = rest_over(FORCE_BEFORE, held_out, found.terms)
+        rest, more = (before, True) if _is_found(before.share) else (rest, more)
     if more or rest.share.low > SETTINGS.systematic:
         return f"{told} closes {describe(closed)}, and {_described(rest)} beside it"
     return ""
@@ -77,7 +99,7 @@ def _without_a_name(
     """The verdict where no effect is confirmed; reason : why the best one is not."""
     found = search.null
     rest = rest_of(held_out, ())
-    if rest.share.low > SETTINGS.worth:
+    if _is_found(rest.share):
         return Decision(kind="unknown", found=found, reason=reason or _described(rest))
     plain, left = (
         float(np.mean(np.concatenate(held_out.errors((), timing=timing)) ** 2))
@@ -85,6 +107,10 @@ def _without_a_name(
     )
     if held_out.relative((), timing=True) <= SETTINGS.worth:
         return Decision(kind="none", found=found)
+    # The friction of an axis that sticks looks like a force before, and is not worth a name.
+    before = rest_over(FORCE_BEFORE, held_out, ())
+    if _is_found(before.share):
+        return Decision(kind="unknown", found=found, reason=reason or _described(before))
     if plain * SETTINGS.noisy < noise**2:
         reason = "what is left changes more from sample to sample than noise does"
     elif left <= SETTINGS.noisy * floor**2:
@@ -141,11 +167,16 @@ def _failing(search: AxisSearch, held_out: HeldOut, found: Fit) -> tuple[str, st
             shares.append(held_out.share(found.terms, rest, timing=True))
         share = min(shares, key=lambda s: s.low)
         why = search.doubt(found, term)
-        if min(s.value for s in shares) < SETTINGS.worth or share.low <= 0.0:
+        if not all(map(_is_found, shares)):
             why = f"the held-out runs do not confirm {name} ({describe(share.value)} closed)"
         if why and (worst is None or share.low < worst[0]):
             worst = (share.low, name, why)
     return None if worst is None else worst[1:]
+
+
+def _is_found(share: Share) -> bool:
+    """Whether the held-out runs confirm that something closes a share that is worth a name."""
+    return share.value >= SETTINGS.worth and share.low > 0.0
 
 
 def _described(rest: Rest) -> str:

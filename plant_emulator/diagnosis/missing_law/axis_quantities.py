@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.axis.effects import Effect, Size
-from plant_emulator.diagnosis.axis.regression import Term
+from plant_emulator.diagnosis.axis.rows import Term
 from plant_emulator.diagnosis.missing_law.quantity import LawQuantity
 from plant_emulator.diagnosis.missing_law.reduced import LawRows, RunRows
 from plant_emulator.diagnosis.missing_law.states import LawState
@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from plant_emulator.diagnosis.axis.motion import Base, Motion
-    from plant_emulator.diagnosis.axis.regression import Regression, Rows
+    from plant_emulator.diagnosis.axis.regression import Regression
+    from plant_emulator.diagnosis.axis.rows import Rows
     from plant_emulator.diagnosis.missing_law.states import Kind
     from plant_emulator.signals.log import Array
 

@@ -9,11 +9,10 @@ import numpy as np
 
 from plant_emulator.diagnosis.answer import RankedEffect
 from plant_emulator.diagnosis.axis.diagnose import fit_result
-from plant_emulator.diagnosis.axis.effects import LIBRARY
 from plant_emulator.diagnosis.axis.held_out import HeldOut
 from plant_emulator.diagnosis.axis.leftover import STATES
 from plant_emulator.diagnosis.axis.quantities import quantities
-from plant_emulator.diagnosis.axis.regression import Term
+from plant_emulator.diagnosis.axis.rows import Term
 from plant_emulator.diagnosis.axis.search import AxisSearch
 from plant_emulator.diagnosis.axis.settings import SETTINGS
 from plant_emulator.diagnosis.axis.start import best_width, prepared, start
@@ -128,9 +127,10 @@ def begin(runs: AxisRuns, plan: Plan) -> HeldOut:
     """The held-out runs of an axis, and the regression of the fitted ones."""
     every, scale = prepared(runs.logs)
     own = every[: len(plan.fitted)]
-    width = best_width(own, scale, ())
-    library = [one for one in (*runs.own, *LIBRARY) if one.name not in runs.without]
-    regression, rows, _ = start(every, replace(scale, width=width), len(own), library, width)
+    known = runs.known_effects
+    width = best_width(own, scale, (), known)
+    scale = replace(scale, width=width)
+    regression, rows, _ = start(every, scale, len(own), runs.library, width, known)
     return HeldOut(rows=rows, regression=regression, folds=plan.folds)
 
 

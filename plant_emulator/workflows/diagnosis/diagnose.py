@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from threadpoolctl import threadpool_limits
 
-from plant_emulator.diagnosis.axis.diagnose import AxisRuns, diagnose_axis
+from plant_emulator.diagnosis.axis.diagnose import AxisResult, AxisRuns, diagnose_axis
 from plant_emulator.diagnosis.diagnose import Diagnose
 from plant_emulator.diagnosis.execution.progress import ReportingPool
 from plant_emulator.diagnosis.report.document import to_json
@@ -27,6 +27,7 @@ from plant_emulator.workflows.arguments import (
     list_names,
     list_sources,
 )
+from plant_emulator.workflows.diagnosis import axis_set
 from plant_emulator.workflows.diagnosis.calibration import load_model_form_errors, trial_cases
 from plant_emulator.workflows.diagnosis.drafting import Drafted
 from plant_emulator.workflows.diagnosis.drafting import draft as draft_law
@@ -52,8 +53,7 @@ DRAFTS = "drafts"
 class Diagnosis:
     """The result of a diagnosis; `print` shows it as the command `diagnose` does.
 
-    given : the parameter set that was diagnosed; None: the machine is a single axis
-    rotary : whether a single axis turns
+    given : the parameter set that was diagnosed; None: a single axis without one
     fitted : the runs of the bench that were not held out
     effect_files : of the user's own effects, absolute
     drafted : drafts of a missing law, with their fits; None: nobody asked, or it cannot be done
@@ -62,7 +62,6 @@ class Diagnosis:
     findings: Findings
     given: ParameterSet | None
     fitted: tuple[Recording, ...]
-    rotary: bool = False
     effect_files: tuple[str, ...] = ()
     drafted: Drafted | None = None
 
@@ -90,8 +89,10 @@ class Diagnosis:
             if self.drafted.of_axis:
                 answer = replace(self.answer, ranking=self.drafted.of_axis[:1])
                 findings = replace(findings, answer=answer)
-        if self.given is None:
-            return axis_parameter_set(findings, files, rotary=self.rotary)
+        if isinstance(findings, AxisResult):
+            of_set = {} if self.given is None else self.given.effect_files
+            return axis_parameter_set(findings, self.given, {**of_set, **files})
+        assert self.given is not None
         return parameter_set(findings, self.given, self.fitted, files)
 
     def to_json(self) -> dict[str, Any]:
@@ -144,7 +145,8 @@ def diagnose(
     logs : paths of log files, or logs that were read, all of one machine; for an axis also a part
         in time of a file, FILE@12.5:20 [s]
     hold_out : logs to predict; without any, every log is held out in turn
-    parameters : a parameter set, the name of a shipped one, or the path of its file
+    parameters : a parameter set, the name of a shipped one, or the path of its file; of an axis
+        only one that a diagnosis saved
     model : the roller bench, or a single motor-driven axis
     without : names of effects to take out of the library
     effect_files : files of your own effects beside the library
@@ -169,9 +171,9 @@ def diagnose(
     check_count("workers", workers, 1)
     if model == "bench" and (columns or one_run):
         raise InputError("columns and one_run belong to the model axis")
-    given = None if model == "axis" else _set(parameters, effect_files)
     runs: Runs[Any]
-    if given is None:
+    if model == "axis":
+        given = _axis_set(parameters)
         runs = axis_runs(
             logs,
             hold_out,
@@ -179,8 +181,10 @@ def diagnose(
             effect_files=effect_files,
             columns=columns,
             one_run=one_run,
+            parameters=given,
         )
     else:
+        given = _set(parameters, effect_files)
         runs = bench_runs(
             logs,
             hold_out,
@@ -202,7 +206,6 @@ def diagnose(
         findings=findings,
         given=given,
         fitted=runs.fitted,
-        rotary=isinstance(runs.recipe, AxisRuns) and runs.recipe.logs[0].rotary,
         effect_files=tuple(str(Path(file).absolute()) for file in effect_files),
         drafted=drafted,
     )
@@ -266,3 +269,10 @@ def _set(parameters: ParameterSet | str | Path, effect_files: Sequence[str | Pat
     if isinstance(parameters, ParameterSet):
         return parameters
     return with_effects.load(parameters, effect_files)
+
+
+def _axis_set(parameters: ParameterSet | str | Path) -> ParameterSet | None:
+    """The set of an axis; None for the default, which is that of the bench."""
+    if isinstance(parameters, ParameterSet):
+        return parameters
+    return None if str(parameters) == DEFAULT else axis_set.load(parameters)

@@ -21,6 +21,7 @@ from plant_emulator.signals.axis_log import AxisLog
 from plant_emulator.signals.log import WHEEL_TORQUE, Log
 from plant_emulator.workflows.axis_files.own_effects import own_effects
 from plant_emulator.workflows.diagnosis.axis_parts import file_of, read_runs
+from plant_emulator.workflows.diagnosis.axis_set import known_axis
 from plant_emulator.workflows.diagnosis.plan import plan_of_runs, plan_recordings
 from plant_emulator.workflows.loading import (
     check_distinct,
@@ -115,6 +116,7 @@ def axis_runs(
     effect_files: Sequence[str | Path] = (),
     columns: Sequence[str] | Mapping[str, str] = (),
     one_run: bool = False,
+    parameters: ParameterSet | None = None,
 ) -> Runs[AxisRuns]:
     """The runs of logs of a single axis; arguments and errors as those of `bench_runs`.
 
@@ -122,6 +124,7 @@ def axis_runs(
     one_run : the files of `logs` are one run
     """
     own = own_effects(effect_files)
+    known = None if parameters is None else known_axis(parameters)
     _check_names(without, [*AXIS_EFFECTS, *(effect.name for effect in own)])
     sources = [_axis_source(one) for one in (*logs, *held_out)]
     fitted, predicted = read_runs(
@@ -135,6 +138,7 @@ def axis_runs(
     words = columns if not isinstance(columns, Mapping) else map("=".join, columns.items())
     settings = {
         "model": "axis",
+        "parameters": parameters.name if parameters else "-",
         "columns": ", ".join(words) or "-",
         "files": "parts of one run" if one_run else "a run each",
         "without": ", ".join(without) or "-",
@@ -142,10 +146,12 @@ def axis_runs(
     }
     files = dict.fromkeys(file_of(one) for one in sources if not isinstance(one, AxisLog))
     return Runs(
-        recipe=AxisRuns(tuple(runs), tuple(without), own),
+        recipe=AxisRuns(tuple(runs), tuple(without), own, known),
         plan=plan,
         notes=tuple(axis_notes(runs)),
-        settings=_settings(settings, [*files, *effect_files]),
+        settings=_settings(
+            settings, [*files, *([parameters.name] if parameters else []), *effect_files]
+        ),
     )
 
 

@@ -14,11 +14,13 @@ from plant_emulator.diagnosis.axis.quantities import UNITS
 from plant_emulator.estimation.initial_states import with_logged_values
 from plant_emulator.model.parameters import Parameter, ParameterSet
 from plant_emulator.solver.kernel import kernel
+from plant_emulator.workflows.diagnosis.axis_set import reference_entries
 from plant_emulator.workflows.provenance import program_version, today
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from plant_emulator.diagnosis.axis.diagnose import AxisResult
     from plant_emulator.diagnosis.diagnose import Findings
     from plant_emulator.effects import Effect
     from plant_emulator.recordings.recording import Recording
@@ -63,13 +65,16 @@ def parameter_set(
 
 
 def axis_parameter_set(
-    findings: Findings, files: Mapping[str, str], *, rotary: bool
+    findings: AxisResult, given: ParameterSet | None, files: Mapping[str, str]
 ) -> ParameterSet:
-    """The fitted values of an axis, and the effects that the answer names.
+    """The fitted values of an axis, and the effects that the answer names beside those given.
 
-    files : of the user's own effects, by effect
+    The sizes of an effect refer to the axis as it was fitted, which the set therefore holds.
+    given : the parameter set that was diagnosed; files : of the user's own effects, by effect
     """
-    final, units = findings.final, UNITS[rotary]
+    final, units = findings.final, UNITS[findings.scale.rotary]
+    before = {} if given is None else given.effects
+    refers_to = reference_entries(findings.base, findings.scale)
     parameters = {
         name: Parameter(
             name=name,
@@ -89,14 +94,15 @@ def axis_parameter_set(
             for q in one.parameters
             if q.name.startswith(f"{name}_")
         }
+        | refers_to
         for name, one in named.items()
     }
     return ParameterSet(
         name="axis",
         parameters=parameters,
         origin={**_origin(findings), "model": "axis"},
-        effects=effects,
-        effect_files={name: file for name, file in files.items() if name in named},
+        effects={**before, **effects},
+        effect_files={name: file for name, file in files.items() if name in (*before, *named)},
     )
 
 

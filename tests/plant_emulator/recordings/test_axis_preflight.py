@@ -1,5 +1,6 @@
 """What is noticed of a run of an axis before anything is fitted."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -101,6 +102,18 @@ def test_the_note_has_travel_speed_and_power_and_asks_where_they_are_large() -> 
     assert "?" not in note
     asked = magnitude_note([replace(LOG, position=POSITION * 180.0 / np.pi)])
     assert fast * 180.0 / np.pi < 600.0 or "are the values in deg?" in asked
+
+
+def test_a_torque_that_may_be_in_millinewtons_is_doubted_until_its_unit_is_named() -> None:
+    # A drive of 0.5 W that is logged in mN m has 500 W in N m.
+    peak = float(np.max(np.abs(TORQUE * VELOCITY)))
+    small = replace(LOG, force=TORQUE * 500.0 / peak)
+    note = magnitude_note([small])
+    assert "W if the values are in mNm: --column force=COLUMN:Nm or :mNm tells which" in note
+    found = re.search(r"with up to ([\d.]+) W, or ([\d.]+) W if", note)
+    assert found is not None
+    assert [float(v) for v in found.groups()] == pytest.approx([500.0, 0.5], rel=0.1)
+    assert "mNm" not in magnitude_note([replace(small, confirmed=frozenset({"force"}))])
 
 
 def test_unused_columns_are_told_once() -> None:

@@ -53,12 +53,13 @@ class Context:
 class Size:
     """A linear constant.
 
-    unit : of a linear and of a rotary axis; lowest : that physics allows
+    unit : of a linear and of a rotary axis; lowest, highest : that physics allows
     """
 
     name: str
     unit: tuple[str, str]
     lowest: float = float("-inf")
+    highest: float = float("inf")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,6 +107,10 @@ class Effect:
     def constants(self) -> list[Size | Shape]:
         """Sizes, then shapes."""
         return [*self.sizes, *self.shapes]
+
+    def has_room(self, scale: Scale) -> bool:
+        """Whether the bounds of every shape leave room between them."""
+        return all(low < high for low, high in (s.bounds(scale) for s in self.shapes))
 
     def to_json(self) -> dict[str, Any]:
         """The effect as an entry of the document `effects/1`; units of a linear, a rotary axis."""

@@ -120,8 +120,9 @@ FRICTION = (
         equation="F + F_s exp(-(q'/v_s)^2) sgn q'",
         needs="slow motion",
         sizes=(Size(name="rise", unit=FORCE, lowest=0.0),),
-        # A rise that is narrower than the change of the sign would only mend its form.
-        shapes=(Shape(name="speed", unit=SPEED, lower=0.005, upper=0.5, of="speed", widths=4.0),),
+        # A rise that is narrower than the change of the sign would only mend its form, and one over
+        # most of the speeds is a curve of the friction.
+        shapes=(Shape(name="speed", unit=SPEED, lower=0.005, upper=0.2, of="speed", widths=4.0),),
         columns=_stribeck,
     ),
     Effect(
@@ -159,7 +160,8 @@ FRICTION = (
         subsystem="gear",
         equation="F + mu |T| sgn q', T the logged load, else M q''",
         needs="several loads, or accelerations",
-        sizes=(Size(name="ratio", unit=NONE, lowest=0.0),),
+        # A friction as large as the force that it grows with holds the axis.
+        sizes=(Size(name="ratio", unit=NONE, lowest=0.0, highest=1.0),),
         columns=_load_friction,
     ),
     Effect(

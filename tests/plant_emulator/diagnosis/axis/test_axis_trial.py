@@ -57,3 +57,15 @@ def test_a_hidden_effect_is_named_and_unknown_without_it() -> None:
     runs = axis_trial.logs(hidden)
     assert axis_trial.is_right("quadratic_drag", axis_trial.diagnosed(runs))
     assert axis_trial.diagnosed(runs, ("quadratic_drag",)).verdict.kind == "unknown"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("seed", "effect"),
+    [(9, "quadratic_drag"), (23, "elasticity"), (27, "delay"), (1096, "coulomb_asymmetry")],
+)
+def test_an_effect_that_the_library_lacks_is_unknown(seed: int, effect: str) -> None:
+    """Neighbours that nearly do: a wide rise of friction, noise, a lag, an offset."""
+    hidden = axis_trial.case(seed)
+    assert hidden.effect == effect
+    assert axis_trial.diagnosed(axis_trial.logs(hidden), (effect,)).verdict.kind == "unknown"

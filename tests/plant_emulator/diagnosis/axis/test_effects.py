@@ -1,10 +1,13 @@
 """Laws of the axis' effects against closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from plant_emulator.diagnosis.axis.effects import LIBRARY
+from plant_emulator.diagnosis.axis.effects.effect import Scale
 from plant_emulator.diagnosis.axis.effects.friction import bristle
 from plant_emulator.diagnosis.axis.effects.gap import crossed
 from plant_emulator.diagnosis.axis.motion import Motion
@@ -12,6 +15,23 @@ from plant_emulator.diagnosis.axis.motion import Motion
 Array = NDArray[np.float64]
 BY_NAME = {effect.name: effect for effect in LIBRARY}
 TIME = np.arange(0.0, 4.0, 1e-3)
+
+
+def test_a_rise_of_friction_needs_room_above_the_width_of_its_sign() -> None:
+    """It is four widths at least and a fifth of the highest speed at most."""
+    scale = Scale(
+        force=1.0,
+        speed=1.0,
+        acceleration=1.0,
+        middle=0.0,
+        travel=1.0,
+        period=1e-3,
+        length=10.0,
+        rotary=True,
+        width=0.04,
+    )
+    assert BY_NAME["stribeck"].has_room(scale)
+    assert not BY_NAME["stribeck"].has_room(replace(scale, width=0.06))
 
 
 def test_a_bristle_bends_exponentially_and_turns_with_the_motion() -> None:
