@@ -32,7 +32,7 @@ class TorqueFault:
         assert reading.shaft_torque_integral is not None
         if self._held is None:
             self._held = reading.shaft_torque
-            self._true_integral = reading.shaft_torque_integral
+            self._true_integral = reading.shaft_torque_integral - reading.shaft_torque_mean * SCAN
         mean = self.shown(reading.shaft_torque_mean, self._held)
         assert self._true_integral is not None
         self._shift += mean * SCAN - (reading.shaft_torque_integral - self._true_integral)
