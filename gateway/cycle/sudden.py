@@ -1,0 +1,91 @@
+"""A sudden fault of torque sensor or current, against what the bench has shown before (pure).
+
+Drifted parameters make the motor's balance wrong by a share of its torque, for hours. Their part
+stands in the slow mean of the residual, and a change of the torque changes it by a share of that
+change only. So the residual less its slow mean has a closer tolerance than the residual itself.
+
+A wrong gain of the torque sensor is an error that follows its own torque, and a loop that answers
+to it swings through zero. The product of both does not. The drive's ripple, of which a poll sees
+one moment a scan, changes its sign from scan to scan; the product takes means over three scans.
+"""
+
+from dataclasses import dataclass
+from math import exp
+from statistics import fmean
+
+SLOW, SMOOTH, FADE = 1.0, 0.1, 0.3
+"""[s] Time constants of the slow means, of the torque whose distance to its slow mean is the
+change, and of a large change that fades."""
+SCANS = 3
+"""Windows over which the product takes its means."""
+RIPPLE, CHANGE_SHARE = 2.0, 1.5
+"""[1] Tolerance over that of the balance itself: of a steady torque, because the drive answers to
+the noise in the setpoint with a current of which a poll knows one moment a scan; and of a change of
+the torque."""
+LIGHT = 3.0
+"""[N m] Torque below which the product's tolerance no longer falls."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Steady:
+    """What the bench has shown of late.
+
+    since : time over which the slow means are taken [s]
+    residual, torque : slow means of the motor's balance, and of its torque [N m]
+    smooth, change : motor's torque smoothed, and its distance to the slow mean, fading [N m]
+    sudden, shown : of the last windows, the residual less its slow mean, and the sensor's torque
+        [N m]
+    """
+
+    since: float = 0.0
+    residual: float = 0.0
+    torque: float = 0.0
+    smooth: float = 0.0
+    change: float = 0.0
+    sudden: tuple[float, ...] = ()
+    shown: tuple[float, ...] = ()
+
+
+def note(
+    state: Steady,
+    residual: float,
+    torque: float,
+    duration: float,
+    *,
+    shown: float,
+    largest: float,
+) -> Steady:
+    """Return the means after one more window: residual, motor's torque [N m], duration [s].
+
+    shown : torque of the sensor over the window [N m]
+    largest : residual that drifted parameters may cause, so that no fault gets into its mean [N m]
+    Until SLOW has passed, the slow means are those of all windows.
+    """
+    since = state.since + duration
+    weight = max(1.0 - exp(-duration / SLOW), duration / since)
+    residual_mean = state.residual + weight * (residual - state.residual)
+    slow = state.torque + weight * (torque - state.torque)
+    smooth = torque + (state.smooth - torque) * exp(-duration / SMOOTH)
+    return Steady(
+        since=since,
+        residual=min(max(residual_mean, -largest), largest),
+        torque=slow,
+        smooth=smooth,
+        change=max(state.change * exp(-duration / FADE), abs(smooth - slow)),
+        sudden=(*state.sudden, residual - state.residual)[-SCANS:],
+        shown=(*state.shown, shown)[-SCANS:],
+    )
+
+
+def tolerance(state: Steady, torque: float, share: float) -> float:
+    """Tolerance of a sudden change of the motor's balance [N m].
+
+    torque, share : tolerance of the balance [N m], and its share of the motor's torque [1]
+    """
+    return RIPPLE * torque + CHANGE_SHARE * share * state.change
+
+
+def product(state: Steady, share: float) -> tuple[float, float]:
+    """Mean of the sudden residual times mean torque, and its tolerance [N^2 m^2]."""
+    sudden, shown = fmean(state.sudden), fmean(state.shown)
+    return sudden * shown, CHANGE_SHARE * share * max(abs(shown), LIGHT) ** 2
