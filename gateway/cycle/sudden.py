@@ -17,13 +17,14 @@ SLOW, SMOOTH, FADE = 1.0, 0.1, 0.3
 """[s] Time constants of the slow means, of the torque whose distance to its slow mean is the
 change, and of a large change that fades."""
 SCANS = 3
-"""Windows over which the product takes its means."""
+"""Windows of a mean without the ripple, in which the product and an impact are seen."""
 RIPPLE, CHANGE_SHARE = 2.0, 1.5
 """[1] Tolerance over that of the balance itself: of a steady torque, because the drive answers to
 the noise in the setpoint with a current of which a poll knows one moment a scan; and of a change of
 the torque."""
-LIGHT = 3.0
-"""[N m] Torque below which the product's tolerance no longer falls."""
+LIGHT, HIT = 3.0, 10.0
+"""[N m] Torque below which the product's tolerance no longer falls, and change of both torques from
+which on the flanks have met at speed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,8 +34,8 @@ class Steady:
     since : time over which the slow means are taken [s]
     residual, torque : slow means of the motor's balance, and of its torque [N m]
     smooth, change : motor's torque smoothed, and its distance to the slow mean, fading [N m]
-    sudden, shown : of the last windows, the residual less its slow mean, and the sensor's torque
-        [N m]
+    motor, shown, sudden : of the last windows, torque of the motor and of the sensor, and the
+        residual less its slow mean [N m]
     """
 
     since: float = 0.0
@@ -42,8 +43,9 @@ class Steady:
     torque: float = 0.0
     smooth: float = 0.0
     change: float = 0.0
-    sudden: tuple[float, ...] = ()
+    motor: tuple[float, ...] = ()
     shown: tuple[float, ...] = ()
+    sudden: tuple[float, ...] = ()
 
 
 def note(
@@ -65,15 +67,21 @@ def note(
     weight = max(1.0 - exp(-duration / SLOW), duration / since)
     residual_mean = state.residual + weight * (residual - state.residual)
     slow = state.torque + weight * (torque - state.torque)
+    motor, both = (*state.motor, torque)[-SCANS:], (*state.shown, shown)[-SCANS:]
+    # Flanks that meet move both torques at once; a sensor that fails moves its own alone.
+    impact = min(abs(fmean(motor) - slow), abs(fmean(both) + slow))
     smooth = torque + (state.smooth - torque) * exp(-duration / SMOOTH)
     return Steady(
         since=since,
         residual=min(max(residual_mean, -largest), largest),
         torque=slow,
         smooth=smooth,
-        change=max(state.change * exp(-duration / FADE), abs(smooth - slow)),
+        change=max(
+            state.change * exp(-duration / FADE), abs(smooth - slow), impact * (impact > HIT)
+        ),
+        motor=motor,
+        shown=both,
         sudden=(*state.sudden, residual - state.residual)[-SCANS:],
-        shown=(*state.shown, shown)[-SCANS:],
     )
 
 

@@ -101,6 +101,16 @@ def test_change_of_torque_is_tolerated_by_a_share():
     assert reason(P, seen, running=True) is None
 
 
+def test_flanks_that_meet_at_speed_are_no_fault_of_a_sensor():
+    """90 N m more within a scan on both sides, 20 % of it missing, for 0.1 s."""
+    hit = replace(DRIVING, armature_current=10.0 + 90.0 / 1.8506, shaft_torque=-18.506 - 72.0)
+    seen = after(hit, before=hit, windows=10, state=BALANCED)
+    assert reason(P, seen, running=True) is None
+    alone = replace(hit, armature_current=10.0)
+    seen = after(alone, before=alone, windows=10, state=BALANCED)
+    assert reason(P, seen, running=True) is Reason.TORQUE_MODEL
+
+
 def test_slow_mean_takes_no_more_of_a_fault_than_parameters_may_cause():
     """After 10 s of a dead sensor it stands at 1 N m and 20 % of 18.506 N m."""
     dead = replace(DRIVING, shaft_torque=0.0)
