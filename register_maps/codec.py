@@ -8,7 +8,7 @@ tick.
 The `range` of the map binds the gateway in both directions: it refuses measurements and setpoints
 outside. On the PLC's side (`encode_measurement`, `decode_setpoint`) only the raw type binds,
 because the PLC has limits of its own, and an emulated PLC must be able to send a wrong value. A
-counter marked `wraps` may be given unwrapped; it starts again at the end of its type.
+counter marked `wraps` may be given unwrapped; it starts again at the end of its range.
 """
 
 import math

@@ -154,10 +154,10 @@ def raw_of(this: Conversion, value: Value) -> float:
 
 
 def _integer_raw(this: Conversion, wanted: float) -> int:
-    """Nearest integer; a counter starts again at the end of its type."""
+    """Nearest integer; a counter starts again at the end of its range."""
     raw = round(wanted)
     if this.register.wraps:
-        lowest, highest = int(this.register.raw.low), int(this.register.raw.high)
+        lowest, highest = int(this.low), int(this.high)
         return (raw - lowest) % (highest - lowest + 1) + lowest
     return raw
 

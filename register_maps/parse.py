@@ -22,7 +22,7 @@ access       "read" (in the measurement block) or "write" (in the command block)
 description, source   what the register is; the document that says so
 not_available  bit pattern that means "no value" (integers; outside the range)
 constant     the only scaled value; any other value is refused
-wraps        true: a counter that starts again at the end of its type
+wraps        true: a counter that starts again at the end of its range
 crc          "crc32": checksum over the words of the command block before this one
 count        number of such registers in a row (only signal "reserved")
 """

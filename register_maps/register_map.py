@@ -61,7 +61,7 @@ class Register:
     range : lowest and highest scaled value
     not_available : raw value with which the PLC says that it has no value
     constant : the only scaled value that the register may hold
-    wraps : the register is a counter that starts again at the end of its type
+    wraps : the register is a counter that starts again at the end of its range
     crc : the register is a checksum over the words of the block before it
     """
 
@@ -156,5 +156,5 @@ class RegisterMap:
         register = self.register(signal)
         if register is None or not register.wraps:
             return None
-        span = (register.raw.high - register.raw.low + 1) * abs(register.scale)
-        return span * register.si_unit.factor
+        lowest, highest = register.range
+        return (highest - lowest + abs(register.scale)) * register.si_unit.factor

@@ -78,12 +78,14 @@ def _check_range(entry: Entry, register: Register) -> None:
 
 
 def _check_counter(entry: Entry, register: Register) -> None:
-    """Refuse a counter without the whole range of its type, and a marker inside the range."""
-    whole = (register.raw.low, register.raw.high)
+    """Refuse a counter that is no integer or has ends between two, and a marker in the range."""
+    digits = [(end - register.offset) / register.scale for end in register.range]
     if register.wraps and register.type not in _INTEGERS:
         raise entry.error("wraps", f"false, since only {', '.join(_INTEGERS)} wrap")
-    if register.wraps and raw_limits(register) != whole:
-        raise entry.error("range", "the whole range of the type, since the counter wraps")
+    if register.wraps and any(abs(digit - round(digit)) > 1e-6 for digit in digits):
+        raise entry.error(
+            "range", "two values of the counter, since it wraps from one to the other"
+        )
     if register.not_available is None:
         return
     if register.type == "float32":

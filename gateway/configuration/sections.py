@@ -180,7 +180,8 @@ class PlausibilityConfig:
     tare : mean torque that the sensor may show at standstill [N m]
     motor_speed_noise, drum_speed_noise [rad/s], torque_noise [N m], current_noise [A] : standard
         deviations of the sensors
-    noisy_speeds : the speed sensors always show noise, so that one without any is stuck
+    noisy_sensors : sensors of torque, current and speeds always show noise in motion, so that one
+        without any is stuck
     """
 
     false_alarms: float = declare(
@@ -196,7 +197,7 @@ class PlausibilityConfig:
     drum_speed_noise: float = declare("drum_speed_noise_rad_s", 0.01, lower=0.0, upper=1.0)
     torque_noise: float = declare("torque_noise_Nm", 0.25, lower=0.0, upper=10.0)
     current_noise: float = declare("current_noise_A", 0.25, lower=0.0, upper=10.0)
-    noisy_speeds: bool = declare("noisy_speeds", False)
+    noisy_sensors: bool = declare("noisy_sensors", False)
 
 
 @dataclass(frozen=True, kw_only=True)

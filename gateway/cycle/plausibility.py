@@ -15,20 +15,33 @@ Drum. The rest of the torques on the drum is that of the truck, which has a limi
 
     e_3 = (J_g + J_d) (omega_d2 - omega_d1) + integral (xi T_meas + T_f) dt     (thesis, eq 4.9)
 
+Two relations hold more closely for a while. A sudden fault shows against the slow mean of e_1, in
+which drifted parameters stand; only their share of a change of the torque is left:
+
+    e_4 = e_1 - integral (slow mean of e_1) dt
+    e_6 = integral (e_4 / dt) T_meas dt, with means over three windows
+
+While the gear pushes the motor, the flanks are in contact and the backlash is closed. The sensor
+then shows a torque that no friction of a free gear can make, whatever its size, because friction
+has the other sign (the bench turns forward only):
+
+    e_5 = e_2 since T_meas > T_c
+
 A CUSUM adds up each residual beyond its tolerance, for either sign: S = max(0, S + e - k dt). The
 tolerance k covers drifted parameters and neglected effects. The alarm level covers the noise; it
 follows from the rate of false alarms that is allowed. Speeds enter e_1 and e_3 as differences, so
 that the noise of a sum is that of its two ends.
 
 A torque sensor that stands still to the last bit at some value, while the current moves, is stuck.
-So is a speed sensor while the other speed moves, if the sensors are known to be noisy: inside the
-backlash one side moves alone.
+If the sensors are known to be noisy, the noise of its partner is move enough, also for a speed
+sensor: without noise, one side moves alone inside the backlash.
 """
 
-from dataclasses import dataclass
-from math import exp
+from dataclasses import dataclass, field
+from math import exp, inf
 
 from gateway.cycle.stuck import Streak, follow, is_stuck
+from gateway.cycle.sudden import Steady, note, product, tolerance
 from gateway.cycle.tolerances import Params
 from gateway.friction.law import friction_torque
 from gateway.reasons import Reason
@@ -42,6 +55,8 @@ time smoothes the acceleration."""
 PULSES = 0.08
 """[N m s^2/rad] Further tolerance of the motor's torque by its acceleration: a setpoint that rises
 in steps drives pulses of current, of which a poll sees only one moment."""
+SETTLED_CONTACT = 0.2
+"""[s] Time for which the gear pushes until the flanks no longer bounce."""
 REACTION = 0.25
 """Further share of the motor's torque at the full torque, where the current weakens the field."""
 COARSE_STEP = 4.0
@@ -57,9 +72,11 @@ NO_TORQUE, NO_SPEED = 1.0, 0.3
 
 @dataclass(frozen=True, kw_only=True)
 class Plausibility:
-    """Sums of the three relations, for either sign, and what else is remembered.
+    """Sums of the relations, for either sign, and what else is remembered.
 
     mean, envelope : mean torque of the motor, and the largest mean, fading [N m]
+    steady : what a sudden fault shows against
+    contact : time since which the gear pushes [s]
     acceleration : of the motor, smoothed [rad/s^2]
     tare, stands : mean of k Phi i + T_meas at standstill [N m], and time since it stands [s]
     torque, motor, drum : streaks of the three sensors
@@ -71,9 +88,17 @@ class Plausibility:
     gear_down: float = 0.0
     drum_up: float = 0.0
     drum_down: float = 0.0
+    sudden_up: float = 0.0
+    sudden_down: float = 0.0
+    gain_up: float = 0.0
+    gain_down: float = 0.0
+    contact_up: float = 0.0
+    contact_down: float = 0.0
     mean: float = 0.0
     envelope: float = 0.0
     acceleration: float = 0.0
+    steady: Steady = field(default_factory=Steady)
+    contact: float = 0.0
     tare: float = 0.0
     stands: float = 0.0
     torque: Streak | None = None
@@ -106,6 +131,21 @@ def judge(
     resisting = p.gear_ratio * torque + friction_torque(middle, p.regulator.friction)
     e_3 = p.drum_inertia * (now.drum_speed - before.drum_speed) + resisting * duration
     k_3 = p.truck_torque * duration
+    e_4 = e_1 - state.steady.residual * duration
+    steady = note(
+        state.steady,
+        e_1 / duration,
+        last,
+        duration,
+        shown=torque,
+        largest=p.torque + p.torque_share * envelope,
+    )
+    missed = coarse(p, duration / SCAN)
+    k_4 = (tolerance(steady, p.torque, p.torque_share) + missed) * duration
+    turned, allowed = product(steady, p.torque_share)
+    e_6, k_6 = turned * duration, (allowed + missed * abs(torque)) * duration
+    contact = state.contact + duration if torque > p.contact else 0.0
+    e_5, k_5 = (e_2, k_2) if contact > SETTLED_CONTACT else (0.0, inf)
     tare, stands = _tare(state, now, last + p.regulator.shaft_torque(now.shaft_torque), duration)
     return Plausibility(
         motor_up=_sum(state.motor_up, e_1 - k_1, p.motor_level),
@@ -114,14 +154,22 @@ def judge(
         gear_down=_sum(state.gear_down, -e_2 - k_2, p.gear_level),
         drum_up=_sum(state.drum_up, e_3 - k_3, p.drum_level),
         drum_down=_sum(state.drum_down, -e_3 - k_3, p.drum_level),
+        sudden_up=_sum(state.sudden_up, e_4 - k_4, p.sudden_level),
+        sudden_down=_sum(state.sudden_down, -e_4 - k_4, p.sudden_level),
+        gain_up=_sum(state.gain_up, e_6 - k_6, p.gain_level),
+        gain_down=_sum(state.gain_down, -e_6 - k_6, p.gain_level),
+        contact_up=_sum(state.contact_up, e_5 - k_5, p.contact_level),
+        contact_down=_sum(state.contact_down, -e_5 - k_5, p.contact_level),
         mean=mean,
         envelope=envelope,
         acceleration=acceleration,
+        steady=steady,
+        contact=contact,
         tare=tare,
         stands=stands,
         # Inside the backlash the current moves the motor alone, and the torque is the friction.
         torque=None
-        if Status.GAP in now.status
+        if Status.GAP in now.status and not p.noisy
         else follow(state.torque, now.shaft_torque, last, p.stuck_torque),
         motor=follow(state.motor, gear_speed, now.drum_speed, p.stuck_motor),
         drum=follow(state.drum, now.drum_speed, gear_speed, p.stuck_drum),
@@ -129,10 +177,13 @@ def judge(
 
 
 def shares(p: Params, state: Plausibility) -> tuple[float, float, float]:
-    """Sums of motor, gear and drum over their alarm levels [1]."""
+    """Largest sums of motor, gear and drum over their alarm levels [1]."""
+    sudden = max(state.sudden_up, state.sudden_down) / p.sudden_level
+    gain = max(state.gain_up, state.gain_down) / p.gain_level
+    touching = max(state.contact_up, state.contact_down) / p.contact_level
     return (
-        max(state.motor_up, state.motor_down) / p.motor_level,
-        max(state.gear_up, state.gear_down) / p.gear_level,
+        max(state.motor_up / p.motor_level, state.motor_down / p.motor_level, sudden, gain),
+        max(state.gear_up / p.gear_level, state.gear_down / p.gear_level, touching),
         max(state.drum_up, state.drum_down) / p.drum_level,
     )
 
@@ -147,7 +198,7 @@ def reason(p: Params, state: Plausibility, *, running: bool) -> Reason | None:
         (balance > 1.0, Reason.TORQUE_MODEL),
         (rest > 1.0, Reason.DRUM_MODEL),
         (play > 1.0, Reason.GEAR_MODEL),
-        (is_stuck(state.torque, NO_TORQUE), Reason.TORQUE_STUCK),
+        (is_stuck(state.torque, -1.0 if p.noisy else NO_TORQUE), Reason.TORQUE_STUCK),
         (motor or drum, Reason.SPEED_STUCK),
         (shifted and not running, Reason.TARE),
     )
@@ -166,8 +217,12 @@ def motor_torque(p: Params, sample: Measurement) -> float:
 def motor_tolerance(p: Params, envelope: float, acceleration: float, scans: float) -> float:
     """Tolerance of the motor's torque balance over a window of so many scans [N m]."""
     share = p.torque_share + REACTION * envelope / p.full_torque
-    coarse = COARSE_STEP * max(scans - 1.0, 0.0) + p.stairs * scans + PULSES * abs(acceleration)
-    return p.torque + share * envelope + coarse
+    return p.torque + share * envelope + coarse(p, scans) + PULSES * abs(acceleration)
+
+
+def coarse(p: Params, scans: float) -> float:
+    """Tolerance of the motor's torque for a current that is known once in so many scans [N m]."""
+    return COARSE_STEP * max(scans - 1.0, 0.0) + p.stairs * scans
 
 
 def _sum(before: float, growth: float, level: float) -> float:

@@ -10,21 +10,30 @@ from statistics import NormalDist
 
 from gateway.configuration.config import Config
 from gateway.configuration.sections import RegulatorConfig
+from gateway.cycle.sudden import RIPPLE
 
 FULL_CURRENT = 72.0
 """[A] Largest armature current of the drive (thesis, eq 3.5)."""
+SUMS = 12.0
+"""Sums that may come to an alarm: six relations, each for either sign."""
 STAIRCASE = 6.0
 """[N m] Further tolerance of the motor's torque a scan under a regulator whose setpoint is a
 staircase, because the current then comes in pulses."""
-TRANSIENT, BUMP = 0.25, 25.0
-"""[N m s] Shares of two alarm levels for what a poll every 10 ms misses: those of e_1 and e_3."""
+TRANSIENT, MISSED, BUMP = 0.25, 0.22, 25.0
+"""[N m s] Shares of alarm levels for what a poll every 10 ms misses: those of e_1, e_4 and e_3."""
 SWING, TOP_SPEED, FASTEST_DRUM = 60.0, 8.0, 5.0
 """[N m], [rad/s], [rad/s^2] Swings of motor torque, drum speed and drum acceleration. A filter in
 front of the PLC shows them later by its time constant."""
+GAIN = 9.0
+"""Level of e_6 over that of e_4 and the tolerance of the torque."""
 GAP_SPREAD = 1.25
 """Widest backlash over the configured one."""
 VISIBLE, VISIBLE_TORQUE = 2.5, 6.0
-"""Deviations of the noise that the partner of a stuck sensor shows, a speed or the current."""
+"""Deviations of the noise by which the partner of a stuck sensor moves: in noise alone, and for
+sure by more than noise."""
+PUSH, BOUNCE = 1.0, 0.1
+"""[N m] Torque above that of a shifted tare with which the gear is known to push the motor, and
+[rad] what the flanks may still move then: shafts wind, and a light touch bounces."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,6 +48,10 @@ class Params:
     speed, speed_share : tolerance of e_2 a second [rad/s], and its share of the speed [1]
     truck_torque : tolerance of e_3 a second [N m at the drum]
     motor_level, gear_level, drum_level : alarm levels of the sums [N m s], [rad], [N m s]
+    sudden_level, gain_level : alarm levels of e_4 [N m s] and e_6 [N^2 m^2 s]
+    contact : shaft torque from which on the flanks of the gear are in contact [N m]
+    contact_level : alarm level of e_2 while they are [rad]
+    noisy : the sensors always show noise
     tare : mean of k Phi i + T_meas that a standing motor may show [N m]
     stuck_torque, stuck_motor, stuck_drum : how far motor torque, drum and motor may move while the
         sensor of torque, motor and drum stands still [N m], [rad/s of the drum]
@@ -61,6 +74,11 @@ class Params:
     motor_level: float
     gear_level: float
     drum_level: float
+    sudden_level: float
+    gain_level: float
+    contact: float
+    contact_level: float
+    noisy: bool
     tare: float
     stuck_torque: float
     stuck_motor: float
@@ -72,6 +90,11 @@ class Params:
         bench, own = config.bench, config.plausibility
         inertia, tail = bench.gear_inertia + bench.drum_inertia, _tail(config)
         flux, lag = bench.flux_constant, max(bench.torque_filter, bench.speed_filter)
+        motor_noise, noisy = own.motor_speed_noise / bench.gear_ratio, own.noisy_sensors
+        torques = flux * own.current_noise, own.torque_noise
+        ends = tail * sqrt(2.0) * bench.motor_inertia * own.motor_speed_noise + lag * SWING
+        sudden = MISSED + ends + _walk(config, RIPPLE * own.torque, *torques)
+        drift = _walk(config, own.speed, own.drum_speed_noise, motor_noise) + lag * TOP_SPEED
         return cls(
             motor_inertia=bench.motor_inertia,
             drum_inertia=inertia,
@@ -87,24 +110,20 @@ class Params:
             speed=own.speed,
             speed_share=own.speed_share,
             truck_torque=own.truck_torque,
-            motor_level=TRANSIENT
-            + lag * SWING
-            + tail * sqrt(2.0) * bench.motor_inertia * own.motor_speed_noise
-            + _walk(config, own.torque, flux * own.current_noise, own.torque_noise),
-            gear_level=2.0 * GAP_SPREAD * bench.backlash_half_gap
-            + lag * TOP_SPEED
-            + _walk(
-                config, own.speed, own.drum_speed_noise, own.motor_speed_noise / bench.gear_ratio
-            ),
+            motor_level=TRANSIENT + ends + _walk(config, own.torque, *torques),
+            gear_level=2.0 * GAP_SPREAD * bench.backlash_half_gap + drift,
             drum_level=BUMP
             + lag * inertia * FASTEST_DRUM
             + tail * sqrt(2.0) * inertia * own.drum_speed_noise,
+            sudden_level=sudden,
+            gain_level=GAIN * own.torque * sudden,
+            contact=own.tare + PUSH,
+            contact_level=BOUNCE + drift,
+            noisy=noisy,
             tare=own.tare,
-            stuck_torque=VISIBLE_TORQUE * flux * own.current_noise,
-            stuck_motor=VISIBLE * own.drum_speed_noise if own.noisy_speeds else inf,
-            stuck_drum=VISIBLE * own.motor_speed_noise / bench.gear_ratio
-            if own.noisy_speeds
-            else inf,
+            stuck_torque=(VISIBLE if noisy else VISIBLE_TORQUE) * flux * own.current_noise,
+            stuck_motor=VISIBLE * own.drum_speed_noise if noisy else inf,
+            stuck_drum=VISIBLE * motor_noise if noisy else inf,
         )
 
 
@@ -115,7 +134,7 @@ def _is_staircase(config: Config) -> bool:
 
 def _chance(config: Config) -> float:
     """Probability of a false alarm in one tick that the configuration allows, for each sum."""
-    return config.plausibility.false_alarms * config.loop.period / 6.0
+    return config.plausibility.false_alarms * config.loop.period / SUMS
 
 
 def _tail(config: Config) -> float:

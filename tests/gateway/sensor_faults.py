@@ -32,7 +32,7 @@ class TorqueFault:
         assert reading.shaft_torque_integral is not None
         if self._held is None:
             self._held = reading.shaft_torque
-            self._true_integral = reading.shaft_torque_integral
+            self._true_integral = reading.shaft_torque_integral - reading.shaft_torque_mean * SCAN
         mean = self.shown(reading.shaft_torque_mean, self._held)
         assert self._true_integral is not None
         self._shift += mean * SCAN - (reading.shaft_torque_integral - self._true_integral)
@@ -87,7 +87,7 @@ def _driven(kmh: float, driver: str, *, noise: bool) -> ClosedLoop:
     top = (kmh or 14.0) / 3.6
     up = top / 0.65
     cycle = Cycle(speed=top, up=up, brake=8.0 + up, down=top / 1.05, duration=60.0)
-    config = Config().with_values({"plausibility.noisy_speeds": noise})
+    config = Config().with_values({"plausibility.noisy_sensors": noise})
     loop = ClosedLoop(config, driver=lambda truck: driver_of(driver, truck, cycle))
     if noise:
         loop.disturb = Noisy(np.random.default_rng(7))

@@ -3,6 +3,7 @@
 import math
 import struct
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -575,6 +576,22 @@ def test_modulus_is_the_span_of_the_counter():
 @given(before=st.integers(0, 65535), step=st.integers(-32767, 32767))
 def test_difference_is_right_across_the_wrap(before, step):
     assert difference((before + step) % 65536, before, 65536.0) == step
+
+
+def test_a_clock_may_start_again_at_midnight(tmp_path):
+    """864 000 000 digits of 0.1 ms are a day; the first after midnight is 0."""
+    text = Path(register_maps.__file__).with_name("bench_int16.toml").read_text()
+    daily = tmp_path / "daily.toml"
+    daily.write_text(text.replace("range = [0, 429496729.5]", "range = [0, 86399999.9]"))
+    found = register_maps.load(daily)
+    modulus = found.modulus("plc_time")
+    assert modulus == pytest.approx(86400.0, abs=1e-9)
+    assert difference(0.004, 86399.994, modulus) == pytest.approx(0.010, abs=1e-9)
+    clock = found.register("plc_time")
+    assert encode_value(clock, 86399.9999) == (13183, 38911)  # 0x337F97FF
+    assert encode_value(clock, 86400.0) == (0, 0)
+    with pytest.raises(CodecError, match="range"):
+        decode_value(clock, (13183, 38912))
 
 
 def test_difference_of_plc_time_across_the_wrap():

@@ -18,7 +18,8 @@ from register_maps.signals import Measurement, Status
 from register_maps.timing import SCAN
 from tests.gateway.closed_loop import ClosedLoop
 from tests.gateway.drifted_bench import largest_shares, sound_drive
-from tests.gateway.sensor_faults import FAULTS, driving
+from tests.gateway.sensor_fault_table import run
+from tests.gateway.sensor_faults import FAULTS
 
 P = Params.of(Config())
 DRIVING = Measurement(
@@ -74,6 +75,88 @@ def test_torque_that_the_current_does_not_make_has_its_reason(shown, sums):
     assert reason(P, seen, running=True) is Reason.TORQUE_MODEL
 
 
+BALANCED = after(DRIVING, windows=300)
+"""Sums after 3 s at steady speed."""
+
+
+def test_sudden_change_is_tolerated_to_twice_the_torque_of_the_balance():
+    """18.506 N m less 2 N m a second. The slow mean does not yet know of the fault."""
+    seen = after(replace(DRIVING, shaft_torque=0.0), before=DRIVING, state=BALANCED)
+    assert seen.sudden_up == pytest.approx(0.01 * (18.506 - 2.0), rel=1e-3)
+
+
+def test_error_that_drifted_parameters_may_cause_is_no_sudden_change():
+    """3 N m are less than 1 N m and 20 % of 18.5 N m, and stand in the slow mean."""
+    drifted = replace(DRIVING, shaft_torque=-15.506)
+    seen = after(drifted, windows=500)
+    assert seen.steady.residual == pytest.approx(3.0, abs=0.05)
+    assert (seen.sudden_up, seen.sudden_down, seen.gain_up, seen.gain_down) == (0.0,) * 4
+    assert reason(P, seen, running=True) is None
+
+
+def test_change_of_torque_is_tolerated_by_a_share():
+    """The motor goes from 18.5 to 37 N m, and its constant is 10 % off: 1.85 N m more."""
+    more = replace(DRIVING, armature_current=20.0, shaft_torque=-33.3108)
+    seen = after(more, windows=200, state=after(replace(DRIVING, shaft_torque=-16.6554)))
+    assert reason(P, seen, running=True) is None
+
+
+def test_flanks_that_meet_at_speed_are_no_fault_of_a_sensor():
+    """90 N m more within a scan on both sides, 20 % of it missing, for 0.1 s."""
+    hit = replace(DRIVING, armature_current=10.0 + 90.0 / 1.8506, shaft_torque=-18.506 - 72.0)
+    seen = after(hit, before=hit, windows=10, state=BALANCED)
+    assert reason(P, seen, running=True) is None
+    alone = replace(hit, armature_current=10.0)
+    seen = after(alone, before=alone, windows=10, state=BALANCED)
+    assert reason(P, seen, running=True) is Reason.TORQUE_MODEL
+
+
+def test_slow_mean_takes_no_more_of_a_fault_than_parameters_may_cause():
+    """After 10 s of a dead sensor it stands at 1 N m and 20 % of 18.506 N m."""
+    dead = replace(DRIVING, shaft_torque=0.0)
+    seen = after(dead, windows=1000, state=BALANCED)
+    assert seen.steady.residual == pytest.approx(1.0 + 0.2 * 18.506, rel=1e-3)
+
+
+def test_wrong_gain_shows_while_the_torque_swings_through_zero():
+    """The shaft takes 8 and -8 N m in turn, 60 ms each, and the sensor shows twice of it.
+
+    The error of 8 N m times 16 N m is 128 N^2 m^2, less 30 % of the shown torque squared 51 a
+    second: 3.5 N^2 m^2 s after 0.07 s, later by the windows in which the mean changes its sign.
+    """
+    assert P.gain_level == pytest.approx(3.5, abs=0.1)
+    state, count = after(replace(DRIVING, armature_current=0.0, shaft_torque=0.0), windows=300), 0
+    while state.gain_up <= P.gain_level and count < 30:
+        size = 8.0 * (-1) ** (count // 6)
+        now = replace(DRIVING, armature_current=size / 1.8506, shaft_torque=-2.0 * size)
+        state, count = after(now, before=now, state=state), count + 1
+    assert 7 < count < 15
+    assert state.gain_down == 0.0
+
+
+PUSHED = replace(DRIVING, armature_current=-5.0, shaft_torque=9.253, drum_speed=1.5)
+"""The gear pushes the motor with 9.253 N m, which the motor brakes; the drum shows too little."""
+
+
+def test_gear_that_pushes_has_no_backlash_left():
+    """0.5 rad/s apart less 0.06 for 0.23 s are 0.1 rad, after 0.2 s of contact."""
+    assert P.contact_level == pytest.approx(0.101, abs=0.001)
+    assert after(PUSHED, before=PUSHED, windows=20).contact_down == 0.0
+    seen = after(PUSHED, before=PUSHED, windows=40)
+    assert seen.contact_up == pytest.approx(0.20 * (0.5 - 0.01 - 0.025 * 2.0), abs=0.01)
+    assert reason(P, replace(seen, contact_up=P.contact_level), running=True) is None
+    last = after(PUSHED, before=PUSHED, windows=44)
+    assert reason(P, last, running=True) is Reason.GEAR_MODEL
+
+
+@pytest.mark.parametrize("shown", [-9.253, 2.4])
+def test_gear_that_does_not_push_for_sure_may_cross_its_backlash(shown):
+    """Up to a tare of 1.5 N m and 1 N m more."""
+    free = replace(PUSHED, shaft_torque=shown, armature_current=-shown / 1.8506)
+    seen = after(free, before=free, windows=44)
+    assert (seen.contact_up, seen.contact_down) == (0.0, 0.0)
+
+
 def test_map_without_a_current_says_nothing_of_the_torque():
     blind = replace(DRIVING, armature_current=None, shaft_torque=-90.0)
     seen = after(blind, before=blind, windows=100)
@@ -127,7 +210,7 @@ def test_configured_offset_is_no_torque():
     assert reason(p, state, running=False) is None
 
 
-NOISY = Params.of(Config().with_values({"plausibility.noisy_speeds": True}))
+NOISY = Params.of(Config().with_values({"plausibility.noisy_sensors": True}))
 
 
 def moved(signal, sizes, p=NOISY):
@@ -137,14 +220,14 @@ def moved(signal, sizes, p=NOISY):
         now = replace(DRIVING, **{signal: size})
         state = judge(p, state, before, now, torque=now.shaft_torque, duration=0.01)
         before = now
-    return replace(state, motor_up=0.0, motor_down=0.0, drum_up=0.0, drum_down=0.0)
+    return replace(Plausibility(), torque=state.torque, motor=state.motor, drum=state.drum)
 
 
 @pytest.mark.parametrize(
     ("signal", "swing", "found"),
     [
-        ("armature_current", 1.6, Reason.TORQUE_STUCK),
-        ("armature_current", 1.4, None),
+        ("armature_current", 0.7, Reason.TORQUE_STUCK),
+        ("armature_current", 0.5, None),
         ("motor_speed", 0.4, Reason.SPEED_STUCK),
         ("motor_speed", 0.3, None),
         ("drum_speed", 0.03, Reason.SPEED_STUCK),
@@ -176,7 +259,7 @@ def test_alarm_level_of_white_noise_is_passed_as_often_as_allowed():
     """Allowed once in 1000 ticks: 1000 walks of 500 steps may pass it once, four times at most."""
     config = Config().with_values({"plausibility.false_alarms_per_hour": 100.0})
     chance = 100.0 / 3600.0 * 0.01
-    assert tolerances._chance(config) == pytest.approx(chance / 6.0)
+    assert tolerances._chance(config) == pytest.approx(chance / 12.0)
     level = tolerances._walk(config, 1.0, 0.5)
     random = np.random.default_rng(1)
     walks = np.cumsum(0.01 * (0.5 * random.standard_normal((20000, 500)) - 1.0), axis=1)
@@ -191,35 +274,33 @@ def test_fewer_false_alarms_take_higher_levels():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("driver", "noise"),
-    [("none", True), ("pi", True), ("none", False)],
-    ids=["none", "pi", "exact"],
-)
+@pytest.mark.parametrize("driver", ["none", "pi"])
 @pytest.mark.parametrize("kmh", [0, 5, 14])
 @pytest.mark.parametrize("name", FAULTS)
-def test_sensor_fault_trips_before_the_drum_runs_away(name, kmh, driver, noise):
-    """Within 0.2 s once the drum turns at 1 rad/s, or before the drum has gained 0.2 rad/s.
+def test_sensor_fault_trips_within_200_ms_above_1_rad_per_second(name, kmh, driver):
+    """A doubled torque at 5 km/h takes 0.3 s.
 
-    A torque sensor that shows too much slows its bench, until its error is within the tolerance.
-    A frozen drum speed of a sensor without noise is that of a drum inside the backlash. A drum
-    speed that is wrong from the beginning is seen when the motor has left the backlash: 0.38 rad
-    at half the speed, which the drum reaches at 1.4 rad/s.
+    There the error is the torque itself, 5 N m, in the drive's ripple of 7 N m. An observer who
+    knows the fault to come needs 0.2 s (tests.gateway.sensor_fault_table).
     """
-    loop = driving(kmh, driver, noise=noise)
-    begin, first = len(loop.drum_speed), max(loop.drum_speed[-1], 1.0)
-    fault, sound = FAULTS[name](), loop.disturb
-    loop.disturb = lambda one, reading: fault(sound(one, reading))
-    fast = 0.0
-    while loop.last.state is State.RUN:
-        loop.run(SCAN)
-        assert len(loop.drum_speed) - begin < 1200
-        fast += SCAN * (loop.drum_speed[-1] > 1.0)
-    while loop.last.state is not State.SAFE:
-        loop.run(SCAN)
-        assert len(loop.drum_speed) - begin < 1600
-    gained = max(loop.drum_speed[begin:]) - first
-    assert fast <= 0.2 + 0.5 * SCAN or gained <= (0.5 if name == "drum speed x0.5" else 0.2)
+    found = run(name, kmh, driver, 0.0)
+    doubled = name == "torque x2" and kmh == 5
+    assert found.time <= (0.3 if doubled else 0.2) + 0.5 * SCAN
+    assert found.gained <= 0.2
+
+
+UNSEEN = {"torque held", "torque x2", "drum speed frozen"}
+"""Without noise a held value is no error while the bench runs steadily, and a doubled torque at
+5 km/h slows its own bench until its error is within the tolerance."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kmh", [0, 5, 14])
+@pytest.mark.parametrize("name", FAULTS)
+def test_without_noise_a_fault_trips_as_soon_or_moves_nothing(name, kmh):
+    found = run(name, kmh, "none", 0.0, noise=False)
+    assert found.gained <= 0.2
+    assert found.time <= 0.2 + 0.5 * SCAN or (kmh and name in UNSEEN)
 
 
 @pytest.mark.slow

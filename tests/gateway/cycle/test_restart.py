@@ -5,9 +5,11 @@ does so as well, with remote still on.
 """
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
+import register_maps
 from gateway.configuration.config import Config
 from gateway.cycle.supervisor import State
 from gateway.reasons import Reason
@@ -58,9 +60,9 @@ def test_restart_in_run_ends_it_with_its_reason_and_starts_nothing(running):
     assert (running.last.state, running.last.reason) == (State.SAFE, Reason.PLC_RESTARTED)
 
 
-def driving_by_a_clock_of(span):
+def driving_by_a_clock_of(span, register_map="bench_int16"):
     """A loop in RUN whose clock starts again at 0 s of its span in 1 s [s]."""
-    loop = ClosedLoop(CONFIG)
+    loop = ClosedLoop(CONFIG, map_name=register_map)
     loop.disturb = lambda _, reading: replace(reading, plc_time=(reading.plc_time - 5.9) % span)
     loop.start()
     loop.run(4.5)
@@ -77,8 +79,18 @@ def test_clock_that_wraps_at_the_end_of_its_register_does_not_end_a_run():
     assert (loop.last.state, loop.last.reason) == (State.RUN, None)
 
 
-def test_clock_that_starts_again_at_midnight_ends_a_run_as_a_restart_does():
-    """No map can declare this wrap: it lies before the end of the register."""
+def test_clock_that_starts_again_at_midnight_as_its_map_says_does_not_end_a_run(tmp_path):
+    text = Path(register_maps.__file__).with_name("bench_int16.toml").read_text()
+    daily = tmp_path / "daily.toml"
+    daily.write_text(text.replace("range = [0, 429496729.5]", "range = [0, 86399999.9]"))
+    loop = driving_by_a_clock_of(86400.0, str(daily))
+    loop.run(2.0)
+    assert loop.observations[-1].measurement.plc_time < 1.1
+    assert (loop.last.state, loop.last.reason) == (State.RUN, None)
+
+
+def test_clock_that_starts_again_against_its_map_ends_a_run_as_a_restart_does():
+    """The map says that it counts on to the end of the register."""
     loop = driving_by_a_clock_of(86400.0)
     loop.run(0.9)
     assert loop.last.state is State.RUN
