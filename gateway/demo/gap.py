@@ -50,6 +50,8 @@ NOISE: Final = {
 TORQUE_PERCENT: Final = 40.0
 """Tolerance of the motor's torque balance: with the usual 20 %, a torque sensor that lags by 37 ms
 may end the drive where the flanks meet, and its log is what the diagnosis needs."""
+OPEN_GAP: Final = 1.1
+"""Gap of a channel from which on it counts, in the noise [1], as in `diagnose`."""
 BEGINS_WITHIN: Final = 60.0
 """[s] Longest time from a start of the emulator to a run of the gateway."""
 
@@ -76,9 +78,28 @@ class GapResult:
 
     @property
     def closed(self) -> float | None:
-        """Share of the gap that the named effect closes [1]; None: nothing was named."""
+        """Share that the effect closes of the gap that other parameters leave [1].
+
+        None: nothing was named, or that gap is within 1.1 times the noise.
+        """
         found: float | None = self.answer["gap"]["closed_fraction"]
         return found
+
+    @property
+    def closed_of_nominal(self) -> float | None:
+        """Share that set and effect close of the gap of the model in force [1].
+
+        1 - sum max(0, (explained/noise)^2 - 1) / sum ((nominal/noise)^2 - 1)
+
+        over the channels with a nominal gap of 1.1 times the noise; None where there is none.
+        """
+        gap, noise = self.answer["gap"], self.answer["gap"]["noise_floor"]
+        open_ = [name for name in noise if gap["nominal"][name] >= OPEN_GAP * noise[name]]
+        if not self.answer["verdict"]["effects"] or not open_:
+            return None
+        before = sum((gap["nominal"][name] / noise[name]) ** 2 - 1.0 for name in open_)
+        left = sum(max(0.0, (gap["explained"][name] / noise[name]) ** 2 - 1.0) for name in open_)
+        return float(1.0 - left / before)
 
     def to_json(self) -> dict[str, Any]:
         """Return the loop as the document gap/1."""
@@ -89,6 +110,7 @@ class GapResult:
             "named": self.named,
             "verdict": {key: verdict[key] for key in ("kind", "effects", "class", "statement")},
             "gap_closed": self.closed,
+            "gap_closed_of_nominal": self.closed_of_nominal,
             "force": {
                 "before": self.before and asdict(self.before),
                 "after": self.after and asdict(self.after),
