@@ -12,6 +12,7 @@ from gateway.demo import gap
 from gateway.demo.seal import SIZES, draw
 from gateway.friction.document import EFFECTS, SENSOR
 from plant_emulator import effects
+from plant_emulator.emulator.scan_timer import TimingReport
 from tools.gap import main
 
 SEEDS = range(200)
@@ -67,6 +68,20 @@ def test_a_share_counts_what_is_left_beyond_the_noise_of_the_channels_with_a_gap
     assert result.closed_of_nominal == pytest.approx(1.0 - 0.21 / 11.0)
     answer["verdict"]["effects"] = []
     assert result.closed_of_nominal is None
+
+
+def test_the_longest_stop_of_the_plc_is_the_largest_lateness_that_the_emulator_reports():
+    timing = TimingReport(
+        scans=900,
+        real_time_factor=1.0,
+        lateness_p50=0.001,
+        lateness_p99=0.002,
+        lateness_max=0.0815,
+        scan_mean=0.0002,
+        scan_max=0.9,
+        lost=0.0,
+    )
+    assert gap.longest_stop(f"listening\n{timing}\n") == pytest.approx(0.0815)
 
 
 @pytest.mark.slow
