@@ -27,27 +27,19 @@ def main(seed: int, out: Path) -> None:
         result = close_gap(seed, out / f"seed_{seed}", console)
     except GatewayError as error:
         raise click.ClickException(str(error)) from error
-    closed = "not told by these runs" if result.closed is None else f"{100.0 * result.closed:.1f} %"
-    answer = "named" if result.named else "NOT named"
+    console.print(f"the hidden effect was {'named' if result.named else 'NOT named'}")
     console.print(
-        f"the hidden effect was {answer}; gap closed: {closed}", highlight=False, soft_wrap=True
+        f"gap closed: {_share(result.closed_of_nominal)} of the gap of the model in force, "
+        f"{_share(result.closed)} of the gap that other parameters leave"
     )
-    console.print(
-        f"force on the truck in cruise before: {told(result.before)}",
-        highlight=False,
-        soft_wrap=True,
-    )
-    console.print(
-        f"force on the truck in cruise after:  {told(result.after)}",
-        highlight=False,
-        soft_wrap=True,
-    )
-    console.print(
-        f"{result.seconds:.0f} s; report and picture: {out}/seed_{seed}",
-        highlight=False,
-        soft_wrap=True,
-    )
+    console.print(f"force on the truck in cruise before: {told(result.before)}")
+    console.print(f"force on the truck in cruise after:  {told(result.after)}")
+    console.print(f"{result.seconds:.0f} s; report and picture: {out}/seed_{seed}")
     sys.exit(0 if result.named else 1)
+
+
+def _share(share: float | None) -> str:
+    return "nothing told" if share is None else f"{100.0 * share:.1f} %"
 
 
 if __name__ == "__main__":

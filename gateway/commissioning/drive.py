@@ -58,14 +58,22 @@ def _corners(points: Iterable[Point], since: float) -> Iterable[tuple[float, flo
 
 
 def _refuse_points(name: str, points: Sequence[Point], repeats: int) -> None:
-    times = [one.time for one in points]
-    if len(points) < 2 or times[0] != 0.0 or any(b <= a for a, b in pairwise(times)):
+    if len(points) < 2 or points[0].time != 0.0:
         raise ConfigError(
             "no program",
             file=name,
-            value=times[:3],
-            expected="two points or more, whose times begin at 0 and increase",
+            value=f"{len(points)} points" + (f" from {points[0].time:g} s" if points else ""),
+            expected="two points or more, from 0 s",
         )
+    for number, (one, after) in enumerate(pairwise(points), 2):
+        if after.time <= one.time:
+            raise ConfigError(
+                "the time does not increase",
+                file=name,
+                place=f"point {number}",
+                value=f"{after.time:g} s",
+                expected=f"more than {one.time:g} s",
+            )
     first, last = points[0].speed, points[-1].speed
     if first != 0.0:
         raise ConfigError(

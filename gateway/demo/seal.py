@@ -11,14 +11,23 @@ from dataclasses import dataclass
 from typing import Final
 
 SIZES: Final = {
-    "torque_sensor_offset": ("offset", 0.4, 1.0),
-    "torque_sensor_gain": ("error", 0.03, 0.06),
+    "torque_sensor_offset": ("offset", 0.55, 1.0),
+    "torque_sensor_gain": ("error", 0.066, 0.1),
     "torque_sensor_lag": ("time_constant", 0.02, 0.04),
-    "gear_oil_temperature": ("viscosity_coefficient", 0.015, 0.03),
+    "gear_oil_temperature": ("viscosity_coefficient", 0.026, 0.03),
     "load_dependent_gear_loss": ("share", 0.04, 0.08),
     "drum_bearing_friction": ("coulomb", 30.0, 80.0),
 }
-"""Effect -> the parameter that is drawn, and its smallest and largest size [SI]."""
+"""Effect -> the parameter that is drawn, and its smallest and largest size [SI].
+
+The smallest size leaves a trace in the demo's logs of which no parameter can follow a norm of 100,
+in the noise (`plant-emulator detectability program1 program2 program3`). In 9353 samples of five
+channels, at least one channel then shows 1.1 times its noise after the parameters were estimated
+again: 5 (1.1^2 - 1) 9353 = 99^2. Below that, `diagnose` tells no share of the gap.
+
+Parameters follow a cold oil further than their tangents show: 0.018 1/K left 1.05 times the noise,
+0.98 with the oil. As the square of the size, that is 1.1 times the noise at 0.025 1/K.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,8 +8,7 @@ The PLC says at a sample which reference it will have reached at the end of the 
 reference of a log is that at the sample. It goes to the line of a new command as fast as the slew
 rate allows; a log tells where it meets the line, between two samples, as the knee.
 
-A recording may be large. It is read twice, piece by piece: first to see what it holds, then to
-write.
+A recording may be large. It is read twice, piece by piece: to see what it holds, and to write.
 """
 
 from collections.abc import Iterator
@@ -164,7 +163,7 @@ class Export:
         """New samples with their times since the first one, by the PLC's clock."""
         self.survey.quality = PollQuality(interval=SCAN)
         last, elapsed, echo = np.nan, 0.0, 0.0
-        before = np.zeros(2)
+        before = np.full((3, 2), np.nan)
         for rows in self.recording.chunks():
             new, repeated = new_samples(rows, last)
             self.survey.quality.repeated += repeated
@@ -261,14 +260,17 @@ def knees_of(begin: Array, told: Array, rate: Array, slew: Array) -> Array:
 
 
 def commands(records: Any, before: Array) -> tuple[Array, Array]:
-    """Slope and slew rate that the PLC follows at each tick [rad/s^2], and those of the last tick.
+    """Slope and slew rate that the PLC follows at each tick [rad/s^2], shape (2, ticks).
 
-    A tick reads what the PLC made of the command of the tick before. Shape (2, ticks).
+    The PLC follows the command of the tick before, or of the one before that, and tells its number.
+    Also returned: slope, slew rate and number of the last two commands, shape (3, 2), as `before`.
     """
-    asked = np.nan_to_num(
-        np.stack([records["setpoint_speed_rate"], records["setpoint_ramp_limit"]])
-    )
-    return np.concatenate([before[:, None], asked[:, :-1]], axis=1), asked[:, -1]
+    names = ("speed_rate", "ramp_limit", "command_sequence")
+    written = np.stack([records[f"setpoint_{name}"] for name in names])
+    known = np.concatenate([before, written], axis=1)
+    last, second_last = known[:, 1:-1], known[:, :-2]
+    older = records["measured_command_sequence_echo"] == second_last[2]
+    return np.nan_to_num(np.where(older, second_last, last)[:2]), known[:, -2:]
 
 
 def new_samples(records: Any, last: float = np.nan) -> tuple[NDArray[np.intp], int]:

@@ -13,6 +13,7 @@ so long the speed of the row is held, which delays all later rows. The speed is 
 import csv
 import gzip
 import math
+import zlib
 from pathlib import Path
 from typing import Final
 
@@ -37,7 +38,7 @@ def read(path: Path) -> list[Point]:
         Point(
             time=_number(path, number, TIME, row[TIME]),
             speed=SPEEDS[speed] * _number(path, number, speed, row[speed]),
-            dwell=max(0.0, _number(path, number, DWELL, row.get(DWELL) or "0")),
+            dwell=_dwell(path, number, row.get(DWELL)),
         )
         for number, row in enumerate(rows, 2)
     ]
@@ -49,9 +50,17 @@ def _text(path: Path) -> str:
     try:
         content = path.read_bytes()
         return (gzip.decompress(content) if path.suffix == ".gz" else content).decode()
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
         why = getattr(error, "strerror", None) or str(error)
         raise ConfigError(why, file=path, expected="a drive program (CSV)") from error
+
+
+def _dwell(path: Path, line: int, text: str | None) -> float:
+    value = _number(path, line, DWELL, text or "0")
+    if value < 0.0:
+        place = f"line {line}: {DWELL}"
+        raise ConfigError("bad value", file=path, place=place, value=text, expected="0 or more")
+    return value
 
 
 def _number(path: Path, line: int, column: str, text: str | None) -> float:

@@ -17,7 +17,7 @@ from gateway.cycle.record import NOTHING, Layout, Tick
 from gateway.cycle.supervisor import State
 from gateway.reasons import Reason
 from gateway.recordings import log, recording
-from gateway.recordings.export import knees_of
+from gateway.recordings.export import commands, knees_of
 from gateway.recordings.header import Header
 from register_maps.signals import Measurement, Status
 
@@ -125,6 +125,27 @@ def test_knee_is_where_the_reference_meets_the_line_of_the_command() -> None:
     after, value = knees_of(begin, told, rate, slew)
     assert after == pytest.approx([1.0 / 300.0, 0.005, 0.01])
     assert value == pytest.approx([6.0, 6.5, 8.0])
+
+
+def test_command_that_the_plc_follows_is_the_one_whose_number_it_tells() -> None:
+    """The PLC has command 7 at tick 2, still 7 at tick 3, then 9; at tick 0 it tells nothing."""
+    fields = [
+        *("setpoint_speed_rate", "setpoint_ramp_limit", "setpoint_command_sequence"),
+        "measured_command_sequence_echo",
+    ]
+    rows = [
+        (10, 300, 6, np.nan),
+        (20, 300, 7, 6),
+        (30, 300, 8, 7),
+        (40, 300, 9, 7),
+        (50, 300, 10, 9),
+    ]
+    records = np.array([(*row,) for row in rows], dtype=[(name, float) for name in fields])
+    (rate, _slew), before = commands(records[:3], np.full((3, 2), np.nan))
+    assert rate == pytest.approx([0.0, 10.0, 20.0])
+    (rate, slew), _ = commands(records[3:], before)
+    assert rate == pytest.approx([20.0, 40.0])
+    assert slew == pytest.approx([300.0, 300.0])
 
 
 @pytest.mark.parametrize(("status", "marked"), [(Status.ROAD_LOAD, True), (STANDING, False)])

@@ -32,10 +32,18 @@ def test_the_reference_of_a_log_from_its_first_sample(tmp_path):
         ("time_s,speed_rpm\n0,0\n1,fast\n", "line 3: speed_rpm: bad value, found 'fast'"),
         ("time_s,speed_rpm\n0,0\n1\n", "line 3: speed_rpm: bad value"),
         ("time_s,speed_rpm\nnan,0\n", "line 2: time_s: bad value, found 'nan'"),
+        ("time_s,speed_rpm,dwell_s\n0,0,-2\n", "line 2: dwell_s: bad value, found '-2'"),
     ],
 )
 def test_a_file_that_is_no_program_is_refused_with_its_place(tmp_path, text, says):
     file = tmp_path / "bad.csv"
     file.write_text(text)
     with pytest.raises(ConfigError, match=says.replace("'", ".")):
+        read(file)
+
+
+def test_a_packed_program_that_was_cut_off_is_refused_with_its_file(tmp_path):
+    file = tmp_path / "cut.csv.gz"
+    file.write_bytes(gzip.compress(b"time_s,speed_rpm\n0,0\n1,100\n2,0\n")[:-12])
+    with pytest.raises(ConfigError, match=r"cut\.csv\.gz: .* expected a drive program"):
         read(file)
