@@ -127,7 +127,7 @@ def test_address_that_cannot_be_is_wrong_usage(address: str) -> None:
 
 @pytest.mark.parametrize(
     "option",
-    [("--reference", "linear"), ("--parameters", "thesis_table_3_1"), ("--next-program", "n.csv")],
+    [("--reference", "linear"), ("--next-program", "n.csv")],
 )
 def test_option_of_the_bench_is_refused_with_an_axis(option: tuple[str, str]) -> None:
     result = CliRunner().invoke(main, ["diagnose", "--model", "axis", "run.csv", *option])
