@@ -19,15 +19,15 @@ from plant_emulator.diagnosis.answer import (
 )
 from plant_emulator.diagnosis.axis.findings import nominal_errors, remainder
 from plant_emulator.diagnosis.axis.quantities import UNITS, quantities
-from plant_emulator.diagnosis.axis.regression import NAMES
+from plant_emulator.diagnosis.axis.regression.fit import NAMES
 from plant_emulator.diagnosis.prediction.gap import OPEN_GAP
 from plant_emulator.diagnosis.prediction.remainder import describe_band, describe_fall
 from plant_emulator.diagnosis.wording import number
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.axis.findings import AxisFindings
-    from plant_emulator.diagnosis.axis.regression import Fit
-    from plant_emulator.diagnosis.axis.rows import Term
+    from plant_emulator.diagnosis.axis.regression.fit import Fit
+    from plant_emulator.diagnosis.axis.regression.rows import Term
     from plant_emulator.diagnosis.axis.search import AxisSearch
 
 # Effects of a ranking that are predicted and shown.

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.axis.effects import Effect, Shape, Size
     from plant_emulator.diagnosis.axis.effects.effect import Scale
-    from plant_emulator.diagnosis.axis.regression import Regression
-    from plant_emulator.diagnosis.axis.rows import Rows
+    from plant_emulator.diagnosis.axis.regression.fit import Regression
+    from plant_emulator.diagnosis.axis.regression.rows import Rows
     from plant_emulator.signals.axis_log import AxisLog
     from plant_emulator.signals.log import Array
 

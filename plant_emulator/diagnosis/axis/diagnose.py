@@ -17,7 +17,7 @@ from plant_emulator.diagnosis.axis.effects import LIBRARY
 from plant_emulator.diagnosis.axis.floor import describe_floor, repeat_floor, sensor_floor
 from plant_emulator.diagnosis.axis.held_out import HeldOut
 from plant_emulator.diagnosis.axis.quantities import UNITS
-from plant_emulator.diagnosis.axis.regression import NAMES
+from plant_emulator.diagnosis.axis.regression.fit import NAMES
 from plant_emulator.diagnosis.axis.search import AxisSearch
 from plant_emulator.diagnosis.axis.settings import SETTINGS
 from plant_emulator.diagnosis.axis.start import best_width, prepared, start
@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.axis.effects import Effect
     from plant_emulator.diagnosis.axis.effects.effect import Scale
     from plant_emulator.diagnosis.axis.known import KnownAxis
-    from plant_emulator.diagnosis.axis.motion import Base, Motion
-    from plant_emulator.diagnosis.axis.regression import Fit, Regression
-    from plant_emulator.diagnosis.axis.rows import KnownEffect, Term
+    from plant_emulator.diagnosis.axis.motion.run import Base, Motion
+    from plant_emulator.diagnosis.axis.regression.fit import Fit, Regression
+    from plant_emulator.diagnosis.axis.regression.rows import KnownEffect, Term
     from plant_emulator.diagnosis.execution.progress import Progress
     from plant_emulator.diagnosis.prediction.held_out import Plan
     from plant_emulator.signals.axis_log import AxisLog

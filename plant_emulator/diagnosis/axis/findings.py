@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.axis.effects.effect import Effect
     from plant_emulator.diagnosis.axis.held_out import HeldOut
     from plant_emulator.diagnosis.axis.known import KnownAxis
-    from plant_emulator.diagnosis.axis.rows import Term
+    from plant_emulator.diagnosis.axis.regression.rows import Term
     from plant_emulator.diagnosis.axis.search import AxisSearch
     from plant_emulator.diagnosis.axis.verdict import Decision
     from plant_emulator.signals.log import Array

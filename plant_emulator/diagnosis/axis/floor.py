@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.axis.regression import residual
+from plant_emulator.diagnosis.axis.regression.fit import residual
 from plant_emulator.diagnosis.wording import number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from plant_emulator.diagnosis.axis.held_out import HeldOut
-    from plant_emulator.diagnosis.axis.rows import Rows
+    from plant_emulator.diagnosis.axis.regression.rows import Rows
     from plant_emulator.signals.log import Array
 
 # Correlation of force and position from which on two runs are repeats [1]: nine tenths of the
@@ -85,7 +85,7 @@ def _position(rows: Rows) -> Array:
 
 
 def _force(rows: Rows) -> Array:
-    from plant_emulator.diagnosis.axis.spline import smooth
+    from plant_emulator.diagnosis.axis.motion.spline import smooth
 
     log = rows.run.log
     return np.asarray(smooth(rows.run.kernel.time, log.force).curve(rows.run.kernel.rows))

@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.axis.effects import TIMING
-from plant_emulator.diagnosis.axis.regression import residual
-from plant_emulator.diagnosis.axis.rows import Term
+from plant_emulator.diagnosis.axis.regression.fit import residual
+from plant_emulator.diagnosis.axis.regression.rows import Term
 from plant_emulator.diagnosis.prediction import block_bootstrap
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from plant_emulator.diagnosis.axis.regression import Regression
-    from plant_emulator.diagnosis.axis.rows import Rows
+    from plant_emulator.diagnosis.axis.regression.fit import Regression
+    from plant_emulator.diagnosis.axis.regression.rows import Rows
     from plant_emulator.signals.log import Array
 
     Folds = Sequence[tuple[tuple[int, ...], tuple[int, ...]]]

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.axis.regression import NAMES
+from plant_emulator.diagnosis.axis.regression.fit import NAMES
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.axis.effects import Effect
-    from plant_emulator.diagnosis.axis.regression import Fit
-    from plant_emulator.diagnosis.axis.rows import KnownEffect
+    from plant_emulator.diagnosis.axis.regression.fit import Fit
+    from plant_emulator.diagnosis.axis.regression.rows import KnownEffect
 
 # Standard errors from which on a parameter differs from that of the set.
 DEVIATES = 3.0

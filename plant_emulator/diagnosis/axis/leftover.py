@@ -14,7 +14,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.axis.effects.effect import FORCE, Effect, Size
 from plant_emulator.diagnosis.axis.effects.friction import bristle
-from plant_emulator.diagnosis.axis.rows import Term
+from plant_emulator.diagnosis.axis.regression.rows import Term
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.answer import Quantity
-from plant_emulator.diagnosis.axis.regression import NAMES, residual
-from plant_emulator.diagnosis.axis.rows import Term
+from plant_emulator.diagnosis.axis.regression.fit import NAMES, residual
+from plant_emulator.diagnosis.axis.regression.rows import Term
 
 if TYPE_CHECKING:
-    from plant_emulator.diagnosis.axis.regression import Fit, Regression
+    from plant_emulator.diagnosis.axis.regression.fit import Fit, Regression
     from plant_emulator.signals.log import Array
 
 UNITS = {

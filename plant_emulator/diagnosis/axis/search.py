@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.answer import SearchStep
-from plant_emulator.diagnosis.axis.motion import UNCERTAIN
-from plant_emulator.diagnosis.axis.rows import Term
+from plant_emulator.diagnosis.axis.motion.run import UNCERTAIN
+from plant_emulator.diagnosis.axis.regression.rows import Term
 from plant_emulator.diagnosis.axis.settings import SETTINGS
 from plant_emulator.diagnosis.axis.start import grid
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from plant_emulator.diagnosis.axis.effects.effect import Effect, Scale
-    from plant_emulator.diagnosis.axis.regression import Fit, Regression
+    from plant_emulator.diagnosis.axis.regression.fit import Fit, Regression
 
 # Steps of a refinement of one shape, and rounds over all shapes.
 STEPS, ROUNDS = 12, 2

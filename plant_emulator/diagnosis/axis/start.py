@@ -11,9 +11,9 @@ import numpy as np
 from plant_emulator.diagnosis.axis.effects import LIBRARY
 from plant_emulator.diagnosis.axis.effects.effect import Scale
 from plant_emulator.diagnosis.axis.floor import moved
-from plant_emulator.diagnosis.axis.motion import Base, prepare, with_width
-from plant_emulator.diagnosis.axis.regression import Regression
-from plant_emulator.diagnosis.axis.rows import KnownEffect, Rows, Term, rows_of
+from plant_emulator.diagnosis.axis.motion.run import Base, prepare, with_width
+from plant_emulator.diagnosis.axis.regression.fit import Regression
+from plant_emulator.diagnosis.axis.regression.rows import KnownEffect, Rows, Term, rows_of
 from plant_emulator.diagnosis.axis.settings import SETTINGS
 from plant_emulator.signals.noise import noise
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from plant_emulator.diagnosis.axis.effects.effect import Effect
-    from plant_emulator.diagnosis.axis.motion import Run
-    from plant_emulator.diagnosis.axis.regression import Fit
+    from plant_emulator.diagnosis.axis.motion.run import Run
+    from plant_emulator.diagnosis.axis.regression.fit import Fit
     from plant_emulator.signals.axis_log import AxisLog
     from plant_emulator.signals.log import Array
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.axis.leftover import FORCE_BEFORE, rest_of, rest_over
-from plant_emulator.diagnosis.axis.motion import UNCERTAIN
+from plant_emulator.diagnosis.axis.motion.run import UNCERTAIN
 from plant_emulator.diagnosis.axis.settings import SETTINGS
 
 if TYPE_CHECKING:
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.axis.held_out import HeldOut, Share
     from plant_emulator.diagnosis.axis.known import KnownAxis
     from plant_emulator.diagnosis.axis.leftover import Rest
-    from plant_emulator.diagnosis.axis.regression import Fit, Regression
-    from plant_emulator.diagnosis.axis.rows import Rows
+    from plant_emulator.diagnosis.axis.regression.fit import Fit, Regression
+    from plant_emulator.diagnosis.axis.regression.rows import Rows
     from plant_emulator.diagnosis.axis.search import AxisSearch
 
 

@@ -1,6 +1,6 @@
 """The forces of an axis in which a law may be missing, and the rows that judge such a law.
 
-A law is a force beside the nominal ones in the regression of `axis/regression.py`. Runs judge it
+A law is a force beside the nominal ones in the regression of `axis/regression/fit.py`. Runs judge it
 that it was not fitted to. A single run is cut into blocks of time for the choice among laws; what
 is left to the runs that were held out is the test of the law that was chosen.
 """
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.axis.effects import Effect, Size
-from plant_emulator.diagnosis.axis.rows import Term
+from plant_emulator.diagnosis.axis.regression.rows import Term
 from plant_emulator.diagnosis.missing_law.quantity import LawQuantity
 from plant_emulator.diagnosis.missing_law.reduced import LawRows, RunRows
 from plant_emulator.diagnosis.missing_law.states import LawState
@@ -20,9 +20,9 @@ from plant_emulator.diagnosis.missing_law.states import LawState
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from plant_emulator.diagnosis.axis.motion import Base, Motion
-    from plant_emulator.diagnosis.axis.regression import Regression
-    from plant_emulator.diagnosis.axis.rows import Rows
+    from plant_emulator.diagnosis.axis.motion.run import Base, Motion
+    from plant_emulator.diagnosis.axis.regression.fit import Regression
+    from plant_emulator.diagnosis.axis.regression.rows import Rows
     from plant_emulator.diagnosis.missing_law.states import Kind
     from plant_emulator.signals.log import Array
 

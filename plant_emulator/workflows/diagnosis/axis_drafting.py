@@ -12,7 +12,7 @@ from plant_emulator.diagnosis.axis.diagnose import fit_result
 from plant_emulator.diagnosis.axis.held_out import HeldOut
 from plant_emulator.diagnosis.axis.leftover import STATES
 from plant_emulator.diagnosis.axis.quantities import quantities
-from plant_emulator.diagnosis.axis.rows import Term
+from plant_emulator.diagnosis.axis.regression.rows import Term
 from plant_emulator.diagnosis.axis.search import AxisSearch
 from plant_emulator.diagnosis.axis.settings import SETTINGS
 from plant_emulator.diagnosis.axis.start import best_width, prepared, start

@@ -14,10 +14,10 @@ from plant_emulator import parameter_sets
 from plant_emulator.diagnosis.axis.effects import LIBRARY
 from plant_emulator.diagnosis.axis.effects.effect import Scale
 from plant_emulator.diagnosis.axis.known import KnownAxis
-from plant_emulator.diagnosis.axis.motion import Base
+from plant_emulator.diagnosis.axis.motion.run import Base
 from plant_emulator.diagnosis.axis.quantities import UNITS
-from plant_emulator.diagnosis.axis.regression import NAMES
-from plant_emulator.diagnosis.axis.rows import KnownEffect, Term
+from plant_emulator.diagnosis.axis.regression.fit import NAMES
+from plant_emulator.diagnosis.axis.regression.rows import KnownEffect, Term
 from plant_emulator.errors import ParameterError
 from plant_emulator.model.parameters import ParameterSet, set_of
 from plant_emulator.workflows.axis_files.own_effects import own_effects

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from plant_emulator.diagnosis.axis.motion import Base, Motion
+    from plant_emulator.diagnosis.axis.motion.run import Base, Motion
     from plant_emulator.signals.log import Array
 
     Shapes = Mapping[str, float]

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from plant_emulator.diagnosis.axis.effects.effect import Context, Scale, Shapes
-    from plant_emulator.diagnosis.axis.motion import Motion
+    from plant_emulator.diagnosis.axis.motion.run import Motion
     from plant_emulator.signals.log import Array
 
 

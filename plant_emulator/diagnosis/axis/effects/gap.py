@@ -14,7 +14,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from plant_emulator.diagnosis.axis.motion import Motion
+    from plant_emulator.diagnosis.axis.motion.run import Motion
     from plant_emulator.signals.log import Array
 
 # Nodes of a flight that are looked at first; each further look is over twice as many.

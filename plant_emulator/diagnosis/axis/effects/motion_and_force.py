@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from plant_emulator.diagnosis.axis.effects.effect import Context, Scale, Shapes
-    from plant_emulator.diagnosis.axis.motion import Motion
+    from plant_emulator.diagnosis.axis.motion.run import Motion
     from plant_emulator.signals.log import Array
 
 # Travel of a revolution of a screw where none is given [m].

@@ -10,7 +10,7 @@ from plant_emulator.diagnosis.axis.effects import LIBRARY
 from plant_emulator.diagnosis.axis.effects.effect import Scale
 from plant_emulator.diagnosis.axis.effects.friction import bristle
 from plant_emulator.diagnosis.axis.effects.gap import crossed
-from plant_emulator.diagnosis.axis.motion import Motion
+from plant_emulator.diagnosis.axis.motion.run import Motion
 
 Array = NDArray[np.float64]
 BY_NAME = {effect.name: effect for effect in LIBRARY}

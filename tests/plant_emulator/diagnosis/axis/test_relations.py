@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.axis.relations import Kernel, stride_of
+from plant_emulator.diagnosis.axis.motion.kernel import Kernel, stride_of
 
 RANDOM = np.random.default_rng(7)
 EVEN = np.arange(200) * 0.01

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.axis.effects.effect import Context
-from plant_emulator.diagnosis.axis.motion import averaged_force
+from plant_emulator.diagnosis.axis.motion.run import averaged_force
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from plant_emulator.diagnosis.axis.effects.effect import Effect, Scale
-    from plant_emulator.diagnosis.axis.motion import Base, Run
+    from plant_emulator.diagnosis.axis.motion.run import Base, Run
     from plant_emulator.signals.log import Array
 
 # The longest delay that is tried, in periods: the rows before it do not count.

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.axis.motion import Base
+from plant_emulator.diagnosis.axis.motion.run import Base
 from plant_emulator.diagnosis.axis.settings import SETTINGS
 from plant_emulator.estimation.covariance import correlation_time
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from plant_emulator.diagnosis.axis.rows import Rows, Term
+    from plant_emulator.diagnosis.axis.regression.rows import Rows, Term
     from plant_emulator.signals.log import Array
 
 NAMES = ("inertia", "viscous_friction", "coulomb_friction", "offset")

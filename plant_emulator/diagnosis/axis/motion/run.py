@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from plant_emulator.diagnosis.axis.relations import Kernel, stride_of
+from plant_emulator.diagnosis.axis.motion.kernel import Kernel, stride_of
+from plant_emulator.diagnosis.axis.motion.spline import smooth
 from plant_emulator.diagnosis.axis.settings import SETTINGS
-from plant_emulator.diagnosis.axis.spline import smooth
 from plant_emulator.errors import LogError
 from plant_emulator.signals.noise import noise
 
