@@ -70,7 +70,7 @@ class AxisRuns:
         return self.known.effects if self.known else ()
 
     @property
-    def library(self) -> list[Effect]:
+    def effects(self) -> list[Effect]:
         """Effects that are tested: the user's own first, who knows the machine."""
         taken = (*self.without, *(one.term.effect.name for one in self.known_effects))
         return [one for one in (*self.own, *LIBRARY) if one.name not in taken]
@@ -100,7 +100,7 @@ def diagnose_axis(
     logs = runs.logs
     check_alike(logs)
     tell = progress or (lambda _label, _share: None)
-    effects, known = runs.library, runs.known_effects
+    effects, known = runs.effects, runs.known_effects
     tell("reading the motion", 0.0)
     prepared_runs, scale = prepared(logs)
     _check_known(runs, prepared_runs[0].motion, scale)

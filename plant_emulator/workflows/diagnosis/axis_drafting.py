@@ -130,7 +130,7 @@ def begin(runs: AxisRuns, plan: Plan) -> HeldOut:
     known = runs.known_effects
     width = best_width(own, scale, (), known)
     scale = replace(scale, width=width)
-    regression, rows, _ = start(every, scale, len(own), runs.library, width, known)
+    regression, rows, _ = start(every, scale, len(own), runs.effects, width, known)
     return HeldOut(rows=rows, regression=regression, folds=plan.folds)
 
 
