@@ -25,7 +25,8 @@ Told = tuple[str, dict[str, Any], str]
 
 def diagnosed(folder: Path, *arguments: str | Path) -> Told:
     """What the terminal, the answer and the report say."""
-    files = ["--json", folder / "a.json", "--report", folder / "a.html", "--workers", "1"]
+    files = ["--json", folder / "a.json", "--report", folder / "a.html"]
+    files += ["--drafts", folder / "drafts", "--workers", "1"]
     words = ["diagnose", "--model", "axis", *arguments, *files]
     result = CliRunner().invoke(main, [str(word) for word in words])
     assert result.exit_code == 0, result.output
