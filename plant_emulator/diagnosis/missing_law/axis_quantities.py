@@ -1,8 +1,8 @@
 """The forces of an axis in which a law may be missing, and the rows that judge such a law.
 
-A law is a force beside the nominal ones in the regression of `axis/regression/fit.py`. Runs judge it
-that it was not fitted to. A single run is cut into blocks of time for the choice among laws; what
-is left to the runs that were held out is the test of the law that was chosen.
+A law is a force beside the nominal ones in the regression of `axis/regression/fit.py`. Runs judge
+it that it was not fitted to. A single run is cut into blocks of time for the choice among laws;
+what is left to the runs that were held out is the test of the law that was chosen.
 """
 
 from __future__ import annotations
