@@ -64,6 +64,7 @@ class MeasuredRun:
     measured : the channels [units], shape (channels, n)
     noise : standard deviation of each channel's noise [units], shape (channels,)
     measured_input : whether an input of the simulation is a measurement with noise of its own
+    hides : effects that an unknown input of the run explains, or that need an input it lacks
     """
 
     source: str
@@ -73,6 +74,7 @@ class MeasuredRun:
     measured: Array
     noise: Array
     measured_input: bool = False
+    hides: frozenset[str] = frozenset()
 
 
 class Model(Protocol):

@@ -9,6 +9,7 @@ from plant_emulator.errors import IdentificationError
 from plant_emulator.estimation.initial_states import GAP
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.model.stage import GAP_POSITION
+from plant_emulator.recordings.wheel_torque import TAKEN
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -53,11 +54,17 @@ def unknowns(
 
 
 def free_parameters(
-    parameters: ParameterSet, names: Sequence[str] = (), *, voltage: bool = False
+    parameters: ParameterSet,
+    names: Sequence[str] = (),
+    *,
+    voltage: bool = False,
+    unknown_torque: bool = False,
 ) -> tuple[str, ...]:
     """The names given, or all that the set calls estimated but those of NOT_FREE and zeros.
 
     voltage : whether a log has it: what only the voltage shows is then free as well
+    unknown_torque : whether a truck's torque that nobody measured acted in every run: its estimate
+        takes some parameters as they are, so that no fit to these runs tells them
 
     Raises IdentificationError for a name that is unknown, calculated from others, or 0 in the set.
     """
@@ -81,7 +88,9 @@ def free_parameters(
     estimated = [
         p.name
         for p in parameters
-        if p.kind == "estimated" and p.name not in NOT_FREE and p.value > 0.0
+        if p.kind == "estimated"
+        and p.name not in (*NOT_FREE, *(TAKEN if unknown_torque else ()))
+        and p.value > 0.0
     ]
     shown = [n for n in IN_VOLTAGE if voltage and parameters[n].kind == "given"]
     return tuple(dict.fromkeys(names)) or (*estimated, *shown)

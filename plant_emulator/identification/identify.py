@@ -122,7 +122,12 @@ def identify(
     progress : called with a stage's name and its done share, 0 to 1
     Raises IdentificationError for a parameter that cannot be free.
     """
-    free = free_parameters(parameters, free, voltage=any(VOLTAGE in r.channels for r in recordings))
+    free = free_parameters(
+        parameters,
+        free,
+        voltage=any(VOLTAGE in r.channels for r in recordings),
+        unknown_torque=all(r.estimated_torque for r in recordings),
+    )
     states = states_of(effects or {})
     recordings = [with_logged_values(r, effects or {}) for r in recordings]
     values = values_of(parameters, effects)

@@ -107,7 +107,12 @@ def noise_directions(
     if not answers:
         return None
     if recording.estimated_torque:
-        answers += _slow_answers(answers)
+        answers += [
+            deviation
+            / step
+            * _answer(recording.with_wheel_torque(torque), values, gap_position, base)
+            for torque in _slowly_disturbed_torques(recording, step)
+        ]
     parts = [
         _strongest([answer[:, first : first + stretch] for answer in answers])
         for first in range(0, base.shape[1], stretch)
@@ -120,15 +125,17 @@ def noise_directions(
     )
 
 
-def _slow_answers(answers: Sequence[Array]) -> list[Array]:
-    """Responses to errors that all windows of a second have in common, and all of a run.
+def _slowly_disturbed_torques(recording: Recording, step: float) -> list[Array]:
+    """Wheel torques that are off by a step for a second, one for each, and for the whole run.
 
-    A wrong friction makes such an error. Independent windows would hardly have one together.
-    answers : responses to the windows in their order, each of shape (channels, samples)
+    A wrong friction makes such an error. Independent windows would hardly have one together, and
+    after a flight through the gap the response to it is not the sum of theirs.
     """
-    size = round(TORQUE_ERROR_TIME / ERROR_WINDOW)
-    seconds = [np.sum(answers[k : k + size], axis=0) for k in range(0, len(answers), size)]
-    return [*seconds, np.sum(answers, axis=0)]
+    run = recording.inputs
+    acts = np.logical_not(run.parked)
+    second = (run.time - run.time[0]) // TORQUE_ERROR_TIME
+    masks = [acts & (second == k) for k in np.unique(second)]
+    return [run.wheel_torque + step * mask for mask in (*masks, acts) if mask.any()]
 
 
 def _window(recording: Recording) -> tuple[int, float, float]:

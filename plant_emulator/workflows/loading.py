@@ -7,6 +7,7 @@ another one, or that is of another bench.
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from itertools import combinations
 from typing import TYPE_CHECKING, cast
 
@@ -99,12 +100,25 @@ def load_recordings(
     check_same_bench(taken, parameters.values())
     hold = cast("Hold | None", reference)
     recordings = [
-        recording(log, hold, use, parameters.sensors) for log, use in zip(taken, uses, strict=True)
+        _weighed(recording(log, hold, use, parameters.sensors), parameters)
+        for log, use in zip(taken, uses, strict=True)
     ]
     if common_channels:
         recordings, more = with_common_voltage(recordings)
         notes += more
     return recordings, notes
+
+
+def _weighed(loaded: Recording, parameters: ParameterSet) -> Recording:
+    """The recording, with the noise beside a simulation where a truck's torque is estimated.
+
+    A noise that the user declared stays.
+    """
+    if not loaded.estimated_torque:
+        return loaded
+    beside = loaded.with_noise_beside(parameters.values())
+    declared = [bool(getattr(parameters.sensors.get(n), "noise", 0.0)) for n in loaded.channels]
+    return replace(beside, noise=np.where(declared, loaded.noise, beside.noise))
 
 
 def with_common_voltage(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:

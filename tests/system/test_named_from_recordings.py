@@ -1,4 +1,4 @@
-"""A bench that hides an effect, a sweep of the gateway over the socket, and the diagnosis of it."""
+"""A bench that hides an effect, a sweep and a truck over the socket, and the diagnosis of both."""
 
 import json
 from dataclasses import replace
@@ -25,12 +25,17 @@ pytestmark = pytest.mark.slow
 SPEEDS = (300.0, 900.0, 1800.0, 3000.0)
 
 
-def swept(folder: Path, option: str) -> Path:
-    """The recording of a sweep on a bench with this effect, without waiting for the clock."""
+def bench_with(folder: Path, option: str) -> Path:
+    """The file of a bench with this effect."""
     bench = folder / "bench.toml"
     sensors = {name: Sensor(noise=noise) for name, noise in NOISE.items()}
     hidden = effects.parse((option,))
     parameter_sets.save(replace(parameter_sets.load(), effects=hidden, sensors=sensors), bench)
+    return bench
+
+
+def swept(folder: Path, bench: Path) -> Path:
+    """The recording of a sweep of this bench, without waiting for the clock."""
     with EmulatorProcess(parameters=str(bench), truck_mass=None, speed=None) as emulator:
         known = Config().with_values({"plc.port": str(emulator.port)})
         config = sweep_config(known, speeds=SPEEDS, hold=3.0)
@@ -45,6 +50,23 @@ def swept(folder: Path, option: str) -> Path:
         return operate_fast(session).recording
 
 
+def cycled(folder: Path, bench: Path) -> Path:
+    """The recording of a truck's cycle on this bench, whose wheel torque nobody measures."""
+    words = ["demo", "--fast", "--load", "0", "--driver", "pi", "--bench-parameters", str(bench)]
+    driven = CliRunner().invoke(gateway, [*words, "--out", str(folder / "cycle")])
+    assert driven.exit_code == 0, driven.output
+    (recording,) = (folder / "cycle").glob("*.rlrec")
+    return recording
+
+
+def exported(recording: Path) -> str:
+    """The log of a recording."""
+    log = recording.with_suffix(".csv.gz")
+    written = CliRunner().invoke(gateway, ["export", str(recording), "--to", str(log)])
+    assert written.exit_code == 0, written.output
+    return str(log)
+
+
 @pytest.mark.parametrize(
     ("subsystem", "effect"),
     [
@@ -54,13 +76,12 @@ def swept(folder: Path, option: str) -> Path:
         ("speed_sensor", "drum_speed_lag"),
     ],
 )
-def test_hidden_effect_is_named_from_the_recording_alone(
+def test_hidden_effect_is_named_from_recordings_alone(
     subsystem: str, effect: str, tmp_path: Path
 ) -> None:
-    recording, log, answer = swept(tmp_path, effect), tmp_path / "run.csv", tmp_path / "gap.json"
-    exported = CliRunner().invoke(gateway, ["export", str(recording), "--to", str(log)])
-    assert exported.exit_code == 0, exported.output
-    words = ["diagnose", str(log), "--workers", "1", "--json", str(answer)]
+    bench, answer = bench_with(tmp_path, effect), tmp_path / "gap.json"
+    logs = [exported(record(tmp_path, bench)) for record in (swept, cycled)]
+    words = ["diagnose", *logs, "--workers", "1", "--json", str(answer)]
     diagnosed = CliRunner().invoke(plant_emulator, words)
     assert diagnosed.exit_code == 0, diagnosed.output
     told = json.loads(answer.read_text())

@@ -75,6 +75,10 @@ class _InputNoiseModel:
         """See `Model`."""
         return whiten_function(self._model.residual(run, effects), self._noise.get(run))
 
+    def unwhitened_residual(self, run: int, effects: Sequence[str]) -> Residual:
+        """See `Model`; what the noise of an input makes of a run is no gap either."""
+        return whiten_function(self._model.unwhitened_residual(run, effects), self._noise.get(run))
+
 
 @dataclass(frozen=True)
 class InputNoiseRecipe:

@@ -13,7 +13,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.localisation.locate import locate
 from plant_emulator.diagnosis.machine import MeasuredRun
-from plant_emulator.diagnosis.machines.bench_candidates import candidate
+from plant_emulator.diagnosis.machines.bench_candidates import candidate, hidden_effects
 from plant_emulator.diagnosis.machines.bench_programs import (
     COLD_SHELL,
     missing_experiments,
@@ -104,7 +104,10 @@ class BenchModel:
         free: Sequence[str] = (),
     ) -> None:
         voltage = [VOLTAGE in r.channels for r in recordings]
-        self._free = free_parameters(parameters, free, voltage=any(voltage))
+        unknown = [r.estimated_torque for r in recordings]
+        self._free = free_parameters(
+            parameters, free, voltage=any(voltage), unknown_torque=all(unknown)
+        )
         self._effects = effects
         self._values = values_of(parameters)
         self.nominal_set = parameters
@@ -116,12 +119,10 @@ class BenchModel:
         self._recordings = [with_logged_values(r, everything, known) for r in recordings]
         self._given = {f"{e}_{key}" for e, own in parameters.effects.items() for key in own}
         self.states = states_of(parameters.effects, known)
+        hides = [hidden_effects(effects, r) for r in recordings]
+        hidden = frozenset.intersection(*hides) if any(unknown) else frozenset()
         self.candidates: Mapping[str, Candidate] = {
-            name: candidate(
-                effect,
-                voltage=all(voltage),
-                unknown_torque=all(r.estimated_torque for r in recordings),
-            )
+            name: candidate(effect, voltage=all(voltage), unknown_torque=name in hidden)
             for name, effect in effects.items()
         }
         self.parameters = tuple(unknowns(parameters, self._free, self._values, ()))
@@ -136,8 +137,9 @@ class BenchModel:
                 measured=np.stack([r.log[name] for name in r.channels]),
                 noise=r.noise,
                 measured_input=r.inputs.truck,
+                hides=own,
             )
-            for r in recordings
+            for r, own in zip(recordings, hides, strict=True)
         ]
 
     def recording(self, run: int) -> Recording:

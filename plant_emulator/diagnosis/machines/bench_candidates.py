@@ -10,14 +10,19 @@ from plant_emulator.recordings.preflight import NAMES
 from plant_emulator.signals.log import VOLTAGE, WHEEL_TORQUE
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from plant_emulator.effects import Effect, EffectParameter
+    from plant_emulator.recordings.recording import Recording
 
     Role = Literal["size", "shape", "state", "stochastic", "fixed"]
 
 # What an effect needs begins so, where the logged voltage shows it.
 LOG_VOLTAGE = f"log {NAMES[VOLTAGE]}"
-# Subsystems whose torques an unknown torque of a truck hides, and what would show them.
+# Subsystems whose torques an unknown torque of a truck hides, and those that only a truck shows.
 BEHIND_THE_GEAR = frozenset({"gear", "drum", "wheel_contact"})
+WHEEL = frozenset({"wheel_contact"})
+# What would show them.
 LOG_WHEEL_TORQUE = f"log {NAMES[WHEEL_TORQUE]}, or give a run without a truck"
 
 
@@ -25,7 +30,7 @@ def candidate(effect: Effect, *, voltage: bool = False, unknown_torque: bool = F
     """Turn the declaration of an effect into unknowns.
 
     voltage : whether all logs have it
-    unknown_torque : whether a truck's torque that nobody measured acted in every run
+    unknown_torque : whether a truck's torque that nobody measured hides it
     """
     name, parameters = effect.name, effect.parameters
     unknowns: dict[str, list[Unknown]] = {r: [] for r in ("size", "shape", "state", "stochastic")}
@@ -53,9 +58,17 @@ def candidate(effect: Effect, *, voltage: bool = False, unknown_torque: bool = F
     )
 
 
+def hidden_effects(effects: Mapping[str, Effect], recording: Recording) -> frozenset[str]:
+    """Names of the effects that a run cannot show, see `MeasuredRun.hides`."""
+    subsystems = BEHIND_THE_GEAR if recording.estimated_torque else WHEEL
+    if recording.inputs.truck and not recording.estimated_torque:
+        return frozenset()
+    return frozenset(name for name, one in effects.items() if one.subsystem in subsystems)
+
+
 def _needs(effect: Effect, *, voltage: bool, unknown_torque: bool) -> str:
     """The sensor or manoeuvre that shows the effect and that these logs lack."""
-    if unknown_torque and effect.subsystem in BEHIND_THE_GEAR:
+    if unknown_torque:
         return LOG_WHEEL_TORQUE
     return "" if voltage and effect.needs.startswith(LOG_VOLTAGE) else effect.needs
 

@@ -16,7 +16,7 @@ import numpy as np
 from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
 from plant_emulator.diagnosis.localisation.drum_subsystem import prior_means
 from plant_emulator.diagnosis.localisation.measured_signals import NOISES
-from plant_emulator.diagnosis.localisation.parity_relations import DRIVE, relation_residuals
+from plant_emulator.diagnosis.localisation.parity_relations import DRIVE, GEAR, relation_residuals
 from plant_emulator.diagnosis.machines.thinning import thin
 from plant_emulator.diagnosis.search.rich_model import rich_columns
 from plant_emulator.errors import UnsettledError
@@ -102,12 +102,14 @@ class BenchRelations:
 
     @cached_property
     def use(self) -> NDArray[np.bool_]:
-        """Rows that count, shape (n,)."""
+        """Rows that count, shape (n,): none of the drum under a torque that nobody measured."""
         relation = [
             np.repeat(t.usable_intervals, len(r.value))
             for t, r in zip(self.thinned, self.site.relations, strict=True)
         ]
-        return np.concatenate([*relation, *(~t.void for t in self.thinned)])
+        counted = np.concatenate([*relation, *(~t.void for t in self.thinned)])
+        open_drum = np.array([m.unknown_torque for m in self.site.signals])[self.owners]
+        return counted & ~(open_drum & np.isin(self.kinds, (GEAR, -1)))
 
     @cached_property
     def kinds(self) -> NDArray[np.int_]:
@@ -125,7 +127,7 @@ class BenchRelations:
 
     @cached_property
     def whiteners(self) -> list[tuple[NDArray[np.int_], Whitener]]:
-        """The rows of each kind in each run, and the filters that whiten them.
+        """The rows of each kind in each run that has some that count, and their whitening filters.
 
         The noise is estimated on what a rich model leaves: see `rich_columns`.
         """
@@ -134,19 +136,16 @@ class BenchRelations:
         rest = Regression.of(y, rich * self.use[:, None]).left
         found: list[tuple[NDArray[np.int_], Whitener]] = []
         for kind in np.unique(self.kinds):
-            index = [
-                np.flatnonzero((self.kinds == kind) & (self.owners == k))
-                for k in range(len(self.runs))
-            ]
-            series = [
-                NoiseSeries(
-                    time=m.time if kind < 0 else m.time[1:],
-                    value=rest[rows],
-                    use=self.use[rows],
-                )
-                for rows, m in zip(index, self.site.signals, strict=True)
-            ]
-            found += zip(index, estimate_channel_noise(series, disturbed=False)[1], strict=True)
+            index, series = [], []
+            for k, m in enumerate(self.site.signals):
+                rows = np.flatnonzero((self.kinds == kind) & (self.owners == k))
+                if not self.use[rows].any():
+                    continue
+                time = m.time if kind < 0 else m.time[1:]
+                index.append(rows)
+                series.append(NoiseSeries(time=time, value=rest[rows], use=self.use[rows]))
+            if index:
+                found += zip(index, estimate_channel_noise(series, disturbed=False)[1], strict=True)
         return found
 
     def white(self, rows: Array) -> Array:

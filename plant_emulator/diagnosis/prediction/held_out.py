@@ -152,13 +152,21 @@ class HeldOutRuns:
         tasks = [self._fold(explained.final, *fold, refitted=False) for fold in folds]
         usable, notes = [], []
         for fold, norms in zip(folds, self.runner.map(signature_norms, tasks), strict=True):
-            hidden = [name for name, norm in norms.items() if norm < DETECTABLE_NORM]
-            if not hidden:
-                usable.append(fold)
-                continue
+            weak = [name for name, norm in norms.items() if norm < DETECTABLE_NORM]
+            hidden = [*weak, *(n for n in followed if n in self._hidden(fold[0]))]
+            open_input = [name for name in followed if name in self._hidden(fold[1])]
             lost = self._sources(fold[1])
-            notes.append(f"{lost}: shows no shrinkage; the other runs do not show {hidden[0]}")
+            if hidden:
+                notes.append(f"{lost}: shows no shrinkage; the other runs do not show {hidden[0]}")
+            elif open_input:
+                notes.append(f"{lost}: shows no shrinkage; it does not show {open_input[0]}")
+            else:
+                usable.append(fold)
         return tuple(usable), tuple(notes)
+
+    def _hidden(self, runs: Sequence[int]) -> frozenset[str]:
+        """Effects that none of these runs can show."""
+        return frozenset.intersection(*(self.runner.model.runs[k].hides for k in runs))
 
     def predictions(
         self, explained: Explanation, followed: tuple[str, ...], folds: Folds

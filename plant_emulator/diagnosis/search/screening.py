@@ -144,6 +144,8 @@ def screen(model: Model, asked: Screening) -> list[Promise]:
     from threadpoolctl import threadpool_limits
 
     base, library = asked.base, _library(model, asked.base)
+    hidden = frozenset.intersection(*(model.runs[k].hides for k in asked.runs))
+    library = {name: one for name, one in library.items() if name not in hidden}
     if asked.nominal:
         base = _at_nominal(model, asked)
     last = bool(base.effects) and base.mean_square <= NOISE_MEAN_SQUARE

@@ -29,7 +29,12 @@ from plant_emulator.diagnosis.search.confirmation import Trial, advance, confirm
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
 from plant_emulator.diagnosis.search.screening import Start, promises, visibilities
 from plant_emulator.diagnosis.search.settings import SETTINGS
-from plant_emulator.diagnosis.search.summary import alternatives, hypotheses, unconverged
+from plant_emulator.diagnosis.search.summary import (
+    alternatives,
+    hypotheses,
+    not_told_apart,
+    unconverged,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -39,9 +44,6 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.search.screening import Promise
     from plant_emulator.estimation.noise.logged_noise import LoggedNoise
-
-# Sets that are fitted again where the noise is found to be another.
-KEPT = 2
 
 
 @dataclass(kw_only=True)
@@ -105,9 +107,7 @@ class Search:
         self.runner = replace(self.declared, recipe=recipe, model=build_model(recipe))
         self.promises.clear()
         self.expanded.clear()
-        kept = sorted(self.sets.values(), key=lambda p: p.cost)[:KEPT]
-        if self.null not in kept:
-            kept.append(self.null)
+        kept = not_told_apart(self.sets)
         self.sets = {}
         self._fits(advance, kept)
         self.null = self.sets[frozenset()]

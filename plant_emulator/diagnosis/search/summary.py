@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fitting.explanation import Hypothesis
+from plant_emulator.diagnosis.search.settings import SETTINGS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,6 +23,16 @@ def hypotheses(sets: Sets, visible: Mapping[str, Visibility]) -> tuple[Hypothesi
         Hypothesis(effect=name, fit=singles.get(name), **vars(visibility))
         for name, visibility in visible.items()
     )
+
+
+def not_told_apart(sets: Sets) -> list[FitResult]:
+    """The best set of each size, and those of its size that may win in another noise."""
+    kept = []
+    for size in {len(key) for key in sets}:
+        same = [one for key, one in sets.items() if len(key) == size]
+        least = min(one.cost for one in same)
+        kept += [one for one in same if one.cost < least + SETTINGS.near]
+    return kept
 
 
 def alternatives(sets: Sets, final: FitResult, name: str) -> dict[str, float]:

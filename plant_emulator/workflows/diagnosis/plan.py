@@ -36,10 +36,18 @@ def plan_recordings(recordings: Sequence[Recording], count: int) -> tuple[list[R
     """The runs of a diagnosis and the plan for them; the first `count` recordings are to be fitted.
 
     The recordings after these are predicted. Without any, each of several recordings is predicted
-    in turn. A single recording is fitted on its first part and predicted on the rest.
+    in turn, but not by runs of trucks whose torque nobody measured: these say too little of gear
+    and drum. A single recording is fitted on its first part and predicted on the rest.
     """
     if len(recordings) > 1:
-        return list(recordings), plan_of_runs(len(recordings), count)
+        plan = plan_of_runs(len(recordings), count)
+        unknown = [r.estimated_torque for r in recordings]
+        telling = tuple(
+            (fitted, predicted)
+            for fitted, predicted in plan.folds
+            if not all(unknown[k] for k in fitted) or all(unknown[k] for k in predicted)
+        )
+        return list(recordings), replace(plan, folds=telling or plan.folds)
     (whole,) = recordings
     end = whole.log.time[0] + FITTED_SHARE * float(np.ptp(whole.log.time))
     first = whole.log.time <= end

@@ -16,7 +16,9 @@ from plant_emulator.recordings.wheel_torque import (
     with_estimated_torque,
 )
 from plant_emulator.signals.log import COMPARED, TRUCK, WHEEL_TORQUE, Log
-from plant_emulator.simulation.sensor_noise import add_noise
+from plant_emulator.signals.noise import noise
+from plant_emulator.simulation.sensor_noise import SENSORS, add_noise
+from plant_emulator.workflows.loading import load_recordings
 from plant_emulator.workflows.simulation import simulate
 
 BenchLog = Callable[[str], Log]
@@ -72,6 +74,22 @@ def unknown(log: Log, parameters: ParameterSet) -> Recording:
     return recording(known, None, dict.fromkeys(COMPARED, use))
 
 
+def test_noise_of_a_bench_whose_reference_is_never_still_is_that_of_its_sensors(
+    nominal: ParameterSet, travel: Log
+) -> None:
+    """A regulator that answers noise moves the current by some 10 A; its sensor has 0.25 A."""
+    moving = np.abs(travel["speed_reference"]) > 1.0
+    asked = 1.3 * np.random.default_rng(1).standard_normal(len(travel.time)) * moving
+    signals = {**travel.signals, "speed_reference": travel["speed_reference"] + asked}
+    driven = simulate(replace(travel, signals=signals), reference="staircase")
+    run = load_recordings([unmeasured(add_noise(driven, 1))], nominal)[0][0]
+    channels = ("motor_speed", "armature_current", "shaft_torque")
+    found = {name: run.noise[run.channels.index(name)] for name in channels}
+    assert noise(run.log["armature_current"]) > 5.0
+    for name in channels:
+        assert 0.9 < found[name] / SENSORS[name][0] < 1.5, name
+
+
 @pytest.mark.slow
 def test_friction_tells_nothing_that_the_unknown_torque_could_not(
     nominal: ParameterSet, travel: Log
@@ -81,16 +99,16 @@ def test_friction_tells_nothing_that_the_unknown_torque_could_not(
         {"gear_viscous_friction": 1.1 * nominal.value("gear_viscous_friction")}
     )
     run, p = unknown(add_noise(travel, 1), stiff), stiff.values()
-    noise = noise_directions(run, p, 0.0)
-    assert noise is not None
+    directions = noise_directions(run, p, 0.0)
+    assert directions is not None
     base = run.residual(p, 0.0)
     counted = run.use.sum(axis=1)
-    assert np.all(np.sum(noise.whiten(base) ** 2, axis=1) < 1.15 * counted)
+    assert np.all(np.sum(directions.whiten(base) ** 2, axis=1) < 1.15 * counted)
 
     def share_left(**values: float) -> float:
         """Of the squares of the change that these values make."""
         other = run.residual({**p, **values}, 0.0) - base
-        return float(np.sum(noise.whiten(other) ** 2) / np.sum(other**2))
+        return float(np.sum(directions.whiten(other) ** 2) / np.sum(other**2))
 
     assert share_left(gear_viscous_friction=1.2 * p["gear_viscous_friction"]) < 2e-3
     assert share_left(flux_constant_1=1.02 * p["flux_constant_1"]) > 0.05

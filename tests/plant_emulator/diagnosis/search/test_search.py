@@ -16,6 +16,7 @@ from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
 from plant_emulator.diagnosis.report.ranking import undetectable
 from plant_emulator.diagnosis.search.search import Search
 from plant_emulator.diagnosis.search.simulation_columns import SimulationColumns
+from plant_emulator.diagnosis.search.summary import not_told_apart
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import (
     SHAPES,
@@ -45,6 +46,15 @@ def test_both_of_two_effects_are_named() -> None:
     assert set(found.final.effects) == {"wave", "cube"}
     assert [names[0] for names in found.classes()] == list(found.final.effects)
     assert adequate(found.final, found.null)
+
+
+def test_sets_that_another_noise_may_put_first_are_kept_in_each_size() -> None:
+    """Two effects that tie alone are both kept, though a set of two has the least cost."""
+    null = fit_null(Line([noisy(2.0 + 3.0 * TIME)]), (0,))
+    costs = {(): 900.0, ("wave",): 500.0, ("cube",): 510.0, ("step",): 700.0, ("wave", "cube"): 300}
+    sets = {frozenset(k): replace(null, effects=k, cost=float(c)) for k, c in costs.items()}
+    kept = {one.effects for one in not_told_apart(sets)}
+    assert kept == {(), ("wave",), ("cube",), ("wave", "cube")}
 
 
 class KnownNoise(Search):

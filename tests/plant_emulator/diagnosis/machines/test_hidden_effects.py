@@ -1,0 +1,82 @@
+"""Which effects a run of the bench can show, and what follows for folds and parameters."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from plant_emulator import effects
+from plant_emulator.diagnosis.machines.bench import BenchModel
+from plant_emulator.model.parameters import ParameterSet
+from plant_emulator.recordings.recording import Recording
+from plant_emulator.recordings.wheel_torque import TAKEN
+from plant_emulator.signals.log import TRUCK, WHEEL_TORQUE, Log
+from plant_emulator.workflows.diagnosis.plan import plan_recordings
+from plant_emulator.workflows.loading import load_recordings
+from plant_emulator.workflows.simulation import simulate
+
+LIBRARY = {
+    name: effects.load(name)
+    for name in ("gear_eccentricity", "tyre_rolling_loss", "motor_friction", "torque_sensor_offset")
+}
+
+
+@pytest.fixture(scope="module")
+def runs(nominal: ParameterSet) -> dict[str, Recording]:
+    """Runs without a truck, with a truck, and with a truck whose torque nobody measured."""
+    travel = simulate("program6")
+    signals = {k: v for k, v in travel.signals.items() if k != WHEEL_TORQUE}
+    unknown = replace(travel, signals={**signals, TRUCK: np.ones(len(travel.time))})
+
+    def loaded(log: Log) -> Recording:
+        return load_recordings([log], nominal)[0][0]
+
+    logs = {"free": simulate("program1"), "truck": travel, "unknown": unknown}
+    return {name: loaded(log) for name, log in logs.items()}
+
+
+def test_run_hides_what_its_unknown_torque_explains_and_what_only_a_truck_shows(
+    nominal: ParameterSet, runs: dict[str, Recording]
+) -> None:
+    model = BenchModel([runs["free"], runs["truck"], runs["unknown"]], nominal, LIBRARY)
+    assert [set(run.hides) for run in model.runs] == [
+        {"tyre_rolling_loss"},
+        set(),
+        {"gear_eccentricity", "tyre_rolling_loss"},
+    ]
+
+
+@pytest.mark.parametrize(
+    ("given", "asks"),
+    [
+        (("free",), set()),
+        (("unknown",), {"gear_eccentricity", "tyre_rolling_loss"}),
+        (("free", "unknown"), {"tyre_rolling_loss"}),
+        (("truck", "unknown"), set()),
+    ],
+)
+def test_wheel_torque_is_asked_for_where_its_lack_hides_an_effect(
+    nominal: ParameterSet, runs: dict[str, Recording], given: tuple[str, ...], asks: set[str]
+) -> None:
+    model = BenchModel([runs[name] for name in given], nominal, LIBRARY)
+    wanted = "or give a run without a truck"
+    assert {name for name, one in model.candidates.items() if wanted in one.needs} == asks
+
+
+def test_parameters_that_the_estimate_of_a_torque_takes_stay_as_they_are(
+    nominal: ParameterSet, runs: dict[str, Recording]
+) -> None:
+    def free(*given: str) -> set[str]:
+        model = BenchModel([runs[name] for name in given], nominal, LIBRARY)
+        return {u.name for u in model.parameters}
+
+    assert free("truck") - free("unknown") == set(TAKEN)
+    assert free("free", "unknown") >= set(TAKEN)
+
+
+def test_a_truck_of_unknown_torque_predicts_no_other_run(
+    runs: dict[str, Recording],
+) -> None:
+    pair = [runs["free"], runs["unknown"]]
+    assert plan_recordings(pair, 2)[1].folds == (((0,), (1,)),)
+    assert plan_recordings(2 * [runs["unknown"]], 2)[1].folds == (((1,), (0,)), ((0,), (1,)))
