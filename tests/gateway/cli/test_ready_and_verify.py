@@ -13,6 +13,7 @@ from rich.console import Console
 from gateway.cli import main
 from gateway.commissioning.verification import CHECKS, verification_program
 from gateway.configuration.config import Config
+from gateway.configuration.program import Program, Ramp
 from gateway.demo.operator import Session, operate_fast
 from gateway.demo.view import Screen
 from plant_emulator.emulator.process import EmulatorProcess
@@ -71,15 +72,19 @@ def recorded(folder: Path, names: list[str]) -> Path:
     with EmulatorProcess(truck_mass=None, speed=None) as emulator:
         values = {"plc.port": str(emulator.port), "limits.speed_max_rpm": "1500"}
         config = Config().with_values(values)
-        program = verification_program(config, names)
-        session = Session(
-            config=config.with_program(program),
-            file=folder / "verify.toml",
-            emulator=emulator,
-            screen=Screen(Console(quiet=True), "", 1.0),
-            duration=program.duration + 1.0,
-        )
-        return operate_fast(session).recording
+        return driven(folder, emulator, config, verification_program(config, names))
+
+
+def driven(folder: Path, emulator: EmulatorProcess, config: Config, program: Program) -> Path:
+    """The recording of a program, without waiting for the clock."""
+    session = Session(
+        config=config.with_program(program),
+        file=folder / "run.toml",
+        emulator=emulator,
+        screen=Screen(Console(quiet=True), "", 1.0),
+        duration=program.duration + 1.0,
+    )
+    return operate_fast(session).recording
 
 
 @pytest.mark.slow
@@ -96,6 +101,17 @@ def test_a_recording_is_verified_again_from_its_file_alone(tmp_path):
     assert abs(torque) < 0.5
 
 
+def test_the_recording_of_another_run_is_refused_and_not_found_within_its_limits(tmp_path):
+    """A program of two ramps has no step of any check."""
+    with EmulatorProcess(truck_mass=None, speed=None) as emulator:
+        steps = (Ramp(speed=20.0, rate=40.0, hold=0.5), Ramp(speed=0.0, rate=40.0, hold=0.0))
+        config = Config().with_values({"plc.port": str(emulator.port)})
+        path = driven(tmp_path, emulator, config, Program(name="short.csv", steps=steps))
+    result = CliRunner().invoke(main, ["verify", str(path)])
+    assert result.exit_code == 2
+    assert "the run of short.csv; expected a recording of verify" in result.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
@@ -103,6 +119,8 @@ def test_a_recording_is_verified_again_from_its_file_alone(tmp_path):
         (["none.rlrec"], "none.rlrec: No such file"),
         (["-c", "none.toml"], "none.toml: No such file"),
         (["-c", "x.toml", "--only", "nothing"], "'nothing' is not one of"),
+        (["a.rlrec", "--set", "truck.load_kg=1"], "a recording has had its own"),
+        (["a.rlrec", "--repeats", "2"], "a recording has had its own"),
     ],
 )
 def test_wrong_use_is_one_line_and_exit_code_2(tmp_path, monkeypatch, arguments, says):
