@@ -45,7 +45,7 @@ def document_in(text: str) -> dict[str, Any] | None:
     inside = DOCUMENT.search(text)
     try:
         found = json.loads(inside[1] if inside else text)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     return found if isinstance(found, dict) else None
 

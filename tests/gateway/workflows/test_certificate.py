@@ -83,12 +83,16 @@ def test_the_page_shows_values_limits_digests_and_what_lies_outside():
         (["--verify", "none.html"], "none.html: No such file"),
         (["--verify", "other.html"], "other.html: no certificate"),
         (["--verify", "half.json"], "half.json: no certificate"),
+        (["--verify", "empty.json"], "empty.json: no certificate"),
+        (["--verify", "deep.json"], "deep.json: no certificate"),
     ],
 )
 def test_wrong_use_is_one_line_and_exit_code_2(tmp_path, monkeypatch, arguments, says):
     monkeypatch.chdir(tmp_path)
     Path("other.html").write_text("<html></html>")
     Path("half.json").write_text('{"schema": "certificate/1", "runs": []}')
+    Path("empty.json").write_text(json.dumps({**DOCUMENT, "parameters": {}}))
+    Path("deep.json").write_text(100_000 * "[")
     result = run(*arguments)
     assert result.exit_code == 2, result.output
     assert says in result.stderr
