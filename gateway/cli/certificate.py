@@ -48,8 +48,8 @@ def command(
     budget and the indices of SAE J2951. The page names every file by its digest and holds the
     document certificate/1. --verify computes all values again from these files.
 
-    Exit code 1: a value lies outside of its limit, there is no check, or the verified certificate
-    says otherwise than its files.
+    Exit code 1: a value lies outside of its limit, a check of `ready` or `verify` is not in the
+    recordings, or the verified certificate says otherwise than its files.
     """
     if (verified is None) == (not recordings):
         raise click.UsageError("expected recordings, or --verify FILE")
@@ -72,7 +72,11 @@ def command(
     if json_file is not None:
         write_json(json_file, made.document, indent=2)
     if json_file != "-":
-        click.echo("every value lies within its limit" if made.holds else "not certified")
+        click.echo(
+            "every value lies within its limit"
+            if made.holds
+            else f"not certified: see {save or json_file}"
+        )
     return 0 if made.holds else 1
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.commissioning import readiness
+from gateway.commissioning.verification import CHECKS
 from gateway.configuration.config import Config
 from gateway.errors import ConfigError
 from gateway.recordings import recording, step_runs
@@ -47,7 +48,7 @@ class Certificate:
 
     @property
     def holds(self) -> bool:
-        """Whether there are checks, and every value of them lies within its limit."""
+        """Whether every check was made, and every value of them lies within its limit."""
         return bool(self.document["holds"])
 
     @property
@@ -80,11 +81,14 @@ def certify(
     pairs = zip(found, configs, strict=True)
     runs = [_run(one, config, lambda path: budget(path, file), folder) for one, config in pairs]
     checks = [check for run in runs for check in run["checks"]]
+    shown = {check["name"] for check in checks}
+    not_shown = [name for name in (*readiness.NAMES, *CHECKS) if name not in shown]
     document = {
         "schema": SCHEMA,
         "date": date or datetime.now(UTC).isoformat(timespec="seconds"),
         "program": "gateway " + version("road-load-bench"),
-        "holds": bool(checks) and all(check["holds"] for check in checks),
+        "holds": not not_shown and all(check["holds"] for check in checks),
+        "not_shown": not_shown,
         "bench": configs[0].document["bench"],
         "map": {"name": found[0].header.map, "sha256": found[0].header.map_hash},
         "parameters": _parameters(parameters, file, folder),

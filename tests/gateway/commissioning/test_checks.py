@@ -5,6 +5,7 @@ import pytest
 
 from gateway.commissioning.check import Check, missing, page
 from gateway.commissioning.checks import acceleration, coast_down, compensation, inertia, response
+from gateway.commissioning.readiness import NAMES
 from gateway.commissioning.readiness import evaluate as ready
 from gateway.commissioning.readiness import readiness_program
 from gateway.commissioning.step_run import StepRun
@@ -208,6 +209,7 @@ def test_a_bench_that_is_well_is_ready_with_its_tare():
     checks = ready(slow_turn())
     assert all(one.holds for one in checks)
     assert checks[0].value == pytest.approx(0.1)
+    assert tuple(dict.fromkeys(one.name for one in checks)) == NAMES
 
 
 @pytest.mark.parametrize(

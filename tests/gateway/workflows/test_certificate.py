@@ -32,6 +32,7 @@ DOCUMENT = {
     "date": "2026-11-23T12:00:00+00:00",
     "program": "gateway 0.2.0",
     "holds": False,
+    "not_shown": [],
     "bench": {"drum_radius_m": 0.645},
     "map": {"name": "bench_int16", "sha256": "2" * 64},
     "parameters": {"set": "set.toml", "sha256": "3" * 64, "origin": {"a": 1}, "effects": ["lag"]},
@@ -60,6 +61,13 @@ def test_a_value_has_four_digits_and_at_most_three_decimals(value, shown):
     check = {**CHECK, "value": value, "source": "own", "holds": False}
     page = html({**DOCUMENT, "runs": [{**RUN, "checks": [check]}]})
     assert f'<td class="number">{shown}</td><td class="number">9</td>' in page
+
+
+def test_checks_that_no_recording_shows_are_named_and_nothing_is_certified(tmp_path):
+    """A bench whose tare, ratio or coast-downs nobody has seen is not to be believed."""
+    page = html({**DOCUMENT, "not_shown": ["tare", "coast-down"]})
+    shown = "Outside: losses. Not shown by these recordings: tare, coast-down."
+    assert f'<p class="fails">{shown}</p>' in page
 
 
 def test_the_page_shows_values_limits_digests_and_what_lies_outside():
@@ -105,8 +113,11 @@ def test_what_follows_from_the_recordings_is_verified_and_a_change_is_not(tmp_pa
     folder.mkdir()
     path, page = recorded(folder, ["losses", "torque"]), folder / "bench.html"
     made = run(path, "--save", page)
-    assert made.exit_code == 0, made.output
+    assert (made.exit_code, made.stdout) == (1, f"not certified: see {page}\n")
     told = document_in(page.read_text("utf-8"))
+    ready = ["tare", "zero", "sign", "ratio", "warm-up", "heartbeat", "clock"]
+    others = ["inertia", "acceleration", "compensation", "coast-down", "response"]
+    assert told["not_shown"] == ready + others
     assert [one["name"] for one in told["runs"][0]["checks"]] == ["losses", "torque"]
     assert told["runs"][0]["files"] == {path.name: hashlib.sha256(path.read_bytes()).hexdigest()}
 
