@@ -67,6 +67,31 @@ def test_a_plc_that_does_not_answer_is_told_before_anything_is_asked_of_the_oper
     assert "remote" not in result.stderr
 
 
+def test_a_bench_whose_registers_do_not_fit_is_told_before_anything_is_asked(tmp_path):
+    """The PLC has the int16 map; the float32 map reads at addresses that it does not have."""
+    with EmulatorProcess(truck_mass=None) as emulator:
+        (tmp_path / "bench.toml").write_text(
+            f'[plc]\nport = {emulator.port}\nmap = "bench_float32"\n'
+        )
+        result = CliRunner().invoke(main, ["ready", "-c", str(tmp_path / "bench.toml")])
+    assert result.exit_code == 1
+    assert "nothing was turned; registers that do not fit: " in result.stderr
+    assert "remote" not in result.stderr
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe", b"a,b\n1,2\n"])
+def test_a_history_that_is_none_is_told_before_anything_is_asked(tmp_path, content):
+    (tmp_path / "readiness.csv").write_bytes(content)
+    with EmulatorProcess(truck_mass=None) as emulator:
+        (tmp_path / "bench.toml").write_text(
+            f'[plc]\nport = {emulator.port}\n[recording]\ndir = "{tmp_path}"\n'
+        )
+        result = CliRunner().invoke(main, ["ready", "-c", str(tmp_path / "bench.toml")])
+    assert result.exit_code == 2
+    assert "readiness.csv: no history of ready; expected a table with date, name" in result.stderr
+    assert "remote" not in result.stderr
+
+
 def recorded(folder: Path, names: list[str]) -> Path:
     """The recording of a verification up to 1500 rpm, without waiting for the clock."""
     with EmulatorProcess(truck_mass=None, speed=None) as emulator:

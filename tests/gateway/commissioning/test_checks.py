@@ -5,9 +5,8 @@ import pytest
 
 from gateway.commissioning.check import Check, missing, page
 from gateway.commissioning.checks import acceleration, coast_down, compensation, inertia, response
-from gateway.commissioning.readiness import NAMES
+from gateway.commissioning.readiness import NAMES, readiness_program
 from gateway.commissioning.readiness import evaluate as ready
-from gateway.commissioning.readiness import readiness_program
 from gateway.commissioning.step_run import StepRun
 from gateway.commissioning.verification import CHECKS, evaluate, verification_program
 from gateway.configuration.config import Config, from_document
