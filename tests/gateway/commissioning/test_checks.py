@@ -169,6 +169,15 @@ def test_a_speed_over_the_limit_is_refused_before_the_start():
         verification_program(config, ["coast-down"])
 
 
+@pytest.mark.parametrize("key", ["rate_up_rpm_s", "rate_down_rpm_s"])
+def test_a_slope_over_the_limit_is_refused_before_the_start(key):
+    """0.75 m/s^2 are 0.75 / 0.645 * 62.6 * 60 / (2 pi) = 695 rpm/s at the motor."""
+    config = Config().with_values({f"limits.{key}": "600"})
+    with pytest.raises(ConfigError, match=rf"limits\.{key}.*slope.*600.*at least 695"):
+        verification_program(config, ["acceleration"])
+    assert verification_program(config, ["coast-down", "response"])
+
+
 def test_a_run_that_shows_nothing_is_missing_in_every_check():
     run = run_of([(pushed(1000.0, 0.0, "nothing"), np.full(500, 1.0))])
     found = evaluate(run, list(CHECKS))
