@@ -81,7 +81,7 @@ def _about(document: dict[str, Any]) -> Iterable[tuple[str, ...]]:
 
 def _section(number: int, run: dict[str, Any]) -> str:
     truck = run["truck"]
-    rows = [("date", run["date"]), ("gateway", run["gateway"])]
+    rows = [("date", run["date"]), ("PLC", run["plc"]), ("gateway", run["gateway"])]
     rows += [("configuration", f"sha256 {run['config_sha256']}")]
     if run["budget"] is not None:
         rows.append(("truck", f"{truck['mass_kg']:g} kg + load {truck['load_kg']:g} kg"))

@@ -138,6 +138,7 @@ def _run(
         "files": _digests(found.path, folder),
         "run": name or "road load",
         "date": found.header.date,
+        "plc": f"{config.plc.host}:{config.plc.port}, unit {config.plc.unit}",
         "config_sha256": found.header.config_hash,
         "gateway": found.header.versions["gateway"],
         "truck": {"mass_kg": config.truck.mass, "load_kg": config.truck.load},

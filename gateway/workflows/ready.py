@@ -91,7 +91,7 @@ def _registers(config: Config, register_map: RegisterMap) -> Check:
     try:
         found = compare_with_device(plc, register_map)
     except PlcError as error:
-        raise PlcError(f"{plc.host}:{plc.port}: {error}; expected a PLC that answers") from error
+        raise PlcError(f"{error}; expected a PLC that answers") from error
     names = ", ".join(one.where for one in found) or "all fit"
     return Check(
         name="map",

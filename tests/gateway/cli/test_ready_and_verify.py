@@ -62,7 +62,7 @@ def test_a_plc_that_does_not_answer_is_told_before_anything_is_asked_of_the_oper
     (tmp_path / "bench.toml").write_text(f"[plc]\nport = {port}\n")
     result = CliRunner().invoke(main, ["ready", "-c", str(tmp_path / "bench.toml")])
     assert result.exit_code == 1
-    assert f"127.0.0.1:{port}" in result.stderr
+    assert result.stderr.count(f"127.0.0.1:{port}") == 1
     assert "expected a PLC that answers" in result.stderr
     assert "remote" not in result.stderr
 

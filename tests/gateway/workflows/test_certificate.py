@@ -17,6 +17,7 @@ RUN = {
     "files": {"verify.rlrec": "0" * 64},
     "run": "verification",
     "date": "2026-11-23T10:00:00+00:00",
+    "plc": "192.0.2.1:502, unit 1",
     "config_sha256": "1" * 64,
     "gateway": "0.2.0",
     "truck": {"mass_kg": 3640.0, "load_kg": 0.0},
@@ -79,6 +80,7 @@ def test_the_page_shows_values_limits_digests_and_what_lies_outside():
     assert "<td>inertia work rating IWR [%]; for comparison -2 .. +4, second-hand</td>" in page
     assert '<td class="outside">OUTSIDE</td>' in page
     assert f"sha256 {'0' * 64}" in page
+    assert "192.0.2.1:502, unit 1</td>" in page
 
 
 @pytest.mark.parametrize(
