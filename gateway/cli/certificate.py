@@ -57,14 +57,14 @@ def command(
         return _verify(verified)
     if save is None and json_file is None:
         raise click.UsageError("expected --save FILE or --json FILE")
-    from gateway.twin.recorded import budget_of, parameter_file
+    from gateway.twin.recorded import parameter_file
     from gateway.workflows.certificate import certify
 
     made = certify(
         recordings,
         parameters,
         parameter_file(parameters),
-        lambda path, file: budget_of(path, str(file)).budget.to_json(),
+        _budget,
         folder=Path(save or ("." if json_file in (None, "-") else str(json_file))).parent,
     )
     if save is not None:
@@ -81,12 +81,16 @@ def command(
 
 
 def _verify(path: Path) -> int:
-    from gateway.twin.recorded import budget_of, parameter_file
+    from gateway.twin.recorded import parameter_file
     from gateway.workflows.certificate import differences
 
-    def budget(one: Path, file: Path) -> dict[str, Any]:
-        return budget_of(one, str(file)).budget.to_json()
-
-    lines = differences(path, budget, parameter_file)
+    lines = differences(path, _budget, parameter_file)
     click.echo("\n".join(lines) or "the certificate agrees with its files")
     return 1 if lines else 0
+
+
+def _budget(recording: Path, file: Path) -> dict[str, Any]:
+    """Entries of the error budget of a recording with the parameter set in a file."""
+    from gateway.twin.recorded import budget_of
+
+    return budget_of(recording, str(file)).budget.to_json()
