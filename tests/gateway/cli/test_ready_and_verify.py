@@ -100,14 +100,19 @@ def recorded(folder: Path, names: list[str]) -> Path:
         return driven(folder, emulator, config, verification_program(config, names))
 
 
-def driven(folder: Path, emulator: EmulatorProcess, config: Config, program: Program) -> Path:
-    """The recording of a program, without waiting for the clock."""
+def driven(
+    folder: Path, emulator: EmulatorProcess, config: Config, program: Program, late: float = 1.0
+) -> Path:
+    """The recording of a program, without waiting for the clock.
+
+    late : time after its longest duration at which the operator turns remote off [s]
+    """
     session = Session(
         config=config.with_program(program),
         file=folder / "run.toml",
         emulator=emulator,
         screen=Screen(Console(quiet=True), "", 1.0),
-        duration=program.duration + 1.0,
+        duration=program.duration + late,
     )
     return operate_fast(session).recording
 
@@ -135,6 +140,17 @@ def test_the_recording_of_another_run_is_refused_and_not_found_within_its_limits
     result = CliRunner().invoke(main, ["verify", str(path)])
     assert result.exit_code == 2
     assert "the run of short.csv; expected a recording of verify" in result.stderr
+
+
+def test_the_part_of_a_run_is_not_verified(tmp_path):
+    """The operator ends the run at the first speed of the sweep, at which nothing is wrong."""
+    with EmulatorProcess(truck_mass=None, speed=None) as emulator:
+        config = Config().with_values({"plc.port": str(emulator.port)})
+        program = verification_program(config, ["losses", "torque"])
+        path = driven(tmp_path, emulator, config, program, late=6.0 - program.duration)
+    result = CliRunner().invoke(main, ["verify", str(path)])
+    assert result.exit_code == 2
+    assert "verification did not come to its end, found 'REMOTE_OFF'" in result.stderr
 
 
 @pytest.mark.parametrize(
