@@ -60,7 +60,10 @@ def test_a_truck_that_stops_later_than_the_recorded_one_brakes_on_as_that_did():
 def test_the_end_of_a_run_tells_the_indices_that_a_replay_tells(driven, tmp_path):
     path = driven / "truck_3640kg.rlrec"
     told = quality_at_the_end(path)
-    assert told == gateway.replay(path).figures.quality
+    replayed = gateway.replay(path)
+    assert told == replayed.figures.quality
+    assert "SAE J2951, drum over demand: " in replayed.summary()
+    assert "SAE J2951, drum over road: " in gateway.replay(path.with_suffix(".csv")).summary()
     assert abs(told.distance) < 0.02
     other = tmp_path / "none.rlrec"
     other.write_bytes(b"no recording")
