@@ -9,8 +9,9 @@ from typing import Any
 from gateway import regulators
 from gateway.configuration.config import Config, Place, from_document, merge
 from gateway.configuration.keys import check_text
+from gateway.configuration.memory import read_memory
 from gateway.errors import ConfigError
-from gateway.friction.document import regulator_entries
+from gateway.friction.document import read_friction, regulator_entries
 
 
 def load(path: str | Path) -> Config:
@@ -54,7 +55,9 @@ def with_values(config: Config, values: Mapping[str, object]) -> Config:
 
 def load_friction(path: str | Path) -> dict[str, Any]:
     """Entries of [regulator] in the file of a friction map or of a parameter set."""
-    return regulator_entries(_toml(Path(path), _text(Path(path))), path)
+    found = regulator_entries(_toml(Path(path), _text(Path(path))), path)
+    read_friction(found["friction"], f"{path}: friction")  # whose error names the file
+    return found
 
 
 def _refuse_unknown_regulator(config: Config, place: Place) -> Config:
@@ -89,7 +92,9 @@ def _with_memory(document: dict[str, Any], directory: Path, place: Place) -> dic
         return document
     check_text(regulator["learned"], place("regulator", "learned"))
     path = directory / regulator["learned"]
-    return document | {"regulator": {**regulator, "learned": _toml(path, _text(path))}}
+    found = _toml(path, _text(path))
+    read_memory(found, f"{path}: memory")  # whose error names the file
+    return document | {"regulator": {**regulator, "learned": found}}
 
 
 def _text(path: Path) -> str:

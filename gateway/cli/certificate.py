@@ -48,8 +48,8 @@ def command(
     budget and the indices of SAE J2951. The page names every file by its digest and holds the
     document certificate/1. --verify computes all values again from these files.
 
-    Exit code 1: a value lies outside of its limit, there is no check, or the verified certificate
-    says otherwise than its files.
+    Exit code 1: a value lies outside of its limit, a check of `ready` or `verify` is not in the
+    recordings, or the verified certificate says otherwise than its files.
     """
     if (verified is None) == (not recordings):
         raise click.UsageError("expected recordings, or --verify FILE")
@@ -57,14 +57,14 @@ def command(
         return _verify(verified)
     if save is None and json_file is None:
         raise click.UsageError("expected --save FILE or --json FILE")
-    from gateway.twin.recorded import budget_of, parameter_file
+    from gateway.twin.recorded import parameter_file
     from gateway.workflows.certificate import certify
 
     made = certify(
         recordings,
         parameters,
         parameter_file(parameters),
-        lambda path, file: budget_of(path, str(file)).budget.to_json(),
+        _budget,
         folder=Path(save or ("." if json_file in (None, "-") else str(json_file))).parent,
     )
     if save is not None:
@@ -72,17 +72,25 @@ def command(
     if json_file is not None:
         write_json(json_file, made.document, indent=2)
     if json_file != "-":
-        click.echo("every value lies within its limit" if made.holds else "not certified")
+        click.echo(
+            "every value lies within its limit"
+            if made.holds
+            else f"not certified: see {save or json_file}"
+        )
     return 0 if made.holds else 1
 
 
 def _verify(path: Path) -> int:
-    from gateway.twin.recorded import budget_of, parameter_file
+    from gateway.twin.recorded import parameter_file
     from gateway.workflows.certificate import differences
 
-    def budget(one: Path, file: Path) -> dict[str, Any]:
-        return budget_of(one, str(file)).budget.to_json()
-
-    lines = differences(path, budget, parameter_file)
+    lines = differences(path, _budget, parameter_file)
     click.echo("\n".join(lines) or "the certificate agrees with its files")
     return 1 if lines else 0
+
+
+def _budget(recording: Path, file: Path) -> dict[str, Any]:
+    """Entries of the error budget of a recording with the parameter set in a file."""
+    from gateway.twin.recorded import budget_of
+
+    return budget_of(recording, str(file)).budget.to_json()

@@ -72,7 +72,8 @@ def command(
         write_json(json_file, driven.to_json(), indent=2)
     if json_file != "-":
         click.echo(f"recording: {driven.ended.recording}")
-        click.echo(f"log: {driven.log} ({driven.samples} samples)")
+        if driven.log is not None:
+            click.echo(f"log: {driven.log} ({driven.samples} samples)")
     if not driven.ended.completed:
         click.echo(f"error: {program} did not come to its end: {driven.ended.why}", err=True)
     return 0 if driven.ended.completed else 1

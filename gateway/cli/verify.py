@@ -24,9 +24,7 @@ Examples:
 @click.option(
     "--repeats",
     type=click.IntRange(1, 100),
-    default=5,
-    show_default=True,
-    help="runs up and down at each rate",
+    help="runs up and down at each rate; default: 5",
 )
 @click.option(
     "--set", "values", multiple=True, metavar="KEY=VALUE", help="change a value of the file"
@@ -39,7 +37,7 @@ def command(
     config: Path | None,
     *,
     only: tuple[str, ...],
-    repeats: int,
+    repeats: int | None,
     values: tuple[str, ...],
     json_file: str | None,
 ) -> int:
@@ -53,10 +51,15 @@ def command(
     Exit code 1: a value lies outside, or the run did not come to its end.
     """
     from gateway import config_file
+    from gateway.commissioning.verification import REPEATS
     from gateway.workflows.verify import evaluate_recording, verify
 
     if (recording is None) == (config is None):
         raise click.UsageError("expected -c CONFIG for a run on the live bench, or a RECORDING")
+    if recording is not None and (values or repeats is not None):
+        raise click.UsageError(
+            "--set and --repeats are for a run on the live bench; a recording has had its own"
+        )
     if recording is not None:
         found = evaluate_recording(recording, only)
     else:
@@ -65,7 +68,7 @@ def command(
         found = verify(
             settings,
             only=only,
-            repeats=repeats,
+            repeats=repeats or REPEATS,
             view=json_file != "-",
             report=partial(click.echo, err=True),
         )

@@ -16,6 +16,8 @@ from register_maps.timing import SCAN
 from register_maps.units import RPM
 
 OWN: Final = "own limit"
+NAMES: Final = ("tare", "zero", "sign", "ratio", "warm-up", "heartbeat", "clock")
+"""Names of the checks of a run."""
 REST, TURN, WARM_UP = "rest", "turn", "warm-up"
 REST_HOLD = 2.0
 TURN_SPEED, TURN_HOLD = 300.0 * RPM, 5.0

@@ -54,13 +54,17 @@ class StepRun:
 
 def replay_steps(
     config: Config, register_map: RegisterMap, seen: Iterable[Observation]
-) -> tuple[list[int], list[float]]:
-    """Step at work, and temperature of the oil [K], in each tick of a run, from its replay."""
-    state, numbers, oil = initial(config, register_map), [], []
+) -> tuple[list[int], list[float], bool]:
+    """Step at work, and temperature of the oil [K], in each tick of a run, from its replay.
+
+    Third: whether the program came to its end.
+    """
+    state, numbers, oil, finished = initial(config, register_map), [], [], False
     for observation in seen:
         before = state.regulator
         state, output = step(config, register_map, state, observation)
         runs = output.state is State.RUN and before is not None
         numbers.append(before.number if runs else OUTSIDE)
         oil.append(nan if state.samples.oil is None else state.samples.oil)
-    return numbers, oil
+        finished = finished or output.finished
+    return numbers, oil, finished

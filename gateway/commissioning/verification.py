@@ -32,7 +32,7 @@ REPEATS: Final = 5
 def verification_program(config: Config, names: Sequence[str], repeats: int = REPEATS) -> Program:
     """Program of these checks; steps that two checks share are driven once.
 
-    Raises ConfigError for a speed over the limit.
+    Raises ConfigError for a speed or a slope over its limit.
     """
     found: list[Step] = []
     shared = dict.fromkeys(CHECKS[name].steps for name in names)
@@ -40,6 +40,7 @@ def verification_program(config: Config, names: Sequence[str], repeats: int = RE
         found += steps(config, repeats)
     for step in found:
         _refuse_fast(config, step)
+        _refuse_steep(config, step)
     rate = RPM * RATE_RPM_S
     return Program(name="verification", steps=(*found, Ramp(speed=0.0, rate=rate, hold=0.0)))
 
@@ -55,6 +56,23 @@ def _refuse_fast(config: Config, step: Step) -> None:
             place="limits.speed_max_rpm",
             value=round(most / RPM),
             expected=f"at least {fastest / RPM:.0f}, or --only with other checks",
+        )
+
+
+def _refuse_steep(config: Config, step: Step) -> None:
+    """Refuse a push that the limits would slow down: the check would blame the bench for it."""
+    if not isinstance(step, Emulation):
+        return
+    slope = step.force / step.mass / config.bench.drum_radius * config.bench.gear_ratio
+    key, most = "rate_up_rpm_s", config.limits.rate_up
+    if slope < 0.0:
+        key, most = "rate_down_rpm_s", config.limits.rate_down
+    if abs(slope) > most:
+        raise ConfigError(
+            "the limits would clip the slope of a check",
+            place=f"limits.{key}",
+            value=round(most / RPM),
+            expected=f"at least {abs(slope) / RPM:.0f}, or --only with other checks",
         )
 
 

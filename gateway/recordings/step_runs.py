@@ -15,7 +15,8 @@ from gateway.recordings.header import config_of, map_of
 def read(path: Path) -> StepRun:
     """Run of a program in a recording.
 
-    Raises ConfigError for a recording without a program, LossesError for one without samples.
+    Raises ConfigError for a recording without a program, or of one that did not come to its end;
+    LossesError for a recording without samples.
     """
     found = recording.read(path)
     config, register_map = config_of(found.header), map_of(found.header)
@@ -23,7 +24,15 @@ def read(path: Path) -> StepRun:
         raise ConfigError(
             "not the run of a program", file=path, expected="a recording of drive, ready or verify"
         )
-    numbers, oil = replay_steps(config, register_map, observations(found.rows(), register_map))
+    seen = observations(found.rows(), register_map)
+    numbers, oil, finished = replay_steps(config, register_map, seen)
+    if not finished:
+        raise ConfigError(
+            f"the run of {config.program.name} did not come to its end",
+            file=path,
+            value=found.stop_reason() or "no run",
+            expected="a whole run: its part may pass where the rest would not",
+        )
     samples = of_recording(found)
     rows = found.records[samples]
     beats = unwrap_time(rows["measured_plc_heartbeat"], register_map.modulus("plc_heartbeat"))

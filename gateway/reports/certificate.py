@@ -32,7 +32,7 @@ def html(document: dict[str, Any]) -> str:
     holds = document["holds"]
     return Template(TEMPLATE.read_text("utf-8")).substitute(
         state="holds" if holds else "fails",
-        verdict="Every value lies within its limit." if holds else _outside(document),
+        verdict="Every value lies within its limit." if holds else _objections(document),
         about=_table((), _about(document)),
         runs="\n".join(_section(n, run) for n, run in enumerate(document["runs"], start=1)),
         # "<" would end the element of the script.
@@ -45,7 +45,7 @@ def document_in(text: str) -> dict[str, Any] | None:
     inside = DOCUMENT.search(text)
     try:
         found = json.loads(inside[1] if inside else text)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     return found if isinstance(found, dict) else None
 
@@ -55,10 +55,14 @@ def is_written(text: str, document: dict[str, Any]) -> bool:
     return DOCUMENT.search(text) is None or text == html(document)
 
 
-def _outside(document: dict[str, Any]) -> str:
+def _objections(document: dict[str, Any]) -> str:
+    """Checks outside of their limits, and checks that no recording shows."""
     checks = [one for run in document["runs"] for one in run["checks"]]
-    names = dict.fromkeys(one["name"] for one in checks if not one["holds"])
-    return escape(f"Outside: {', '.join(names)}.") if names else "No checks: nothing is certified."
+    outside = dict.fromkeys(one["name"] for one in checks if not one["holds"])
+    named = {"Outside": outside, "Not shown by these recordings": document["not_shown"]}
+    return escape(
+        " ".join(f"{what}: {', '.join(names)}." for what, names in named.items() if names)
+    )
 
 
 def _about(document: dict[str, Any]) -> Iterable[tuple[str, ...]]:
@@ -77,7 +81,7 @@ def _about(document: dict[str, Any]) -> Iterable[tuple[str, ...]]:
 
 def _section(number: int, run: dict[str, Any]) -> str:
     truck = run["truck"]
-    rows = [("date", run["date"]), ("gateway", run["gateway"])]
+    rows = [("date", run["date"]), ("PLC", run["plc"]), ("gateway", run["gateway"])]
     rows += [("configuration", f"sha256 {run['config_sha256']}")]
     if run["budget"] is not None:
         rows.append(("truck", f"{truck['mass_kg']:g} kg + load {truck['load_kg']:g} kg"))

@@ -6,6 +6,7 @@ Nobody measures this torque on a bench. It is known as well as the parameter set
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -25,21 +26,34 @@ SMOOTHING_SAMPLES: Final = 11
 """Scans of the centred mean: the drum's acceleration is noisy, its integral is not."""
 STANDING_DRUM, STANDING_GEAR = 0.02, 0.005
 """[rad/s] Speeds of drum and gear output below which the truck stands."""
+STANDING_TREAD: Final = 0.02
+"""[m/s] Speed of the tread below which a truck is held by its brake."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RecordedTorque:
-    """Driver that gives a recorded torque, one value a scan [N m]; NaN: the truck is parked."""
+    """Driver that gives a recorded torque, one value a scan [N m]; NaN: the truck is parked.
+
+    A truck that comes to its stop later than the recorded one brakes on as that one did last.
+    """
 
     torque: Array
 
-    def torques(self, time: float, speed: float) -> tuple[float, float]:  # noqa: ARG002 - protocol
+    @cached_property
+    def _last(self) -> Array:
+        """The torque, and where the truck is parked, the last one before [N m]; 0: none."""
+        known = np.where(np.isfinite(self.torque), np.arange(len(self.torque)), -1)
+        index = np.maximum.accumulate(known)
+        return np.where(index < 0, 0.0, self.torque[index])
+
+    def torques(self, time: float, speed: float) -> tuple[float, float]:
         """Drive and brake torque at the wheel [N m]; a negative torque is that of the brake."""
-        index = round(time / SCAN)
-        value = self.torque[index] if index < len(self.torque) else np.nan
-        if np.isnan(value):
+        index = min(round(time / SCAN), len(self.torque) - 1)
+        parked = bool(np.isnan(self.torque[index]))
+        if parked and speed < STANDING_TREAD:
             return 0.0, PARKED_TORQUE
-        return max(float(value), 0.0), max(-float(value), 0.0)
+        value = float(self._last[index])
+        return 0.0 if parked else max(value, 0.0), max(-value, 0.0)
 
 
 def wheel_torque(found: GatewayRecording, config: Config, register_map: RegisterMap) -> Array:
@@ -52,7 +66,8 @@ def wheel_torque(found: GatewayRecording, config: Config, register_map: Register
     lever = config.truck.wheel_radius / config.bench.drum_radius
     ends, torques, standing = [0.0], [0.0], [True]
     seen = observations(found.rows(), register_map)
-    for window, torque in truck_torques(seen, config, register_map):
+    states = found.records["state"]
+    for window, torque in truck_torques(seen, states, config, register_map):
         ends.append(ends[-1] + window.duration)
         torques.append(lever * torque)
         standing.append(_stands(window, config.bench.gear_ratio))

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.commissioning import readiness
+from gateway.commissioning.verification import CHECKS
 from gateway.configuration.config import Config
 from gateway.errors import ConfigError
 from gateway.recordings import recording, step_runs
@@ -28,7 +29,6 @@ from gateway.workflows.run_quality import quality_of
 from gateway.workflows.verify import evaluate_recording
 
 SCHEMA: Final = "certificate/1"
-KEYS: Final = {"date", "program", "holds", "bench", "map", "parameters", "runs"}
 DIGITS: Final = 9
 """Significant digits of a value in the document."""
 EQUAL: Final = 1e-6
@@ -48,7 +48,7 @@ class Certificate:
 
     @property
     def holds(self) -> bool:
-        """Whether there are checks, and every value of them lies within its limit."""
+        """Whether every check was made, and every value of them lies within its limit."""
         return bool(self.document["holds"])
 
     @property
@@ -81,11 +81,14 @@ def certify(
     pairs = zip(found, configs, strict=True)
     runs = [_run(one, config, lambda path: budget(path, file), folder) for one, config in pairs]
     checks = [check for run in runs for check in run["checks"]]
+    shown = {check["name"] for check in checks}
+    not_shown = [name for name in (*readiness.NAMES, *CHECKS) if name not in shown]
     document = {
         "schema": SCHEMA,
         "date": date or datetime.now(UTC).isoformat(timespec="seconds"),
         "program": "gateway " + version("road-load-bench"),
-        "holds": bool(checks) and all(check["holds"] for check in checks),
+        "holds": not not_shown and all(check["holds"] for check in checks),
+        "not_shown": not_shown,
         "bench": configs[0].document["bench"],
         "map": {"name": found[0].header.map, "sha256": found[0].header.map_hash},
         "parameters": _parameters(parameters, file, folder),
@@ -135,6 +138,7 @@ def _run(
         "files": _digests(found.path, folder),
         "run": name or "road load",
         "date": found.header.date,
+        "plc": f"{config.plc.host}:{config.plc.port}, unit {config.plc.unit}",
         "config_sha256": found.header.config_hash,
         "gateway": found.header.versions["gateway"],
         "truck": {"mass_kg": config.truck.mass, "load_kg": config.truck.load},
@@ -189,19 +193,37 @@ def differences(path: Path, budget: Budget, file_of: Callable[[str, Path], Path]
     """
     text = _text(path)
     document = report.document_in(text)
-    if document is None or document.get("schema") != SCHEMA or KEYS - document.keys():
+    if document is None or not _is_certificate(document):
         raise ConfigError("no certificate", file=path, expected=f"a page or document {SCHEMA}")
-    lines = [] if report.is_written(text, document) else ["the page differs from its document"]
     folder, name = path.parent, document["parameters"]["set"]
     file = file_of(name, folder)
     changed = list(_changed_files(document, file, folder))
     if changed:
-        return lines + changed
+        return changed
     recordings = [folder / next(iter(run["files"])) for run in document["runs"]]
     shown = name if file != folder / name else str(file)
     again = certify(recordings, shown, file, budget, folder=folder, date=document["date"])
     skipped = {"program": document["program"]}
-    return lines + list(_differences(document, {**again.document, **skipped}, ""))
+    lines = list(_differences(document, {**again.document, **skipped}, ""))
+    if not lines and not report.is_written(text, document):
+        return ["the page differs from its document"]
+    return lines
+
+
+def _is_certificate(document: dict[str, Any]) -> bool:
+    """Whether a document names its date, its program, and files with their digests."""
+    texts = [document.get(key) for key in ("schema", "date", "program")]
+    known, runs = document.get("parameters"), document.get("runs")
+    if not isinstance(known, dict) or not isinstance(runs, list):
+        return False
+    texts += [known.get("set"), known.get("sha256")]
+    files = [one.get("files") if isinstance(one, dict) else None for one in runs]
+    return (
+        all(isinstance(one, str) for one in texts)
+        and texts[0] == SCHEMA
+        and bool(files)
+        and all(isinstance(one, dict) and one for one in files)
+    )
 
 
 def _text(path: Path) -> str:

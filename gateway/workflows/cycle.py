@@ -79,7 +79,8 @@ def _leg(path: Path, entry: Mapping[str, Any]) -> Leg:
     found = recording.read(path.parent / _text(path, entry, "recording"))
     config, register_map = config_of(found.header), map_of(found.header)
     seen = observations(found.rows(), register_map)
-    measured = work(truck_torques(seen, config, register_map), config.bench.drum_radius)
+    torques = truck_torques(seen, found.records["state"], config, register_map)
+    measured = work(torques, config.bench.drum_radius)
     if config.program is not None or not measured["distance"]:
         raise ConfigError(
             "no truck moved", file=found.path, expected="a recording of a truck in road load"

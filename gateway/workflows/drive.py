@@ -25,11 +25,11 @@ REST_AFTER: Final = 1.0
 
 @dataclass(frozen=True, kw_only=True)
 class Drive:
-    """A program that was driven: how it ended, and its log."""
+    """A program that was driven: how it ended, and its log, None: the run did not begin."""
 
     program: Program
     ended: Ended
-    log: Path
+    log: Path | None
     samples: int
 
     def to_json(self) -> dict[str, Any]:
@@ -41,7 +41,7 @@ class Drive:
             "completed": self.ended.completed,
             "stop_reason": self.ended.why,
             "recording": str(self.ended.recording),
-            "log": str(self.log),
+            "log": None if self.log is None else str(self.log),
             "samples": self.samples,
         }
 
@@ -77,20 +77,27 @@ def drive(
     )
     ended = run_program(prepared, view=view)
     log = ended.recording.with_suffix(".csv.gz")
-    return Drive(program=program, ended=ended, log=log, samples=write_log(ended.recording, log))
+    samples = write_log(ended.recording, log)
+    return Drive(program=program, ended=ended, log=log if samples else None, samples=samples)
 
 
 def write_log(path: Path, target: Path) -> int:
-    """Write the log of a run, from a moment of rest before it; return the count of its samples."""
-    export = Export(recording.stream(path), Extent(begin=_start(path) - REST_AFTER))
+    """Write the log of a run, from a moment of rest before it; return the count of its samples.
+
+    Nothing is written of a run that did not begin: 0 samples.
+    """
+    start = _start(path)
+    if start is None:
+        return 0
+    export = Export(recording.stream(path), Extent(begin=start - REST_AFTER))
     log_writer.write(target, export)
     return export.survey.samples
 
 
-def _start(path: Path) -> float:
-    """Time of the log at which the run of a recording begins [s]; 0 where it did not begin."""
+def _start(path: Path) -> float | None:
+    """Time of the log at which the run of a recording begins [s]; None: it did not begin."""
     found = recording.read(path)
     rows = found.records[of_recording(found)]
     time = unwrap_time(rows["measured_plc_time"], map_of(found.header).modulus("plc_time"))
     running = np.flatnonzero(rows["state"] == State.RUN)
-    return float(time[running[0]]) if len(running) else 0.0
+    return float(time[running[0]]) if len(running) else None

@@ -13,7 +13,7 @@ from gateway.commissioning import readiness
 from gateway.commissioning.check import Check, page
 from gateway.configuration.config import Config
 from gateway.cycle.record import Layout
-from gateway.errors import GatewayError, PlcError
+from gateway.errors import ConfigError, GatewayError, PlcError
 from gateway.recordings import step_runs
 from gateway.workflows.check import compare_with_device
 from gateway.workflows.live_program import run_program
@@ -61,10 +61,16 @@ def ready(
     warm_up : time at one speed [s]; view : show the run on standard output
     report : takes lines for the operator
 
-    Raises GatewayError where the PLC does not answer, or the run did not come to its end.
+    Raises GatewayError where the PLC does not answer or does not fit the register map, so that
+    nothing turns, or where the run did not come to its end; ConfigError for a history that is none.
     """
     register_map = register_maps.load(config.plc.map)
-    standing = [_registers(config, register_map), _disk(config, register_map)]
+    registers = _registers(config, register_map)
+    if not registers.holds:
+        raise GatewayError(f"nothing was turned; {registers.what}; see gateway registers verify")
+    history = Path(config.recording.dir) / HISTORY
+    before = _last_tare(history)
+    standing = [registers, _disk(config, register_map)]
     program = readiness.readiness_program(warm_up)
     report(
         f"no truck on the drum; {program.duration:.0f} s from the moment in which the PLC is "
@@ -75,8 +81,6 @@ def ready(
     if not ended.completed:
         raise GatewayError(f"the run did not come to its end: {ended.why}; see {ended.recording}")
     checks = (*standing, *readiness.evaluate(step_runs.read(ended.recording)))
-    history = Path(config.recording.dir) / HISTORY
-    before = _last_tare(history)
     _remember(history, checks)
     return Readiness(checks=checks, recording=ended.recording, before=before)
 
@@ -87,7 +91,7 @@ def _registers(config: Config, register_map: RegisterMap) -> Check:
     try:
         found = compare_with_device(plc, register_map)
     except PlcError as error:
-        raise PlcError(f"{plc.host}:{plc.port}: {error}; expected a PLC that answers") from error
+        raise PlcError(f"{error}; expected a PLC that answers") from error
     names = ", ".join(one.where for one in found) or "all fit"
     return Check(
         name="map",
@@ -115,12 +119,16 @@ def _disk(config: Config, register_map: RegisterMap) -> Check:
 
 
 def _last_tare(history: Path) -> str | None:
-    """Tare of the time before with its date; None: there is none."""
+    """Tare of the time before with its date; None: there is none. Raises ConfigError."""
     if not history.exists():
         return None
-    with history.open(newline="", encoding="utf-8") as file:
-        tares = [row for row in csv.DictReader(file) if row.get("name") == "tare"]
-    return f"{tares[-1]['value']} Nm on {tares[-1]['date']}" if tares else None
+    try:
+        rows = list(csv.DictReader(history.read_text("utf-8").splitlines()))
+        tares = [row for row in rows if row["name"] == "tare"]
+        return f"{tares[-1]['value']} Nm on {tares[-1]['date']}" if tares else None
+    except (UnicodeDecodeError, KeyError) as error:
+        expected = f"a table with {', '.join(COLUMNS)}, or no file"
+        raise ConfigError("no history of ready", file=history, expected=expected) from error
 
 
 def _remember(history: Path, checks: Sequence[Check]) -> None:

@@ -68,7 +68,8 @@ class Replay:
             ticks = len(self.comparison.time)
             lines.append(describe_differences(self.path, self.differences, ticks))
         if self.figures.quality is not None:
-            lines.append(f"SAE J2951, drum over road: {self.figures.quality}")
+            other = "road" if self.differences is None else "demand"
+            lines.append(f"SAE J2951, drum over {other}: {self.figures.quality}")
         if self.differences != ():
             lines.append(describe_comparison(self.comparison))
         return "\n".join(lines)

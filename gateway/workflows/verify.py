@@ -15,7 +15,7 @@ from gateway.commissioning.verification import (
     verification_program,
 )
 from gateway.configuration.config import Config
-from gateway.errors import GatewayError
+from gateway.errors import ConfigError, GatewayError
 from gateway.recordings import step_runs
 from gateway.workflows.live_program import run_program
 
@@ -85,7 +85,15 @@ def evaluate_recording(path: Path, names: Sequence[str] = ()) -> Verification:
     """Evaluate the recording of a verification again.
 
     names : of checks, default: those whose steps the recording has
+
+    Raises ConfigError for the recording of another run, which has no steps of a check.
     """
     run = step_runs.read(path)
-    known = names or [name for name, check in CHECKS.items() if any(run.parts(check.LABEL))]
+    known = [name for name, check in CHECKS.items() if any(run.parts(check.LABEL))]
+    if not known:
+        assert run.config.program is not None
+        raise ConfigError(
+            f"the run of {run.config.program.name}", file=path, expected="a recording of verify"
+        )
+    known = list(names or known)
     return Verification(checks=tuple(evaluate(run, known)), recording=path)

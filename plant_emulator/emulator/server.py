@@ -75,7 +75,14 @@ class PlcServer:
         )
 
     async def start(self) -> None:
-        """Start to listen and set `port` to the real port. Raises PortError."""
+        """Start to listen and set `port` to the real port. Raises PortError.
+
+        Faults that change meanwhile wait: each of two listeners would want the port.
+        """
+        async with self._changing:
+            await self._listen()
+
+    async def _listen(self) -> None:
         listener = _Listener(self)
         await listener.serve_forever(background=True)
         self._listener = listener
@@ -94,7 +101,7 @@ class PlcServer:
             if faults.refuses(names):
                 await self.stop()
             elif self._listener is None:
-                await self.start()
+                await self._listen()
 
     def request(
         self, function: int, address: int, count: int, values: list[int] | None

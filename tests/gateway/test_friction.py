@@ -201,6 +201,12 @@ def test_a_key_that_the_user_writes_wins_over_the_set(tmp_path):
     assert load(file).regulator.torque_offset == 2.0
 
 
+def test_an_effect_out_of_range_is_refused_by_the_name_of_its_file(tmp_path):
+    path = set_file(tmp_path, load_dependent_gear_loss={"share": 3.0})
+    with pytest.raises(ConfigError, match=r"set\.toml: friction\.load_.*\.share: .* 0 \.\. 0\.5"):
+        with_values(Config(), {"regulator.friction": str(path)})
+
+
 def test_what_cannot_be_used_is_a_warning_of_the_review(tmp_path):
     path = set_file(tmp_path, drum_speed_lag={"time_constant": 0.1}, stribeck={"rise": 60.0})
     values = {"regulator.friction": str(path), "regulator.name": "thesis"}

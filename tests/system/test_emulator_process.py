@@ -148,6 +148,16 @@ def test_duration_is_in_emulated_seconds():
     assert 490 < int(errors.split()[0]) < 520
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", ["exception_4", "frozen_heartbeat"])
+def test_a_fault_from_the_start_leaves_the_port_to_one_listener(fault):
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = str(free.getsockname()[1])
+    process = started("--port", port, "--fault", fault, "--duration", "1")
+    out, errors = process.communicate(timeout=60)
+    assert (process.returncode, out) == (0, f"listening on 127.0.0.1:{port}\n"), errors
+
+
 @pytest.mark.parametrize(
     ("arguments", "what"),
     [

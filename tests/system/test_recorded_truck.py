@@ -11,7 +11,7 @@ from gateway import config_file
 from gateway.cli import main
 from gateway.recordings import recording
 from gateway.recordings.header import map_of
-from gateway.twin.wheel_torque import wheel_torque
+from gateway.twin.wheel_torque import RecordedTorque, wheel_torque
 from gateway.workflows.run_quality import quality_at_the_end
 from plant_emulator import logs
 
@@ -40,10 +40,30 @@ def test_wheel_torque_of_the_sensors_is_that_of_the_truck(driven):
     assert np.all(np.isnan(told[:180]))
 
 
+def test_a_set_that_the_run_did_not_know_is_taken_for_the_whole_run(driven):
+    """15 s of 100 scans. Under that set the gateway would have asked for other speeds."""
+    found = recording.read(driven / "truck_3640kg.rlrec")
+    config = config_file.load(driven / "truck_3640kg.toml")
+    told = config.with_values({"regulator.torque_gain_percent": 9.0})
+    assert len(wheel_torque(found, told, map_of(found.header))) == pytest.approx(1500, abs=20)
+
+
+def test_a_truck_that_stops_later_than_the_recorded_one_brakes_on_as_that_did():
+    """A locked wheel would stop 3640 kg within a scan, with more torque than a sensor has."""
+    driver = RecordedTorque(torque=np.array([np.nan, 50.0, -300.0, np.nan]))
+    assert driver.torques(0.01, 2.0) == (50.0, 0.0)
+    assert driver.torques(0.03, 0.5) == (0.0, 300.0)
+    assert driver.torques(0.09, 0.5) == (0.0, 300.0)
+    assert driver.torques(0.03, 0.0) == driver.torques(0.0, 0.0) == (0.0, 1e6)
+
+
 def test_the_end_of_a_run_tells_the_indices_that_a_replay_tells(driven, tmp_path):
     path = driven / "truck_3640kg.rlrec"
     told = quality_at_the_end(path)
-    assert told == gateway.replay(path).figures.quality
+    replayed = gateway.replay(path)
+    assert told == replayed.figures.quality
+    assert "SAE J2951, drum over demand: " in replayed.summary()
+    assert "SAE J2951, drum over road: " in gateway.replay(path.with_suffix(".csv")).summary()
     assert abs(told.distance) < 0.02
     other = tmp_path / "none.rlrec"
     other.write_bytes(b"no recording")

@@ -74,6 +74,22 @@ def test_ctrl_c_ramps_down_and_still_leaves_the_log(tmp_path):
     assert logs.read(tmp_path / told["log"])["motor_speed"].max() > 5.0
 
 
+@pytest.mark.slow
+@pytest.mark.realtime
+def test_a_run_that_did_not_begin_leaves_no_log(tmp_path):
+    """Its log would be one more file of runs/*.csv.gz, in which nothing moves."""
+    with EmulatorProcess(truck_mass=None) as emulator:
+        process = started(tmp_path, emulator.port)
+        until_armed(emulator)
+        process.send_signal(signal.SIGINT)
+        output, errors = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert "short.csv did not come to its end: stopped by the operator" in errors
+    assert "log:" not in output
+    assert json.loads((tmp_path / "drive.json").read_text())["log"] is None
+    assert not list((tmp_path / "runs").glob("*.csv.gz"))
+
+
 @pytest.mark.parametrize(
     ("program", "says"),
     [

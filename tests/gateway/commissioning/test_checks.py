@@ -5,8 +5,8 @@ import pytest
 
 from gateway.commissioning.check import Check, missing, page
 from gateway.commissioning.checks import acceleration, coast_down, compensation, inertia, response
+from gateway.commissioning.readiness import NAMES, readiness_program
 from gateway.commissioning.readiness import evaluate as ready
-from gateway.commissioning.readiness import readiness_program
 from gateway.commissioning.step_run import StepRun
 from gateway.commissioning.verification import CHECKS, evaluate, verification_program
 from gateway.configuration.config import Config, from_document
@@ -169,6 +169,15 @@ def test_a_speed_over_the_limit_is_refused_before_the_start():
         verification_program(config, ["coast-down"])
 
 
+@pytest.mark.parametrize("key", ["rate_up_rpm_s", "rate_down_rpm_s"])
+def test_a_slope_over_the_limit_is_refused_before_the_start(key):
+    """0.75 m/s^2 are 0.75 / 0.645 * 62.6 * 60 / (2 pi) = 695 rpm/s at the motor."""
+    config = Config().with_values({f"limits.{key}": "600"})
+    with pytest.raises(ConfigError, match=rf"limits\.{key}.*slope.*600.*at least 695"):
+        verification_program(config, ["acceleration"])
+    assert verification_program(config, ["coast-down", "response"])
+
+
 def test_a_run_that_shows_nothing_is_missing_in_every_check():
     run = run_of([(pushed(1000.0, 0.0, "nothing"), np.full(500, 1.0))])
     found = evaluate(run, list(CHECKS))
@@ -208,6 +217,7 @@ def test_a_bench_that_is_well_is_ready_with_its_tare():
     checks = ready(slow_turn())
     assert all(one.holds for one in checks)
     assert checks[0].value == pytest.approx(0.1)
+    assert tuple(dict.fromkeys(one.name for one in checks)) == NAMES
 
 
 @pytest.mark.parametrize(

@@ -52,6 +52,13 @@ def test_what_is_no_memory_is_refused(table, told):
         Config().with_values({"regulator.learned": table})
 
 
+def test_a_file_that_holds_no_memory_is_refused_by_its_name(tmp_path):
+    path = tmp_path / "cycle.toml"
+    path.write_text("duration = nan\ncrossings = []\n", "utf-8")
+    with pytest.raises(ConfigError, match=r"cycle\.toml: memory\.duration: bad value, found nan"):
+        with_values(Config(), {"regulator.learned": str(path)})
+
+
 def test_a_memory_without_a_crossing_is_written_as_it_is_read(tmp_path):
     path = tmp_path / "cycle.toml"
     path.write_text(Memory(duration=3.0).toml, "utf-8")

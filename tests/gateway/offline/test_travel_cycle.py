@@ -95,7 +95,8 @@ def test_work_of_a_run_is_that_of_the_emulated_bench_within_1_percent():
     loop = ClosedLoop(Config())
     loop.start()
     loop.run(9.0)
-    found = work(truck_torques(loop.observations, loop.config, loop.map), 0.645)
+    states = [one.state for one in loop.outputs]
+    found = work(truck_torques(loop.observations, states, loop.config, loop.map), 0.645)
     force, speed = np.array(loop.wheel_torque) / 0.1715, np.array(loop.drum_speed) * 0.645
     own = float(np.sum(np.maximum(force * speed, 0.0)) * SCAN)
     assert own > 1e4

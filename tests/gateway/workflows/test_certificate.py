@@ -17,6 +17,7 @@ RUN = {
     "files": {"verify.rlrec": "0" * 64},
     "run": "verification",
     "date": "2026-11-23T10:00:00+00:00",
+    "plc": "192.0.2.1:502, unit 1",
     "config_sha256": "1" * 64,
     "gateway": "0.2.0",
     "truck": {"mass_kg": 3640.0, "load_kg": 0.0},
@@ -32,6 +33,7 @@ DOCUMENT = {
     "date": "2026-11-23T12:00:00+00:00",
     "program": "gateway 0.2.0",
     "holds": False,
+    "not_shown": [],
     "bench": {"drum_radius_m": 0.645},
     "map": {"name": "bench_int16", "sha256": "2" * 64},
     "parameters": {"set": "set.toml", "sha256": "3" * 64, "origin": {"a": 1}, "effects": ["lag"]},
@@ -62,6 +64,13 @@ def test_a_value_has_four_digits_and_at_most_three_decimals(value, shown):
     assert f'<td class="number">{shown}</td><td class="number">9</td>' in page
 
 
+def test_checks_that_no_recording_shows_are_named_and_nothing_is_certified(tmp_path):
+    """A bench whose tare, ratio or coast-downs nobody has seen is not to be believed."""
+    page = html({**DOCUMENT, "not_shown": ["tare", "coast-down"]})
+    shown = "Outside: losses. Not shown by these recordings: tare, coast-down."
+    assert f'<p class="fails">{shown}</p>' in page
+
+
 def test_the_page_shows_values_limits_digests_and_what_lies_outside():
     page = html(DOCUMENT)
     assert '<p class="fails">Outside: losses.</p>' in page
@@ -71,6 +80,7 @@ def test_the_page_shows_values_limits_digests_and_what_lies_outside():
     assert "<td>inertia work rating IWR [%]; for comparison -2 .. +4, second-hand</td>" in page
     assert '<td class="outside">OUTSIDE</td>' in page
     assert f"sha256 {'0' * 64}" in page
+    assert "192.0.2.1:502, unit 1</td>" in page
 
 
 @pytest.mark.parametrize(
@@ -83,12 +93,16 @@ def test_the_page_shows_values_limits_digests_and_what_lies_outside():
         (["--verify", "none.html"], "none.html: No such file"),
         (["--verify", "other.html"], "other.html: no certificate"),
         (["--verify", "half.json"], "half.json: no certificate"),
+        (["--verify", "empty.json"], "empty.json: no certificate"),
+        (["--verify", "deep.json"], "deep.json: no certificate"),
     ],
 )
 def test_wrong_use_is_one_line_and_exit_code_2(tmp_path, monkeypatch, arguments, says):
     monkeypatch.chdir(tmp_path)
     Path("other.html").write_text("<html></html>")
     Path("half.json").write_text('{"schema": "certificate/1", "runs": []}')
+    Path("empty.json").write_text(json.dumps({**DOCUMENT, "parameters": {}}))
+    Path("deep.json").write_text(100_000 * "[")
     result = run(*arguments)
     assert result.exit_code == 2, result.output
     assert says in result.stderr
@@ -101,8 +115,11 @@ def test_what_follows_from_the_recordings_is_verified_and_a_change_is_not(tmp_pa
     folder.mkdir()
     path, page = recorded(folder, ["losses", "torque"]), folder / "bench.html"
     made = run(path, "--save", page)
-    assert made.exit_code == 0, made.output
+    assert (made.exit_code, made.stdout) == (1, f"not certified: see {page}\n")
     told = document_in(page.read_text("utf-8"))
+    ready = ["tare", "zero", "sign", "ratio", "warm-up", "heartbeat", "clock"]
+    others = ["inertia", "acceleration", "compensation", "coast-down", "response"]
+    assert told["not_shown"] == ready + others
     assert [one["name"] for one in told["runs"][0]["checks"]] == ["losses", "torque"]
     assert told["runs"][0]["files"] == {path.name: hashlib.sha256(path.read_bytes()).hexdigest()}
 
