@@ -18,8 +18,9 @@ BATCH, MEMORY = 10, 10.0
 CLIP, CLIPPED = 4.0, 0.9
 """Largest s^2 over its mean that counts, so that a fault or an impact hardly raises the level; and
 the mean of normal noise that is left by it: v of E min(z^2, 4 v) = v."""
-QUIET = 6.0
-"""[N^2 m^2] Least variance of a window. A bench that has just set off has not shown its own yet."""
+QUIET, LOUD = 6.0, 60.0
+"""[N^2 m^2] Least variance, because a bench that has just set off has not shown its own yet; and
+largest, because a sensor that breaks slowly must not teach the level to wait for it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +39,7 @@ def note(state: BalanceNoise, residual: float, duration: float) -> BalanceNoise:
     between = fmean(recent[BATCH:]) - fmean(recent[:BATCH])
     shown = min(BATCH * between * between / 2.0, CLIP * state.variance)
     variance = shown + (state.variance - shown) * exp(-duration / MEMORY)
-    return BalanceNoise(variance=max(variance, QUIET), recent=recent)
+    return BalanceNoise(variance=min(max(variance, QUIET), LOUD), recent=recent)
 
 
 def level(state: BalanceNoise, tolerance: float, duration: float, rarity: float) -> float:

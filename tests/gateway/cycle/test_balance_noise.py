@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gateway.cycle.balance_noise import CLIP, CLIPPED, QUIET, BalanceNoise, level, note
+from gateway.cycle.balance_noise import CLIP, CLIPPED, LOUD, QUIET, BalanceNoise, level, note
 
 
 def shown(series, state=None):
@@ -45,6 +45,12 @@ def test_fault_hardly_raises_the_level_until_it_trips():
     before, _ = shown(np.zeros(100))
     after, _ = shown(np.full(25, 6.0), before)
     assert QUIET < after.variance <= QUIET * (1.0 + 3.0 * 0.025 * 1.1)
+
+
+def test_noise_of_a_sensor_that_breaks_raises_the_level_to_a_bound():
+    """300 N m of noise for 100 s."""
+    state, _ = shown(300.0 * np.random.default_rng(4).standard_normal(10_000))
+    assert state.variance == LOUD == 60.0
 
 
 def test_level_by_hand():
