@@ -29,8 +29,9 @@ has the other sign (the bench turns forward only):
 
 A CUSUM adds up each residual beyond its tolerance, for either sign: S = max(0, S + e - k dt). The
 tolerance k covers drifted parameters and neglected effects. The alarm level covers the noise; it
-follows from the rate of false alarms that is allowed. Speeds enter e_1 and e_3 as differences, so
-that the noise of a sum is that of its two ends.
+follows from the rate of false alarms that is allowed. That of the motor's balance is the noise that
+this bench has shown of late. Speeds enter e_3 as differences, so that the noise of a sum is that of
+its two ends.
 
 A torque sensor that stands still to the last bit at some value, while the current moves, is stuck.
 If the sensors are known to be noisy, the noise of its partner is move enough, also for a speed
@@ -38,10 +39,12 @@ sensor: without noise, one side moves alone inside the backlash.
 """
 
 from dataclasses import dataclass, field
-from math import exp, inf
+from math import copysign, exp, inf
 
+from gateway.cycle import balance_noise
+from gateway.cycle.balance_noise import BalanceNoise
 from gateway.cycle.stuck import Streak, follow, is_stuck
-from gateway.cycle.sudden import Steady, note, product, tolerance
+from gateway.cycle.sudden import DRIVING, Steady, note, product, tolerance
 from gateway.cycle.tolerances import Params
 from gateway.friction.law import friction_torque
 from gateway.reasons import Reason
@@ -69,31 +72,33 @@ TARE_TIME, AT_REST = 0.5, 0.8
 NO_TORQUE, NO_SPEED = 1.0, 0.3
 """[N m], [rad/s of the drum] Values that a sensor may show without any noise."""
 
+Pair = tuple[float, float]
+"""Sums of a residual and of its negative."""
+NOTHING = (0.0, 0.0)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Plausibility:
     """Sums of the relations, for either sign, and what else is remembered.
 
+    motor, gear, drum, sudden, gain, touching : sums of e_1, e_2, e_3, e_4, e_6, e_5
+    noise, level : noise of the motor's balance, and alarm level of e_1 and e_4 for it [N m s]
     mean, envelope : mean torque of the motor, and the largest mean, fading [N m]
     steady : what a sudden fault shows against
     contact : time since which the gear pushes [s]
     acceleration : of the motor, smoothed [rad/s^2]
     tare, stands : mean of k Phi i + T_meas at standstill [N m], and time since it stands [s]
-    torque, motor, drum : streaks of the three sensors
+    still_torque, still_motor, still_drum : streaks of the three sensors
     """
 
-    motor_up: float = 0.0
-    motor_down: float = 0.0
-    gear_up: float = 0.0
-    gear_down: float = 0.0
-    drum_up: float = 0.0
-    drum_down: float = 0.0
-    sudden_up: float = 0.0
-    sudden_down: float = 0.0
-    gain_up: float = 0.0
-    gain_down: float = 0.0
-    contact_up: float = 0.0
-    contact_down: float = 0.0
+    motor: Pair = NOTHING
+    gear: Pair = NOTHING
+    drum: Pair = NOTHING
+    sudden: Pair = NOTHING
+    gain: Pair = NOTHING
+    touching: Pair = NOTHING
+    noise: BalanceNoise = field(default_factory=BalanceNoise)
+    level: float = inf
     mean: float = 0.0
     envelope: float = 0.0
     acceleration: float = 0.0
@@ -101,9 +106,9 @@ class Plausibility:
     contact: float = 0.0
     tare: float = 0.0
     stands: float = 0.0
-    torque: Streak | None = None
-    motor: Streak | None = None
-    drum: Streak | None = None
+    still_torque: Streak | None = None
+    still_motor: Streak | None = None
+    still_drum: Streak | None = None
 
 
 def judge(
@@ -131,35 +136,34 @@ def judge(
     resisting = p.gear_ratio * torque + friction_torque(middle, p.regulator.friction)
     e_3 = p.drum_inertia * (now.drum_speed - before.drum_speed) + resisting * duration
     k_3 = p.truck_torque * duration
-    e_4 = e_1 - state.steady.residual * duration
+    sudden, missed = e_1 / duration - state.steady.residual, coarse(p, duration / SCAN)
+    e_4 = sudden * duration
     steady = note(
         state.steady,
-        e_1 / duration,
+        # What polls have missed may be all of it, and gets into no mean.
+        copysign(max(abs(e_1) / duration - missed, 0.0), e_1),
         last,
         duration,
         shown=torque,
         largest=p.torque + p.torque_share * envelope,
     )
-    missed = coarse(p, duration / SCAN)
-    k_4 = (tolerance(steady, p.torque, p.torque_share) + missed) * duration
-    turned, allowed = product(steady, p.torque_share)
+    k_4 = (tolerance(steady, p.torque, share_of(p, steady.change)) + missed) * duration
+    turned, allowed = product(steady, p.torque, p.torque_share)
     e_6, k_6 = turned * duration, (allowed + missed * abs(torque)) * duration
     contact = state.contact + duration if torque > p.contact else 0.0
     e_5, k_5 = (e_2, k_2) if contact > SETTLED_CONTACT else (0.0, inf)
     tare, stands = _tare(state, now, last + p.regulator.shaft_torque(now.shaft_torque), duration)
+    noise = state.noise if stands else balance_noise.note(state.noise, sudden, duration)
+    level = balance_noise.level(noise, DRIVING * p.torque, duration, p.rarity) + p.swing
     return Plausibility(
-        motor_up=_sum(state.motor_up, e_1 - k_1, p.motor_level),
-        motor_down=_sum(state.motor_down, -e_1 - k_1, p.motor_level),
-        gear_up=_sum(state.gear_up, e_2 - k_2, p.gear_level),
-        gear_down=_sum(state.gear_down, -e_2 - k_2, p.gear_level),
-        drum_up=_sum(state.drum_up, e_3 - k_3, p.drum_level),
-        drum_down=_sum(state.drum_down, -e_3 - k_3, p.drum_level),
-        sudden_up=_sum(state.sudden_up, e_4 - k_4, p.sudden_level),
-        sudden_down=_sum(state.sudden_down, -e_4 - k_4, p.sudden_level),
-        gain_up=_sum(state.gain_up, e_6 - k_6, p.gain_level),
-        gain_down=_sum(state.gain_down, -e_6 - k_6, p.gain_level),
-        contact_up=_sum(state.contact_up, e_5 - k_5, p.contact_level),
-        contact_down=_sum(state.contact_down, -e_5 - k_5, p.contact_level),
+        motor=_sum(state.motor, e_1, k_1, level),
+        gear=_sum(state.gear, e_2, k_2, p.gear_level),
+        drum=_sum(state.drum, e_3, k_3, p.drum_level),
+        sudden=_sum(state.sudden, e_4, k_4, level),
+        gain=_sum(state.gain, e_6, k_6, p.gain * level),
+        touching=_sum(state.touching, e_5, k_5, p.contact_level),
+        noise=noise,
+        level=level,
         mean=mean,
         envelope=envelope,
         acceleration=acceleration,
@@ -168,37 +172,32 @@ def judge(
         tare=tare,
         stands=stands,
         # Inside the backlash the current moves the motor alone, and the torque is the friction.
-        torque=None
+        still_torque=None
         if Status.GAP in now.status and not p.noisy
-        else follow(state.torque, now.shaft_torque, last, p.stuck_torque),
-        motor=follow(state.motor, gear_speed, now.drum_speed, p.stuck_motor),
-        drum=follow(state.drum, now.drum_speed, gear_speed, p.stuck_drum),
+        else follow(state.still_torque, now.shaft_torque, last, p.stuck_torque),
+        still_motor=follow(state.still_motor, gear_speed, now.drum_speed, p.stuck_motor),
+        still_drum=follow(state.still_drum, now.drum_speed, gear_speed, p.stuck_drum),
     )
 
 
 def shares(p: Params, state: Plausibility) -> tuple[float, float, float]:
     """Largest sums of motor, gear and drum over their alarm levels [1]."""
-    sudden = max(state.sudden_up, state.sudden_down) / p.sudden_level
-    gain = max(state.gain_up, state.gain_down) / p.gain_level
-    touching = max(state.contact_up, state.contact_down) / p.contact_level
-    return (
-        max(state.motor_up / p.motor_level, state.motor_down / p.motor_level, sudden, gain),
-        max(state.gear_up / p.gear_level, state.gear_down / p.gear_level, touching),
-        max(state.drum_up, state.drum_down) / p.drum_level,
-    )
+    torque = max(*state.motor, *state.sudden, max(state.gain) / p.gain) / state.level
+    play = max(max(state.gear) / p.gear_level, max(state.touching) / p.contact_level)
+    return torque, play, max(state.drum) / p.drum_level
 
 
 def reason(p: Params, state: Plausibility, *, running: bool) -> Reason | None:
     """Reason of the first relation that does not hold; None: all sensors are plausible."""
-    motor = is_stuck(state.motor, NO_SPEED)
-    drum = is_stuck(state.drum, NO_SPEED)
+    motor = is_stuck(state.still_motor, NO_SPEED)
+    drum = is_stuck(state.still_drum, NO_SPEED)
     shifted = state.stands > TARE_TIME and abs(state.tare) > p.tare
     balance, play, rest = shares(p, state)
     found = (
         (balance > 1.0, Reason.TORQUE_MODEL),
         (rest > 1.0, Reason.DRUM_MODEL),
         (play > 1.0, Reason.GEAR_MODEL),
-        (is_stuck(state.torque, -1.0 if p.noisy else NO_TORQUE), Reason.TORQUE_STUCK),
+        (is_stuck(state.still_torque, -1.0 if p.noisy else NO_TORQUE), Reason.TORQUE_STUCK),
         (motor or drum, Reason.SPEED_STUCK),
         (shifted and not running, Reason.TARE),
     )
@@ -216,8 +215,13 @@ def motor_torque(p: Params, sample: Measurement) -> float:
 
 def motor_tolerance(p: Params, envelope: float, acceleration: float, scans: float) -> float:
     """Tolerance of the motor's torque balance over a window of so many scans [N m]."""
-    share = p.torque_share + REACTION * envelope / p.full_torque
+    share = share_of(p, envelope)
     return p.torque + share * envelope + coarse(p, scans) + PULSES * abs(acceleration)
+
+
+def share_of(p: Params, torque: float) -> float:
+    """Share of a torque of the motor [N m] that drifted parameters may cause [1]."""
+    return p.torque_share + REACTION * torque / p.full_torque
 
 
 def coarse(p: Params, scans: float) -> float:
@@ -225,9 +229,13 @@ def coarse(p: Params, scans: float) -> float:
     return COARSE_STEP * max(scans - 1.0, 0.0) + p.stairs * scans
 
 
-def _sum(before: float, growth: float, level: float) -> float:
-    """CUSUM after one more window, held at CUSUM_CEILING levels."""
-    return min(max(before + growth, 0.0), CUSUM_CEILING * level)
+def _sum(before: Pair, residual: float, tolerance: float, level: float) -> Pair:
+    """CUSUM after one more window, for either sign, held at CUSUM_CEILING levels."""
+    ceiling = CUSUM_CEILING * level
+    return (
+        min(max(before[0] + residual - tolerance, 0.0), ceiling),
+        min(max(before[1] - residual - tolerance, 0.0), ceiling),
+    )
 
 
 def _tare(

@@ -18,13 +18,17 @@ SLOW, SMOOTH, FADE = 1.0, 0.1, 0.3
 change, and of a large change that fades."""
 SCANS = 3
 """Windows of a mean without the ripple, in which the product and an impact are seen."""
-RIPPLE, CHANGE_SHARE = 2.0, 1.5
-"""[1] Tolerance over that of the balance itself: of a steady torque, because the drive answers to
-the noise in the setpoint with a current of which a poll knows one moment a scan; and of a change of
-the torque."""
-LIGHT, HIT = 3.0, 10.0
-"""[N m] Torque below which the product's tolerance no longer falls, and change of both torques from
-which on the flanks have met at speed."""
+RIPPLE, DRIVING = 1.5, 2.0
+"""[1] Tolerance of a sudden change over that of the balance itself: of a steady torque, because the
+drive answers to the noise in the setpoint with a current of which a poll knows one moment a scan;
+and with the changes that this noise makes all the time."""
+PRODUCT_SHARE = 1.5
+"""[1] Tolerance of the product over the share of the balance, because its two means are of the same
+windows."""
+LIGHT, HIT = 5.0, 10.0
+"""Torque over the tolerance of the balance [1] below which the product's tolerance no longer falls,
+because a motor that rattles in the backlash shows torque and current in the same pulses; and change
+of both torques [N m] from which on the flanks have met at speed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,10 +94,13 @@ def tolerance(state: Steady, torque: float, share: float) -> float:
 
     torque, share : tolerance of the balance [N m], and its share of the motor's torque [1]
     """
-    return RIPPLE * torque + CHANGE_SHARE * share * state.change
+    return RIPPLE * torque + share * state.change
 
 
-def product(state: Steady, share: float) -> tuple[float, float]:
-    """Mean of the sudden residual times mean torque, and its tolerance [N^2 m^2]."""
+def product(state: Steady, torque: float, share: float) -> tuple[float, float]:
+    """Mean of the sudden residual times mean torque, and its tolerance [N^2 m^2].
+
+    torque, share : as for `tolerance`
+    """
     sudden, shown = fmean(state.sudden), fmean(state.shown)
-    return sudden * shown, CHANGE_SHARE * share * max(abs(shown), LIGHT) ** 2
+    return sudden * shown, PRODUCT_SHARE * share * max(abs(shown), LIGHT * torque) ** 2

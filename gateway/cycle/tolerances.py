@@ -10,7 +10,8 @@ from statistics import NormalDist
 
 from gateway.configuration.config import Config
 from gateway.configuration.sections import RegulatorConfig
-from gateway.cycle.sudden import RIPPLE
+from gateway.cycle.balance_noise import walk
+from gateway.cycle.sudden import DRIVING, PRODUCT_SHARE
 
 FULL_CURRENT = 72.0
 """[A] Largest armature current of the drive (thesis, eq 3.5)."""
@@ -19,13 +20,11 @@ SUMS = 12.0
 STAIRCASE = 6.0
 """[N m] Further tolerance of the motor's torque a scan under a regulator whose setpoint is a
 staircase, because the current then comes in pulses."""
-TRANSIENT, MISSED, BUMP = 0.25, 0.22, 25.0
-"""[N m s] Shares of alarm levels for what a poll every 10 ms misses: those of e_1, e_4 and e_3."""
+BUMP = 25.0
+"""[N m s] Share of the alarm level of e_3 for what a poll every 10 ms misses."""
 SWING, TOP_SPEED, FASTEST_DRUM = 60.0, 8.0, 5.0
 """[N m], [rad/s], [rad/s^2] Swings of motor torque, drum speed and drum acceleration. A filter in
 front of the PLC shows them later by its time constant."""
-GAIN = 9.0
-"""Level of e_6 over that of e_4 and the tolerance of the torque."""
 GAP_SPREAD = 1.25
 """Widest backlash over the configured one."""
 VISIBLE, VISIBLE_TORQUE = 2.5, 6.0
@@ -47,8 +46,10 @@ class Params:
     stairs : further tolerance of e_1 for each scan of a window [N m]
     speed, speed_share : tolerance of e_2 a second [rad/s], and its share of the speed [1]
     truck_torque : tolerance of e_3 a second [N m at the drum]
-    motor_level, gear_level, drum_level : alarm levels of the sums [N m s], [rad], [N m s]
-    sudden_level, gain_level : alarm levels of e_4 [N m s] and e_6 [N^2 m^2 s]
+    rarity : an alarm of a sum is as rare as exp(-rarity) in one tick
+    swing : share of the alarm level of e_1 for a filter in front of the PLC [N m s]
+    gain : alarm level of e_6 over that of e_1: noise and tolerance have the torque as factor [N m]
+    gear_level, drum_level : alarm levels of e_2 [rad] and e_3 [N m s]
     contact : shaft torque from which on the flanks of the gear are in contact [N m]
     contact_level : alarm level of e_2 while they are [rad]
     noisy : the sensors always show noise
@@ -71,11 +72,11 @@ class Params:
     speed: float
     speed_share: float
     truck_torque: float
-    motor_level: float
+    rarity: float
+    swing: float
+    gain: float
     gear_level: float
     drum_level: float
-    sudden_level: float
-    gain_level: float
     contact: float
     contact_level: float
     noisy: bool
@@ -88,13 +89,11 @@ class Params:
     def of(cls, config: Config) -> "Params":
         """Parameters out of the configuration."""
         bench, own = config.bench, config.plausibility
-        inertia, tail = bench.gear_inertia + bench.drum_inertia, _tail(config)
+        inertia, rarity = bench.gear_inertia + bench.drum_inertia, -log(_chance(config))
         flux, lag = bench.flux_constant, max(bench.torque_filter, bench.speed_filter)
         motor_noise, noisy = own.motor_speed_noise / bench.gear_ratio, own.noisy_sensors
-        torques = flux * own.current_noise, own.torque_noise
-        ends = tail * sqrt(2.0) * bench.motor_inertia * own.motor_speed_noise + lag * SWING
-        sudden = MISSED + ends + _walk(config, RIPPLE * own.torque, *torques)
-        drift = _walk(config, own.speed, own.drum_speed_noise, motor_noise) + lag * TOP_SPEED
+        noise = own.drum_speed_noise**2 + motor_noise**2
+        drift = walk(noise, own.speed, config.loop.period, rarity) + lag * TOP_SPEED
         return cls(
             motor_inertia=bench.motor_inertia,
             drum_inertia=inertia,
@@ -110,13 +109,15 @@ class Params:
             speed=own.speed,
             speed_share=own.speed_share,
             truck_torque=own.truck_torque,
-            motor_level=TRANSIENT + ends + _walk(config, own.torque, *torques),
+            rarity=rarity,
+            swing=lag * SWING,
+            gain=DRIVING * own.torque / (PRODUCT_SHARE * own.torque_share)
+            if own.torque_share
+            else inf,
             gear_level=2.0 * GAP_SPREAD * bench.backlash_half_gap + drift,
             drum_level=BUMP
             + lag * inertia * FASTEST_DRUM
-            + tail * sqrt(2.0) * inertia * own.drum_speed_noise,
-            sudden_level=sudden,
-            gain_level=GAIN * own.torque * sudden,
+            + _tail(config) * sqrt(2.0) * inertia * own.drum_speed_noise,
             contact=own.tare + PUSH,
             contact_level=BOUNCE + drift,
             noisy=noisy,
@@ -140,13 +141,3 @@ def _chance(config: Config) -> float:
 def _tail(config: Config) -> float:
     """Deviations that normal noise exceeds with this probability."""
     return -NormalDist().inv_cdf(_chance(config))
-
-
-def _walk(config: Config, tolerance: float, *deviations: float) -> float:
-    """Level that a sum of white noise passes with the allowed probability.
-
-    P(S > h) = exp(-2 k h / (s^2 dt)) for increments of mean -k dt and variance (s dt)^2: the
-    largest value of a random walk (E. S. Page, Biometrika 41 (1954) 100).
-    """
-    variance = sum(one * one for one in deviations) * config.loop.period
-    return -log(_chance(config)) * variance / (2.0 * tolerance)

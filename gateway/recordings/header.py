@@ -26,6 +26,8 @@ from register_maps.register_map import RegisterMap
 SCHEMA: Final = "recording/1"
 PREFIX: Final = len(MAGIC) + 4
 """[bytes] Magic and length, before the header."""
+RENAMED: Final = {("plausibility", "noisy_speeds"): "noisy_sensors"}
+"""Keys of older recordings, each by its section, and what the configuration calls them now."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -176,5 +178,9 @@ def map_of(header: Header) -> RegisterMap:
 
 
 def config_of(header: Header) -> Config:
-    """The configuration that a recording was made with."""
-    return from_document(header.config, place=lambda section, key: f"recording: [{section}] {key}")
+    """The configuration that a recording was made with. Raises ConfigError for an unknown key."""
+    document = {
+        section: {RENAMED.get((section, key), key): value for key, value in entries.items()}
+        for section, entries in header.config.items()
+    }
+    return from_document(document, place=lambda section, key: f"recording: [{section}] {key}")

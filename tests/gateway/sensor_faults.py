@@ -77,20 +77,23 @@ FAULTS: dict[str, Callable[[], Callable[[Measurement], Measurement]]] = {
 """A fault by its name; call it to begin the fault with the next sample."""
 
 
-def driving(kmh: float, driver: str, *, noise: bool = True) -> ClosedLoop:
-    """A loop at this speed; at standstill, 1 s before the truck sets off."""
-    return _driven(kmh, driver, noise=noise).branch()
+def driving(kmh: float, driver: str, *, seed: int | None = 7) -> ClosedLoop:
+    """A loop at this speed; at standstill, 1 s before the truck sets off.
+
+    seed : of the noise of the sensors; None: no noise
+    """
+    return _driven(kmh, driver, seed).branch()
 
 
 @cache
-def _driven(kmh: float, driver: str, *, noise: bool) -> ClosedLoop:
+def _driven(kmh: float, driver: str, seed: int | None) -> ClosedLoop:
     top = (kmh or 14.0) / 3.6
     up = top / 0.65
     cycle = Cycle(speed=top, up=up, brake=8.0 + up, down=top / 1.05, duration=60.0)
-    config = Config().with_values({"plausibility.noisy_sensors": noise})
+    config = Config().with_values({"plausibility.noisy_sensors": seed is not None})
     loop = ClosedLoop(config, driver=lambda truck: driver_of(driver, truck, cycle))
-    if noise:
-        loop.disturb = Noisy(np.random.default_rng(7))
+    if seed is not None:
+        loop.disturb = Noisy(np.random.default_rng(seed))
     loop.start()
     loop.run(4.0 + up - 0.2 if kmh else 0.8)
     return loop

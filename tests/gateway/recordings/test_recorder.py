@@ -20,7 +20,7 @@ import register_maps
 from gateway.configuration.config import Config
 from gateway.cycle.record import COMMANDED, MEASURED, NOTHING, Layout, Tick
 from gateway.errors import GatewayError, RecordingError
-from gateway.recordings.header import Header
+from gateway.recordings.header import Header, config_of
 from gateway.recordings.recorder import Job, Recorder, reason_of_end
 from gateway.recordings.recording import is_recording, read, stream
 from register_maps.signals import Control, Measurement, Mode, Setpoint, Status
@@ -213,6 +213,18 @@ def test_a_recording_older_than_the_entry_of_its_program_is_read(tmp_path: Path)
         with_header(write(path, 1), lambda head: {k: head[k] for k in head if k not in without})
     )
     assert read(path).header == HEADER
+
+
+def test_a_recording_with_the_old_name_of_a_key_has_its_configuration(tmp_path: Path) -> None:
+    path = tmp_path / "a.rlrec"
+
+    def older(head: dict[str, Any]) -> dict[str, Any]:
+        assert head["config"]["plausibility"].pop("noisy_sensors") is False
+        head["config"]["plausibility"]["noisy_speeds"] = True
+        return head
+
+    path.write_bytes(with_header(write(path, 1), older))
+    assert config_of(read(path).header).plausibility.noisy_sensors
 
 
 def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
