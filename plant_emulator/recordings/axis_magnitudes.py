@@ -71,6 +71,9 @@ TURN = 2.0 * np.pi
 DOUBTFUL_POWER = 100.0
 # Speed and power are means over this share of the run, and so many samples at least.
 MEAN_SHARE, FEWEST_MEAN_SAMPLES = 1.0 / 500.0, 5
+# Between two samples [s]: slower logs say nothing of the motion of an axis, and one of 1 kHz whose
+# time is in ms has a period of 1.
+LONGEST_PERIOD = 0.5
 # Counts a revolution of encoders.
 COUNTS = (
     *(2**k for k in range(6, 25)),
@@ -105,6 +108,12 @@ def check_magnitudes(log: AxisLog, columns: Mapping[str, str]) -> None:
 
     columns : names of the columns by quantity, those only whose unit nobody confirmed
     """
+    period = float(np.median(np.diff(log.time)))
+    if period > LONGEST_PERIOD:
+        raise LogError(
+            f"{log.source}: a sample every {period:.3g} s, and an axis moves within less than "
+            f"{LONGEST_PERIOD:g} s; if the time is in ms, give --column time=COLUMN:ms"
+        )
     kind, (speed, power) = KINDS[log.rotary], _largest(log)
     if log.rotary and "position" in columns and counts_degrees(log.position):
         column = columns["position"]

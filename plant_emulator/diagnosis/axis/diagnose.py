@@ -146,7 +146,7 @@ def diagnose_axis(
         ),
         final=fit_result(decision.found, regression),
         fixed={},
-        base=regression.base,
+        base=decision.found.reference,
         scale=scale,
     )
 

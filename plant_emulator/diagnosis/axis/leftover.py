@@ -83,7 +83,13 @@ def _filter(c: Context, _: Shapes) -> Sequence[Array]:
     return [np.interp(m.time - k * c.scale.period, m.time, m.slope) for k in AGO]
 
 
-def _state(name: str, columns: Callable[[Context, Shapes], Sequence[Array]], count: int) -> Effect:
+def _state(
+    name: str,
+    columns: Callable[[Context, Shapes], Sequence[Array]],
+    count: int,
+    *,
+    refers: bool = False,
+) -> Effect:
     return Effect(
         name=name,
         title=name,
@@ -91,6 +97,7 @@ def _state(name: str, columns: Callable[[Context, Shapes], Sequence[Array]], cou
         equation="a curve",
         sizes=tuple(Size(name=str(k), unit=FORCE) for k in range(count)),
         columns=columns,
+        refers=refers,
     )
 
 
@@ -101,7 +108,7 @@ STATES = (
     _state("the speed", _speed, 2 * ORDER),
     _state("the position", _position, 2 * ORDER),
     _state("the acceleration", _acceleration, 4),
-    _state("the time", _time, ORDER),
+    _state("the time", _time, ORDER, refers=True),
     _state("the way since a reversal", _past, len(DISPLACEMENTS)),
 )
 

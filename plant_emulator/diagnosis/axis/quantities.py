@@ -92,7 +92,7 @@ def _covariance(regression: Regression, found: Fit) -> Array:
             slopes.append((sides[1] - sides[0]) / (2.0 * STEP))
     if not slopes:
         return found.covariance
-    designs = [rows.design(found.terms, regression.base) for rows in regression.rows]
+    designs = [rows.design(found.terms, found.reference) for rows in regression.rows]
     whole = np.column_stack([np.concatenate(designs), *slopes])
     scatter = found.cost / found.count / regression.independent
     return np.asarray(np.linalg.pinv(whole.T @ whole, hermitian=True) * scatter)

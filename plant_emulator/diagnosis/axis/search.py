@@ -24,8 +24,9 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.axis.effects.effect import Effect, Scale
     from plant_emulator.diagnosis.axis.regression.fit import Fit, Regression
 
-# Steps of a refinement of one shape, and rounds over all shapes.
-STEPS, ROUNDS = 12, 2
+# Steps of a refinement of one shape, rounds over all shapes at most, and the relative fall of the
+# cost below which a round is the last: a resonance is found by many small steps of its two shapes.
+STEPS, ROUNDS, SETTLED = 12, 12, 1e-3
 # Distance from a bound of a shape, in the logarithm, within which it lies at the bound.
 AT_BOUND = 0.02
 
@@ -166,9 +167,12 @@ class AxisSearch:
     def refined(self, found: Fit) -> Fit:
         """The fit with its shapes refined one after the other, within their bounds."""
         for _ in range(ROUNDS):
+            before = found.cost
             for k, term in enumerate(found.terms):
                 for j in range(len(term.effect.shapes)):
                     found = self._refined(found, k, j)
+            if found.cost >= (1.0 - SETTLED) * before:
+                break
         return found
 
     def _refined(self, found: Fit, k: int, j: int) -> Fit:

@@ -100,7 +100,7 @@ def start(
             one.run, force_noise=force, position_noise=position * one.run.position_noise
         )
     # A delay that only takes noise away is no part of the reference of other effects.
-    base = around.fit(rich_terms(library, scale))
+    base = around.linear(rich_terms(library, scale), around.base)
     return around.in_noise_of(rich).around(base), rows, library
 
 
@@ -111,9 +111,9 @@ def richest(around: Regression, library: Sequence[Effect], scale: Scale) -> Fit:
     """
     linear = rich_terms(library, scale)
     late = [(Term(e, s),) for e in LIBRARY if e.replaced for s in grid(e, scale)]
-    first = around.fit(linear)
+    first = around.linear(linear, around.base)
     best = min(
-        (around.fit([*linear, *terms]) for terms in late),
+        (around.linear([*linear, *terms], around.base) for terms in late),
         key=lambda fit: sensor_noise(around, fit)[0],
     )
     # The least of many estimates is too small: it counts where it is another one.

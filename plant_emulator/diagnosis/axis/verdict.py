@@ -140,8 +140,9 @@ def _confirmed(search: AxisSearch, held_out: HeldOut) -> tuple[Fit, str]:
     least = min(map(search.value, confirmed.values())) + SETTINGS.margin
     like = [f for f in confirmed.values() if search.value(f) <= least]
     winner = min(like, key=lambda f: (-len(f.terms), search.value(f)))
-    alike = search.alike(winner)
-    return next(f for f in alike if f is winner or _failing(search, held_out, f) is None), ""
+    # A winner that came by taking effects back need not be one of those that the search believes.
+    like = [f for f in search.alike(winner) if f is winner or not _failing(search, held_out, f)]
+    return next(iter(like), winner), ""
 
 
 def _ranked(search: AxisSearch) -> list[Fit]:

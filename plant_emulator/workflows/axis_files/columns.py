@@ -45,7 +45,7 @@ BARE = {
 }
 NAMES = ("time", "position", "velocity", "force", "torque", "load", "temperature")
 FORM = re.compile(
-    r"(?P<column>.+?)(?P<factors>(\s*[*/]\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)*)\s*(:(?P<unit>[^:]*))?"
+    r"(?P<column>.+?)(?P<factors>(\s*[*/]\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)*)\s*(:(?P<unit>[^:,]*))?"
 )
 FACTOR = re.compile(r"([*/])\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)")
 IN_BRACKETS = re.compile(r"\s*[\[(](?P<unit>[^\])]*)[\])]\s*$")

@@ -73,6 +73,7 @@ def _effect(path: Path) -> Effect:
         sizes=sizes,
         shapes=shapes,
         columns=_checked_columns(path, columns, len(sizes)) if sizes else None,
+        refers=True,
         replaced=None if sizes else _checked_force(path, replaced),
     )
 

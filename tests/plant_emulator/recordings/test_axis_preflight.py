@@ -7,7 +7,11 @@ import numpy as np
 import pytest
 
 from plant_emulator.errors import LogError
-from plant_emulator.recordings.axis_magnitudes import counts_degrees, magnitude_note
+from plant_emulator.recordings.axis_magnitudes import (
+    check_magnitudes,
+    counts_degrees,
+    magnitude_note,
+)
 from plant_emulator.recordings.axis_preflight import axis_notes, axis_preflight, held_period
 from plant_emulator.signals.axis_log import AxisLog
 from tests.plant_emulator.axis_motion import motion
@@ -93,6 +97,12 @@ def test_steps_that_divide_360_tell_degrees() -> None:
     assert not counts_degrees(steps * step)
     assert counts_degrees(steps * 360.0 / 4096)
     assert not counts_degrees(np.round(POSITION, 2))
+
+
+def test_milliseconds_in_a_column_of_seconds_are_told() -> None:
+    slow = replace(LOG, time=TIME * 1e3)
+    with pytest.raises(LogError, match=r"a sample every 10 s.* give --column time=COLUMN:ms"):
+        check_magnitudes(slow, {})
 
 
 def test_the_note_has_travel_speed_and_power_and_asks_where_they_are_large() -> None:

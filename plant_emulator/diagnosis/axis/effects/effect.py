@@ -87,6 +87,7 @@ class Effect:
     """An effect of an axis.
 
     columns : force per size at the nodes, one array a size; empty for an effect of the force
+    refers : whether the columns depend on the nominal parameters, and so on the fit that they enter
     replaced : the force that acts, from a function of time to another one, for these shapes
     needs : what a log must have to show the effect
     applies : whether the runs have the channels that the law needs
@@ -100,6 +101,7 @@ class Effect:
     sizes: tuple[Size, ...] = ()
     shapes: tuple[Shape, ...] = ()
     columns: Callable[[Context, Shapes], Sequence[Array]] | None = None
+    refers: bool = False
     replaced: Callable[[Callable[[Array], Array], Array, Shapes], Array] | None = None
     applies: Callable[[Motion, Scale], bool] = lambda _motion, _scale: True
 

@@ -163,6 +163,7 @@ FRICTION = (
         # A friction as large as the force that it grows with holds the axis.
         sizes=(Size(name="ratio", unit=NONE, lowest=0.0, highest=1.0),),
         columns=_load_friction,
+        refers=True,
     ),
     Effect(
         name="warm_up",
@@ -173,6 +174,7 @@ FRICTION = (
         sizes=(Size(name="ratio", unit=NONE),),
         shapes=(Shape(name="time", unit=TIME, lower=0.03, upper=1.0, of="length"),),
         columns=_warm_up,
+        refers=True,
         applies=_has_no_temperature,
     ),
     Effect(
@@ -183,6 +185,7 @@ FRICTION = (
         needs="a temperature that changes",
         sizes=(Size(name="ratio", unit=("1/K", "1/K")),),
         columns=_temperature,
+        refers=True,
         applies=_has_a_temperature,
     ),
 )

@@ -182,6 +182,7 @@ FORCES = (
         needs="large forces",
         sizes=(Size(name="saturation", unit=NONE),),
         columns=_torque_constant,
+        refers=True,
         applies=lambda motion, _: motion.load is None,
     ),
     Effect(
@@ -191,6 +192,7 @@ FORCES = (
         equation="F + a L + b F (F / F_rms)^2, L the load: error of the constant, and saturation",
         sizes=(Size(name="error", unit=NONE), Size(name="saturation", unit=NONE)),
         columns=_torque_constant_with_load,
+        refers=True,
         applies=lambda motion, _: motion.load is not None,
     ),
     Effect(

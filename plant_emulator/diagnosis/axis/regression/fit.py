@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.axis.regression.rows import Rows, Term
     from plant_emulator.signals.log import Array
 
+# Fits at most around the nominal parameters of the fit before, and the relative change of the cost
+# from which on a further one changes nothing.
+REFERENCES, SETTLED = 6, 1e-3
 NAMES = ("inertia", "viscous_friction", "coulomb_friction", "offset")
 
 
@@ -31,6 +34,7 @@ class Fit:
     """A fit of nominal parameters, friction levels and sizes.
 
     values : NAMES, then the sizes term by term; covariance : of `values`
+    reference : nominal parameters that the terms refer to
     levels : own friction and inertia of each fitted run beyond the common ones [1]
     cost : squares with the priors' penalty; count : rows
     """
@@ -38,6 +42,7 @@ class Fit:
     terms: tuple[Term, ...]
     values: Array
     covariance: Array
+    reference: Base
     levels: tuple[Array, ...]
     cost: float
     count: int
@@ -68,7 +73,7 @@ class Fit:
 class Regression:
     """The regression of some runs.
 
-    base : nominal parameters that effects refer to
+    base : nominal parameters that a run's own ones refer to, and the terms of a linear fit
     variance : of what a rich model leaves; independent : share of the rows that are, there
     spread : prior deviation of a run's own friction and inertia [1]; 0: no own one
     """
@@ -80,13 +85,27 @@ class Regression:
     spread: tuple[float, float] = (SETTINGS.friction_spread, 0.0)
 
     def fit(self, terms: Sequence[Term]) -> Fit:
-        """Fit these terms."""
+        """Fit these terms around the nominal parameters of the fit itself.
+
+        A law of the force or of the friction is one of the parameters that stand beside it. Those
+        of another fit leave a force that a further effect would explain.
+        """
+        best = found = self.linear(terms, self.base)
+        for _ in range(REFERENCES if any(t.effect.refers for t in terms) else 0):
+            before, found = found, self.linear(terms, found.base)
+            best = min(best, found, key=lambda one: one.cost)
+            if abs(found.cost - before.cost) <= SETTLED * before.cost:
+                break
+        return best
+
+    def linear(self, terms: Sequence[Term], reference: Base) -> Fit:
+        """Fit these terms; reference : nominal parameters that they refer to."""
         own = sum(s > 0.0 for s in self.spread) if len(self.rows) > 1 else 0
         shared = len(NAMES) + sum(len(t.effect.sizes) for t in terms)
         size = shared + own * len(self.rows)
         information, projected, square = np.zeros((size, size)), np.zeros(size), 0.0
         for k, rows in enumerate(self.rows):
-            a, b = rows.design(terms, self.base), rows.force(terms)
+            a, b = rows.design(terms, reference), rows.force(terms)
             a = np.concatenate([a, rows.own(self.base)[:, :own]], axis=1)
             first = shared + own * k
             place = [*range(shared), *range(first, first + own)]
@@ -107,6 +126,7 @@ class Regression:
             terms=tuple(terms),
             values=values[:shared],
             covariance=inverse[:shared, :shared] * scatter,
+            reference=reference,
             levels=tuple(levels),
             cost=cost,
             count=count,
@@ -149,9 +169,9 @@ class Regression:
 def residual(rows: Rows, found: Fit, base: Base, level: Array) -> Array:
     """Averaged force less what a fit explains, shape (rows,) [N or N m].
 
-    level : the run's own values
+    base : that the run's own values refer to; level : these values
     """
-    predicted = rows.design(found.terms, base) @ found.values
+    predicted = rows.design(found.terms, found.reference) @ found.values
     own = rows.own(base)[:, : len(level)] @ level
     return np.asarray(rows.force(found.terms) - predicted - own)
 

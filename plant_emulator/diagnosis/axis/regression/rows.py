@@ -144,7 +144,7 @@ class Rows:
         """Columns of an effect's sizes, shape (rows, sizes)."""
         if term.effect.columns is None:
             return np.zeros((int(self.use.sum()), 0))
-        key = ("columns", term.key, base)
+        key = ("columns", term.key, base if term.effect.refers else None)
         if key not in self.cache:
             context = Context(motion=self.run.motion, base=base, scale=self.scale)
             found = term.effect.columns(context, term.values)

@@ -60,6 +60,24 @@ def test_a_hidden_effect_is_named_and_unknown_without_it() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", [1117, 1118])
+def test_a_saturation_is_named_alone(seed: int) -> None:
+    """Its force is that of the parameters beside it; with others a friction by the load remains."""
+    hidden = axis_trial.case(seed)
+    assert hidden.effect == "torque_constant"
+    assert axis_trial.is_right("torque_constant", axis_trial.diagnosed(axis_trial.logs(hidden)))
+
+
+@pytest.mark.slow
+def test_a_resonance_is_found_with_its_damping() -> None:
+    """The axis of seed 1115 has a spring of 110 rad/s and a damping ratio of 0.05."""
+    (first, *_) = axis_trial.diagnosed(axis_trial.logs(axis_trial.case(1115))).ranking
+    found = {one.name: one.value for one in first.parameters}
+    assert found["elasticity_frequency"] == pytest.approx(110.0, rel=0.01)
+    assert found["elasticity_damping"] == pytest.approx(0.05, rel=0.2)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "effect"),
     [(9, "quadratic_drag"), (23, "elasticity"), (27, "delay"), (1096, "coulomb_asymmetry")],

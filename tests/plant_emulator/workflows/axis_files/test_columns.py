@@ -25,6 +25,7 @@ from plant_emulator.workflows.axis_files.units import convert_unit, target
         ("force=torque_Nm*-1", "torque_Nm", -1.0, None),
         ("velocity=Speed [rad/s]", "Speed [rad/s]", 1.0, None),
         ("time=data(:,1):ms", "data(:,1)", 1.0, "ms"),
+        ("time=data(:,1)", "data(:,1)", 1.0, None),
         ("load=a:b:N", "a:b", 1.0, "N"),
     ],
 )

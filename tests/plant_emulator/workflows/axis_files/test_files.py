@@ -93,17 +93,17 @@ def test_parquet_and_mdf4_are_read_with_their_units(tmp_path: Path) -> None:
 
 def test_a_velocity_stands_in_for_a_position(tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
-    path.write_text("time_s,n,torque_Nm\n0,0,1\n1,60,1\n3,60,1\n")
+    path.write_text("time_s,n,torque_Nm\n0,0,1\n0.1,60,1\n0.3,60,1\n")
     log = read(path, ["velocity=n:rpm"])
     assert log.velocity == pytest.approx([0.0, 2.0 * np.pi, 2.0 * np.pi])
-    # by the trapezoidal rule: half a revolution, then two
-    assert log.position == pytest.approx([0.0, np.pi, 5.0 * np.pi])
+    # by the trapezoidal rule: a twentieth of a revolution, then a fifth
+    assert log.position == pytest.approx([0.0, 0.1 * np.pi, 0.5 * np.pi])
 
 
 def test_an_encoder_that_begins_anew_each_revolution_is_continued(tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
     angles = [340, 355, 5, 20, 10, 357, 350]
-    rows = "".join(f"{k},{angle},1\n" for k, angle in enumerate(angles))
+    rows = "".join(f"{0.1 * k},{angle},1\n" for k, angle in enumerate(angles))
     path.write_text(f"time_s,enc,torque_Nm\n{rows}")
     log = read(path, ["position=enc:deg"])
     continued = [340.0, 355.0, 365.0, 380.0, 370.0, 357.0, 350.0]
@@ -112,7 +112,7 @@ def test_an_encoder_that_begins_anew_each_revolution_is_continued(tmp_path: Path
 
 def test_load_and_temperature_are_read(tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
-    path.write_text("time_s,position_m,force_N,load_force_N,T\n0,0,1,5,300\n1,1,2,6,310\n")
+    path.write_text("time_s,position_m,force_N,load_force_N,T\n0,0,1,5,300\n0.1,1,2,6,310\n")
     log = read(path, ["temperature=T:K"])
     assert not log.rotary
     assert log.load == pytest.approx([5.0, 6.0])
