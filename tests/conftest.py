@@ -118,7 +118,7 @@ def end_processes(
 
 def pytest_report_header() -> str:
     """The processor whose code computes: the last bits of every figure depend on it."""
-    import numpy as np  # noqa: F401  # loads the library
+    import numpy as np  # noqa: F401 - loads the library
     from threadpoolctl import threadpool_info
 
     algebra = {one.get("architecture", one["internal_api"]) for one in threadpool_info()}

@@ -128,7 +128,7 @@ def lsoda_tuned(study: Study) -> Rows:
 def cvodes(study: Study) -> Rows:
     """CVODES of CasADi, where CasADi is installed."""
     try:
-        import casadi  # noqa: F401
+        import casadi  # noqa: F401 - only whether it is there
     except ImportError as error:
         click.echo(f"cvodes: {error}; pip install 'road-load-bench[bench]' brings it", err=True)
         yield missing("cvodes", "CasADi CVODES: not installed", 8.0)
@@ -207,7 +207,7 @@ def first_result(study: Study) -> Rows:
 def identification(_: Study) -> Rows:
     """A fit of nine parameters and an initial state to one log, from the nominal parameters."""
     try:
-        import lmfit  # noqa: F401
+        import lmfit  # noqa: F401 - only whether it is there
     except ImportError as error:
         click.echo(f"identification: {error}; pip install 'road-load-bench[bench]'", err=True)
         yield missing("identification", "lmfit on scipy LSODA: not installed", 100.0)

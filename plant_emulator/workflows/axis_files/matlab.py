@@ -68,7 +68,7 @@ def _arrays(held: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Ar
     """Vectors and columns of matrices that are numbers, by name."""
     for name, value in held.items():
         if hasattr(value, "_fieldnames"):
-            fields = {field: getattr(value, field) for field in value._fieldnames}  # noqa: SLF001
+            fields = {field: getattr(value, field) for field in value._fieldnames}  # noqa: SLF001 - scipy lists them so
             yield from _arrays(fields, f"{prefix}{name}.")
             continue
         array = np.asarray(value)

@@ -2,7 +2,7 @@
 
 import os
 
-import scipy.linalg  # noqa: F401  # brings an OpenBLAS of its own
+import scipy.linalg  # noqa: F401 - brings an OpenBLAS of its own
 from threadpoolctl import threadpool_info
 
 
