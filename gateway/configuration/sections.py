@@ -169,7 +169,7 @@ class LimitsConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class PlausibilityConfig:
-    """Allowed deviations of the sensors from the model of the bench (gateway.cycle.plausibility).
+    """Allowed deviations of the sensors from the model of the bench (gateway.plausibility).
 
     false_alarms : rate that is allowed by noise [1/s, in the file an hour]
     torque, torque_share : tolerance of the motor's torque balance [N m], and its share of the

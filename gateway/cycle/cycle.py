@@ -22,8 +22,8 @@ from gateway.cycle.limits import Limit, Limited, Limits
 from gateway.cycle.samples import Samples
 from gateway.cycle.supervisor import Facts, Reason, State, Supervisor, advance
 from gateway.cycle.surveillance import Surveillance
-from gateway.cycle.tolerances import Params
 from gateway.errors import ConfigError
+from gateway.plausibility.tolerances import Params
 from gateway.regulators import Regulator
 from gateway.regulators.demand import Demand
 from register_maps.register_map import RegisterMap

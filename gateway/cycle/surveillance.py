@@ -3,11 +3,12 @@
 from dataclasses import dataclass, field, replace
 
 from gateway.configuration.config import Config
-from gateway.cycle import following, pace, plausibility
+from gateway.cycle import following, pace
 from gateway.cycle.following import Following
-from gateway.cycle.plausibility import Plausibility
 from gateway.cycle.samples import Samples, torque_of, without_sensor
-from gateway.cycle.tolerances import Params
+from gateway.plausibility import relations as plausibility
+from gateway.plausibility.relations import Plausibility
+from gateway.plausibility.tolerances import Params
 from gateway.reasons import Reason
 from register_maps.register_map import RegisterMap
 

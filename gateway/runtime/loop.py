@@ -16,11 +16,11 @@ from typing import Final, Protocol
 
 from gateway.configuration.config import Config
 from gateway.cycle.cycle import Observation, Output, initial, step
-from gateway.cycle.plausibility import shares
 from gateway.cycle.record import NOTHING, Layout, Tick
 from gateway.cycle.supervisor import State
 from gateway.errors import BugError, GatewayError
 from gateway.link.plc import READ_HOLDING, READ_INPUT, LinkError, PlcLink
+from gateway.plausibility.relations import shares
 from gateway.reasons import Reason
 from gateway.runtime.timing import Histogram
 from register_maps.codec import CodecError, Refusal, decode_measurement, encode_setpoint

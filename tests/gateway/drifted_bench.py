@@ -5,7 +5,7 @@ Effects have up to their plausible size: friction of the motor, armature reactio
 
     python -m tests.gateway.drifted_bench 101 120 6
 
-drives each of these seeds for 6 minutes, and prints the largest sums of gateway.cycle.plausibility
+drives each of these seeds for 6 minutes, and prints the largest sums of gateway.plausibility
 over their alarm levels: motor, gear and drum. At last it tells the false alarms that these drives
 let expect in 100 hours, by the tails of the largest sums of each minute. Everything is drawn anew
 in each drive: the bench, the travels, the noise of the sensors and what the regulator makes of it.
@@ -17,8 +17,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from gateway.configuration.config import Config
-from gateway.cycle.plausibility import shares
 from gateway.cycle.supervisor import State
+from gateway.plausibility.relations import shares
 from plant_emulator import parameter_sets
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.simulation.sensor_noise import SENSORS

@@ -42,8 +42,8 @@ from scipy.optimize import lsq_linear
 
 from gateway.arrays import Array
 from gateway.configuration.config import Config
-from gateway.cycle.plausibility import motor_torque
 from gateway.cycle.supervisor import State
+from gateway.plausibility.relations import motor_torque
 from register_maps.signals import Measurement
 from register_maps.timing import SCAN
 from tests.gateway.closed_loop import ClosedLoop, Reading

@@ -10,8 +10,8 @@ from statistics import NormalDist
 
 from gateway.configuration.config import Config
 from gateway.configuration.sections import RegulatorConfig
-from gateway.cycle.balance_noise import walk
-from gateway.cycle.sudden import DRIVING, PRODUCT_SHARE
+from gateway.plausibility.balance_noise import walk
+from gateway.plausibility.sudden import DRIVING, PRODUCT_SHARE
 
 FULL_CURRENT = 72.0
 """[A] Largest armature current of the drive (thesis, eq 3.5)."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gateway.cycle.balance_noise import CLIP, CLIPPED, LOUD, QUIET, BalanceNoise, level, note
+from gateway.plausibility.balance_noise import CLIP, CLIPPED, LOUD, QUIET, BalanceNoise, level, note
 
 
 def shown(series, state=None):

@@ -41,12 +41,12 @@ sensor: without noise, one side moves alone inside the backlash.
 from dataclasses import dataclass, field
 from math import copysign, exp, inf
 
-from gateway.cycle import balance_noise
-from gateway.cycle.balance_noise import BalanceNoise
-from gateway.cycle.stuck import Streak, follow, is_stuck
-from gateway.cycle.sudden import DRIVING, Steady, note, product, tolerance
-from gateway.cycle.tolerances import Params
 from gateway.friction.law import friction_torque
+from gateway.plausibility import balance_noise
+from gateway.plausibility.balance_noise import BalanceNoise
+from gateway.plausibility.stuck import Streak, follow, is_stuck
+from gateway.plausibility.sudden import DRIVING, Steady, note, product, tolerance
+from gateway.plausibility.tolerances import Params
 from gateway.reasons import Reason
 from register_maps.signals import Measurement, Status
 from register_maps.timing import SCAN

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from gateway.configuration.config import Config
-from gateway.cycle import tolerances
-from gateway.cycle.balance_noise import walk
-from gateway.cycle.plausibility import NOTHING, Plausibility, judge, reason
 from gateway.cycle.supervisor import State
-from gateway.cycle.tolerances import Params
+from gateway.plausibility import tolerances
+from gateway.plausibility.balance_noise import walk
+from gateway.plausibility.relations import NOTHING, Plausibility, judge, reason
+from gateway.plausibility.tolerances import Params
 from gateway.reasons import Reason
 from register_maps.signals import Measurement, Status
 from register_maps.timing import SCAN
