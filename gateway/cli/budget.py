@@ -39,4 +39,4 @@ def command(recording: Path, *, parameters: str, json_file: str | None) -> None:
     if json_file is not None:
         write_json(json_file, found.to_json(), indent=2)
     if json_file != "-":
-        click.echo(str(found.budget))
+        click.echo(str(found))

@@ -24,7 +24,7 @@ Examples:
 @click.option(
     "--repeats",
     type=click.IntRange(1, 100),
-    help="runs up and down at each rate; default: 5",
+    help="runs up and down at each rate, coast-downs of each truck (2 to 4); default: 5",
 )
 @click.option(
     "--set", "values", multiple=True, metavar="KEY=VALUE", help="change a value of the file"

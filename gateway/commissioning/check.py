@@ -37,7 +37,7 @@ class Check:
         shown = f"{self.value:+9.2f}" if isfinite(self.value) else "  missing"
         mark = "" if self.holds else "  OUTSIDE"
         return (
-            f"{self.name:13s} {self.what:44s} {shown} {self.unit:4s} "
+            f"{self.name:13s} {self.what:58s} {shown} {self.unit:4s} "
             f"of {self.limit:6.4g}  {self.source}{mark}"
         )
 

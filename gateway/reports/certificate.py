@@ -95,7 +95,9 @@ def _section(number: int, run: dict[str, Any]) -> str:
         parts += ["<h3>Indices of SAE J2951, drum over demand</h3>", _table((), indices)]
     if run["budget"] is not None:
         columns = ("cause", "force [N]", "energy [%]", "speed [km/h]")
-        parts += ["<h3>Error budget against the road</h3>", _table(columns, _budget(run["budget"]))]
+        part = "first {judged_seconds:.1f} of {duration_seconds:.1f} s".format_map(run["budget"])
+        parts.append(f"<h3>Error budget against the road, {part}</h3>")
+        parts.append(_table(columns, _budget(run["budget"])))
     return "<section>\n" + "\n".join(parts) + "\n</section>"
 
 

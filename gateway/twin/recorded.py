@@ -19,11 +19,17 @@ from register_maps.timing import SCAN
 
 @dataclass(frozen=True, kw_only=True)
 class RecordedBudget:
-    """Error budget of a recorded run, and the parameter set of its digital twin."""
+    """Error budget of a recorded run, and the parameter set of its digital twin.
+
+    judged, duration : first part of the run that the budget judges, and the whole [s]. A road on
+        which the truck is faster than the bench may be ends the first part.
+    """
 
     recording: Path
     parameters: str
     budget: Budget
+    judged: float
+    duration: float
 
     def to_json(self) -> dict[str, Any]:
         """Return the budget as the document budget/1."""
@@ -31,8 +37,18 @@ class RecordedBudget:
             "schema": "budget/1",
             "recording": str(self.recording),
             "parameters": self.parameters,
+            "judged_seconds": self.judged,
+            "duration_seconds": self.duration,
             **self.budget.to_json(),
         }
+
+    def __str__(self) -> str:
+        if self.judged == self.duration:
+            return str(self.budget)
+        return (
+            f"{self.budget}\njudged: the first {self.judged:.1f} of {self.duration:.1f} s; "
+            "then the truck would be faster on the road than limits.speed_max_rpm lets the bench be"
+        )
 
 
 def budget_of(path: Path, parameters: str) -> RecordedBudget:
@@ -49,13 +65,19 @@ def budget_of(path: Path, parameters: str) -> RecordedBudget:
         )
     told = config_file.with_values(config, {"regulator.friction": str(parameter_file(parameters))})
     driver = RecordedTorque(torque=wheel_torque(found, told, known))
-    duration = SCAN * len(driver.torque)
+    judged = SCAN * driver.samples_within(config)
 
     def run(twin: Twin) -> TwinRun:
-        return closed_loop.run(twin, lambda: driver, duration)
+        return closed_loop.run(twin, lambda: driver, judged)
 
     twin = Twin(config=config, parameters=bench, map=known)
-    return RecordedBudget(recording=path, parameters=parameters, budget=budget(twin, told, run))
+    return RecordedBudget(
+        recording=path,
+        parameters=parameters,
+        budget=budget(twin, told, run),
+        judged=judged,
+        duration=SCAN * len(driver.torque),
+    )
 
 
 def parameter_file(parameters: str, folder: Path = Path()) -> Path:

@@ -14,8 +14,10 @@ import numpy as np
 from gateway.arrays import Array
 from gateway.configuration.config import Config
 from gateway.errors import GatewayError
+from gateway.offline.evaluation import road_speed
 from gateway.offline.recording_replay import observations
 from gateway.offline.truck_torque import truck_torques
+from gateway.physics.road_load import road_load
 from gateway.physics.window import Window
 from gateway.recordings.recording import GatewayRecording
 from plant_emulator.simulation.truck import PARKED_TORQUE
@@ -40,20 +42,33 @@ class RecordedTorque:
     torque: Array
 
     @cached_property
-    def _last(self) -> Array:
-        """The torque, and where the truck is parked, the last one before [N m]; 0: none."""
+    def on_the_move(self) -> Array:
+        """Torque on a truck that moves [N m]: where the recorded one is parked, its last brake."""
         known = np.where(np.isfinite(self.torque), np.arange(len(self.torque)), -1)
         index = np.maximum.accumulate(known)
-        return np.where(index < 0, 0.0, self.torque[index])
+        last = np.where(index < 0, 0.0, self.torque[index])
+        return np.where(known < 0, np.minimum(last, 0.0), last)
 
     def torques(self, time: float, speed: float) -> tuple[float, float]:
         """Drive and brake torque at the wheel [N m]; a negative torque is that of the brake."""
         index = min(round(time / SCAN), len(self.torque) - 1)
-        parked = bool(np.isnan(self.torque[index]))
-        if parked and speed < STANDING_TREAD:
+        if np.isnan(self.torque[index]) and speed < STANDING_TREAD:
             return 0.0, PARKED_TORQUE
-        value = float(self._last[index])
-        return 0.0 if parked else max(value, 0.0), max(-value, 0.0)
+        value = float(self.on_the_move[index])
+        return max(value, 0.0), max(-value, 0.0)
+
+    def samples_within(self, config: Config) -> int:
+        """Number of scans until this torque drives a truck on the road faster than the bench may.
+
+        config : truck, road and the limit of the speed
+        """
+        truck, bench, scans = config.truck, config.bench, len(self.torque)
+        fastest = config.limits.speed_max / bench.gear_ratio * bench.drum_radius
+        force = self.on_the_move / truck.wheel_radius
+        road = road_load(truck, bench).force
+        speed = road_speed(SCAN * np.arange(scans, dtype=np.float64), force, truck.total_mass, road)
+        faster = np.flatnonzero(speed > fastest)
+        return int(faster[0]) if len(faster) else scans
 
 
 def wheel_torque(found: GatewayRecording, config: Config, register_map: RegisterMap) -> Array:

@@ -60,7 +60,8 @@ def verify(
 ) -> Verification:
     """Verify the emulated road on the live bench, without a truck on the drum.
 
-    only : names of checks, default: all; repeats : of the runs up and down
+    only : names of checks, default: all
+    repeats : of the runs up and down, and of the coast-downs, these 2 to 4 times
     view : show the run on standard output; report : takes lines for the operator
 
     Raises ConfigError for a configuration that does not fit, GatewayError where the run did not

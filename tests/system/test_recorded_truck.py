@@ -9,6 +9,7 @@ from click.testing import CliRunner
 import gateway
 from gateway import config_file
 from gateway.cli import main
+from gateway.configuration.config import Config
 from gateway.recordings import recording
 from gateway.recordings.header import map_of
 from gateway.twin.wheel_torque import RecordedTorque, wheel_torque
@@ -57,6 +58,15 @@ def test_a_truck_that_stops_later_than_the_recorded_one_brakes_on_as_that_did():
     assert driver.torques(0.03, 0.0) == driver.torques(0.0, 0.0) == (0.0, 1e6)
 
 
+def test_a_torque_counts_until_it_drives_the_truck_faster_than_the_bench_may_turn():
+    """1450 N against 450 N on 1000 kg: 1 m/s^2. 4830 rpm / 62.6 * 0.645 m are 5.2115 m/s."""
+    truck = {"truck.mass_kg": 1000.0, "truck.f0_N": 450.0, "truck.wheel_radius_m": 0.2}
+    config = Config().with_values(truck)
+    driver = RecordedTorque(torque=np.full(1000, 0.2 * 1450.0))
+    assert driver.samples_within(config) == 522
+    assert RecordedTorque(torque=driver.torque[:500]).samples_within(config) == 500
+
+
 def test_the_end_of_a_run_tells_the_indices_that_a_replay_tells(driven, tmp_path):
     path = driven / "truck_3640kg.rlrec"
     told = quality_at_the_end(path)
@@ -77,6 +87,7 @@ def test_backlash_costs_the_nominal_bench_most(driven, tmp_path):
     assert result.exit_code == 0, result.output
     told = json.loads(answer.read_text())
     assert (told["schema"], told["largest"]) == ("budget/1", "backlash")
+    assert told["judged_seconds"] == told["duration_seconds"] == pytest.approx(15.0, abs=0.2)
     parts = [*told["causes"], told["interaction"], told["left"]]
     for column in ("force_newton", "energy_percent", "speed_km_h"):
         assert sum(one[column] for one in parts) == pytest.approx(told["whole"][column])

@@ -1,8 +1,11 @@
 """Virtual coast-downs of the smallest and the largest truck (40 CFR 1066.270).
 
 No truck stands on the drum. The regulator emulates one that rolls out under its road load. The mean
-force of an interval of speeds is m dv / dt. It has to be the road load.
+force of an interval of speeds is m dv / dt. It has to be the road load in two consecutive
+coast-downs (WLTP: EU 2017/1151, sub-annex 4). One alone does not show that the bench repeats it.
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -21,6 +24,8 @@ SPEED_BOUNDS: Array = np.arange(16.0, 3.0, -2.0) * KMH
 """[m/s] Speeds between which a mean force is taken."""
 SPEED_MARGIN = 1.0 * KMH
 LONGEST_COAST = 180.0
+FEWEST, MOST = 2, 4
+"""Coast-downs of each truck: two in a row have to hold; the first may find a colder gear."""
 
 
 def start(config: Config) -> Step:
@@ -30,10 +35,11 @@ def start(config: Config) -> Step:
     return Ramp(speed=speed, rate=RPM * RATE_RPM_S, hold=3.0)
 
 
-def steps(config: Config, repeats: int) -> list[Step]:  # noqa: ARG001 - all checks have these arguments
-    """Let the smallest and the largest truck roll out."""
+def steps(config: Config, repeats: int) -> list[Step]:
+    """Let the smallest and the largest truck roll out, each FEWEST to MOST times."""
+    number = min(max(repeats, FEWEST), MOST)
     masses = (config.verification.smallest, config.verification.largest)
-    return [one for mass in masses for one in (start(config), roll_out(config, mass))]
+    return [one for mass in masses for one in (start(config), roll_out(config, mass)) * number]
 
 
 def roll_out(config: Config, mass: float) -> Emulation:
@@ -72,24 +78,39 @@ def targets(step: Emulation, bounds: Array) -> Array:
 
 
 def evaluate(run: StepRun) -> list[Check]:
-    """Worst error of the mean force of each truck."""
-    return [
-        _judge(run, step, part) for step, part in run.parts(LABEL) if isinstance(step, Emulation)
-    ] or [missing(NAME, "no coast-down", "N", run.config.verification.coast_down, SOURCE)]
+    """Worst error of the mean force of each truck, in two coast-downs in a row."""
+    trucks: dict[float, list[tuple[Emulation, slice]]] = {}
+    for step, part in run.parts(LABEL):
+        if isinstance(step, Emulation):
+            trucks.setdefault(step.mass, []).append((step, part))
+    return [_judge(run, coasts) for coasts in trucks.values()] or [
+        missing(NAME, "no coast-down", "N", run.config.verification.coast_down, SOURCE)
+    ]
 
 
-def _judge(run: StepRun, step: Emulation, part: slice) -> Check:
-    limit = run.config.verification.coast_down
-    found = mean_forces(run.trace.time[part], run.rim_speed[part], step.mass, SPEED_BOUNDS)
-    errors = found - targets(step, SPEED_BOUNDS)
-    if not np.isfinite(errors).all():
-        what = f"{step.mass:.0f} kg: did not roll from 16 to 4 km/h"
+def _judge(run: StepRun, coasts: Sequence[tuple[Emulation, slice]]) -> Check:
+    """Judge the first two coast-downs in a row that hold, or the two that come nearest to it."""
+    limit, step, count = run.config.verification.coast_down, coasts[0][0], len(coasts)
+    wanted = targets(step, SPEED_BOUNDS)
+    errors = np.array([_forces(run, *one) - wanted for one in coasts])
+    worst = np.abs(errors).max(axis=1)
+    pairs = np.maximum(worst[:-1], worst[1:])
+    if not np.isfinite(pairs).any():
+        what = f"{step.mass:.0f} kg: not twice in a row from 16 to 4 km/h"
         return missing(NAME, what, "N", limit, SOURCE)
-    worst = int(np.argmax(np.abs(errors)))
-    target = float(targets(step, SPEED_BOUNDS)[worst])
+    within = np.flatnonzero(pairs <= limit)
+    first = int(within[0]) if len(within) else int(np.nanargmin(pairs))
+    pair = errors[first : first + 2].ravel()
+    at = int(np.argmax(np.abs(pair)))
+    value, interval = float(pair[at]), at % len(wanted)
+    needed = str(first + 2) if len(within) else "none"
     what = (
-        f"{step.mass:.0f} kg, {100.0 * errors[worst] / target:+.1f} % of {target:.0f} N at "
-        f"{SPEED_BOUNDS[worst] / KMH:.0f} .. {SPEED_BOUNDS[worst + 1] / KMH:.0f} km/h"
+        f"{step.mass:.0f} kg in {needed} of {count} runs, "
+        f"{100.0 * value / wanted[interval]:+.1f} % of {wanted[interval]:.0f} N at "
+        f"{SPEED_BOUNDS[interval] / KMH:.0f} .. {SPEED_BOUNDS[interval + 1] / KMH:.0f} km/h"
     )
-    value = float(errors[worst])
     return Check(name=NAME, what=what, value=value, unit="N", limit=limit, source=SOURCE)
+
+
+def _forces(run: StepRun, step: Emulation, part: slice) -> Array:
+    return mean_forces(run.trace.time[part], run.rim_speed[part], step.mass, SPEED_BOUNDS)

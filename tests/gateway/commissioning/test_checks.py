@@ -75,21 +75,50 @@ def test_target_of_an_interval_is_the_mean_of_the_road_load_over_its_speeds():
     assert coast_down.targets(road, np.array([3.0, 1.0])) == pytest.approx([27.0])
 
 
+def coasts(*rates: float) -> StepRun:
+    """Coast-downs of 4000 kg, one after the other, each with its deceleration [m/s^2]."""
+    step = pushed(4000.0, 0.0, "coast-down")
+    return run_of([(step, falling(5.0, 0.9, rate)) for rate in rates])
+
+
 def test_a_truck_that_rolls_out_too_fast_by_40_newton_is_outside_and_says_so():
-    (found,) = coast_down.evaluate(
-        run_of([(pushed(4000.0, 0.0, "coast-down"), falling(5.0, 0.9, 0.11))])
-    )
+    (found,) = coast_down.evaluate(coasts(0.11, 0.11))
     assert found.value == pytest.approx(40.0, rel=1e-3)
     assert not found.holds
-    assert "+10.0 % of 400 N" in found.what
+    assert "in none of 2 runs, +10.0 % of 400 N" in found.what
 
 
-def test_a_truck_that_does_not_roll_out_is_missing_not_within():
-    speed = np.full(2000, 4.6)
-    (found,) = coast_down.evaluate(run_of([(pushed(4000.0, 0.0, "coast-down"), speed)]))
+def test_two_coast_downs_in_a_row_within_the_limit_hold_and_their_number_is_told():
+    """4000 kg at 0.11, 0.101 and 0.1005 m/s^2 are 40, 4 and 2 N over their 400 N."""
+    (found,) = coast_down.evaluate(coasts(0.11, 0.101, 0.1005, 0.11))
+    assert found.value == pytest.approx(4.0, rel=1e-2)
+    assert found.holds
+    assert "in 3 of 4 runs, +1.0 % of 400 N" in found.what
+
+
+def test_coast_downs_within_the_limit_that_do_not_follow_each_other_do_not_hold():
+    (found,) = coast_down.evaluate(coasts(0.1, 0.11, 0.1, 0.11))
+    assert not found.holds
+
+
+@pytest.mark.parametrize("speeds", [[falling(5.0, 0.9, 0.1)], [np.full(2000, 4.6)] * 2])
+def test_a_truck_that_does_not_roll_out_twice_is_missing_not_within(speeds):
+    (found,) = coast_down.evaluate(
+        run_of([(pushed(4000.0, 0.0, "coast-down"), speed) for speed in speeds])
+    )
     assert np.isnan(found.value)
     assert not found.holds
     assert found.to_json()["value"] is None
+
+
+@pytest.mark.parametrize(("repeats", "driven"), [(1, 2), (3, 3), (5, 4)])
+def test_each_truck_rolls_out_two_to_four_times(repeats, driven):
+    steps = coast_down.steps(Config(), repeats)
+    masses = [step.mass for step in steps if isinstance(step, Emulation)]
+    assert (
+        masses
+        == [Config().verification.smallest] * driven + [Config().verification.largest] * driven
+    )
 
 
 def test_force_left_on_the_bare_bench_is_mass_times_deceleration():

@@ -27,7 +27,8 @@ RUN = {
 }
 ERRORS = {"force_newton": 1.25, "energy_percent": -0.5, "speed_km_h": 0.125}
 BUDGET = {"causes": [{"cause": "dead time", **ERRORS}], "interaction": ERRORS, "left": ERRORS}
-TRUCK = {"run": "road load", "checks": [], "budget": {**BUDGET, "whole": ERRORS, "largest": "x"}}
+JUDGED = {"judged_seconds": 9.8, "duration_seconds": 30.0, "whole": ERRORS, "largest": "x"}
+TRUCK = {"run": "road load", "checks": [], "budget": {**BUDGET, **JUDGED}}
 DOCUMENT = {
     "schema": "certificate/1",
     "date": "2026-11-23T12:00:00+00:00",
@@ -49,6 +50,7 @@ def test_the_page_holds_its_document_and_a_changed_word_on_it_is_noticed():
     page = html(DOCUMENT)
     assert document_in(page) == DOCUMENT
     assert page.count("</script>") == 1
+    assert "against the road, first 9.8 of 30.0 s" in page
     assert is_written(page, DOCUMENT)
     assert not is_written(page.replace("<td>losses</td>", "<td>torque</td>"), DOCUMENT)
     assert is_written(json.dumps(DOCUMENT), DOCUMENT)
