@@ -11,7 +11,7 @@ from plant_emulator.errors import IdentificationError, UnsettledError
 from plant_emulator.recordings.wheel_torque import is_estimated
 from plant_emulator.signals.log import VOLTAGE, Array, Log, compared_channels, without_voltage
 from plant_emulator.signals.mains import noise_beside_lines
-from plant_emulator.signals.noise import noise
+from plant_emulator.signals.noise import FLOOR, noise
 from plant_emulator.simulation.simulate import TOLERANCE, Hold, RunInputs, inputs_of, simulate
 
 if TYPE_CHECKING:
@@ -105,8 +105,14 @@ class Recording:
 
         values : of the model [SI]
         """
-        rows = self.residual(values, gap_position=0.0) * self.noise[:, None]
-        beside = [noise(row, use) for row, use in zip(rows, self.use, strict=True)]
+        try:
+            rows = self.strict_residual(values, gap_position=0.0) * self.noise[:, None]
+        except UnsettledError:
+            return self
+        beside = [
+            max(noise(row, use), FLOOR * float(np.ptp(self.log[name])))
+            for name, row, use in zip(self.channels, rows, self.use, strict=True)
+        ]
         return replace(self, noise=np.minimum(self.noise, beside))
 
     def without_voltage(self) -> Recording:

@@ -22,6 +22,7 @@ from plant_emulator.recordings.same_bench import check_same_bench
 from plant_emulator.recordings.stamps import restamp
 from plant_emulator.recordings.wheel_torque import mark_informative, with_estimated_torque
 from plant_emulator.signals.log import VOLTAGE, Log
+from plant_emulator.simulation.simulate import values_of
 from plant_emulator.workflows.arguments import check_signals
 
 if TYPE_CHECKING:
@@ -116,7 +117,7 @@ def _weighed(loaded: Recording, parameters: ParameterSet) -> Recording:
     """
     if not loaded.estimated_torque:
         return loaded
-    beside = loaded.with_noise_beside(parameters.values())
+    beside = loaded.with_noise_beside(values_of(parameters))
     declared = [bool(getattr(parameters.sensors.get(n), "noise", 0.0)) for n in loaded.channels]
     return replace(beside, noise=np.where(declared, loaded.noise, beside.noise))
 

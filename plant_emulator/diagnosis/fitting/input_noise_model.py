@@ -43,11 +43,18 @@ def whiten_inputs(runner: TaskRunner) -> tuple[TaskRunner, FitResult | None]:
 
 
 def find_input_noise(model: Model, task: Task) -> dict[int, NoiseDirections]:
-    """Find the directions of the residual that input noise disturbs at a fit, by run (a step)."""
+    """Find the directions of the residual that input noise disturbs at a fit, by run (a step).
+
+    Runs that are only predicted have them too; their states are searched for.
+    """
+    base = task.base
+    states = dict(zip(task.runs, base.states, strict=True))
     found = {
-        run: model.input_noise(run, task.base, state)
-        for run, state in zip(task.runs, task.base.states, strict=True)
-        if model.runs[run].measured_input
+        k: model.input_noise(
+            k, base, states.get(k) or model.initial_states(k, base.effects, base.values)
+        )
+        for k, run in enumerate(model.runs)
+        if run.measured_input
     }
     return {run: noise for run, noise in found.items() if noise is not None}
 
@@ -76,7 +83,7 @@ class _InputNoiseModel:
         return whiten_function(self._model.residual(run, effects), self._noise.get(run))
 
     def unwhitened_residual(self, run: int, effects: Sequence[str]) -> Residual:
-        """See `Model`; what the noise of an input makes of a run is no gap either."""
+        """See `Model`, but what the noise of an input makes of a run is no gap: it is whitened."""
         return whiten_function(self._model.unwhitened_residual(run, effects), self._noise.get(run))
 
 

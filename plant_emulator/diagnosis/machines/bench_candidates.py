@@ -23,7 +23,8 @@ LOG_VOLTAGE = f"log {NAMES[VOLTAGE]}"
 BEHIND_THE_GEAR = frozenset({"gear", "drum", "wheel_contact"})
 WHEEL = frozenset({"wheel_contact"})
 # What would show them.
-LOG_WHEEL_TORQUE = f"log {NAMES[WHEEL_TORQUE]}, or give a run without a truck"
+LOG_WHEEL_TORQUE = f"log {NAMES[WHEEL_TORQUE]}"
+OR_NO_TRUCK = ", or give a run without a truck"
 
 
 def candidate(effect: Effect, *, voltage: bool = False, unknown_torque: bool = False) -> Candidate:
@@ -69,7 +70,7 @@ def hidden_effects(effects: Mapping[str, Effect], recording: Recording) -> froze
 def _needs(effect: Effect, *, voltage: bool, unknown_torque: bool) -> str:
     """The sensor or manoeuvre that shows the effect and that these logs lack."""
     if unknown_torque:
-        return LOG_WHEEL_TORQUE
+        return LOG_WHEEL_TORQUE + ("" if effect.subsystem in WHEEL else OR_NO_TRUCK)
     return "" if voltage and effect.needs.startswith(LOG_VOLTAGE) else effect.needs
 
 

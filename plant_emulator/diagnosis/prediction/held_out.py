@@ -17,7 +17,7 @@ from plant_emulator.diagnosis.prediction.gap import (
 from plant_emulator.diagnosis.prediction.trace import traces
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
@@ -147,26 +147,31 @@ class HeldOutRuns:
         Runs that do not show an effect cannot predict it, so that no fold may be left.
         """
         folds = self.plan.folds
-        if not followed or len(folds) < 2:
-            return folds, ()
-        tasks = [self._fold(explained.final, *fold, refitted=False) for fold in folds]
+        norms: Iterable[Mapping[str, float]] = [{} for _ in folds]
+        if followed and len(folds) > 1:
+            tasks = [self._fold(explained.final, *fold, refitted=False) for fold in folds]
+            norms = self.runner.map(signature_norms, tasks)
         usable, notes = [], []
-        for fold, norms in zip(folds, self.runner.map(signature_norms, tasks), strict=True):
-            weak = [name for name, norm in norms.items() if norm < DETECTABLE_NORM]
-            hidden = [*weak, *(n for n in followed if n in self._hidden(fold[0]))]
-            open_input = [name for name in followed if name in self._hidden(fold[1])]
-            lost = self._sources(fold[1])
-            if hidden:
-                notes.append(f"{lost}: shows no shrinkage; the other runs do not show {hidden[0]}")
-            elif open_input:
-                notes.append(f"{lost}: shows no shrinkage; it does not show {open_input[0]}")
-            else:
-                usable.append(fold)
+        for (fitted, predicted), own in zip(folds, norms, strict=True):
+            weak = [name for name, norm in own.items() if norm < DETECTABLE_NORM]
+            unseen = [*weak, *(n for n in followed if all(n in self._hides(k) for k in fitted))]
+            telling = tuple(k for k in predicted if not self._hides(k) & set(followed))
+            if unseen:
+                lost = self._sources(predicted)
+                notes.append(f"{lost}: shows no shrinkage; the other runs do not show {unseen[0]}")
+                continue
+            if telling != predicted:
+                lost = self._sources([k for k in predicted if k not in telling])
+                notes.append(
+                    f"{lost}: shows no shrinkage; it does not show {' and '.join(followed)}"
+                )
+            if telling:
+                usable.append((fitted, telling))
         return tuple(usable), tuple(notes)
 
-    def _hidden(self, runs: Sequence[int]) -> frozenset[str]:
-        """Effects that none of these runs can show."""
-        return frozenset.intersection(*(self.runner.model.runs[k].hides for k in runs))
+    def _hides(self, run: int) -> frozenset[str]:
+        """Effects that a run cannot show."""
+        return self.runner.model.runs[run].hides
 
     def predictions(
         self, explained: Explanation, followed: tuple[str, ...], folds: Folds

@@ -30,8 +30,9 @@ def not_told_apart(sets: Sets) -> list[FitResult]:
     kept = []
     for size in {len(key) for key in sets}:
         same = [one for key, one in sets.items() if len(key) == size]
-        least = min(one.cost for one in same)
-        kept += [one for one in same if one.cost < least + SETTINGS.near]
+        best = min(same, key=lambda one: one.cost)
+        near = SETTINGS.near * max(1.0, best.mean_square)
+        kept += [one for one in same if one.cost < best.cost + near]
     return kept
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from plant_emulator import effects
 from plant_emulator.diagnosis.machines.bench import BenchModel
+from plant_emulator.diagnosis.machines.bench_candidates import LOG_WHEEL_TORQUE
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import Recording
 from plant_emulator.recordings.wheel_torque import TAKEN
@@ -59,8 +60,11 @@ def test_wheel_torque_is_asked_for_where_its_lack_hides_an_effect(
     nominal: ParameterSet, runs: dict[str, Recording], given: tuple[str, ...], asks: set[str]
 ) -> None:
     model = BenchModel([runs[name] for name in given], nominal, LIBRARY)
-    wanted = "or give a run without a truck"
-    assert {name for name, one in model.candidates.items() if wanted in one.needs} == asks
+    changed = {n for n, one in model.candidates.items() if one.needs != LIBRARY[n].needs}
+    assert changed == asks
+    assert all(model.candidates[n].needs.startswith(LOG_WHEEL_TORQUE) for n in asks)
+    free = {n for n in asks if "without a truck" in model.candidates[n].needs}
+    assert free == asks - {"tyre_rolling_loss"}
 
 
 def test_parameters_that_the_estimate_of_a_torque_takes_stay_as_they_are(
