@@ -152,11 +152,14 @@ def labelled(folder: Path, only: tuple[str, ...]) -> None:
 @main.command()
 @click.option("--seed", type=click.IntRange(0), required=True, help="Seed of the cases.")
 @click.option("--count", type=click.IntRange(1), default=9, show_default=True)
-def outside(seed: int, count: int) -> None:
+@click.option("--only", metavar="NUMBER", type=int, multiple=True, help="Of these the ones named.")
+def outside(seed: int, count: int, only: tuple[int, ...]) -> None:
     """Draft the laws of effects that are in no library."""
-    numbers = [k for k, kind in enumerate(draw.kinds(seed, CASES)) if kind == "outside"]
+    numbers = [k for k, kind in enumerate(draw.kinds(seed, CASES)) if kind == "outside"][:count]
+    if strange := set(only) - set(numbers):
+        raise click.BadParameter(f"{min(strange)} is none of {numbers}", param_hint="--only")
     with TemporaryDirectory() as scratch:
-        for number in numbers[:count]:
+        for number in only or numbers:
             use_own_effects(*(laws.load(name) for name in laws.names()))
             case = draw.draw(seed, number, NOMINAL, kernel().effects)
             logs = [
