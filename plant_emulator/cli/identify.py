@@ -51,7 +51,8 @@ def command(
     """Fit the bench's parameters to LOGs, all at once.
 
     Without --free, all parameters that the set calls estimated are fitted, except gear_inertia. A
-    logged voltage adds armature_resistance and flux_constant. Every log has its own start position
+    logged voltage adds armature_resistance and flux_constant. Trucks alone, whose wheel torque
+    nobody measured, tell nothing of gear friction and drum. Every log has its own start position
     in the backlash gap. The noise is estimated from the logs, with its colour, hum and outliers.
     Standard errors come from the residuals and their autocorrelation.
     """

@@ -10,11 +10,13 @@ from plant_emulator.estimation.initial_states import GAP
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.wheel_torque import TAKEN
+from plant_emulator.signals.log import VOLTAGE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.model.parameters import ParameterSet
+    from plant_emulator.recordings.recording import Recording
 
 # Held fixed unless asked for: a log shows it only through J_g + xi^2 J_m.
 NOT_FREE = frozenset({"gear_inertia"})
@@ -54,17 +56,12 @@ def unknowns(
 
 
 def free_parameters(
-    parameters: ParameterSet,
-    names: Sequence[str] = (),
-    *,
-    voltage: bool = False,
-    unknown_torque: bool = False,
+    parameters: ParameterSet, names: Sequence[str] = (), recordings: Sequence[Recording] = ()
 ) -> tuple[str, ...]:
     """The names given, or all that the set calls estimated but those of NOT_FREE and zeros.
 
-    voltage : whether a log has it: what only the voltage shows is then free as well
-    unknown_torque : whether a truck's torque that nobody measured acted in every run: its estimate
-        takes some parameters as they are, so that no fit to these runs tells them
+    recordings : of the fit. If one has the voltage, what only that shows is free as well. If a
+        truck's torque that nobody measured acted in every run, what its estimate takes is not free.
 
     Raises IdentificationError for a name that is unknown, calculated from others, or 0 in the set.
     """
@@ -85,6 +82,8 @@ def free_parameters(
                 'kind = "estimated", in a parameter set',
                 argument="free",
             )
+    voltage = any(VOLTAGE in r.channels for r in recordings)
+    unknown_torque = bool(recordings) and all(r.estimated_torque for r in recordings)
     estimated = [
         p.name
         for p in parameters

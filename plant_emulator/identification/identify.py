@@ -30,7 +30,6 @@ from plant_emulator.estimation.noise.logged_noise import noise_of_runs
 from plant_emulator.estimation.residuals import residual_functions, whiten_functions
 from plant_emulator.estimation.start_search import FINE_SCANS, StartSearch
 from plant_emulator.model.stage import GAP_POSITION
-from plant_emulator.signals.log import VOLTAGE
 from plant_emulator.signals.noise import NoiseSeries
 from plant_emulator.simulation.simulate import TOLERANCE, values_of
 
@@ -115,19 +114,13 @@ def identify(
 ) -> Identification:
     """Estimate the free parameters of a bench from its logs.
 
-    free : names; none: all that the set calls estimated but gear_inertia, and the parameters that a
-        logged voltage shows
+    free : names; none: all that the set calls estimated and the logs show, see `free_parameters`
     effects : values of effects that the bench has, by effect and parameter [SI]; the initial states
         among them are fitted for every run, or taken from its log
     progress : called with a stage's name and its done share, 0 to 1
     Raises IdentificationError for a parameter that cannot be free.
     """
-    free = free_parameters(
-        parameters,
-        free,
-        voltage=any(VOLTAGE in r.channels for r in recordings),
-        unknown_torque=all(r.estimated_torque for r in recordings),
-    )
+    free = free_parameters(parameters, free, recordings)
     states = states_of(effects or {})
     recordings = [with_logged_values(r, effects or {}) for r in recordings]
     values = values_of(parameters, effects)

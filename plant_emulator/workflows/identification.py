@@ -126,7 +126,8 @@ def identify(
     parameters : the set that the fit starts from and that holds the priors: a parameter set, the
         name of a shipped one, or the path of its file
     free : names of the parameters to estimate; without any, all that the set calls estimated but
-        gear_inertia, and with a logged voltage armature_resistance and flux_constant as well
+        gear_inertia, and with a logged voltage armature_resistance and flux_constant as well; of
+        trucks alone whose torque nobody measured, nothing of gear friction and drum
     hold_out : logs to predict; only their initial states are fitted
     effects : effects that the bench is known to have, with given sizes; as for `simulate`
     reference : what holds between samples of the speed reference; None: as the log says

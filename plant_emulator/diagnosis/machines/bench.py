@@ -105,9 +105,7 @@ class BenchModel:
     ) -> None:
         voltage = [VOLTAGE in r.channels for r in recordings]
         unknown = [r.estimated_torque for r in recordings]
-        self._free = free_parameters(
-            parameters, free, voltage=any(voltage), unknown_torque=all(unknown)
-        )
+        self._free = free_parameters(parameters, free, recordings)
         self._effects = effects
         self._values = values_of(parameters)
         self.nominal_set = parameters
