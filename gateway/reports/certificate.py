@@ -110,7 +110,7 @@ def _check(one: dict[str, Any]) -> tuple[str, ...]:
 
 def _budget(budget: dict[str, Any]) -> Iterable[tuple[str, ...]]:
     rows = [(one["cause"], one) for one in budget["causes"]]
-    rows += [("interaction", budget["interaction"]), ("drive, margins", budget["left"])]
+    rows += [("interaction", budget["interaction"]), ("drive", budget["left"])]
     for name, one in (*rows, ("whole", budget["whole"])):
         errors = (one["force_newton"], one["energy_percent"], one["speed_km_h"])
         yield name, *map(_number, errors)

@@ -6,7 +6,7 @@ made ideal, and at last all of them.
     whole       error of the twin as it is
     alone_i     error as it is less error with cause i ideal: what cause i costs
     interaction what all causes cost together, less the sum of what each costs alone
-    left        error with all causes ideal: the drive's own lag, and the regulator's margins
+    left        error with all causes ideal: the drive's own lag
 
 Each error is that of the bench over the road under the same torque: mean force of the emulated road
 [N], traction energy [%], speed [km/h rms].
@@ -92,7 +92,7 @@ class Budget:
         rows = {
             **self.alone,
             "interaction": self.interaction,
-            "drive, margins": self.left,
+            "drive": self.left,
             "whole": self.whole,
         }
         head = f"{'cause':24s}{'force N':>12s}{'energy %':>12s}{'speed km/h':>12s}"
@@ -129,6 +129,7 @@ def ideals(told: Config) -> Mapping[str, Callable[[Twin], Twin]]:
         "backlash": _without_backlash,
         "quantisation": lambda twin: replace(twin, map=register_maps.load("bench_float32")),
         "poll": lambda twin: _with(twin, {"loop.period_ms": 1e3 * SCAN}),
+        "margin at the start": lambda twin: _with(twin, {"regulator.breakaway_Nm": 0.0}),
     }
 
 

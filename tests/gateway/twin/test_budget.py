@@ -20,6 +20,7 @@ IDEAL = {
     "regulator.under_compensation_percent": 0.0,
     "regulator.under_compensation_slow_percent": 0.0,
     "regulator.lead_s": 0.021053,
+    "regulator.breakaway_Nm": 0.0,
     "bench.dead_time_ms": 0.0,
     "bench.backlash_half_gap_rad": 0.0,
 }
@@ -48,6 +49,7 @@ CASES = {
         {},
         replace(PERFECT, effects=effects.parse(("torque_sensor_gain:error=-0.05",))),
     ),
+    "margin at the start": ({"regulator.breakaway_Nm": 30.0}, PERFECT),
     "backlash": (
         {"bench.backlash_half_gap_rad": 0.15073},
         PERFECT.with_values({"backlash_half_gap": 0.15073}),
