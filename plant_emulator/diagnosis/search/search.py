@@ -2,9 +2,8 @@
 
 The log evidence of a set is half the fall of its penalised cost, less the gain that each of its
 effects needs. The best set is expanded by the effects of largest predicted gain, until it leaves
-only noise or no predicted gain is large enough. An approximate law leaves a residual of its own: a
-relative error e of the law leaves e^2 of what the effect has closed. Another effect needs so much
-more gain.
+only noise or no predicted gain is large enough. An effect beside an approximate law needs so much
+more gain as the error of this law may feign (`law_error`).
 """
 
 from __future__ import annotations
@@ -26,6 +25,7 @@ from plant_emulator.diagnosis.fitting.explanation import Explanation
 from plant_emulator.diagnosis.fitting.fit_steps import refit
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.confirmation import Trial, advance, confirm, look
+from plant_emulator.diagnosis.search.law_error import LawErrors
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
 from plant_emulator.diagnosis.search.screening import Start, promises, visibilities
 from plant_emulator.diagnosis.search.settings import SETTINGS
@@ -65,6 +65,7 @@ class Search:
     promises: dict[frozenset[str], list[Promise]] = field(default_factory=dict)
     expanded: set[frozenset[str]] = field(default_factory=set)
     trace: list[SearchStep] = field(default_factory=list)
+    law_errors: LawErrors = field(default_factory=LawErrors)
     reduced_costs: dict[str, float] = field(default_factory=dict)
     restarted: bool = False
 
@@ -105,6 +106,7 @@ class Search:
         self.noise = noise
         recipe = WhitenedRecipe(self.declared.recipe, noise)
         self.runner = replace(self.declared, recipe=recipe, model=build_model(recipe))
+        self.law_errors = LawErrors()
         self.promises.clear()
         self.expanded.clear()
         kept = not_told_apart(self.sets)
@@ -141,8 +143,7 @@ class Search:
 
     def _leaves_noise(self, found: FitResult) -> bool:
         """Whether a fit leaves only noise, and no predicted gain is large enough."""
-        promised = self._screen(found)
-        most = promised[0].gain if promised else 0.0
+        most = max((p.gain for p in self._screen(found)), default=0.0)
         return found.mean_square <= NOISE_MEAN_SQUARE and most <= self._needed(found)
 
     def _foreign(self, found: FitResult) -> bool:
@@ -157,19 +158,15 @@ class Search:
         return self.promises[key]
 
     def _needed(self, found: FitResult) -> float:
-        """Gain of log evidence that one more effect needs on top of a fit."""
-        library = self.runner.model.candidates
-        exact = all(library[name].exact_form for name in found.effects)
-        closed = 0.0 if exact else max(0.0, self.null.cost - found.cost)
+        """Least gain of log evidence that one more effect needs on top of a fit."""
         first = not found.effects and not self.random_evidence
         needed = SETTINGS.needed if first else SETTINGS.needed_again
-        return needed + SETTINGS.law_error**2 * 0.5 * (closed + self.random_evidence)
+        return needed + SETTINGS.law_error**2 * 0.5 * self.random_evidence
 
     def _expand(self, base: FitResult) -> None:
         """Fit the effect of the largest predicted gain on top of a set, then its rivals."""
         needed = self._needed(base) if base.effects else SETTINGS.promising
-        found = [p for p in self._screen(base) if p.gain > needed]
-        if not found:
+        if not (found := [p for p in self._screen(base) if p.gain > needed]):
             return
         (best,) = self._confirm(base, found[:1])
         leaves_noise = best.mean_square <= NOISE_MEAN_SQUARE
@@ -215,10 +212,12 @@ class Search:
 
     def _value(self, found: FitResult) -> float:
         """Negative log evidence of a set, with the gain that each of its effects needs."""
-        price = 0.0
-        for count, _ in enumerate(found.effects):
-            smaller = self.sets.get(frozenset(found.effects[:count]), self.null)
-            price += self._needed(smaller)
+        price, smaller = 0.0, self.null
+        for count, _ in enumerate(found.effects, 1):
+            larger = self.sets.get(frozenset(found.effects[:count]), found)
+            feigned = self.law_errors.feigned(self.runner, self.null, smaller, larger)
+            price += self._needed(smaller) + feigned
+            smaller = larger
         return 0.5 * found.cost + price
 
     def _settled(self) -> FitResult:

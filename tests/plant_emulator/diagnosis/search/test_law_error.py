@@ -1,0 +1,38 @@
+"""The gain that the error of an approximate law can feign, against hand calculations."""
+
+import numpy as np
+import pytest
+
+from plant_emulator.diagnosis.search.law_error import feigned_gain
+from tests.plant_emulator.diagnosis.line import SHAPES, TIME, Line, explained, noisy
+
+
+@pytest.mark.parametrize(
+    ("closed", "more", "gain"),
+    [
+        ([20.0, 0.0], [3.0, 4.0], 0.5 * 0.01 * (20.0 * 3.0) ** 2 / 25.0),
+        ([-20.0, 10.0], [3.0, 4.0], 0.5 * 0.01 * (20.0 * 3.0 + 10.0 * 4.0) ** 2 / 25.0),
+        ([30.0, 40.0], [3.0, 4.0], 0.5 * 0.01 * 2500.0),  # the same shape: all that is allowed
+        ([30.0, 0.0], [0.0, 4.0], 0.0),
+        ([30.0, 0.0], [0.0, 0.0], 0.0),
+    ],
+)
+def test_gain_by_hand(closed: list[float], more: list[float], gain: float) -> None:
+    assert feigned_gain(np.array(closed), np.array(more), 0.1) == pytest.approx(gain)
+
+
+@pytest.mark.parametrize(
+    ("ripples", "named"), [(TIME > 0.0, {"late"}), (TIME < 0.0, {"late", "wave"})]
+)
+def test_an_effect_where_the_law_does_not_act_needs_no_more(
+    monkeypatch: pytest.MonkeyPatch, ripples: object, named: set[str]
+) -> None:
+    """By hand: the late effect takes 1000 * 30^2 / 2 from the squares, of which a law that is wrong
+    by a tenth leaves 4500. A ripple of 1.5 over half of the samples takes 1125, and acts either
+    where the late effect does, or where it does not.
+    """
+    monkeypatch.setitem(SHAPES, "late", lambda x: (x > 0.0) * np.sin(31.0 * x))
+    monkeypatch.setitem(SHAPES, "wave", lambda x: ripples * np.sin(20.0 * x))
+    measured = 30.0 * SHAPES["late"](TIME) + 1.5 * SHAPES["wave"](TIME)
+    model = Line([noisy(measured)], ["late", "wave"])
+    assert set(explained(model).final.effects) == named
