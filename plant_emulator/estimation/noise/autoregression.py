@@ -79,9 +79,11 @@ class Autoregression:
 
         known : number of samples that precede each one without a break
         """
+        if self.order == 0:
+            return series / self.deviations[0]
         used = np.where(known >= self.order, self.order, np.minimum(known, SHORT))
         left = series.copy()
-        for m in {self.order, min(self.order, SHORT)} - {0}:
+        for m in {self.order, min(self.order, SHORT)}:
             whole = series.copy()
             whole[1:] -= np.convolve(series, self.predictors[m])[: len(series) - 1]
             left = np.where(used == m, whole, left)
