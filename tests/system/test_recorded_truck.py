@@ -12,6 +12,7 @@ from gateway.cli import main
 from gateway.configuration.config import Config
 from gateway.recordings import recording
 from gateway.recordings.header import map_of
+from gateway.reports.certificate import document_in
 from gateway.twin.wheel_torque import RecordedTorque, wheel_torque
 from gateway.workflows.run_quality import quality_at_the_end
 from plant_emulator import logs
@@ -97,3 +98,18 @@ def test_a_recording_that_is_none_is_refused_in_one_line(driven):
     result = CliRunner().invoke(main, ["budget", str(driven / "truck_3640kg.toml")])
     assert result.exit_code == 2
     assert "Traceback" not in result.output
+
+
+def test_a_certificate_with_a_truck_shows_its_budget_and_is_verified(driven):
+    """The page says how much of the run the budget judges, and --verify computes it again."""
+    page = driven / "truck.html"
+    truck = driven / "truck_3640kg.rlrec"
+    made = CliRunner().invoke(main, ["certificate", str(truck), "--save", str(page)])
+    assert (made.exit_code, made.stdout) == (1, f"not certified: see {page}\n")
+    text = page.read_text("utf-8")
+    (run,) = document_in(text)["runs"]
+    assert run["budget"]["largest"] in {one["cause"] for one in run["budget"]["causes"]}
+    judged = "first {judged_seconds:.1f} of {duration_seconds:.1f} s".format_map(run["budget"])
+    assert f"Error budget against the road, {judged}" in text
+    verified = CliRunner().invoke(main, ["certificate", "--verify", str(page)])
+    assert (verified.exit_code, verified.stdout) == (0, "the certificate agrees with its files\n")
