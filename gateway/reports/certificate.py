@@ -129,7 +129,8 @@ def _text(value: Any) -> str:
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    first = "<tr>" + "".join(f"<th>{escape(one)}</th>" for one in head) + "</tr>"
+    cells = "".join(f"<th>{escape(one)}</th>" for one in head)
+    first = f"<thead><tr>{cells}</tr></thead>"
     lines = ["<table>", *([first] if head else [])]
     lines += ["<tr>" + "".join(map(_cell, row)) + "</tr>" for row in rows]
     return "\n".join((*lines, "</table>"))
