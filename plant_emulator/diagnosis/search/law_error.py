@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class LawErrors:
-    """The errors of the laws in one noise; rows : whitened residuals of the fits that were asked."""
+    """The errors of the laws in one noise; rows : whitened residuals of fits that were asked."""
 
     rows: dict[tuple[object, ...], Array] = field(default_factory=dict)
 
