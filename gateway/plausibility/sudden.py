@@ -6,7 +6,9 @@ change only. So the residual less its slow mean has a closer tolerance than the 
 
 A wrong gain of the torque sensor is an error that follows its own torque, and a loop that answers
 to it swings through zero. The product of both does not. The drive's ripple, of which a poll sees
-one moment a scan, changes its sign from scan to scan; the product takes means over three scans.
+one moment a scan, changes its sign from scan to scan and shows in both. So the product takes means
+over three windows: of the torque equal ones, because they pass nothing of a period of three scans,
+and of the residual binomial ones, because they pass more of a slower swing.
 """
 
 from dataclasses import dataclass
@@ -16,16 +18,18 @@ from statistics import fmean
 SLOW, SMOOTH, FADE = 1.0, 0.1, 0.3
 """[s] Time constants of the slow means, of the torque whose distance to its slow mean is the
 change, and of a large change that fades."""
-SCANS = 3
-"""Windows of a mean without the ripple, in which the product and an impact are seen."""
+SCANS, BINOMIAL = 3, (1.0, 2.0, 1.0)
+"""Windows of a mean without the ripple, in which the product and an impact are seen; and weights
+[1] of the residual's mean."""
 RIPPLE, DRIVING = 1.5, 2.0
 """[1] Tolerance of a sudden change over that of the balance itself: of a steady torque, because the
 drive answers to the noise in the setpoint with a current of which a poll knows one moment a scan;
 and with the changes that this noise makes all the time."""
-PRODUCT_SHARE = 1.5
+PRODUCT_SHARE, PRODUCT_LEVEL = 1.5, 0.8
 """[1] Tolerance of the product over the share of the balance, because its two means are of the same
-windows."""
-LIGHT, HIT = 5.0, 10.0
+windows; and its alarm level over that of Page's law: with it drifted benches come to 0.3 alarms in
+100 hours (seeds 701 to 728), because the product is small where the torque is."""
+LIGHT, HIT = 2.0, 10.0
 """Torque over the tolerance of the balance [1] below which the product's tolerance no longer falls,
 because a motor that rattles in the backlash shows torque and current in the same pulses; and change
 of both torques [N m] from which on the flanks have met at speed."""
@@ -102,5 +106,6 @@ def product(state: Steady, torque: float, share: float) -> tuple[float, float]:
 
     torque, share : as for `tolerance`
     """
-    sudden, shown = fmean(state.sudden), fmean(state.shown)
+    shown = fmean(state.shown)
+    sudden = fmean(state.sudden, BINOMIAL[-len(state.sudden) :])
     return sudden * shown, PRODUCT_SHARE * share * max(abs(shown), LIGHT * torque) ** 2

@@ -11,7 +11,7 @@ from statistics import NormalDist
 from gateway.configuration.config import Config
 from gateway.configuration.sections import RegulatorConfig
 from gateway.plausibility.balance_noise import walk
-from gateway.plausibility.sudden import DRIVING, PRODUCT_SHARE
+from gateway.plausibility.sudden import DRIVING, PRODUCT_LEVEL, PRODUCT_SHARE
 
 FULL_CURRENT = 72.0
 """[A] Largest armature current of the drive (thesis, eq 3.5)."""
@@ -111,7 +111,7 @@ class Params:
             truck_torque=own.truck_torque,
             rarity=rarity,
             swing=lag * SWING,
-            gain=DRIVING * own.torque / (PRODUCT_SHARE * own.torque_share)
+            gain=PRODUCT_LEVEL * DRIVING * own.torque / (PRODUCT_SHARE * own.torque_share)
             if own.torque_share
             else inf,
             gear_level=2.0 * GAP_SPREAD * bench.backlash_half_gap + drift,

@@ -16,7 +16,8 @@ free of the truck's unknown torque. He has to bear
 - the noise of the balance. Its autocovariance is taken from sound runs at the same speed: sensors,
   and what a poll does not see of a current that changes within a scan;
 - drifted parameters: DRIFT and DRIFT_SHARE, constant over the run, learnt from the balance;
-- the configured rate of false alarms, counted over all ticks, because a fault may begin in any.
+- the configured rate of false alarms, counted over all ticks, because a fault may begin in any, and
+  shared by all faults of the table, because any of them may.
 
 He trips when the balance is likelier with the fault than without it, by the inverse of the rate:
 
@@ -157,7 +158,7 @@ def bound_of(name: str, kmh: float, driver: str, moment: float, *, seed: int) ->
     true = np.array([_mean(one) for one in (*before[1:], *(true for true, _ in pairs))])
     error = np.array([_mean(shown) - _mean(true) for true, shown in pairs])
     own = Config()
-    rarity = -log(own.plausibility.false_alarms * own.loop.period)
+    rarity = -log(own.plausibility.false_alarms * own.loop.period / len(FAULTS))
     return bound(_residual(loop, heard), error, -true, noise(kmh, driver), rarity)
 
 

@@ -134,10 +134,10 @@ def test_wrong_gain_shows_while_the_torque_swings_through_zero():
     """The shaft takes 8 and -8 N m in turn, 60 ms each, and the sensor shows twice of it.
 
     The error of 8 N m times 16 N m is 128 N^2 m^2, less 30 % of the shown torque squared 51 a
-    second: 6.67 N m times 0.331 N m s after 0.03 s, later by the windows in which the mean changes
+    second: 5.33 N m times 0.331 N m s after 0.03 s, later by the windows in which the mean changes
     its sign.
     """
-    assert pytest.approx(2.0 / 0.3) == P.gain
+    assert pytest.approx(0.8 * 2.0 / 0.3) == P.gain
     state, count = after(replace(DRIVING, armature_current=0.0, shaft_torque=0.0), windows=300), 0
     while state.gain[0] <= P.gain * state.level and count < 30:
         size = 8.0 * (-1) ** (count // 6)
