@@ -145,6 +145,7 @@ def judge(
         last,
         duration,
         shown=torque,
+        rise=rise,
         largest=p.torque + p.torque_share * envelope,
     )
     k_4 = (tolerance(steady, p.torque, share_of(p, steady.change)) + missed) * duration

@@ -15,20 +15,21 @@ from dataclasses import dataclass
 from math import exp
 from statistics import fmean
 
-SLOW, SMOOTH, FADE = 1.0, 0.1, 0.3
+SLOW, SMOOTH, FADE, RISE = 1.0, 0.1, 0.3, 0.5
 """[s] Time constants of the slow means, of the torque whose distance to its slow mean is the
-change, and of a large change that fades."""
+change, of a large change that fades, and of the mean acceleration."""
 SCANS, BINOMIAL = 3, (1.0, 2.0, 1.0)
 """Windows of a mean without the ripple, in which the product and an impact are seen; and weights
 [1] of the residual's mean."""
-RIPPLE, DRIVING = 1.5, 2.0
+RIPPLE, DRIVING, PULSES = 1.3, 2.0, 0.04
 """[1] Tolerance of a sudden change over that of the balance itself: of a steady torque, because the
 drive answers to the noise in the setpoint with a current of which a poll knows one moment a scan;
-and with the changes that this noise makes all the time."""
+and with the changes that this noise makes all the time. Further tolerance by the acceleration of
+the motor [N m s^2/rad]: a setpoint that rises drives larger pulses of current."""
 PRODUCT_SHARE, PRODUCT_LEVEL = 1.5, 0.8
 """[1] Tolerance of the product over the share of the balance, because its two means are of the same
-windows; and its alarm level over that of Page's law: with it drifted benches come to 0.3 alarms in
-100 hours (seeds 701 to 728), because the product is small where the torque is."""
+windows; and its alarm level over that of Page's law, because the product is small where the torque
+is: 50 drifted benches let expect 0.1 alarms in 100 hours."""
 LIGHT, HIT = 2.0, 10.0
 """Torque over the tolerance of the balance [1] below which the product's tolerance no longer falls,
 because a motor that rattles in the backlash shows torque and current in the same pulses; and change
@@ -42,6 +43,7 @@ class Steady:
     since : time over which the slow means are taken [s]
     residual, torque : slow means of the motor's balance, and of its torque [N m]
     smooth, change : motor's torque smoothed, and its distance to the slow mean, fading [N m]
+    rise : mean acceleration of the motor [rad/s^2]
     motor, shown, sudden : of the last windows, torque of the motor and of the sensor, and the
         residual less its slow mean [N m]
     """
@@ -51,6 +53,7 @@ class Steady:
     torque: float = 0.0
     smooth: float = 0.0
     change: float = 0.0
+    rise: float = 0.0
     motor: tuple[float, ...] = ()
     shown: tuple[float, ...] = ()
     sudden: tuple[float, ...] = ()
@@ -63,11 +66,12 @@ def note(
     duration: float,
     *,
     shown: float,
+    rise: float,
     largest: float,
 ) -> Steady:
     """Return the means after one more window: residual, motor's torque [N m], duration [s].
 
-    shown : torque of the sensor over the window [N m]
+    shown : torque of the sensor over the window [N m]; rise : acceleration of the motor [rad/s^2]
     largest : residual that drifted parameters may cause, so that no fault gets into its mean [N m]
     Until SLOW has passed, the slow means are those of all windows.
     """
@@ -87,6 +91,7 @@ def note(
         change=max(
             state.change * exp(-duration / FADE), abs(smooth - slow), impact * (impact > HIT)
         ),
+        rise=rise + (state.rise - rise) * exp(-duration / RISE),
         motor=motor,
         shown=both,
         sudden=(*state.sudden, residual - state.residual)[-SCANS:],
@@ -98,7 +103,7 @@ def tolerance(state: Steady, torque: float, share: float) -> float:
 
     torque, share : tolerance of the balance [N m], and its share of the motor's torque [1]
     """
-    return RIPPLE * torque + share * state.change
+    return RIPPLE * torque + share * state.change + PULSES * abs(state.rise)
 
 
 def product(state: Steady, torque: float, share: float) -> tuple[float, float]:
@@ -108,4 +113,5 @@ def product(state: Steady, torque: float, share: float) -> tuple[float, float]:
     """
     shown = fmean(state.shown)
     sudden = fmean(state.sudden, BINOMIAL[-len(state.sudden) :])
-    return sudden * shown, PRODUCT_SHARE * share * max(abs(shown), LIGHT * torque) ** 2
+    allowed = PRODUCT_SHARE * share * max(abs(shown), LIGHT * torque) ** 2
+    return sudden * shown, allowed + PULSES * abs(state.rise * shown)
