@@ -53,9 +53,10 @@ TORQUE_PERCENT: Final = 40.0
 may end the drive where the flanks meet, and its log is what the diagnosis needs."""
 OPEN_GAP: Final = 1.1
 """Gap of a channel from which on it counts, in the noise [1], as in `diagnose`."""
-STOPPED, DRIVES = 0.05, 3
-"""[s] Lateness of the emulated PLC from which on a run is driven again, and number of runs. After a
-stop of 80 ms the drive's current was 17 times its noise beside a simulation of the truth."""
+STOPPED, DRIVES = 0.02, 3
+"""[s] Lateness of the emulated PLC from which on a run is driven again, and number of runs: a PLC
+that is late by two scans takes a command of another scan than the log tells. After a stop of 80 ms
+the drive's current was 17 times its noise beside a simulation of the truth."""
 BEGINS_WITHIN: Final = 60.0
 """[s] Longest time from a start of the emulator to a run of the gateway."""
 
