@@ -272,12 +272,14 @@ class BenchRecipe:
 
     without : effects to take out of the library
     own : paths of the files of a user's own effects
+    free : parameters to fit; empty: those that the recordings show
     """
 
     recordings: tuple[Recording, ...]
     parameters: ParameterSet
     without: tuple[str, ...] = ()
     own: tuple[Path, ...] = ()
+    free: tuple[str, ...] = ()
 
     def known_effects(self) -> dict[str, Effect]:
         """Effects to test, by name: those that this process knows and the bench has not."""
@@ -287,7 +289,7 @@ class BenchRecipe:
     def build(self) -> BenchModel:
         """Build the model; this process then knows the user's own effects."""
         use_own_effects(*(from_file(path) for path in self.own))
-        return BenchModel(self.recordings, self.parameters, self.known_effects())
+        return BenchModel(self.recordings, self.parameters, self.known_effects(), self.free)
 
     def digest(self) -> str:
         """Hash of all that the model is made of.

@@ -15,6 +15,7 @@ from plant_emulator.diagnosis.axis.effects import NAMES as AXIS_EFFECTS
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
 from plant_emulator.diagnosis.report.details import EstimatedInput
 from plant_emulator.errors import DiagnosisError
+from plant_emulator.estimation.free_parameters import free_parameters
 from plant_emulator.recordings.axis_preflight import axis_notes
 from plant_emulator.recordings.wheel_torque import deviation
 from plant_emulator.signals.axis_log import AxisLog
@@ -98,13 +99,15 @@ def bench_runs(
         "own effects": ", ".join(map(str, effect_files)) or "-",
         **{f"sampling of {r.log.source}": describe_sampling(r.log.time) for r in recordings},
     }
+    fitted = tuple(recordings[k] for k in plan.fitted)
+    free = free_parameters(parameters, recordings=fitted)
     return Runs(
-        recipe=BenchRecipe(tuple(recordings), parameters, tuple(without), files),
+        recipe=BenchRecipe(tuple(recordings), parameters, tuple(without), files, free),
         plan=plan,
         notes=tuple(notes),
         settings=_settings(settings, [*logs, *held_out, parameters.name, *effect_files]),
         inputs=_estimated_torques(recordings, parameters),
-        fitted=tuple(recordings[k] for k in plan.fitted),
+        fitted=fitted,
     )
 
 

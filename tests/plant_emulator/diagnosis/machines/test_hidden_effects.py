@@ -13,6 +13,7 @@ from plant_emulator.recordings.recording import Recording
 from plant_emulator.recordings.wheel_torque import TAKEN
 from plant_emulator.signals.log import TRUCK, WHEEL_TORQUE, Log
 from plant_emulator.workflows.diagnosis.plan import plan_recordings
+from plant_emulator.workflows.diagnosis.runs import bench_runs
 from plant_emulator.workflows.loading import load_recordings
 from plant_emulator.workflows.simulation import simulate
 
@@ -76,6 +77,14 @@ def test_parameters_that_the_estimate_of_a_torque_takes_stay_as_they_are(
 
     assert free("truck") - free("unknown") == set(TAKEN)
     assert free("free", "unknown") >= set(TAKEN)
+
+
+def test_a_run_that_is_held_out_frees_no_parameter(
+    nominal: ParameterSet, runs: dict[str, Recording]
+) -> None:
+    fitted, held_out = [runs["unknown"].log], [runs["free"].log]
+    model = bench_runs(fitted, held_out, nominal).recipe.build()
+    assert not {u.name for u in model.parameters} & set(TAKEN)
 
 
 def test_a_truck_of_unknown_torque_predicts_no_other_run(
