@@ -84,13 +84,22 @@ def _insufficient(found: Fit, held_out: HeldOut) -> str:
     # A cause leaves noise, and a neighbour of the cause leaves a law.
     rest, closed = rest_of(held_out, found.terms), held_out.share(found.terms, ()).value
     more = rest.share.low > SETTINGS.worth and rest.share.value > closed
-    # A delay and a lag are exact laws: beside them the force before has nothing left to say.
+    # A delay and a lag are exact laws: beside them the force before has nothing left to say of the
+    # gap. A command that is held for a part of a sample leaves a little, which is no other law.
     if any(term.effect.replaced for term in found.terms):
         before = rest_over(FORCE_BEFORE, held_out, found.terms)
-        rest, more = (before, True) if _is_found(before.share) else (rest, more)
+        is_law = _is_found(before.share) and _of_gap(before, held_out, found) >= SETTINGS.worth
+        rest, more = (before, True) if is_law else (rest, more)
     if more or rest.share.low > SETTINGS.systematic:
         return f"{told} closes {describe(closed)}, and {_described(rest)} beside it"
     return ""
+
+
+def _of_gap(rest: Rest, held_out: HeldOut, found: Fit) -> float:
+    """Rms of what a further law predicts beside a fit, in that of the error without effects [1]."""
+    left = max(0.0, 1.0 - rest.share.value)
+    predicted = held_out.relative(found.terms) * np.sqrt(max(0.0, 1.0 - left**2))
+    return float(predicted / held_out.relative(()))
 
 
 def _without_a_name(
