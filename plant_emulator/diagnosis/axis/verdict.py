@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -131,20 +132,18 @@ def _without_a_name(
 def _confirmed(search: AxisSearch, held_out: HeldOut) -> tuple[Fit, str]:
     """The best set of which the held-out runs need every effect; else why the best one fails."""
     confirmed: dict[frozenset[str], Fit] = {}
-    reasons = []
+    failing: dict[frozenset[str], str] = {}
     for found in _ranked(search)[: SETTINGS.beam]:
-        names, why = found, ""
-        while names.terms:
-            failing = _failing(search, held_out, names)
-            if failing is None:
-                confirmed[frozenset(names.names)] = names
+        for part in _parts(search, found):
+            key = frozenset(part.names)
+            if key not in failing:
+                failing[key] = _failing(search, held_out, part)
+            if not failing[key]:
+                confirmed[key] = part
                 break
-            name, why = failing
-            names = search.fit_set([n for n in names.names if n != name])
-        if not names.terms:
-            reasons.append(why)
     if not confirmed:
-        return search.null, reasons[0] or _doubted(search)
+        singles = [part for part in _parts(search, search.best) if len(part.terms) == 1]
+        return search.null, failing[frozenset(singles[0].names)] if singles else _doubted(search)
     # Sets of like evidence differ by what the held-out runs say, and these need every effect.
     least = min(map(search.value, confirmed.values())) + SETTINGS.margin
     like = [f for f in confirmed.values() if search.value(f) <= least]
@@ -152,6 +151,12 @@ def _confirmed(search: AxisSearch, held_out: HeldOut) -> tuple[Fit, str]:
     # A winner that came by taking effects back need not be one of those that the search believes.
     like = [f for f in search.alike(winner) if f is winner or not _failing(search, held_out, f)]
     return next(iter(like), winner), ""
+
+
+def _parts(search: AxisSearch, found: Fit) -> list[Fit]:
+    """A set and all that are a part of it, but the empty one, the largest evidence first."""
+    parts = [p for k in range(len(found.names)) for p in combinations(found.names, k + 1)]
+    return sorted(map(search.fit_set, parts), key=search.value)
 
 
 def _ranked(search: AxisSearch) -> list[Fit]:
@@ -166,9 +171,9 @@ def _doubted(search: AxisSearch) -> str:
     return search.doubt(found, found.terms[0]) if search.gain(found) > 0.0 else ""
 
 
-def _failing(search: AxisSearch, held_out: HeldOut, found: Fit) -> tuple[str, str] | None:
-    """The effect of a set that the held-out runs need least, and why it fails; None: none does."""
-    worst: tuple[float, str, str] | None = None
+def _failing(search: AxisSearch, held_out: HeldOut, found: Fit) -> str:
+    """Why the held-out runs do not confirm the effect of a set that they need least; empty: do."""
+    worst: tuple[float, str] | None = None
     for term in found.terms:
         name = term.effect.name
         rest = search.fit_set([n for n in found.names if n != name]).terms
@@ -180,8 +185,8 @@ def _failing(search: AxisSearch, held_out: HeldOut, found: Fit) -> tuple[str, st
         if not all(map(_is_found, shares)):
             why = f"the held-out runs do not confirm {name} ({describe(share.value)} closed)"
         if why and (worst is None or share.low < worst[0]):
-            worst = (share.low, name, why)
-    return None if worst is None else worst[1:]
+            worst = (share.low, why)
+    return "" if worst is None else worst[1]
 
 
 def _is_found(share: Share) -> bool:
