@@ -14,9 +14,10 @@ from plant_emulator.cli import main
 ROOT = Path(__file__).parents[3]
 DATA = ROOT / os.environ.get("REAL_DATA", "../shared/data")
 EMPS, HSM150 = DATA / "emps", DATA / "hsm150"
-SERVO = DATA / "real" / "sts3215"
+SERVO, JOINT = DATA / "real" / "sts3215", DATA / "real" / "hej90"
 
 needs_servo = pytest.mark.skipif(not SERVO.is_dir(), reason=f"{SERVO}: no data; set REAL_DATA")
+needs_joint = pytest.mark.skipif(not JOINT.is_dir(), reason=f"{JOINT}: no data; set REAL_DATA")
 needs_emps = pytest.mark.skipif(not EMPS.is_dir(), reason=f"{EMPS}: no data; set REAL_DATA")
 needs_hsm150 = pytest.mark.skipif(not HSM150.is_dir(), reason=f"{HSM150}: no data; set REAL_DATA")
 
@@ -32,6 +33,13 @@ def diagnosed(folder: Path, *arguments: str | Path) -> Told:
     assert result.exit_code == 0, result.output
     answer = json.loads((folder / "a.json").read_text())
     return result.stdout, answer, (folder / "a.html").read_text()
+
+
+def error(told: str) -> tuple[float, float]:
+    """Error on the held-out runs before and after, in percent, as the terminal tells it."""
+    found = re.search(r"falls from ([\d.]+) % to ([\d.]+) %", " ".join(told.split()))
+    assert found is not None
+    return float(found[1]), float(found[2])
 
 
 def emps(folder: Path, *more: str) -> Told:
@@ -74,9 +82,7 @@ def test_emps_has_the_published_coefficient_of_either_direction(emps_told: Told)
 @pytest.mark.slow
 def test_emps_tells_the_held_out_error_and_where_the_rest_lies(emps_told: Told) -> None:
     statement = emps_told[1]["verdict"]["statement"]
-    found = re.search(r"norm\(e\)/norm\(y\) falls from ([\d.]+) % to ([\d.]+) %", statement)
-    assert found is not None
-    assert [float(v) for v in found.groups()] == pytest.approx([5.95, 5.34], abs=0.1)
+    assert error(statement) == pytest.approx((5.95, 5.34), abs=0.1)
     assert statement.endswith("the rest lies mainly at 20 to 35 Hz: elasticity, or unknown.")
     shown = re.sub(r"\s+", " ", emps_told[0])
     assert statement in shown
@@ -136,6 +142,16 @@ def test_a_servo_on_a_pendulum_has_gravity_and_a_delay(tmp_path: Path) -> None:
     held_out = [word for path in second for word in ("--hold-out", path)]
     told, answer, _ = diagnosed(tmp_path, *first, *held_out)
     assert answer["verdict"]["effects"] == ["gravity", "delay"]
-    left = re.search(r"% to ([\d.]+) %", " ".join(told.split()))
-    assert left is not None
-    assert float(left[1]) < 20.0
+    assert error(told)[1] < 20.0
+
+
+@needs_joint
+@pytest.mark.slow
+def test_the_friction_of_a_joint_grows_with_its_load(tmp_path: Path) -> None:
+    """SOURCE.md of the data: by hand, friction by the load leaves 54.8 of 65.6 % on pulses."""
+    pulses = ("35_0.2_1.0", "70_0.2_1.5", "105_0.15_1.5", "140_0.1_1.5")
+    *fitted, unseen = [JOINT / f"Nm{pulse}_0.09_full_15ms.csv.gz" for pulse in pulses]
+    told, answer, _ = diagnosed(tmp_path, *fitted, "--hold-out", unseen)
+    assert answer["verdict"]["effects"] == ["load_friction"]
+    before, after = error(told)
+    assert 1.0 - after / before > 0.8 * (1.0 - 54.8 / 65.6)
