@@ -97,22 +97,31 @@ def scan_states(
     values: Mapping[str, float],
     groups: Sequence[Sequence[Unknown]],
     residual: Residual,
+    plain: Mapping[str, float] | None = None,
 ) -> dict[str, float]:
     """Find states of a run in the best basin by scans, all parameters as given.
 
     The gap position is scanned first, with all other states at their starts. Then each group of
-    states is scanned: all states together would be too many.
+    states is scanned: all states together would be too many. A ripple whose phase is not known yet
+    can mislead the first scan. Therefore both are repeated at the gap position of the plain bench.
 
     values : all parameters [SI]; groups : the states but the gap position
     residual : of the run, as a function of its states
+    plain : parameters without effects; None: no state is a phase
     """
     starts = {u.name: u.start for group in groups for u in group}
-    search = StartSearch([recording], {**values, **starts}, ())
-    search.scan_gaps(GAP_SCAN_POINTS)
-    found = {GAP_POSITION: search.gaps[0], **starts}
-    for group in groups:
-        found = scan_unknowns(residual, found, group)
-    return found
+    every = [{**values, **starts}] if plain is None else [{**values, **starts}, plain]
+    found = []
+    for known in every:
+        search = StartSearch([recording], known, ())
+        search.scan_gaps(GAP_SCAN_POINTS)
+        states = {GAP_POSITION: search.gaps[0], **starts}
+        for group in groups:
+            states = scan_unknowns(residual, states, group)
+        found.append(states)
+    if len(found) == 1:
+        return found[0]
+    return min(found, key=lambda states: float(np.sum(residual(states) ** 2)))
 
 
 def fit_from(

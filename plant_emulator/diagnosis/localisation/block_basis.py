@@ -9,8 +9,8 @@ the drum subsystem. No law can thus be made of the noise of the signals that it 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -50,11 +50,12 @@ NEAR_STANDSTILL = np.array([0.0, 1.25, 3.0, 6.0, 12.5, 25.0, 50.0])
 
 @dataclass(frozen=True)
 class BlockQuantities:
-    """Quantities inside the blocks over the intervals of a run [SI], shape (n - 1,) each.
+    """Quantities inside the blocks of a run [SI], at its samples or as means over its intervals.
 
     speed, acceleration : of the motor
     torque, current : that speed and load ask for; torque_rate, torque_curvature : its derivatives
     load : torque from the shaft to the drum; angle : of the gear's output
+    drum_speed : of the drum subsystem, which follows the measured motor speed
     demand : delayed speed reference; demand_rate, demand_curvature : its derivatives
     wheel_torque : of the truck; truck : whether there is one
     """
@@ -69,11 +70,18 @@ class BlockQuantities:
     torque_curvature: Array
     load: Array
     angle: Array
+    drum_speed: Array
     demand: Array
     demand_rate: Array
     demand_curvature: Array
     wheel_torque: Array
     truck: bool
+
+    def means(self) -> BlockQuantities:
+        """The means over the intervals, shape (n - 1,) each."""
+        names = [field.name for field in fields(self) if field.name != "truck"]
+        own: dict[str, Any] = {name: interval_means(getattr(self, name)) for name in names}
+        return replace(self, **own)
 
     @property
     def moving(self) -> Array:
@@ -89,7 +97,7 @@ class BlockQuantities:
 def block_quantities(
     m: MeasuredSignals, drum_speed: Array, p: Mapping[str, float]
 ) -> BlockQuantities:
-    """Compute the quantities inside the blocks of a run.
+    """Compute the quantities inside the blocks of a run at its samples, shape (n,) each.
 
     drum_speed : of the drum subsystem, simulated with the measured motor speed [rad/s]
     """
@@ -110,16 +118,13 @@ def block_quantities(
         "torque_curvature": smooth(t, torque, SMOOTHING_WINDOW, 2),
         "load": load,
         "angle": turned_angle(t, m.speed / xi),
+        "drum_speed": drum_speed,
         "demand": demand,
         "demand_rate": smooth(t, demand, SMOOTHING_WINDOW, 1),
         "demand_curvature": smooth(t, demand, SMOOTHING_WINDOW, 2),
         "wheel_torque": truck * p["wheel_radius"] / p["drum_radius"],
     }
-    return BlockQuantities(
-        time=interval_means(t),
-        truck=m.truck,
-        **{name: interval_means(value) for name, value in channels.items()},
-    )
+    return BlockQuantities(time=t, truck=m.truck, **channels)
 
 
 @dataclass(frozen=True)

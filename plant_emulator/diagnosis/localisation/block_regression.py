@@ -102,12 +102,17 @@ class BlockRegression:
         return {**self.drum_fit.parameters(), **self.drum_fit.states(run)}
 
     @cached_property
-    def quantities(self) -> list[block_basis.BlockQuantities]:
-        """Quantities inside the blocks, one record a run."""
+    def samples(self) -> list[block_basis.BlockQuantities]:
+        """Quantities inside the blocks at the samples, one record a run."""
         return [
             block_basis.block_quantities(m, self.drum.simulate(k, self.drum_values(k)), self.values)
             for k, m in enumerate(self.signals)
         ]
+
+    @cached_property
+    def quantities(self) -> list[block_basis.BlockQuantities]:
+        """Quantities inside the blocks over the intervals, one record a run."""
+        return [one.means() for one in self.samples]
 
     @cached_property
     def speed_noise(self) -> list[Array]:

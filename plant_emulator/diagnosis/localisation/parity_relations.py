@@ -127,6 +127,23 @@ def _compile_loop() -> Callable[..., tuple[Array, NDArray[np.bool_]]]:
     return compiler.compile_function(_solve_backwards, on_disk=True)
 
 
+def speed_error(voltage: Array, time: Array, p: Mapping[str, float]) -> Array:
+    """Speed error that the drive must have had for a small voltage more [rad/s].
+
+    Both controllers are solved backwards, as in `reconstructed_reference`: each is the filter
+    K (1 + h/T) x_n = K x_(n-1) + y_n - y_(n-1). It holds where the drive is not limited.
+
+    voltage : shape (n, k) [V]; time : with nearly even steps h, shape (n,) [s]
+    """
+    from scipy.signal import lfilter
+
+    found, step = voltage, float(np.median(np.diff(time)))
+    for name in ("current", "speed"):
+        gain, rate = p[f"{name}_gain"], 1.0 + step / p[f"{name}_integral_time"]
+        found = lfilter([1.0, -1.0], [gain * rate, -gain], found, axis=0)
+    return np.asarray(found)
+
+
 def relation_count(m: MeasuredSignals) -> int:
     """Number of relations of a run: that of the armature needs its voltage."""
     return ROWS if m.voltage is not None else ARMATURE

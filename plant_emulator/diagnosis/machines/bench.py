@@ -228,12 +228,16 @@ class BenchModel:
         """See `Model`."""
         given = [u for u in self.states if u.name != GAP_POSITION]
         groups = [given, *(self.candidates[name].states for name in effects)]
-        residual = self.residual(run, effects)
+        residual, plain = self.residual(run, effects), None
+        if any(u.angle for group in groups for u in group):
+            own = {name: value for name, value in values.items() if name in self._free}
+            plain = {**self.fixed_values(run, ()), **own}
         return scan_states(
             self._recordings[run],
             {**self.fixed_values(run, effects), **values},
             groups,
             lambda states: residual({**values, **states}),
+            plain,
         )
 
     def locate(self, where: FitResult, runs: Sequence[int]) -> Location | None:

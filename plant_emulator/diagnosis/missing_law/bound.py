@@ -22,7 +22,8 @@ import numpy as np
 from plant_emulator.diagnosis.localisation.linear_splines import linear_splines
 from plant_emulator.diagnosis.missing_law.curve import knots_of
 from plant_emulator.diagnosis.missing_law.grammar import factors
-from plant_emulator.diagnosis.missing_law.reduced import WIDE_PRIOR, products, run_rows
+from plant_emulator.diagnosis.missing_law.law_search import columns_of
+from plant_emulator.diagnosis.missing_law.reduced import WIDE_PRIOR, products
 from plant_emulator.diagnosis.prediction import block_bootstrap
 
 if TYPE_CHECKING:
@@ -51,9 +52,13 @@ class Bound:
     interval: tuple[float, float]
 
 
-def estimate_bound(regression: BlockRegression, searches: Sequence[LawSearch]) -> Bound | None:
-    """The bound over all quantities; None: the runs show no gap beyond chance in the relations."""
-    rows = run_rows(regression, regression.model)
+def estimate_bound(
+    regression: BlockRegression, rows: Sequence[RunRows], searches: Sequence[LawSearch]
+) -> Bound | None:
+    """The bound over all quantities; None: the runs show no gap beyond chance in the relations.
+
+    rows : of all runs without a law
+    """
     none = [np.zeros((len(own.y), 0)) for own in rows]
     before = _squares(regression, rows, none, products(rows, none), ())
     counts = [
@@ -82,14 +87,8 @@ def _candidates(regression: BlockRegression, one: LawSearch) -> Iterator[list[Ar
     """Squares that each candidate of a quantity leaves in the held-out runs."""
     rows = one.rows.runs
     law = [one.terms[j] for j in one.list_nested()[-1]]
-    own = [term.own for term in law for _ in range(2 if term.own else 1)]
-    columns = one.rows.of(
-        [
-            np.concatenate([term.values(k, len(values)) for term in law], axis=1)
-            for k, values in enumerate(one.quantity.states[0].values)
-        ]
-    )
-    yield _squares(regression, rows, columns, products(rows, columns, own), range(len(own)))
+    columns, p = columns_of(one.rows, one.quantity, law)
+    yield _squares(regression, rows, columns, p, range(len(p.own)))
     columns, own, ends = _curves(one)
     p = products(rows, columns, own)
     begins = [0, *ends[:-1]]
@@ -117,7 +116,7 @@ def _basis(state: LawState, run: int) -> Array:
     parts = [
         factor.values(run)
         for factor in factors(state)
-        if factor.function in {"delay", "lag", "turn"}
+        if factor.function in {"delay", "lag", "turn", "play"}
     ]
     if state.kind not in {"angle", "followed"}:
         parts.append(linear_splines(state.values[run], knots_of(state)))
@@ -132,14 +131,11 @@ def _squares(
     chosen: Sequence[int],
 ) -> list[Array]:
     """Squares that a fit to the other runs leaves in each interval, shape (1, n - 1) a run."""
-    mine, found = [j for j in chosen if p.own[j]], []
-    common = [j for j in chosen if not p.own[j]]
+    found = []
     for k, (own, part) in enumerate(zip(rows, columns, strict=True)):
-        fitted = p.coefficients(chosen, [run for run in range(len(rows)) if run != k])
-        scaled = part / p.scale
-        left = own.y - own.shared @ fitted[: p.shared] - scaled[:, common] @ fitted[p.shared :]
-        left = left - scaled[:, mine] @ p.own_coefficients(chosen, fitted, k)
-        found.append(_of_intervals(own.squares(left), len(regression.weights[k]) - 1))
+        others = [run for run in range(len(rows)) if run != k]
+        left = own.squares(p.left(chosen, others, k, own, part))
+        found.append(_of_intervals(left, len(regression.weights[k]) - 1))
     return found
 
 

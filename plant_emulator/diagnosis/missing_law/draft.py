@@ -13,8 +13,10 @@ from plant_emulator.diagnosis.localisation.block_regression import BlockRegressi
 from plant_emulator.diagnosis.missing_law.bound import estimate_bound
 from plant_emulator.diagnosis.missing_law.curve import curve
 from plant_emulator.diagnosis.missing_law.law_search import DRAFTED_GAIN, search
+from plant_emulator.diagnosis.missing_law.line_scan import with_lines
 from plant_emulator.diagnosis.missing_law.quantities import quantities
 from plant_emulator.diagnosis.missing_law.reduced import law_rows
+from plant_emulator.diagnosis.missing_law.row_noise import row_noise
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.missing_law.bound import Bound
     from plant_emulator.diagnosis.missing_law.law_search import Law, LawSearch
+    from plant_emulator.diagnosis.missing_law.quantity import LawQuantity
+    from plant_emulator.diagnosis.missing_law.reduced import LawRows
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
 
@@ -68,13 +72,22 @@ def sketch(
     with threadpool_limits(1):
         regression = BlockRegression(recordings, parameters, null)
         every = [(one, law_rows(regression, one)) for one in quantities(regression)]
-        before = every[0][1].null_loss()
-        searches = [search(rows, one, before) for one, rows in every]
+        searches = _searches([(with_lines(rows, one), rows) for one, rows in every])
+        best = max(searches, key=lambda one: one.score(one.list_nested()[-1]))
+        noise = row_noise(regression, best.left(best.list_nested()[-1]))
+        searches = _searches([(one.quantity, noise.whiten(one.rows)) for one in searches])
         found = tuple(
             replace(one, parameters=_parameters(regression, one.law))
             for one in sketches(searches, DRAFTED_GAIN)
         )
-        return Sketchbook(sketches=found, bound=estimate_bound(regression, searches))
+        plain = noise.whiten(every[0][1]).runs
+        return Sketchbook(sketches=found, bound=estimate_bound(regression, plain, searches))
+
+
+def _searches(every: Sequence[tuple[LawQuantity, LawRows]]) -> list[LawSearch]:
+    """The search in each quantity."""
+    before = every[0][1].null_loss()
+    return [search(rows, one, before) for one, rows in every]
 
 
 def _parameters(regression: BlockRegression, law: Law) -> dict[str, float]:

@@ -10,7 +10,12 @@ import numpy as np
 from plant_emulator.diagnosis.localisation.drum_subsystem import LAWS_OF_ANGLE, is_torque_size
 from plant_emulator.diagnosis.localisation.measured_signals import NOISES
 from plant_emulator.diagnosis.localisation.parity_relations import GEAR
-from plant_emulator.diagnosis.missing_law.quantity import BenchQuantity, in_relations, time_of
+from plant_emulator.diagnosis.missing_law.quantity import (
+    BenchQuantity,
+    angle_of,
+    in_relations,
+    time_of,
+)
 from plant_emulator.diagnosis.missing_law.states import FILTER_TIMES, LawState
 
 if TYPE_CHECKING:
@@ -23,6 +28,9 @@ if TYPE_CHECKING:
 
 # Torque on the drum whose response is linearised [N m], in the size of a bearing's friction.
 SMALL_TORQUE = 5.0
+# Largest multiple of its angle that a torque on the drum is looked for at. Its inertia hides faster
+# ones from its speed, and the gear's relation takes them for friction of the gear.
+LARGEST_WEIGHT_MULTIPLE = 4.5
 
 
 def drum_friction(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQuantity:
@@ -58,10 +66,7 @@ def drum_friction(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQuan
 def drum_weight(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQuantity:
     """Torque on the drum that does not follow the direction of the motion, as a weight's."""
     xi = r.values["gear_ratio"]
-    angle = LawState(
-        values=[one.angle for one in q], time=[one.time for one in q],
-        name="angle of the drum", symbol="theta", unit="rad", code="s.drum_speed", kind="angle",
-    )  # fmt: skip
+    angle = replace(_drum_angle(q), scanned=LARGEST_WEIGHT_MULTIPLE)
 
     def rows(run: int, values: Array) -> tuple[Array, Array]:
         return in_relations({GEAR: 1.0 / xi}, values), _drum_response(r, r.drum_fit, run, values)
@@ -97,31 +102,32 @@ def _drum_response(r: BlockRegression, fitted: Estimate, run: int, torque: Array
 
 
 def speed_sensor(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQuantity:
-    """Error of the drum's speed sensor, which also shows in the gear's relation."""
+    """Error of the drum's speed sensor, which also shows in the gear's relation.
+
+    q : at the samples
+    """
     xi, inertia = r.values["gear_ratio"], r.values["drum_inertia"]
     speed = LawState(
-        values=[one.speed / xi for one in q], time=[one.time for one in q],
+        values=[one.drum_speed for one in q], time=[one.time for one in q],
         name="drum speed", symbol="w", unit="rad/s", code="value", kind="signed", lags=FILTER_TIMES,
     )  # fmt: skip
 
-    angle = LawState(
-        values=[one.angle for one in q], time=[one.time for one in q],
-        name="angle of the drum", symbol="theta", unit="rad", code="s.drum_speed", kind="angle",
-    )  # fmt: skip
-
     def rows(run: int, values: Array) -> tuple[Array, Array]:
-        m = r.signals[run]
-        slope = np.gradient(values, q[run].time, axis=0)
-        samples = np.concatenate([values[:1], 0.5 * (values[1:] + values[:-1]), values[-1:]])
-        level = m.noise[NOISES.index("drum_speed")]
-        return in_relations({GEAR: inertia / xi}, slope), samples / level
+        slope = np.diff(values, axis=0) / np.diff(q[run].time)[:, None]
+        level = r.signals[run].noise[NOISES.index("drum_speed")]
+        return in_relations({GEAR: inertia / xi}, slope), values / level
 
     return BenchQuantity(
         place="speed_sensor",
         name="error of the drum's speed sensor",
         unit="rad/s",
         hook="measured_drum_speed",
-        states=(speed, time_of(q), angle),
+        states=(speed, time_of(q), _drum_angle(q)),
         rows=rows,
         model=r.model,
     )
+
+
+def _drum_angle(q: Sequence[BlockQuantities]) -> LawState:
+    """Angle of the drum, which lies on either side of its gap to that of the gear."""
+    return angle_of(q, [one.drum_speed for one in q], "angle of the drum", "s.drum_speed")

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 LARGEST_SIZE = 5.0
 # Prior standard deviation of a width or a time constant, and its bounds [that of the draft].
 SHAPE_STD, SHAPE_FACTOR = 0.5, 10.0
+# The same of a multiple of an angle: the speed behind it is known to some per mille.
+MULTIPLE_STD, MULTIPLE_FACTOR = 0.005, 1.02
 # Laws against the motion that have a Coulomb and a viscous part, by the law of the Coulomb part.
 VISCOUS = {
     "drum_coulomb_friction": "drum_viscous_friction",
@@ -80,9 +82,11 @@ def _parameters(law: Law) -> list[str]:
             f'        unit="{unit_of(law, term)}", meaning="a{k}",\n    ),\n'
         )
         for j, factor in enumerate(term.factors, 1):
-            if factor.function in {"bell", "delay", "lag"}:
-                found.append(_shape(k, j, factor))
+            if factor.function in {"bell", "delay", "lag", "play"}:
+                unit = "s" if factor.function in {"delay", "lag"} else factor.state.unit
+                found.append(_shape(k, j, factor, unit, SHAPE_STD, SHAPE_FACTOR))
             elif factor.function == "turn":
+                found.append(_shape(k, j, factor, "1", MULTIPLE_STD, MULTIPLE_FACTOR))
                 found.append(PHASE.format(here=f"{k}{j}"))
     return found
 
@@ -90,7 +94,7 @@ def _parameters(law: Law) -> list[str]:
 def unit_of(law: Law, term: Term) -> str:
     """Unit of a term's coefficient: that of the quantity over those of the factors."""
     powers = {"linear": "{}", "size": "{}", "delay": "{}", "lag": "{}", "square": "({})^2"}
-    powers["root"] = "({})^0.5"
+    powers |= {"root": "({})^0.5", "play": "{}"}
     below = [
         powers[factor.function].format(factor.state.unit)
         for factor in term.factors
@@ -99,13 +103,13 @@ def unit_of(law: Law, term: Term) -> str:
     return f"{law.quantity.unit}/({' '.join(below)})" if below else law.quantity.unit
 
 
-def _shape(k: int, j: int, factor: Factor) -> str:
-    unit = factor.state.unit if factor.function == "bell" else "s"
+def _shape(k: int, j: int, factor: Factor, unit: str, std: float, most: float) -> str:
+    """Parameter of a factor's scale; std : its prior deviation, and most : its bounds' factor."""
     b = factor.scale
     return (
         f'    "b{k}{j}": EffectParameter(\n'
-        f"        neutral={b:.4g}, lower={b / SHAPE_FACTOR:.4g}, upper={b * SHAPE_FACTOR:.4g},\n"
-        f'        plausible={b:.4g}, unit="{unit}", meaning="b{k}{j}", std={SHAPE_STD * b:.4g},\n'
+        f"        neutral={b:.6g}, lower={b / most:.6g}, upper={b * most:.6g},\n"
+        f'        plausible={b:.6g}, unit="{unit}", meaning="b{k}{j}", std={std * b:.4g},\n'
         "    ),\n"
     )
 
@@ -119,7 +123,8 @@ def _memories(name: str, law: Law) -> str:
             if not text:
                 continue
             parts.append(text)
-            hook = f', follows="{law.quantity.hook}"' if factor.function == "delay" else ""
+            follows = factor.function in {"delay", "play"}
+            hook = f', follows="{law.quantity.hook}"' if follows else ""
             table.append(f'    "memory{k}{j}": Memory(start{k}{j}, advance{k}{j}{hook}),\n')
     return "\n".join(parts) + ("\n\nMEMORIES = {\n" + "".join(table) + "}\n" if table else "")
 
@@ -131,6 +136,13 @@ def _advance(name: str, here: str, factor: Factor) -> str:
         return (
             f"\ndef start{here}(p):\n    return 0.0\n\n\n"
             f"def advance{here}(base, a, s, p):\n    return base + a * {state.code}\n"
+        )
+    if factor.function == "play":
+        half = f"p.{name}_b{here}"
+        return (
+            f"\ndef start{here}(p):\n    return 0.0\n\n\n"
+            f"def advance{here}(base, a, value, s, p):\n"
+            f"    return max(value - {half}, min(value + {half}, base))\n"
         )
     if factor.function not in {"delay", "lag"}:
         return ""
@@ -197,6 +209,7 @@ def _code(name: str, here: str, factor: Factor) -> str:
         "sign": f"(1.0 if {x} > 0.0 else -1.0 if {x} < 0.0 else 0.0)",
         "bell": f"exp(-({x} / {b}) * ({x} / {b}))",
         "delay": f"(s.{name}_memory{here} - value)",
+        "play": f"(s.{name}_memory{here} - value)",
         "lag": f"s.{name}_memory{here}",
-        "turn": f"cos({factor.scale} * s.{name}_memory{here} + p.{name}_phase{here})",
+        "turn": f"cos({b} * s.{name}_memory{here} + p.{name}_phase{here})",
     }[factor.function]

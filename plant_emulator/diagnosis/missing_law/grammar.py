@@ -3,8 +3,10 @@
 A term is a coefficient times one or two factors. A factor is a function of one state:
 
     1   x   |x|   x|x|   sqrt|x|   sign x   exp(-(x/s)^2)   lag of x   cos(k x + phase)
+    play of x
 
-s, and the time constant of a lag, come from a grid. The fit by simulation moves them afterwards.
+s, the time constant of a lag, and the half width of a play come from a grid. The fit by simulation
+moves them afterwards. The multiple k of an angle comes from a scan of the runs (`line_scan`).
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from plant_emulator.diagnosis.missing_law.states import lag_state
+from plant_emulator.diagnosis.missing_law.states import lag_state, play_state
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -23,7 +25,9 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.missing_law.states import LawState
     from plant_emulator.signals.log import Array
 
-    Function = Literal["linear", "size", "square", "root", "sign", "bell", "delay", "lag", "turn"]
+    Function = Literal[
+        "linear", "size", "square", "root", "sign", "bell", "delay", "lag", "turn", "play"
+    ]
 
 # Functions without a scale.
 PLAIN: dict[str, Callable[[Array], Array]] = {
@@ -35,8 +39,8 @@ PLAIN: dict[str, Callable[[Array], Array]] = {
 }
 # Widths of a bell [largest value of the state].
 BELL_WIDTHS = (0.02, 0.05, 0.1, 0.2, 0.5)
-# Harmonics of an angle.
-HARMONICS = (1.0, 2.0, 3.0, 4.0)
+# Half widths of a play [largest value of the state].
+PLAY_WIDTHS = (0.005, 0.01, 0.02, 0.05)
 
 # Functions of each kind of state that make a factor; those with a scale come from its grid.
 FUNCTIONS: dict[str, tuple[Function, ...]] = {
@@ -53,9 +57,9 @@ FUNCTIONS: dict[str, tuple[Function, ...]] = {
 
 @dataclass(frozen=True, eq=False)
 class Factor:
-    """A function of one state; scale : width [unit], time constant [s] or harmonic, else 0.
+    """A function of one state; scale : width [unit], time constant [s] or multiple, else 0.
 
-    delay : lag of the state minus the state; lag : the lag itself
+    delay, play : lag and play of the state, minus the state; lag : the lag itself
     """
 
     function: Function
@@ -76,6 +80,8 @@ class Factor:
             return lag_state(time, x, self.scale, 0.0)
         if self.function == "bell":
             return np.asarray(np.exp(-((x / self.scale) ** 2)))
+        if self.function == "play":
+            return play_state(x, self.scale, 0.0) - x
         return np.asarray(PLAIN[self.function](x))
 
     @property
@@ -92,7 +98,8 @@ class Factor:
             "bell": f"exp(-({x}/{s})^2)",
             "delay": f"(lag({x}, {s} s) - {x})",
             "lag": f"lag({x}, {s} s)",
-            "turn": f"cos({'' if self.scale == 1.0 else f'{s} '}{x} + phase)",
+            "turn": f"cos({self.scale:.4g} {x} + phase)",
+            "play": f"(play({x}, {s}) - {x})",
         }[self.function]
 
     @property
@@ -115,9 +122,14 @@ class Term:
         return found
 
     @property
+    def turn(self) -> int:
+        """Number of the factor of an angle, from 1 on; 0: there is none."""
+        return next((j for j, f in enumerate(self.factors, 1) if f.function == "turn"), 0)
+
+    @property
     def own(self) -> bool:
         """Whether each run has coefficients of its own: where an angle starts is not known."""
-        return any(factor.function == "turn" for factor in self.factors)
+        return self.turn > 0
 
     @property
     def text(self) -> str:
@@ -148,11 +160,13 @@ def factors(state: LawState) -> Iterator[Factor]:
         if function == "bell":
             yield from (Factor("bell", state, w * state.largest) for w in BELL_WIDTHS)
         elif function == "turn":
-            yield from (Factor("turn", state, k) for k in HARMONICS)
+            yield from (Factor("turn", state, k) for k in state.multiples)
         else:
             yield Factor(function, state)
     follows = state.kind in {"followed", "signed"}
     yield from (Factor("delay" if follows else "lag", state, tau) for tau in state.lags)
+    if state.kind == "signed" and state.lags:
+        yield from (Factor("play", state, w * state.largest) for w in PLAY_WIDTHS)
 
 
 def _paired(state: LawState, other: LawState) -> Iterator[Factor]:
@@ -164,9 +178,8 @@ def _paired(state: LawState, other: LawState) -> Iterator[Factor]:
 
 
 def _simple(state: LawState) -> Iterator[Factor]:
-    """Factors that a product may have: of first order, a root, a wide bell, a lag, a slow turn."""
+    """Factors that a product may have: of first order, a root, a wide bell, a lag, a turn."""
     for factor in factors(state):
         wide = factor.function == "bell" and factor.scale >= BELL_WIDTHS[2] * state.largest
-        slow = factor.function == "turn" and factor.scale <= HARMONICS[1]
-        if factor.function in {"linear", "size", "root", "lag"} or wide or slow:
+        if factor.function in {"linear", "size", "root", "lag", "turn"} or wide:
             yield factor

@@ -1,9 +1,10 @@
 """The hypothesis test of drafted laws: joint fits, and predictions of held-out runs.
 
 Every draft is an effect of the model by now. A fit starts where the regression with the law lies,
-and from the nominal parameters: the fit without effects has bent the parameters to the gap. A few
-rough iterations tell the better start. A law that explains no part of the runs that it is fitted to
-predicts none of the others, and is not followed further.
+with the states of the fit without effects, and from the nominal parameters: the fit without effects
+may have bent parameters and states to the gap. A few rough iterations tell the better start. A law
+that explains no part of the runs that it is fitted to predicts none of the others, and is not
+followed further. The shares count in the noise that the best draft leaves.
 """
 
 from __future__ import annotations
@@ -11,7 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from plant_emulator.diagnosis.execution.pool import build_model
+from plant_emulator.diagnosis.fitting.fit_steps import refit
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_from
+from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.prediction.gap import (
     Fold,
     block_lengths,
@@ -21,6 +25,7 @@ from plant_emulator.diagnosis.prediction.gap import (
     predict,
 )
 from plant_emulator.diagnosis.prediction.trace import traces
+from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -47,12 +52,15 @@ class DraftedLaw:
 
     effect : name of the effect; values : parameters that the regression with the law tells [SI]
     null : fit without effects; runs : that it was fitted to
+    states : what the regression tells of the law's states in each of these runs, by their names in
+        the effect; empty: nothing
     """
 
     effect: str
     values: Mapping[str, float]
     null: FitResult
     runs: tuple[int, ...]
+    states: Sequence[Mapping[str, float]] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,9 +88,10 @@ class LawResult:
 
 def try_law(model: Model, law: DraftedLaw) -> FitResult:
     """Fit a draft roughly to all runs, and give the better one of its starts (a task)."""
-    nominal = model.nominal(law.runs)
-    starts = [{**law.null.values, **law.values}, {**law.null.values, **nominal}]
-    trials = [_fit_from_start(model.rough(), law, start) for start in starts]
+    nominal = {**law.null.values, **model.nominal(law.runs)}
+    told = {**law.null.values, **law.values}
+    starts = [(told, law.null.states), (nominal, [{} for _ in law.runs])]
+    trials = [_fit_from_start(model.rough(), law, *start) for start in starts]
     return min(trials, key=lambda found: found.cost)
 
 
@@ -106,13 +115,27 @@ def laws_to_follow(trials: Sequence[FitResult], null: FitResult) -> list[bool]:
     ]
 
 
-def _fit_from_start(model: Model, law: DraftedLaw, start: Mapping[str, float]) -> FitResult:
+def _fit_from_start(
+    model: Model,
+    law: DraftedLaw,
+    start: Mapping[str, float],
+    known_states: Sequence[Mapping[str, float]],
+) -> FitResult:
+    """A few iterations; known_states : of each run at the start, others follow from the values."""
     candidate = model.candidates[law.effect]
     own = {u.name: u.start for u in (*candidate.sizes, *candidate.shapes)}
     known = {name: value for name, value in start.items() if name in law.null.values}
     values = {**known, **own}
     effects = (law.effect,)
-    states = [model.initial_states(run, effects, values) for run in law.runs]
+    told = law.states or [{} for _ in law.runs]
+    states = [
+        {
+            **model.initial_states(run, effects, values),
+            **known,
+            **{f"{law.effect}_{name}": value for name, value in phases.items()},
+        }
+        for run, known, phases in zip(law.runs, known_states, told, strict=True)
+    ]
     return fit(model, effects, law.runs, values, states, ROUGH_ITERATIONS)
 
 
@@ -125,6 +148,8 @@ def compare_laws(runner: TaskRunner, plan: Plan, laws: Sequence[DraftedLaw]) -> 
         pair for pair, follow in zip(zip(laws, trials, strict=True), chosen, strict=True) if follow
     ]
     fits = list(runner.map(finish_law, pairs))
+    if fits:
+        runner, (null, *fits) = _in_logged_noise(runner, (null, *fits))
     folds = [
         _fold(plan, start, fitted, predicted)
         for start in ((null, *fits) if fits else ())
@@ -141,6 +166,19 @@ def compare_laws(runner: TaskRunner, plan: Plan, laws: Sequence[DraftedLaw]) -> 
         else LawResult(effect=law.effect, fit=trial, gain=None, interval=None, traces=())
         for law, trial, follow in zip(laws, trials, chosen, strict=True)
     ]
+
+
+def _in_logged_noise(
+    runner: TaskRunner, fits: Sequence[FitResult]
+) -> tuple[TaskRunner, list[FitResult]]:
+    """The runner and the fits in the noise that the best fit leaves, if it is not as declared."""
+    best = min(fits, key=lambda one: one.cost)
+    (noise,) = runner.map(estimate_noise, [Task(base=best, runs=runner.runs)])
+    if noise.plain:
+        return runner, list(fits)
+    recipe = WhitenedRecipe(runner.recipe, noise)
+    own = replace(runner, recipe=recipe, model=build_model(recipe))
+    return own, list(own.map(refit, [Task(base=one, runs=own.runs) for one in fits]))
 
 
 def _result(

@@ -44,6 +44,7 @@ class Law:
     coefficients, errors : of each term [unit of the quantity over that of the term]
     gain : fall of twice the loss of every run, with the law fitted to the other runs
     nuisance : coefficients of the columns that all runs share beside the law
+    phases : of the angles in each run, by name in the effect file [rad]
     """
 
     quantity: LawQuantity
@@ -52,11 +53,12 @@ class Law:
     errors: tuple[float, ...]
     gain: float
     nuisance: tuple[float, ...]
+    phases: tuple[Mapping[str, float], ...] = ()
 
     def over_state(self, name: str, knots: Array) -> Array | None:
         """Values of the law at values of this state; None: it depends on more than the state."""
         if any(
-            factor.state.name != name or factor.function in {"delay", "lag", "turn"}
+            factor.state.name != name or factor.function in {"delay", "lag", "turn", "play"}
             for term in self.terms
             for factor in term.factors
         ):
@@ -88,7 +90,7 @@ class Law:
 
     @property
     def _functions(self) -> frozenset[tuple[str, str, float]]:
-        """Functions and states of the law, with harmonics, without other scales."""
+        """Functions and states of the law, with multiples, without other scales."""
         return frozenset(
             (f.function, f.state.name, f.scale if f.function == "turn" else 0.0)
             for term in self.terms
@@ -156,6 +158,15 @@ class LawSearch:
         """Held-out gain of these terms."""
         return float(2.0 * (self.null - self.products.held_out_losses(self._columns(chosen)).sum()))
 
+    def left(self, chosen: Sequence[int]) -> list[Array]:
+        """What the law of these terms leaves of the rows of each run, fitted to all of them."""
+        every = range(len(self.rows.runs))
+        columns, p = columns_of(self.rows, self.quantity, [self.terms[j] for j in chosen])
+        return [
+            one.without_own(p.left(range(len(p.own)), every, k, one, columns[k]))
+            for k, one in enumerate(self.rows.runs)
+        ]
+
     def _columns(self, chosen: Sequence[int]) -> list[int]:
         """Numbers of the columns of these terms: a turn has two."""
         widths = [2 if term.own else 1 for term in self.terms]
@@ -170,7 +181,7 @@ class LawSearch:
         """The best law of one term, and longer ones as long as another term counts."""
         starts = self.singles()[:EXTENDED_LAWS]
         found = [starts[0]]
-        while len(found) < MOST_TERMS:
+        while len(found) < min(MOST_TERMS, len(self.terms)):
             longer = [
                 (*start, j) for start in starts for j in range(len(self.terms)) if j not in start
             ]
@@ -188,16 +199,21 @@ class LawSearch:
         found = p.coefficients(columns, every)
         errors = np.sqrt(np.diag(p.covariance(columns, every)))
         shared = iter(zip(found[p.shared :], errors, strict=True))
-        turns = [p.own_coefficients(columns, found, k) for k in every]
+        mine = [j for j in columns if p.own[j]]
+        turns = np.array([p.own_coefficients(columns, found, k) / p.scale[mine] for k in every])
         sizes, deviations, at = [], [], 0
-        for j in chosen:
-            first = self._columns([j])[0]
+        phases: list[dict[str, float]] = [{} for _ in every]
+        for k, j in enumerate(chosen, 1):
             if self.terms[j].own:
-                amplitudes = [np.hypot(*one[at : at + 2]) for one in turns]
-                sizes.append(float(np.mean(amplitudes)) / p.scale[first])
-                deviations.append(float(np.std(amplitudes)) / p.scale[first])
+                cosine, sine = turns[:, at : at + 2].T
+                amplitudes = np.hypot(cosine, sine)
+                sizes.append(float(np.mean(amplitudes)))
+                deviations.append(float(np.std(amplitudes)))
+                for own, phase in zip(phases, np.arctan2(-sine, cosine), strict=True):
+                    own[f"phase{k}{self.terms[j].turn}"] = float(phase)
                 at += 2
                 continue
+            first = self._columns([j])[0]
             size, error = next(shared)
             sizes.append(float(size / p.scale[first]))
             deviations.append(float(error / p.scale[first]))
@@ -208,15 +224,24 @@ class LawSearch:
             errors=tuple(deviations),
             gain=self.gain(chosen),
             nuisance=tuple(found[: p.shared].tolist()),
+            phases=tuple(phases),
         )
 
 
 def search(rows: LawRows, quantity: LawQuantity, null: float) -> LawSearch:
     """Prepare the search in a quantity; null : see `LawSearch`."""
     every = terms(quantity.states)
+    return LawSearch(quantity, rows, every, columns_of(rows, quantity, every)[1], null)
+
+
+def columns_of(
+    rows: LawRows, quantity: LawQuantity, every: Sequence[Term]
+) -> tuple[list[Array], NuisanceProducts]:
+    """Columns of terms in the rows of each run, and their products."""
     values = [
         np.concatenate([term.values(k, len(own)) for term in every], axis=1)
         for k, own in enumerate(quantity.states[0].values)
     ]
     own = [term.own for term in every for _ in range(2 if term.own else 1)]
-    return LawSearch(quantity, rows, every, products(rows.runs, rows.of(values), own), null)
+    columns = rows.of(values)
+    return columns, products(rows.runs, columns, own)

@@ -6,13 +6,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.localisation.parity_relations import ARMATURE, DRIVE, GEAR, MOTOR
+from plant_emulator.diagnosis.localisation.measured_signals import interval_means
+from plant_emulator.diagnosis.localisation.parity_relations import (
+    ARMATURE,
+    DRIVE,
+    GEAR,
+    MOTOR,
+    ROWS,
+    speed_error,
+)
 from plant_emulator.diagnosis.missing_law.drum_quantities import (
     drum_friction,
     drum_weight,
     speed_sensor,
 )
-from plant_emulator.diagnosis.missing_law.quantity import BenchQuantity, rows_in_relations, time_of
+from plant_emulator.diagnosis.missing_law.quantity import (
+    BenchQuantity,
+    angle_of,
+    rows_in_relations,
+    time_of,
+)
 from plant_emulator.diagnosis.missing_law.states import FILTER_TIMES, WARMING_TIMES, LawState
 from plant_emulator.model.array_laws import gear_friction
 
@@ -21,6 +34,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.localisation.block_basis import BlockQuantities
     from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
+    from plant_emulator.signals.log import Array
 
 
 def quantities(regression: BlockRegression) -> list[BenchQuantity]:
@@ -31,9 +45,9 @@ def quantities(regression: BlockRegression) -> list[BenchQuantity]:
         drum_friction(regression, q),
         drum_weight(regression, q),
         _motor(regression, q),
-        _flux(regression, q),
+        _flux(regression, regression.samples),
         _torque_sensor(regression, q),
-        speed_sensor(regression, q),
+        speed_sensor(regression, regression.samples),
         _reference(regression, q),
     ]
     if any(m.voltage is not None for m in regression.signals):
@@ -53,11 +67,8 @@ def _gear(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQuantity:
         name="torque to the drum along the motion", symbol="T", unit="N m",
         code="s.drum_shaft_torque * s.gear_direction", kind="signed",
     )  # fmt: skip
-    angle = LawState(
-        values=[one.angle for one in q], time=[one.time for one in q],
-        name="angle of the gear's output", symbol="theta", unit="rad", code="s.gear_speed",
-        kind="angle",
-    )  # fmt: skip
+    speeds = [one.speed / xi for one in q]
+    angle = angle_of(q, speeds, "angle of the gear's output", "s.gear_speed")
     direction = LawState(
         values=[one.moving for one in q], time=[one.time for one in q],
         name="direction", symbol="d", unit="", code="s.gear_direction", kind="direction",
@@ -90,6 +101,10 @@ def _motor(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQuantity:
 
 
 def _flux(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQuantity:
+    """Flux of the motor; q : at the samples, because a ripple turns far from one to the next.
+
+    Where the voltage is not logged, the drive's relation takes it from the current and the flux.
+    """
     current = LawState(
         values=[np.abs(one.current) for one in q], time=[one.time for one in q],
         name="size of the armature current", symbol="i", unit="A", code="abs(s.armature_current)",
@@ -104,14 +119,22 @@ def _flux(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQuantity:
         name="flux", symbol="kPhi", unit="N m/A", code="value", kind="followed", lags=FILTER_TIMES,
         start="p.flux_constant",
     )  # fmt: skip
-    weights = {MOTOR: [one.current for one in q], ARMATURE: [one.speed for one in q]}
+
+    def rows(run: int, values: Array) -> tuple[Array, None]:
+        torque, voltage = (by[:, None] * values for by in (q[run].current, q[run].speed))
+        found = np.zeros((ROWS, len(values) - 1, values.shape[1]))
+        found[MOTOR], found[ARMATURE] = interval_means(torque), interval_means(voltage)
+        if r.signals[run].voltage is None:
+            found[DRIVE] = -interval_means(speed_error(voltage, q[run].time, r.values))
+        return found, None
+
     return BenchQuantity(
         place="motor",
         name="flux of the motor",
         unit="N m/A",
         hook="flux",
-        states=(current, speed, time_of(q), flux),
-        rows=rows_in_relations(weights),
+        states=(current, speed, time_of(q), flux, _motor_angle(q)),
+        rows=rows,
         model=r.model,
     )
 
@@ -128,7 +151,7 @@ def _torque_sensor(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQua
         name="error of the torque sensor",
         unit="N m",
         hook="measured_shaft_torque",
-        states=(torque, time_of(q)),
+        states=(torque, time_of(q), _motor_angle(q)),
         rows=rows_in_relations({MOTOR: -1.0, GEAR: 1.0}),
         model=r.model,
     )
@@ -169,3 +192,7 @@ def _voltage(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQuantity:
         rows=rows_in_relations({ARMATURE: 1.0}),
         model=r.model,
     )
+
+
+def _motor_angle(q: Sequence[BlockQuantities]) -> LawState:
+    return angle_of(q, [one.speed for one in q], "angle of the motor", "s.motor_speed")

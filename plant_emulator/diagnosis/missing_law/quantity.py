@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from plant_emulator.diagnosis.localisation.parity_relations import ROWS
 from plant_emulator.diagnosis.missing_law.states import LawState
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.localisation.block_basis import BlockQuantities
     from plant_emulator.diagnosis.localisation.marginal_likelihood import LinearModel
     from plant_emulator.signals.log import Array
+
+# Samples that a turn of the fastest ripple has on average.
+SAMPLES_A_TURN = 2.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -87,4 +91,28 @@ def time_of(q: Sequence[BlockQuantities]) -> LawState:
         kind="time",
         values=[one.time - one.time[0] for one in q],
         time=[one.time for one in q],
+    )
+
+
+def angle_of(
+    q: Sequence[BlockQuantities], speeds: Sequence[Array], name: str, code: str
+) -> LawState:
+    """Angle of a shaft as a state; speeds : of the shaft in every run [rad/s].
+
+    The scan ends where a ripple has SAMPLES_A_TURN on average.
+    """
+    angles = [
+        cumulative_trapezoid(speed, one.time, initial=0)
+        for one, speed in zip(q, speeds, strict=True)
+    ]
+    steps = np.concatenate([np.abs(np.diff(one)) for one in angles])
+    return LawState(
+        name=name,
+        symbol="theta",
+        unit="rad",
+        code=code,
+        kind="angle",
+        values=angles,
+        time=[one.time for one in q],
+        scanned=float(2.0 * np.pi / SAMPLES_A_TURN / np.mean(steps)),
     )

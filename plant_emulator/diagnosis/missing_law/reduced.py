@@ -62,9 +62,16 @@ class RunRows:
 
     def squares(self, left: Array) -> Array:
         """Squares of a residual with the run's own coefficients fitted, and their price shared."""
-        inner = np.eye(self.own.shape[1]) + self.own.T @ self.own
-        found = np.linalg.solve(inner, self.own.T @ left)
+        found = self._own_coefficients(left)
         return np.asarray((left - self.own @ found) ** 2 + found @ found / len(left))
+
+    def without_own(self, left: Array) -> Array:
+        """A residual with the run's own coefficients fitted."""
+        return np.asarray(left - self.own @ self._own_coefficients(left))
+
+    def _own_coefficients(self, left: Array) -> Array:
+        inner = np.eye(self.own.shape[1]) + self.own.T @ self.own
+        return np.asarray(np.linalg.solve(inner, self.own.T @ left))
 
 
 def run_rows(regression: BlockRegression, model: LinearModel) -> list[RunRows]:
@@ -169,6 +176,19 @@ class NuisanceProducts:
         gram, product = self.grams[run], self.products[run]
         inner = gram[np.ix_(own, own)] + self.width**-2.0 * np.eye(len(own))
         return np.asarray(np.linalg.solve(inner, product[own] - gram[np.ix_(own, shared)] @ found))
+
+    def left(
+        self, chosen: Sequence[int], fitted: Sequence[int], run: int, rows: RunRows, columns: Array
+    ) -> Array:
+        """Residual of a run whose shared coefficients were fitted to some runs, shape (n,).
+
+        columns : of all terms in the run, as they were given; the run's own nuisance is not fitted
+        """
+        shared, own = ([j for j in chosen if self.own[j] == alone] for alone in (False, True))
+        found, scaled = self.coefficients(chosen, fitted), columns / self.scale
+        left = rows.y - rows.shared @ found[: self.shared]
+        left = left - scaled[:, shared] @ found[self.shared :]
+        return np.asarray(left - scaled[:, own] @ self.own_coefficients(chosen, found, run))
 
     def held_out_losses(self, chosen: Sequence[int]) -> Array:
         """Loss of every run, with all shared coefficients fitted to the other runs."""

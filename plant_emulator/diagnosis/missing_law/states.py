@@ -25,11 +25,14 @@ class LawState:
 
     symbol : letter in a formula; unit : of the state, empty for a pure number
     code : expression in an effect's law
-    values : over the intervals of each run [SI], shape (n - 1,) each; time : likewise [s]
+    values : of each run, as its quantity asks for them: means over intervals, shape (n - 1,), or
+        at the samples, shape (n,) [SI]; time : likewise [s]
     kind : which functions make sense; `followed` is a state that has a lag only, `curved` one whose
         multiple is no law, as that of an acceleration, which is an inertia
     lags : time constants that a lag of the state may have [s]; empty: none
     start : expression of a lag's value at the start of a run
+    scanned : of an angle, the largest multiple of it that is looked for [1]
+    multiples : of an angle, those whose ripple a law may have [1]
     """
 
     name: str
@@ -41,6 +44,8 @@ class LawState:
     time: Sequence[Array]
     lags: tuple[float, ...] = ()
     start: str = "0.0"
+    scanned: float = 0.0
+    multiples: tuple[float, ...] = ()
 
     @property
     def largest(self) -> float:
@@ -58,3 +63,11 @@ def lag_state(time: Array, value: Array, tau: float, start: float) -> Array:
     share = float(-np.expm1(-np.median(np.diff(time)) / tau))
     found, _ = lfilter([share], [1.0, share - 1.0], value, zi=[(1.0 - share) * start])
     return np.asarray(found)
+
+
+def play_state(value: Array, half: float, start: float) -> Array:
+    """Play of half a width over a state (M. A. Krasnoselskii, Systems with Hysteresis, 1989)."""
+    found, here = np.empty(len(value)), start
+    for n, x in enumerate(value.tolist()):
+        here = found[n] = max(x - half, min(x + half, here))
+    return found

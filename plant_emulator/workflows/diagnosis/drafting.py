@@ -87,7 +87,13 @@ def draft(runs: Runs[Any], null: FitResult | None, pool: Pool, folder: Path) -> 
     own = replace(recipe, without=_library(recipe), own=(*recipe.own, *files))
     runner = TaskRunner(pool=pool, recipe=own, model=build_model(own), runs=runs.plan.fitted)
     alternatives = [
-        DraftedLaw(effect=file.stem, values=one.parameters, null=null, runs=runs.plan.fitted)
+        DraftedLaw(
+            effect=file.stem,
+            values=one.parameters,
+            null=null,
+            runs=runs.plan.fitted,
+            states=one.law.phases,
+        )
         for one, file in zip(found, files, strict=True)
     ]
     drafted = _rank(book, files, compare_laws(runner, runs.plan, alternatives))

@@ -12,7 +12,10 @@ from plant_emulator.diagnosis.localisation.parity_relations import (
     DRIVE,
     GEAR,
     MOTOR,
+    delayed_reference,
+    reconstructed_reference,
     relation_residuals,
+    speed_error,
 )
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import Recording, recording
@@ -111,3 +114,21 @@ def test_a_limit_of_the_simulated_drive_counts_only_next_to_one_of_the_real_driv
     found = whitened_relations(signals, p, (np.zeros((3, len(limited))), also))
     drive = np.abs(found.whiten(np.ones((3, len(limited), 1))).reshape(-1, 3)[:, DRIVE])
     assert drive[soon] < 0.01 * drive[late]
+
+
+def test_speed_error_of_a_small_voltage_is_that_of_both_controllers_solved_backwards(
+    run: Recording, nominal: ParameterSet
+) -> None:
+    p = nominal.values()
+    m = measured_signals(run, p)
+    voltage = p["armature_resistance"] * m.current + FLUX_IN_CRUISE * m.motor_speed
+    more = np.random.default_rng(1).normal(size=len(m.time))
+    (plain, limited), (found, also) = (
+        reconstructed_reference(replace(m, voltage=own), p, delayed_reference(m, 0.0))
+        for own in (voltage, voltage + 1e-3 * more)
+    )
+    before = slice(0, int(np.argmax(np.append(limited | also, True))))
+    assert before.stop > 100
+    shown = speed_error(more[:, None], m.time, p)[:, 0]
+    expected = (found - plain) / 1e-3
+    np.testing.assert_allclose(shown[before], expected[before], rtol=1e-3, atol=1e-4)

@@ -95,6 +95,18 @@ def test_delay_follows_its_own_law_with_its_time_constant(tmp_path: Path) -> Non
     assert effect.laws["measured_shaft_torque"](8.0, s, values(effect)) == pytest.approx(shown)
 
 
+def test_play_shows_a_change_only_beyond_half_its_width(tmp_path: Path) -> None:
+    effect = written(tmp_path, "measured_shaft_torque", (1.0, Term((Factor("play", TORQUE, 2.0),))))
+    memory, shown = effect.memories["memory11"], []
+    assert memory.follows == "measured_shaft_torque"
+    for torque in (1.0, 5.0, 4.0, 1.0, -3.0):
+        base = shown[-1] if shown else 0.0
+        shown.append(memory.advance(base, 1e-4, torque, SimpleNamespace(), values(effect)))
+    assert shown == [0.0, 3.0, 3.0, 3.0, -1.0]
+    s = SimpleNamespace(draft_memory11=3.0)
+    assert effect.laws["measured_shaft_torque"](4.0, s, values(effect)) == pytest.approx(3.0)
+
+
 def test_turn_has_an_angle_and_a_phase_of_each_run(tmp_path: Path) -> None:
     effect = written(tmp_path, "drum_torque", (10.0, Term((Factor("turn", ANGLE, 2.0),))))
     assert effect.parameters["phase11"].per_run

@@ -48,6 +48,12 @@ def test_functions_of_a_signed_state(function: str, scale: float, expected: list
     np.testing.assert_allclose(factor.values(0)[:, 0], expected)
 
 
+def test_play_of_a_sensor_starts_at_rest_and_loses_half_its_width_at_each_reversal() -> None:
+    factor = Factor("play", state("signed", [1.0, 5.0, 4.0, 1.0, -3.0], lags=(0.1,)), 2.0)
+    shown = factor.values(0)[:, 0] + factor.state.values[0]
+    np.testing.assert_allclose(shown, [0.0, 3.0, 3.0, 3.0, -1.0])
+
+
 def test_product_of_two_factors_is_their_product() -> None:
     one = Factor("linear", state("level", [1.0, 2.0, 3.0]))
     other = Factor("root", state("level", [4.0, 9.0, 16.0]))
