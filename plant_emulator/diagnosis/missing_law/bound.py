@@ -62,7 +62,8 @@ def estimate_bound(
     none = [np.zeros((len(own.y), 0)) for own in rows]
     before = _squares(regression, rows, none, products(rows, none), ())
     counts = [
-        np.full_like(one, len(own.y) / one.size) for one, own in zip(before, rows, strict=True)
+        _of_intervals((own.y != 0.0).astype(np.float64), one.size)
+        for one, own in zip(before, rows, strict=True)
     ]
     lengths = [block_bootstrap.block_length(np.sqrt(one)) for one in before]
     total = sum(one.sum() for one in counts)

@@ -9,7 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
+from plant_emulator.diagnosis.machines.thinning import thin
 from plant_emulator.diagnosis.missing_law.bound import estimate_bound
 from plant_emulator.diagnosis.missing_law.curve import curve
 from plant_emulator.diagnosis.missing_law.law_search import DRAFTED_GAIN, search
@@ -23,12 +26,15 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.answer import Curve
     from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.localisation.parity_relations import WhitenedRelations
+    from plant_emulator.diagnosis.machines.thinning import Thinned
     from plant_emulator.diagnosis.missing_law.bound import Bound
     from plant_emulator.diagnosis.missing_law.law_search import Law, LawSearch
     from plant_emulator.diagnosis.missing_law.quantity import LawQuantity
     from plant_emulator.diagnosis.missing_law.reduced import LawRows
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
+    from plant_emulator.signals.log import Array
 
 # At most so many laws are tested by simulation: each takes a fit a fold.
 MOST_LAWS = 3
@@ -65,23 +71,37 @@ def sketch(
 ) -> Sketchbook:
     """Sketch the laws that are worth a test, and bound what any law could close.
 
+    Of a channel that is sampled and held only the new values count, as in the relations of a
+    diagnosis.
+
     null : converged fit without effects; at least two recordings, because other runs judge
     """
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):
-        regression = BlockRegression(recordings, parameters, null)
-        every = [(one, law_rows(regression, one)) for one in quantities(regression)]
+        thinned = [thin(one, one.use) for one in recordings]
+        regression = BlockRegression([one.recording for one in thinned], parameters, null)
+        counted = [_counted(*pair) for pair in zip(thinned, regression.relations, strict=True)]
+        every = [
+            (one, law_rows(regression, one).mapped(lambda run, rows: rows * counted[run]))
+            for one in quantities(regression)
+        ]
         searches = _searches([(with_lines(rows, one), rows) for one, rows in every])
         best = max(searches, key=lambda one: one.score(one.list_nested()[-1]))
         noise = row_noise(regression, best.left(best.list_nested()[-1]))
-        searches = _searches([(one.quantity, noise.whiten(one.rows)) for one in searches])
+        searches = _searches([(one.quantity, one.rows.mapped(noise.white)) for one in searches])
         found = tuple(
             replace(one, parameters=_parameters(regression, one.law))
             for one in sketches(searches, DRAFTED_GAIN)
         )
-        plain = noise.whiten(every[0][1]).runs
+        plain = every[0][1].mapped(noise.white).runs
         return Sketchbook(sketches=found, bound=estimate_bound(regression, plain, searches))
+
+
+def _counted(one: Thinned, relations: WhitenedRelations) -> Array:
+    """Whether each row of a run counts, shape (rows, 1)."""
+    intervals = np.repeat(one.usable_intervals, len(relations.value))
+    return np.concatenate([intervals, ~one.void])[:, None]
 
 
 def _searches(every: Sequence[tuple[LawQuantity, LawRows]]) -> list[LawSearch]:

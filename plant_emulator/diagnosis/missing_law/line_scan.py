@@ -31,7 +31,7 @@ LINES = 2
 HIGH = 200
 # A line is refined so often, to a tenth of the step each time.
 REFINEMENTS = 2
-# Radians of the fastest multiple in the longest run below which there is no ripple to speak of.
+# Radians of the longest run times the multiples that are scanned, below which no line shows.
 SHORTEST_SPAN = 20.0
 # Determinant of a cosine and a sine beside the nuisance below which the run does not tell them
 # apart, or from it [square of their squares' sum without nuisance].
@@ -49,7 +49,7 @@ def with_lines(rows: LawRows, quantity: LawQuantity) -> LawQuantity:
 def find_lines(rows: LawRows, state: LawState) -> LawState:
     """The angle with the multiples at which a law over it shows the largest lines."""
     span = max(float(np.ptp(own)) for own in state.values)
-    if state.scanned * span <= SHORTEST_SPAN:
+    if (state.scanned - SLOWEST) * span <= SHORTEST_SPAN:
         return state
     grid = np.arange(SLOWEST, state.scanned, np.pi / span)
     nuisance = [np.concatenate([one.shared, one.own], axis=1) for one in rows.runs]

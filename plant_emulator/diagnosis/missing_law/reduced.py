@@ -111,6 +111,14 @@ class LawRows:
     runs: Sequence[RunRows]
     columns: Callable[[int, Array], Array]
 
+    def mapped(self, change: Callable[[int, Array], Array]) -> LawRows:
+        """The same with another map of the rows; change : of a run's rows, shape (rows, k)."""
+        runs = [
+            RunRows(change(k, one.y[:, None])[:, 0], change(k, one.shared), change(k, one.own))
+            for k, one in enumerate(self.runs)
+        ]
+        return LawRows(runs, lambda run, values: change(run, self.columns(run, values)))
+
     def of(self, values: Sequence[Array]) -> list[Array]:
         """Rows of laws; values : in each run."""
         return [self.columns(k, own) for k, own in enumerate(values)]

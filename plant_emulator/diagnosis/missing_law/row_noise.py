@@ -7,13 +7,12 @@ and a law is then judged in rows that are white.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from plant_emulator.diagnosis.localisation.parity_relations import ROWS
-from plant_emulator.diagnosis.missing_law.reduced import LawRows
 from plant_emulator.estimation.noise.estimate import estimate_channel_noise
 from plant_emulator.signals.noise import NoiseSeries
 
@@ -41,19 +40,6 @@ class RowNoise:
                 columns = [whitener.white(column) for column in own[:, shown].T]
                 found[place, shown] = np.stack(columns, axis=-1)
         return found
-
-    def whiten(self, law: LawRows) -> LawRows:
-        """The rows of all runs, and how laws show in them, in their own noise."""
-        runs = [
-            replace(
-                one,
-                y=self.white(k, one.y[:, None])[:, 0],
-                shared=self.white(k, one.shared),
-                own=self.white(k, one.own),
-            )
-            for k, one in enumerate(law.runs)
-        ]
-        return LawRows(runs, lambda run, values: self.white(run, law.columns(run, values)))
 
 
 def row_noise(regression: BlockRegression, rest: Sequence[Array]) -> RowNoise:
