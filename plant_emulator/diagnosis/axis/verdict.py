@@ -154,9 +154,10 @@ def _confirmed(search: AxisSearch, held_out: HeldOut) -> tuple[Fit, str]:
 
 
 def _parts(search: AxisSearch, found: Fit) -> list[Fit]:
-    """A set and all that are a part of it, but the empty one, the largest evidence first."""
+    """A set and its parts, but the empty one and those without evidence; the largest one first."""
     parts = [p for k in range(len(found.names)) for p in combinations(found.names, k + 1)]
-    return sorted(map(search.fit_set, parts), key=search.value)
+    found_parts = [part for part in map(search.fit_set, parts) if np.isfinite(search.value(part))]
+    return sorted(found_parts, key=search.value)
 
 
 def _ranked(search: AxisSearch) -> list[Fit]:

@@ -171,10 +171,13 @@ def compare_laws(runner: TaskRunner, plan: Plan, laws: Sequence[DraftedLaw]) -> 
 def _in_logged_noise(
     runner: TaskRunner, fits: Sequence[FitResult]
 ) -> tuple[TaskRunner, list[FitResult]]:
-    """The runner and the fits in the noise that the best fit leaves, if it is not as declared."""
+    """The runner and the fits in the noise that the best fit leaves, if it is not as declared.
+
+    Noise that follows a misfit would hide the gap: what no sensor has is none.
+    """
     best = min(fits, key=lambda one: one.cost)
     (noise,) = runner.map(estimate_noise, [Task(base=best, runs=runner.runs)])
-    if noise.plain:
+    if noise.plain or not all(one.of_sensor for one in noise.channels.values()):
         return runner, list(fits)
     recipe = WhitenedRecipe(runner.recipe, noise)
     own = replace(runner, recipe=recipe, model=build_model(recipe))

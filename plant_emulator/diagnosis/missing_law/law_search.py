@@ -80,7 +80,7 @@ class Law:
         """
         if self.quantity.name != other.quantity.name:
             return False
-        if self._functions == other._functions:
+        if self._functions == other._functions and self._turns_like(other):
             return True
         if any(term.own for term in (*self.terms, *other.terms)):
             return False
@@ -89,12 +89,19 @@ class Law:
         return bool(abs(one @ two) >= SAME_SHAPE * size)
 
     @property
-    def _functions(self) -> frozenset[tuple[str, str, float]]:
-        """Functions and states of the law, with multiples, without other scales."""
-        return frozenset(
-            (f.function, f.state.name, f.scale if f.function == "turn" else 0.0)
-            for term in self.terms
-            for f in term.factors
+    def _functions(self) -> frozenset[tuple[str, str]]:
+        """Functions and states of the law, without scales."""
+        return frozenset((f.function, f.state.name) for term in self.terms for f in term.factors)
+
+    def _turns_like(self, other: Law) -> bool:
+        """Whether no run tells a multiple of the other law from the nearest one of this law."""
+        mine, others = (
+            {f.scale: f.state for term in law.terms for f in term.factors if f.function == "turn"}
+            for law in (self, other)
+        )
+        return all(
+            min(abs(k - own) for own in mine) * max(map(np.ptp, state.values)) < np.pi
+            for k, state in others.items()
         )
 
     @property

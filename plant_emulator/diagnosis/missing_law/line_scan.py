@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 SLOWEST = 0.5
 # Lines that are taken one after the other, the largest one first.
 LINES = 2
+# Multiples that are tried at most: a longer log is not scanned as far.
+MOST_MULTIPLES = 10_000
 # Only so many multiples with the largest power come into question for the next line.
 HIGH = 200
 # A line is refined so often, to a tenth of the step each time.
@@ -51,16 +53,20 @@ def find_lines(rows: LawRows, state: LawState) -> LawState:
     span = max(float(np.ptp(own)) for own in state.values)
     if (state.scanned - SLOWEST) * span <= SHORTEST_SPAN:
         return state
-    grid = np.arange(SLOWEST, state.scanned, np.pi / span)
+    step = np.pi / span
+    fastest = min(state.scanned, SLOWEST + MOST_MULTIPLES * step)
+    grid = np.arange(SLOWEST, fastest, step)
     nuisance = [np.concatenate([one.shared, one.own], axis=1) for one in rows.runs]
     found = []
     for _ in range(LINES):
         power = _power(rows, state, nuisance, grid)
         line, grid = grid[np.argmax(power)], grid[np.argsort(power)[-HIGH:]]
         for k in range(REFINEMENTS):
-            near = line + np.pi / span * 0.1**k * np.linspace(-1.0, 1.0, 21)
+            near = line + step * 0.1**k * np.linspace(-1.0, 1.0, 21)
+            near = np.clip(near, SLOWEST, fastest)
             line = near[np.argmax(_power(rows, state, nuisance, near))]
         found.append(float(line))
+        grid = grid[np.abs(grid - line) > step]
         waves = [_columns(rows, state, run, np.array([line])) for run in range(len(nuisance))]
         nuisance = [
             np.concatenate([own, WIDE_PRIOR * wave], axis=1)

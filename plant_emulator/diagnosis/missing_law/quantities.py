@@ -23,6 +23,7 @@ from plant_emulator.diagnosis.missing_law.drum_quantities import (
 from plant_emulator.diagnosis.missing_law.quantity import (
     BenchQuantity,
     angle_of,
+    in_relations,
     rows_in_relations,
     time_of,
 )
@@ -46,7 +47,7 @@ def quantities(regression: BlockRegression) -> list[BenchQuantity]:
         drum_weight(regression, q),
         _motor(regression, q),
         _flux(regression, regression.samples),
-        _torque_sensor(regression, q),
+        _torque_sensor(regression, regression.samples),
         speed_sensor(regression, regression.samples),
         _reference(regression, q),
     ]
@@ -140,19 +141,25 @@ def _flux(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQuantity:
 
 
 def _torque_sensor(r: BlockRegression, q: Sequence[BlockQuantities]) -> BenchQuantity:
+    """Error of the torque sensor; q : at the samples, of which the relations take the means."""
     xi = r.values["gear_ratio"]
     torque = LawState(
         values=[-(one.load + gear_friction(one.speed / xi, r.values)) / xi for one in q],
         time=[one.time for one in q],
         name="shaft torque", symbol="T", unit="N m", code="value", kind="signed", lags=FILTER_TIMES,
     )  # fmt: skip
+
+    def rows(run: int, values: Array) -> tuple[Array, None]:
+        del run
+        return in_relations({MOTOR: -1.0, GEAR: 1.0}, interval_means(values)), None
+
     return BenchQuantity(
         place="torque_sensor",
         name="error of the torque sensor",
         unit="N m",
         hook="measured_shaft_torque",
         states=(torque, time_of(q), _motor_angle(q)),
-        rows=rows_in_relations({MOTOR: -1.0, GEAR: 1.0}),
+        rows=rows,
         model=r.model,
     )
 

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 # Samples that a turn of the fastest ripple has on average.
 SAMPLES_A_TURN = 2.0
+# Largest multiple that is looked for: the teeth of a wheel.
+LARGEST_MULTIPLE = 40.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -99,7 +101,7 @@ def angle_of(
 ) -> LawState:
     """Angle of a shaft as a state; speeds : of the shaft in every run [rad/s].
 
-    The scan ends where a ripple has SAMPLES_A_TURN on average.
+    The scan ends where a ripple has SAMPLES_A_TURN on average, or at LARGEST_MULTIPLE.
     """
     angles = [
         cumulative_trapezoid(speed, one.time, initial=0)
@@ -114,5 +116,5 @@ def angle_of(
         kind="angle",
         values=angles,
         time=[one.time for one in q],
-        scanned=float(2.0 * np.pi / SAMPLES_A_TURN / np.mean(steps)),
+        scanned=min(LARGEST_MULTIPLE, float(2.0 * np.pi / SAMPLES_A_TURN / np.mean(steps))),
     )

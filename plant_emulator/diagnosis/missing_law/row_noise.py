@@ -2,7 +2,8 @@
 
 Colour, hum and outliers of a log are in every relation that the channel enters. Each relation, and
 the drum speed, counts as a channel of its own: its noise is estimated on what the best law leaves,
-and a law is then judged in rows that are white.
+and a law is then judged in rows that are white. What no sensor has is no noise but a gap that the
+law does not close: such rows stay as they are.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.localisation.parity_relations import ROWS
+from plant_emulator.estimation.noise.channel_noise import ChannelNoise, Whitener
 from plant_emulator.estimation.noise.estimate import estimate_channel_noise
 from plant_emulator.signals.noise import NoiseSeries
 
@@ -20,7 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
-    from plant_emulator.estimation.noise.channel_noise import Whitener
     from plant_emulator.signals.log import Array
 
 
@@ -61,6 +62,9 @@ def row_noise(regression: BlockRegression, rest: Sequence[Array]) -> RowNoise:
                 places.append(place)
                 series.append(NoiseSeries(time=time, value=value, use=value != 0.0))
         if any(one.use.any() for one in series):
-            for k, place, own in zip(runs, places, estimate_channel_noise(series)[1], strict=True):
+            noise, whiteners = estimate_channel_noise(series)
+            if not noise.of_sensor:
+                whiteners = [Whitener(ChannelNoise(), one.use, one.time) for one in series]
+            for k, place, own in zip(runs, places, whiteners, strict=True):
                 found[k].append((place, own))
     return RowNoise(found)

@@ -12,7 +12,7 @@ from plant_emulator import effects
 from plant_emulator.diagnosis.answer import Draft
 from plant_emulator.diagnosis.axis.diagnose import AxisRuns
 from plant_emulator.diagnosis.execution.pool import TaskRunner, build_model
-from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.fitting.joint_fit import fit_from, fit_null
 from plant_emulator.diagnosis.machines.bench import BenchModel, BenchRecipe
 from plant_emulator.diagnosis.missing_law.bound import Bound
 from plant_emulator.diagnosis.missing_law.draft import sketch
@@ -65,7 +65,7 @@ class Drafted:
 def draft(runs: Runs[Any], null: FitResult | None, pool: Pool, folder: Path) -> Drafted | None:
     """Draft the missing law of these runs; no drafts where no law closes a gap.
 
-    null : converged fit of the bench without effects; None: it is made here
+    null : fit of the bench without effects, in any noise; None: it is made here
     folder : of the effect files, one a draft
     None: it cannot be done. The relations know the nominal equations of the bench only, without
     effects of a set; and other runs judge a law, so that a single run is not enough.
@@ -76,8 +76,9 @@ def draft(runs: Runs[Any], null: FitResult | None, pool: Pool, folder: Path) -> 
         return _of_axis(draft_axis(recipe, runs.plan, folder))
     if not isinstance(recipe, BenchRecipe) or recipe.parameters.effects or len(runs.fitted) < 2:
         return None
-    if null is None:
-        null = fit_null(BenchModel(runs.fitted, recipe.parameters, {}), range(len(runs.fitted)))
+    # The costs of the drafts count in the declared noise at first, and so does the fit without one.
+    plain, every = BenchModel(runs.fitted, recipe.parameters, {}), range(len(runs.fitted))
+    null = fit_null(plain, every) if null is None else fit_from(plain, (), every, null)
     book = sketch(runs.fitted, recipe.parameters, null)
     found = book.sketches
     if not found:

@@ -1,8 +1,11 @@
 """Drafted laws on logs of the independent bench, whose labels nobody told the search."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
+import numpy as np
 import pytest
+from scipy.integrate import cumulative_trapezoid
 
 from plant_emulator import parameter_sets
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
@@ -54,3 +57,19 @@ def test_a_bench_without_an_effect_gets_no_draft(
     logs = [bench_log(f"bench_practice/{case}/program{k}") for k in (1, 2, 3)]
     book = drafted(*logs)
     assert (book.sketches, book.bound) == ((), None)
+
+
+def test_ripple_of_the_torque_sensor_is_drawn_where_the_motor_turns_fast(
+    bench_log: Callable[[str], Log],
+) -> None:
+    """A cruise turns the motor by 3.8 rad a sample: the means of two samples have another sign."""
+    logs = [bench_log(f"bench_practice/practice_004/program{k}") for k in (1, 2)]
+    for k, log in enumerate(logs):
+        angle = cumulative_trapezoid(log["motor_speed"], log.time, initial=0)
+        torque = log["shaft_torque"] + 3.0 * np.cos(1.2 * angle + 0.7)
+        logs[k] = replace(log, signals={**log.signals, "shaft_torque": torque})
+    law = drafted(*logs).sketches[0].law
+    assert (law.quantity.place, len(law.terms)) == ("torque_sensor", 1)
+    assert law.terms[0].text == "cos(1.2 theta + phase)"
+    assert law.coefficients[0] == pytest.approx(3.0, abs=0.1)
+    assert [own["phase11"] for own in law.phases] == pytest.approx([0.7, 0.7], abs=0.1)

@@ -1,5 +1,7 @@
 """Two laws are the same where no run tells them apart."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -18,6 +20,8 @@ SPEED = LawState(
     time=[np.arange(200) * 0.01, np.arange(100) * 0.01],
 )
 LINEAR, ROOT = Term((Factor("linear", SPEED),)), Term((Factor("root", SPEED),))
+ANGLE = replace(SPEED, name="angle", kind="angle")
+TURN, SAME_TURN, OTHER_TURN = (Term((Factor("turn", ANGLE, k),)) for k in (2.0, 2.001, 3.0))
 WIDE, NARROW = Term((Factor("bell", SPEED, 3.0),)), Term((Factor("bell", SPEED, 0.3),))
 
 
@@ -46,6 +50,8 @@ def law(*terms: tuple[float, Term], name: str = "friction") -> Law:
         (law((2.0, LINEAR)), law((2.0, LINEAR), (0.02, ROOT)), True),
         (law((2.0, LINEAR)), law((2.0, ROOT)), False),
         (law((2.0, LINEAR)), law((2.0, LINEAR), name="torque"), False),
+        (law((2.0, TURN)), law((2.1, SAME_TURN)), True),
+        (law((2.0, TURN)), law((2.0, OTHER_TURN)), False),
         (law((2.0, WIDE), (1.0, ROOT)), law((2.0, NARROW), (1.0, LINEAR)), False),
     ],
 )

@@ -1,12 +1,13 @@
 """The scan finds a ripple at any multiple of an angle; no line of noise is worth its price."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.missing_law.law_search import LawSearch, search
-from plant_emulator.diagnosis.missing_law.line_scan import find_lines, with_lines
+from plant_emulator.diagnosis.missing_law.line_scan import SLOWEST, find_lines, with_lines
 from plant_emulator.diagnosis.missing_law.quantity import LawQuantity
 from plant_emulator.diagnosis.missing_law.reduced import LawRows, RunRows
 from plant_emulator.diagnosis.missing_law.states import LawState
@@ -97,3 +98,11 @@ def test_a_law_leaves_the_noise_of_the_runs() -> None:
 @pytest.mark.parametrize("scanned", [0.0, 0.1])
 def test_an_angle_that_hardly_turns_is_not_scanned(scanned: float) -> None:
     assert find_lines(runs_with((3.0, 2.2)), angle(scanned)).multiples == ()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_line_is_slower_than_a_trend_or_faster_than_the_scan(seed: int) -> None:
+    short = replace(angle(4.5), values=[one / 25.0 for one in ANGLES])
+    lines = find_lines(runs_with(seed=seed), short).multiples
+    assert lines
+    assert all(SLOWEST <= one <= 4.5 for one in lines)
