@@ -114,10 +114,14 @@ def _curves(one: LawSearch) -> tuple[list[Array], list[bool], list[int]]:
 
 def _basis(state: LawState, run: int) -> Array:
     """Basis of the curves over a state: splines, and its lags; of an angle its harmonics."""
+    none = np.zeros((len(state.values[run]), 0))  # an angle that hardly turns has no harmonics
     parts = [
-        factor.values(run)
-        for factor in factors(state)
-        if factor.function in {"delay", "lag", "turn", "play"}
+        none,
+        *(
+            factor.values(run)
+            for factor in factors(state)
+            if factor.function in {"delay", "lag", "turn", "play"}
+        ),
     ]
     if state.kind not in {"angle", "followed"}:
         parts.append(linear_splines(state.values[run], knots_of(state)))

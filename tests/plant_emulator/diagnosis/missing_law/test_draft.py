@@ -59,6 +59,25 @@ def test_a_bench_without_an_effect_gets_no_draft(
     assert (book.sketches, book.bound) == ((), None)
 
 
+def test_slow_logs_are_drafted_without_ripples_of_the_motor(
+    bench_log: Callable[[str], Log],
+) -> None:
+    """At 10 Hz the motor turns by several revolutions from one sample to the next."""
+    logs = [bench_log(f"bench_practice/practice_003/program{k}") for k in (1, 2)]
+    slow = [
+        replace(
+            log,
+            time=log.time[::10],
+            signals={name: own[::10].copy() for name, own in log.signals.items()},
+        )
+        for log in logs
+    ]
+    book = drafted(*slow)
+    assert book.bound is not None
+    best = book.sketches[0].law
+    assert best.quantity.place == "torque_sensor"  # the label: its lag of 0.1 s
+
+
 def test_ripple_of_the_torque_sensor_is_drawn_where_the_motor_turns_fast(
     bench_log: Callable[[str], Log],
 ) -> None:
