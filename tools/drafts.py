@@ -125,9 +125,12 @@ def separation(runs: Runs, found: Drafted) -> tuple[float, float] | None:
     model, last = build_model(recipe), len(runs.fitted)
     costs = []
     for one in (best, other):
-        states = [*one.states, model.initial_states(last, one.effects, one.values)]
-        costs.append(fit(model, one.effects, range(last + 1), one.values, states).cost)
-    return (other.cost - best.cost) / 2.0, (costs[1] - costs[0]) / 2.0
+        begun = fit(model, one.effects, range(last), one.values, one.states)
+        states = [*begun.states, model.initial_states(last, begun.effects, begun.values)]
+        ended = fit(model, begun.effects, range(last + 1), begun.values, states)
+        costs.append((begun.cost, ended.cost))
+    (before, after), (other_before, other_after) = costs
+    return (other_before - before) / 2.0, (other_after - after) / 2.0
 
 
 @click.group()

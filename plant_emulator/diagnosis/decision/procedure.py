@@ -147,18 +147,26 @@ class Procedure:
 
         Outliers are as random as a random effect. It counts only where it shows beside them too.
         """
-        tasks = [
-            Task(base=base, runs=self.runner.runs, effect=name)
-            for name in names
-            if self.runner.model.candidates[name].stochastic
+        own = [name for name in names if self.runner.model.candidates[name].stochastic]
+        found = [
+            one
+            for one in self._fit_components(self._beside_lines, base, own)
+            if one.consistent and one.evidence > EVIDENCE_THRESHOLD
         ]
-        found = list(self._beside_lines.map(fit_random_effect, tasks))
-        beside = self._cleared.map(fit_random_effect, tasks) if self.disturbances else found
+        if self.disturbances is None:
+            return found
+        beside = self._fit_components(self._cleared, base, [one.effect for one in found])
         return [
             one
             for one, other in zip(found, beside, strict=True)
-            if one.consistent and min(one.evidence, other.evidence) > EVIDENCE_THRESHOLD
+            if other.evidence > EVIDENCE_THRESHOLD
         ]
+
+    def _fit_components(
+        self, runner: TaskRunner, base: FitResult, names: Iterable[str]
+    ) -> list[VarianceComponent]:
+        tasks = [Task(base=base, runs=runner.runs, effect=name) for name in names]
+        return list(runner.map(fit_random_effect, tasks))
 
     def _check_consistency(self, explained: Explanation, decision: Decision) -> Decision:
         """Make the decision unknown where each run agrees with the equations, but not together."""

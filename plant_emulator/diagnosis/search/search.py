@@ -132,14 +132,18 @@ class Search:
         best = min(self.sets.values(), key=self._value)
         while len(best.effects) < most_effects:
             key = frozenset(best.effects)
-            if key in self.expanded or (best.effects and self._leaves_noise(best)):
+            if key in self.expanded or (best.effects and self._is_complete(best)):
                 break
             self.expanded.add(key)
             self._expand(best)
             before, best = best, self._settled()
-            if best is before or self._foreign(best):
+            if best is before:
                 break
         return best
+
+    def _is_complete(self, found: FitResult) -> bool:
+        """Whether no effect is worth adding to a set: it leaves noise, or the cause is foreign."""
+        return self._foreign(found) or self._leaves_noise(found)
 
     def _leaves_noise(self, found: FitResult) -> bool:
         """Whether a fit leaves only noise, and no predicted gain is large enough."""
