@@ -60,9 +60,11 @@ class Verdict:
     effects : the accepted effects
     classes : for each of them, the effects that these logs cannot tell from it, itself first
     parameters : the parameters that deviate from their nominal values
-    confidence : share of right answers among trial cases with this evidence; None: not known
+    confidence : probability that the verdict is right, by trials of known truth; None: not known
     statement : the verdict in one sentence
     next_experiment : the run that would decide what is open; None: nothing is open
+    log_odds, unexplained : what the confidence rests on, see `calibration.confidence`; None: the
+        machine has no confidence
     """
 
     kind: Kind
@@ -72,6 +74,8 @@ class Verdict:
     confidence: float | None
     statement: str
     next_experiment: str | None
+    log_odds: float | None = None
+    unexplained: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

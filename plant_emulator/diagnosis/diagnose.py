@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.answer import Answer, Logs
-from plant_emulator.diagnosis.calibration.confidence import confidence
+from plant_emulator.diagnosis.calibration.confidence import Standing, confidence
 from plant_emulator.diagnosis.decision import subsystem
 from plant_emulator.diagnosis.decision.procedure import Procedure
 from plant_emulator.diagnosis.design.next_experiment import Advice
 from plant_emulator.diagnosis.execution.pool import TaskRunner, build_model
 from plant_emulator.diagnosis.execution.progress import ReportingPool
-from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
+from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, unexplained
 from plant_emulator.diagnosis.fitting.fit_steps import simulate_once
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.prediction.gap import shows_shrinkage
@@ -96,6 +96,16 @@ class _Tests:
     def final(self) -> FitResult:
         """The fit with the accepted effects, the random ones included."""
         return with_random_effects(self.explained) if self.decision.effects else self.explained.null
+
+    @property
+    def standing(self) -> Standing:
+        """How the decision stands among the hypotheses."""
+        explained = self.explained
+        return Standing(
+            kind=self.decision.kind,
+            log_odds=explained.log_odds,
+            unexplained=unexplained(explained.final, explained.null),
+        )
 
     def reference(self, gaps: Gaps) -> Gap | None:
         """The gap that the decision closes a share of.
@@ -222,13 +232,15 @@ class Diagnose:
             gap.closed_fraction,
             location.subsystem,
         )
+        standing = tests.standing
         next_experiment = Advice(runner=tests.runner).next_experiment(
             tests.explained, tests.decision, location, [one.effect for one in hidden]
         )
         return verdict(
             tests.decision,
             classes=tests.explained.classes(),
-            confidence=self._confidence(tests),
+            confidence=None if self.cases is None else confidence(self.cases, standing),
+            standing=standing,
             sentence=sentence,
             next_experiment=next_experiment,
         )
@@ -256,19 +268,6 @@ class Diagnose:
             model_form_errors=self.model_form_errors,
         )
 
-    def _confidence(self, tests: _Tests) -> float | None:
-        if self.cases is None:
-            return None
-        return confidence(self.cases, tests.decision.kind, _evidence(tests))
-
     def _fixed_values(self, name: str) -> dict[str, float]:
         fixed = self.model.candidates[name].fixed
         return {key.removeprefix(f"{name}_"): value for key, value in fixed.items()}
-
-
-def _evidence(tests: _Tests) -> float:
-    """Evidence of the weakest accepted effect, or of the best one where none is accepted."""
-    explained = tests.explained
-    by_name = {one.effect: explained.evidence(one) for one in explained.hypotheses}
-    named = [by_name[name] for name in tests.decision.effects]
-    return min(named) if named else max(by_name.values(), default=0.0)

@@ -1,40 +1,81 @@
-"""The confidence in a verdict: how often one like it was right, among cases of known truth."""
+"""The confidence in a verdict: the probability that it is right, by trials of known truth.
+
+    log(p / (1 - p)) = a + b . x
+
+x are two features of an answer, and a and b are estimated from the cases of a trial that have a
+verdict of the same kind (logistic regression with Gaussian priors; C. M. Bishop, Pattern
+Recognition and Machine Learning, 2006, 4.5; as a calibration: J. Platt 1999). The posterior odds of
+the named set alone do not say how often such an answer is right: the laws of machines are not quite
+those of the library, and the noise of logs is not quite what the model takes it for.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+from scipy.optimize import minimize
+from scipy.special import expit
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from plant_emulator.signals.log import Array
+
+# Verdicts whose cases are counted together: neither names an effect, for the same reason.
+ALIKE = {"parameter": "none"}
+# Prior standard deviations: odds of 1 to 20 and 20 to 1 for the share of right answers, and a
+# feature that changes the odds by e a unit.
+PRIOR_STD = np.array([3.0, 1.0, 1.0])
+
 
 @dataclass(frozen=True, kw_only=True)
-class TrialVerdict:
-    """A verdict of a blind trial: its kind, its evidence, and whether it was right."""
+class Standing:
+    """How an answer stands among the hypotheses.
+
+    log_odds : of the named set against its best rival, in the mean square that it leaves [nats]
+    unexplained : what the named set leaves of the gap over what it may leave [1]; of a verdict that
+        names nothing, what the best set leaves
+    """
 
     kind: str
-    evidence: float
+    log_odds: float
+    unexplained: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrialVerdict(Standing):
+    """A verdict of a blind trial, and whether it was right."""
+
     right: bool
 
 
-# A share is taken of at least so many cases, if there are so many of a kind.
-FEWEST_CASES = 20
-
-
-def confidence(cases: Sequence[TrialVerdict], kind: str, evidence: float) -> float | None:
-    """Share of right verdicts of this kind with at least this evidence [1].
-
-    (right + 1) / (cases + 2)                                    (Laplace's rule of succession)
-
-    Few cases thus give no certainty. If fewer than FEWEST_CASES effects had so much evidence, the
-    FEWEST_CASES with the most count. The evidence of a verdict that names no effect says nothing:
-    all cases of its kind count.
-    None: there are no cases of this kind
-    """
-    same = sorted((c for c in cases if c.kind == kind), key=lambda c: -c.evidence)
+def confidence(cases: Sequence[TrialVerdict], answer: Standing) -> float | None:
+    """Probability that a verdict is right [1]; None: the trial had no such verdict."""
+    same = [one for one in cases if _group(one) == _group(answer)]
     if not same:
         return None
-    if kind == "effect":
-        same = [c for k, c in enumerate(same) if k < FEWEST_CASES or c.evidence >= evidence]
-    return (sum(c.right for c in same) + 1.0) / (len(same) + 2.0)
+    x = np.stack([_features(one) for one in same])
+    weights = _regress(x, np.array([one.right for one in same], float))
+    return float(expit(_features(answer) @ weights))
+
+
+def _group(answer: Standing) -> str:
+    return ALIKE.get(answer.kind, answer.kind)
+
+
+def _features(answer: Standing) -> Array:
+    """1 and the features: logarithms, because evidence grows with the length of the logs."""
+    return np.array([1.0, np.arcsinh(answer.log_odds), np.log1p(max(0.0, answer.unexplained))])
+
+
+def _regress(x: Array, right: Array) -> Array:
+    """Most probable weights of the features, shape (3,)."""
+
+    def loss(weights: Array) -> float:
+        logits = x @ weights
+        misfit = np.logaddexp(0.0, logits) - right * logits
+        return float(misfit.sum() + 0.5 * np.sum((weights / PRIOR_STD) ** 2))
+
+    return np.asarray(minimize(loss, np.zeros(x.shape[1])).x)

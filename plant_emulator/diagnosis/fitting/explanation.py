@@ -46,6 +46,7 @@ class Explanation:
     reduced_costs : for each of several accepted effects, the least cost of a fit without it
     trace : the search in its order
     noise : of every channel as the logs show it; empty where it is as declared
+    log_odds : of the final set against its best rival, in the mean square that it leaves [nats]
     """
 
     null: FitResult
@@ -53,6 +54,7 @@ class Explanation:
     hypotheses: tuple[Hypothesis, ...]
     alternatives: dict[str, dict[str, float]]
     unconverged: str
+    log_odds: float
     random_effects: tuple[VarianceComponent, ...] = ()
     reduced_costs: dict[str, float] = field(default_factory=dict)
     trace: tuple[SearchStep, ...] = ()

@@ -103,6 +103,8 @@ def _verdict(part: Mapping[str, Any]) -> Verdict:
         confidence=part["confidence"],
         statement=part["statement"],
         next_experiment=part["next_experiment"],
+        log_odds=part.get("log_odds"),
+        unexplained=part.get("unexplained"),
     )
 
 

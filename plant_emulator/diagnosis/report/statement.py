@@ -10,6 +10,7 @@ from plant_emulator.diagnosis.wording import in_words, percent, quantity
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from plant_emulator.diagnosis.calibration.confidence import Standing
     from plant_emulator.diagnosis.decision.verdict import Decision
     from plant_emulator.diagnosis.machine import Candidate
 
@@ -19,6 +20,7 @@ def verdict(
     *,
     classes: Sequence[Sequence[str]],
     confidence: float | None,
+    standing: Standing,
     sentence: str,
     next_experiment: str | None,
 ) -> Verdict:
@@ -40,6 +42,8 @@ def verdict(
         confidence=confidence,
         statement=sentence,
         next_experiment=next_experiment,
+        log_odds=standing.log_odds,
+        unexplained=standing.unexplained,
     )
 
 

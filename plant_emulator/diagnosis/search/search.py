@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from plant_emulator.diagnosis.answer import SearchStep
 from plant_emulator.diagnosis.execution.pool import build_model
 from plant_emulator.diagnosis.fitting.evidence import (
+    CLASS_MARGIN,
     EVIDENCE_THRESHOLD,
     NOISE_MEAN_SQUARE,
     UNEXPLAINED_SHARE,
@@ -288,6 +289,25 @@ class Search:
         (smaller,) = self._fits(refit, [self.sets[frozenset(best.effects) - {cheapest}]])
         return self._without_needless(smaller)
 
+    def _log_odds(self, final: FitResult) -> float:
+        """Log odds of a set against its best rival [nats], in the mean square that the set leaves.
+
+        A set that these logs cannot tell from it is no rival. The gain of an effect that was
+        screened beside the set, but not fitted, is the predicted one.
+        """
+        own, key = self._value(final), frozenset(final.effects)
+        rivals = [self._value(self.null)] if key else []
+        for names, one in self.sets.items():
+            alike = len(names) == len(key) == len(names & key) + 1 and (
+                evidence_of(one.cost - final.cost, final, self.null) < CLASS_MARGIN
+            )
+            if names != key and not alike:
+                rivals.append(self._value(one))
+        screened = self.promises.get(key, [])
+        larger = [p for p in screened if key | {p.effect} not in self.sets]
+        rivals += [own + self._needed(final) - p.gain for p in larger]
+        return (min(rivals, default=own) - own) / max(1.0, final.mean_square)
+
     def _explanation(self, final: FitResult) -> Explanation:
         (shown,) = self.runner.map(visibilities, [self._task(self.null)])
         return Explanation(
@@ -296,6 +316,7 @@ class Search:
             hypotheses=hypotheses(self.sets, shown),
             alternatives={name: alternatives(self.sets, final, name) for name in final.effects},
             unconverged=unconverged(final),
+            log_odds=self._log_odds(final),
             reduced_costs=self.reduced_costs if len(final.effects) > 1 else {},
             trace=tuple(self.trace),
             noise=self.noise.channels if self.noise else {},

@@ -17,7 +17,10 @@ def trial_cases() -> list[TrialVerdict]:
     """The cases of the blind trial that this version was calibrated with."""
     return [
         TrialVerdict(
-            kind=row["kind"], evidence=float(row["evidence"]), right=row["right"] == "True"
+            kind=row["kind"],
+            log_odds=float(row["log_odds"]),
+            unexplained=float(row["unexplained"]),
+            right=row["right"] == "True",
         )
         for row in _rows("calibration.csv")
     ]

@@ -120,6 +120,8 @@ def effect() -> dict[str, Any]:
             "(gear_oil_temperature); with it the model follows the held-out run to the noise.",
             "next_experiment": "drive program1 in reverse from a cold start: it separates "
             "gear_oil_temperature from friction_asymmetry",
+            "log_odds": 29.5,
+            "unexplained": 0.1,
         },
         "location": place(),
         "gap": {

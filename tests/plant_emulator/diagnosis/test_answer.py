@@ -44,6 +44,7 @@ def explanation(falls: dict[str, float], accepted: tuple[str, ...]) -> Explanati
         hypotheses=tuple(hypothesis(name, fall) for name, fall in falls.items()),
         alternatives={},
         unconverged="",
+        log_odds=0.0,
     )
 
 

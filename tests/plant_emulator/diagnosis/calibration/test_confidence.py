@@ -1,36 +1,53 @@
-"""The confidence of an answer, from cases of known truth; shares by hand."""
+"""The confidence of an answer, from cases of known truth."""
 
+from collections.abc import Sequence
+
+import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.calibration.confidence import FEWEST_CASES, TrialVerdict, confidence
+from plant_emulator.diagnosis.calibration.confidence import Standing, TrialVerdict, confidence
 
 
-def cases(kind: str, *rights: bool) -> list[TrialVerdict]:
-    """Cases of rising evidence 100, 200, ..."""
+def answer(log_odds: float, unexplained: float = 0.0, kind: str = "effect") -> Standing:
+    return Standing(kind=kind, log_odds=log_odds, unexplained=unexplained)
+
+
+def cases(kind: str, odds: Sequence[float], rights: Sequence[bool]) -> list[TrialVerdict]:
     return [
-        TrialVerdict(kind=kind, evidence=100.0 * (k + 1), right=right)
-        for k, right in enumerate(rights)
+        TrialVerdict(kind=kind, log_odds=float(one), unexplained=0.0, right=bool(right))
+        for one, right in zip(odds, rights, strict=True)
     ]
 
 
-def test_only_cases_of_at_least_the_evidence_count() -> None:
-    """30 cases, the 5 weakest wrong: from 501 on all 25 are right."""
-    known = cases("effect", *[False] * 5, *[True] * 25)
-    assert confidence(known, "effect", 501.0) == pytest.approx(26 / 27)
-    assert confidence(known, "effect", 1.0) == pytest.approx(26 / 32)
+def test_the_share_of_right_answers_is_the_confidence_where_all_stand_alike() -> None:
+    """400 cases, 300 right: three quarters, but for priors that 400 cases outweigh."""
+    known = cases("effect", np.zeros(400), np.arange(400) < 300)
+    assert confidence(known, answer(0.0)) == pytest.approx(0.75, abs=0.005)
 
 
-def test_evidence_beyond_most_cases_is_not_punished_for_their_number() -> None:
-    known = cases("effect", *[True] * 30)
-    assert confidence(known, "effect", 1e9) == pytest.approx(
-        (FEWEST_CASES + 1) / (FEWEST_CASES + 2)
+def test_answers_of_large_odds_have_the_larger_confidence() -> None:
+    """Drawn by the law log(p / (1 - p)) = -2 + asinh(odds), which is found again."""
+    random = np.random.default_rng(4)
+    odds = random.uniform(0.0, 100.0, 2000)
+    right = random.random(2000) < 1.0 / (1.0 + np.exp(2.0 - np.arcsinh(odds)))
+    known = cases("effect", odds, right.tolist())
+    for one in (0.5, 3.0, 30.0):
+        true = 1.0 / (1.0 + np.exp(2.0 - np.arcsinh(one)))
+        assert confidence(known, answer(one)) == pytest.approx(true, abs=0.05)
+
+
+def test_few_cases_give_no_certainty() -> None:
+    found = confidence(cases("unknown", [0.0, 0.0], [True, True]), answer(0.0, kind="unknown"))
+    assert found is not None
+    assert 0.5 < found < 0.95
+
+
+def test_other_parameters_and_nothing_are_counted_together() -> None:
+    known = cases("none", np.full(50, 10.0), [True] * 50)
+    assert confidence(known, answer(10.0, kind="parameter")) == confidence(
+        known, answer(10.0, kind="none")
     )
 
 
-def test_evidence_of_a_verdict_without_a_name_says_nothing() -> None:
-    known = cases("unknown", True, True, False)
-    assert confidence(known, "unknown", 1e9) == confidence(known, "unknown", 0.0) == 3 / 5
-
-
-def test_kind_without_cases_has_no_confidence() -> None:
-    assert confidence(cases("none", True), "effect", 100.0) is None
+def test_a_verdict_that_no_trial_had_has_no_confidence() -> None:
+    assert confidence(cases("none", [1.0], [True]), answer(1.0)) is None

@@ -175,6 +175,7 @@ def explanation(model: Slope) -> Explanation:
         hypotheses=tuple(hypotheses),
         alternatives={"square": costs},
         unconverged="",
+        log_odds=0.0,
     )
 
 
@@ -290,7 +291,9 @@ def test_bench_names_the_program_that_has_what_an_effect_needs():
         standard_errors={},
         converged=True,
     )
-    explained = Explanation(null=null, final=null, hypotheses=(), alternatives={}, unconverged="")
+    explained = Explanation(
+        null=null, final=null, hypotheses=(), alternatives={}, unconverged="", log_odds=0.0
+    )
     nothing = Decision(kind="none", effects=(), deviations=(), reason="")
     asked = Advice(runner=TaskRunner(pool=InProcess(), recipe=recipe, model=model, runs=(0, 1, 2)))
     for hidden, program in (("wheel_slip", "program6"), ("integrator_windup", "program4 (60 s")):
