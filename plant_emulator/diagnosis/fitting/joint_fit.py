@@ -90,12 +90,14 @@ def fit(
     near: Estimate | None = None,
     *,
     shrinkage: bool = False,
+    over_kinks: bool = True,
 ) -> FitResult:
     """Fit parameters, states and these effects to these runs, from these start values.
 
     iterations : at most so many; None: as many as `estimate` allows
     near : an estimate of the same runs; slopes of its unknowns follow by secants, see `estimate`
     shrinkage : see `joint_unknowns`
+    over_kinks : whether a fit from far off, without `near`, is led over the kinks of its cost
     """
     unknowns = with_starts(
         joint_unknowns(model, effects, runs, shrinkage=shrinkage), values, states
@@ -108,7 +110,7 @@ def fit(
         iterations=iterations,
         follow=near,
     )
-    if near is None:
+    if near is None and over_kinks:
         rough = [model.rough().residual(k, effects) for k in runs]
         found = _led_over_kinks(found, residuals, rough, iterations)
     reached = to_result(effects, found, len(runs))

@@ -2,15 +2,19 @@
 
 Every draft is an effect of the model by now. A fit starts where the regression with the law lies,
 with the states of the fit without effects, and from the nominal parameters: the fit without effects
-may have bent parameters and states to the gap. A few rough iterations tell the better start. A law
-that explains no part of the runs that it is fitted to predicts none of the others, and is not
-followed further. The shares count in the noise that the best draft leaves.
+may have bent parameters and states to the gap. A start that leaves far more than no law at all is
+none: far from the data a regression may tell a law that makes the machine unstable. A few rough
+iterations tell the better start. A law that explains no part of the runs that it is fitted to
+predicts none of the others, and is not followed further. The shares count in the noise that the
+best draft leaves.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from plant_emulator.diagnosis.execution.pool import build_model
 from plant_emulator.diagnosis.fitting.fit_steps import refit
@@ -42,6 +46,8 @@ if TYPE_CHECKING:
 WORTH_A_TERM = 0.02
 # Share of what the best law explains from which on another law is followed.
 RIVAL_SHARE = 0.5
+# Times the squares that the fit without a law leaves, up to which a start is one.
+FAR_OFF = 2.0
 # Iterations after which a start shows whether the law explains a part of the runs.
 ROUGH_ITERATIONS = 4
 
@@ -87,12 +93,21 @@ class LawResult:
 
 
 def try_law(model: Model, law: DraftedLaw) -> FitResult:
-    """Fit a draft roughly to all runs, and give the better one of its starts (a task)."""
+    """Fit a draft roughly to all runs, and give the better one of its starts (a task).
+
+    Where there is no start, the fit without effects is given: such a law explains nothing.
+    """
     nominal = {**law.null.values, **model.nominal(law.runs)}
     told = {**law.null.values, **law.values}
     starts = [(told, law.null.states), (nominal, [{} for _ in law.runs])]
-    trials = [_fit_from_start(model.rough(), law, *start) for start in starts]
-    return min(trials, key=lambda found: found.cost)
+    rough = model.rough()
+    limit = FAR_OFF * law.null.sum_of_squares
+    trials = [
+        _fit_from_start(rough, law, values, states)
+        for values, states in starts
+        if _squares_at(rough, law, values) < limit
+    ]
+    return min(trials, key=lambda found: found.cost, default=law.null)
 
 
 def finish_law(model: Model, trial: tuple[DraftedLaw, FitResult]) -> FitResult:
@@ -113,6 +128,19 @@ def laws_to_follow(trials: Sequence[FitResult], null: FitResult) -> list[bool]:
         explains(one, null) and null.mean_square - one.mean_square >= RIVAL_SHARE * most
         for one in trials
     ]
+
+
+def _squares_at(model: Model, law: DraftedLaw, start: Mapping[str, float]) -> float:
+    """Sum of squares that a start leaves in the states of the fit without effects."""
+    candidate = model.candidates[law.effect]
+    own = {u.name: u.start for u in (*candidate.sizes, *candidate.shapes, *candidate.states)}
+    told = law.states or [{} for _ in law.runs]
+    total = 0.0
+    for run, known, phases in zip(law.runs, law.null.states, told, strict=True):
+        named = {f"{law.effect}_{name}": value for name, value in phases.items()}
+        residual = model.residual(run, (law.effect,))({**start, **own, **known, **named})
+        total += float(np.sum(residual**2))
+    return total
 
 
 def _fit_from_start(
@@ -136,7 +164,7 @@ def _fit_from_start(
         }
         for run, known, phases in zip(law.runs, known_states, told, strict=True)
     ]
-    return fit(model, effects, law.runs, values, states, ROUGH_ITERATIONS)
+    return fit(model, effects, law.runs, values, states, ROUGH_ITERATIONS, over_kinks=False)
 
 
 def compare_laws(runner: TaskRunner, plan: Plan, laws: Sequence[DraftedLaw]) -> list[LawResult]:

@@ -1,9 +1,17 @@
 """Which tested laws become drafts."""
 
+import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.fit_result import FitResult
-from plant_emulator.diagnosis.missing_law.hypothesis_test import LawResult, laws_to_follow
+from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.missing_law.hypothesis_test import (
+    DraftedLaw,
+    LawResult,
+    laws_to_follow,
+    try_law,
+)
+from tests.plant_emulator.diagnosis.line import TIME, Line, effect, noisy
 
 
 def fitted(mean_square: float) -> FitResult:
@@ -56,3 +64,18 @@ def test_draft_closes_a_certain_part_of_the_gap_worth_its_terms(
         traces=(),
     )
     assert result.is_draft(terms) is expected
+
+
+@pytest.mark.parametrize(("told", "fitted"), [(1.0, True), (6.0, False), (30.0, False)])
+def test_law_whose_start_leaves_far_more_than_no_law_starts_no_fit(
+    told: float, *, fitted: bool
+) -> None:
+    """By hand, in parts of 2000 samples: a wave of 1 leaves 1 + 1 / 2 without a law.
+
+    From a start of 6 it leaves 1 + 25 / 2, more than twice that, and from one of 1 the noise.
+    """
+    model = Line([noisy(2.0 + 3.0 * TIME + np.sin(20.0 * TIME))], ["wave"])
+    model.candidates["wave"] = effect("wave", told)
+    null = fit_null(model, [0])
+    found = try_law(model, DraftedLaw(effect="wave", values={}, null=null, runs=(0,)))
+    assert (found is not null) is fitted

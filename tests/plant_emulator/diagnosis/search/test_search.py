@@ -48,6 +48,17 @@ def test_both_of_two_effects_are_named() -> None:
     assert adequate(found.final, found.null)
 
 
+def test_odds_of_a_set_are_those_against_its_best_rival() -> None:
+    """By hand: a wave of size A takes n A^2 / 4 from half the squares, of which the first effect
+    needs 15. One more effect than the wave needs 30 and gains next to nothing. Where nothing acts,
+    the best effect lacks up to 15.
+    """
+    for size, odds in ((0.3, 0.09 * 500 - 15), (3.0, 30.0)):
+        found = explained(Line([noisy(2.0 + 3.0 * TIME + size * np.sin(20.0 * TIME))]))
+        assert found.log_odds == pytest.approx(odds, abs=10.0)
+    assert 5.0 < explained(Line([noisy(2.0 + 3.0 * TIME)])).log_odds < 16.0
+
+
 def test_sets_that_another_noise_may_put_first_are_kept_in_each_size() -> None:
     """Two effects that tie alone are both kept, though a set of two has the least cost."""
     null = fit_null(Line([noisy(2.0 + 3.0 * TIME)]), (0,))
