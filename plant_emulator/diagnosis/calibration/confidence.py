@@ -18,6 +18,8 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.special import expit
 
+from plant_emulator.diagnosis.search.settings import SETTINGS
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -66,8 +68,16 @@ def _group(answer: Standing) -> str:
 
 
 def _features(answer: Standing) -> Array:
-    """1 and the features: logarithms, because evidence grows with the length of the logs."""
-    return np.array([1.0, np.arcsinh(answer.log_odds), np.log1p(max(0.0, answer.unexplained))])
+    """1 and the features: logarithms, because evidence grows with the length of the logs.
+
+    The best rival of an answer that tells all is the same with one more effect, which gains nothing
+    and needs its gain. Smaller odds say that a rival is near, other ones that noise is not all that
+    is left.
+    """
+    complete = SETTINGS.needed_again if answer.kind == "effect" else SETTINGS.needed
+    return np.array(
+        [1.0, np.log1p(abs(complete - answer.log_odds)), np.log1p(max(0.0, answer.unexplained))]
+    )
 
 
 def _regress(x: Array, right: Array) -> Array:

@@ -25,14 +25,14 @@ def test_the_share_of_right_answers_is_the_confidence_where_all_stand_alike() ->
     assert confidence(known, answer(0.0)) == pytest.approx(0.75, abs=0.005)
 
 
-def test_answers_of_large_odds_have_the_larger_confidence() -> None:
-    """Drawn by the law log(p / (1 - p)) = -2 + asinh(odds), which is found again."""
+def test_answers_whose_rival_is_one_needless_effect_more_have_the_larger_confidence() -> None:
+    """Drawn by the law log(p / (1 - p)) = 3 - log(1 + |30 - odds|), which is found again."""
     random = np.random.default_rng(4)
-    odds = random.uniform(0.0, 100.0, 2000)
-    right = random.random(2000) < 1.0 / (1.0 + np.exp(2.0 - np.arcsinh(odds)))
-    known = cases("effect", odds, right.tolist())
-    for one in (0.5, 3.0, 30.0):
-        true = 1.0 / (1.0 + np.exp(2.0 - np.arcsinh(one)))
+    odds = random.uniform(0.0, 60.0, 4000)
+    share = 1.0 / (1.0 + np.exp(np.log1p(np.abs(30.0 - odds)) - 3.0))
+    known = cases("effect", odds, (random.random(4000) < share).tolist())
+    for one in (0.0, 25.0, 30.0, 50.0):
+        true = 1.0 / (1.0 + np.exp(np.log1p(abs(30.0 - one)) - 3.0))
         assert confidence(known, answer(one)) == pytest.approx(true, abs=0.05)
 
 
