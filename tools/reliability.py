@@ -73,6 +73,8 @@ def summary(one: Sequence[tuple[float, bool]]) -> tuple[float, float, float, flo
 def main(table: Path | None, picture: Path | None) -> None:
     """Print the share of right answers of TABLE by confidence, and the Brier score."""
     told = sorted(of_trial(table) if table else of_calibration())
+    if len(told) < BINS:
+        raise click.ClickException(f"{len(told)} cases have a confidence; {BINS} are needed")
     bins = [[told[k] for k in part] for part in np.array_split(np.arange(len(told)), BINS)]
     for one in bins:
         mean, share, low, high = summary(one)

@@ -49,7 +49,7 @@ class CaseResult:
     closed_fraction : of the answer; closed_fraction_true : against the noise-free logs
     seconds : duration of the case; error : last line of a failed diagnosis
     dirt : kind of dirt of its logs; empty: they are clean
-    log_odds, unexplained : how the answer stands, see `diagnosis.calibration.confidence`
+    log_odds : how the answer stands, see `diagnosis.calibration.confidence`
     """
 
     case: int
@@ -77,7 +77,6 @@ class CaseResult:
     error: str = ""
     dirt: str = ""
     log_odds: float | None = None
-    unexplained: float | None = None
 
     def to_json(self) -> dict[str, Any]:
         """The result as JSON types; `classes` has the key "class"."""

@@ -190,7 +190,6 @@ def score(
         evidence=weakest_evidence(unsealed),
         confidence=answer.verdict.confidence if answer else None,
         log_odds=answer.verdict.log_odds if answer else None,
-        unexplained=answer.verdict.unexplained if answer else None,
         right=is_right(unsealed),
         top1=sorted(unsealed.named) == sorted(h.effect for h in case.hidden),
         false_alarm=is_false_alarm(unsealed),

@@ -53,13 +53,9 @@ def cases(results: Sequence[CaseResult]) -> str:
 
 
 def evidence_table(results: Sequence[CaseResult]) -> str:
-    """CSV text with verdict, its standing and correctness of every case that has an answer."""
-    rows = [
-        [one.verdict, one.log_odds, one.unexplained, one.right]
-        for one in results
-        if one.log_odds is not None
-    ]
-    return _text(("kind", "log_odds", "unexplained", "right"), rows)
+    """CSV text with verdict, log odds and correctness of every case that has an answer."""
+    rows = [[one.verdict, one.log_odds, one.right] for one in results if one.log_odds is not None]
+    return _text(("kind", "log_odds", "right"), rows)
 
 
 def _text(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:

@@ -63,8 +63,8 @@ class Verdict:
     confidence : probability that the verdict is right, by trials of known truth; None: not known
     statement : the verdict in one sentence
     next_experiment : the run that would decide what is open; None: nothing is open
-    log_odds, unexplained : what the confidence rests on, see `calibration.confidence`; None: the
-        machine has no confidence
+    log_odds : what the confidence rests on, see `calibration.confidence`; None: of an axis, or of
+        an older file
     """
 
     kind: Kind
@@ -75,7 +75,6 @@ class Verdict:
     statement: str
     next_experiment: str | None
     log_odds: float | None = None
-    unexplained: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,7 +18,7 @@ from plant_emulator.diagnosis.decision.procedure import Procedure
 from plant_emulator.diagnosis.design.next_experiment import Advice
 from plant_emulator.diagnosis.execution.pool import TaskRunner, build_model
 from plant_emulator.diagnosis.execution.progress import ReportingPool
-from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, unexplained
+from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.fit_steps import simulate_once
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.prediction.gap import shows_shrinkage
@@ -100,12 +100,7 @@ class _Tests:
     @property
     def standing(self) -> Standing:
         """How the decision stands among the hypotheses."""
-        explained = self.explained
-        return Standing(
-            kind=self.decision.kind,
-            log_odds=explained.log_odds,
-            unexplained=unexplained(explained.final, explained.null),
-        )
+        return Standing(kind=self.decision.kind, log_odds=self.explained.log_odds)
 
     def reference(self, gaps: Gaps) -> Gap | None:
         """The gap that the decision closes a share of.

@@ -1,8 +1,8 @@
 """The confidence in a verdict: the probability that it is right, by trials of known truth.
 
-    log(p / (1 - p)) = a + b . x
+    log(p / (1 - p)) = a + b x
 
-x are two features of an answer, and a and b are estimated from the cases of a trial that have a
+x is a feature of an answer, and a and b are estimated from the cases of a trial that have a
 verdict of the same kind (logistic regression with Gaussian priors; C. M. Bishop, Pattern
 Recognition and Machine Learning, 2006, 4.5; as a calibration: J. Platt 1999). The posterior odds of
 the named set alone do not say how often such an answer is right: the laws of machines are not quite
@@ -28,22 +28,20 @@ if TYPE_CHECKING:
 # Verdicts whose cases are counted together: neither names an effect, for the same reason.
 ALIKE = {"parameter": "none"}
 # Prior standard deviations: odds of 1 to 20 and 20 to 1 for the share of right answers, and a
-# feature that changes the odds by e a unit.
-PRIOR_STD = np.array([3.0, 1.0, 1.0])
+# feature that changes them by e a unit.
+PRIOR_STD = np.array([3.0, 1.0])
 
 
 @dataclass(frozen=True, kw_only=True)
 class Standing:
     """How an answer stands among the hypotheses.
 
-    log_odds : of the named set against its best rival, in the mean square that it leaves [nats]
-    unexplained : what the named set leaves of the gap over what it may leave [1]; of a verdict that
-        names nothing, what the best set leaves
+    log_odds : of the named set against its best rival, in the mean square that it leaves [nats]; of
+        a verdict that names nothing, those of the best set
     """
 
     kind: str
     log_odds: float
-    unexplained: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,20 +66,19 @@ def _group(answer: Standing) -> str:
 
 
 def _features(answer: Standing) -> Array:
-    """1 and the features: logarithms, because evidence grows with the length of the logs.
+    """1 and the feature, a logarithm, because evidence grows with the length of the logs.
 
     The best rival of an answer that tells all is the same with one more effect, which gains nothing
-    and needs its gain. Smaller odds say that a rival is near, other ones that noise is not all that
-    is left.
+    and needs its gain. Smaller odds say that a rival is near. Odds far above say that no other
+    effect was asked for beside the set, and negative ones that the set is not the best: both where
+    more than noise is left.
     """
     complete = SETTINGS.needed_again if answer.kind == "effect" else SETTINGS.needed
-    return np.array(
-        [1.0, np.log1p(abs(complete - answer.log_odds)), np.log1p(max(0.0, answer.unexplained))]
-    )
+    return np.array([1.0, np.log1p(abs(complete - answer.log_odds))])
 
 
 def _regress(x: Array, right: Array) -> Array:
-    """Most probable weights of the features, shape (3,)."""
+    """Most probable weights of the features, shape (2,)."""
 
     def loss(weights: Array) -> float:
         logits = x @ weights

@@ -60,16 +60,7 @@ def leaves_little(found: FitResult, gap: float) -> bool:
 
     gap : sum of squares beyond the noise without the cause [chi squared]
     """
-    return excess(found) <= _may_leave(gap)
-
-
-def unexplained(found: FitResult, null: FitResult) -> float:
-    """What a fit leaves of the gap without effects, over what an adequate one may leave [1]."""
-    return excess(found) / _may_leave(excess(null))
-
-
-def _may_leave(gap: float) -> float:
-    return max(UNEXPLAINED_SHARE * gap, EVIDENCE_THRESHOLD)
+    return excess(found) <= max(UNEXPLAINED_SHARE * gap, EVIDENCE_THRESHOLD)
 
 
 def adequate(found: FitResult, null: FitResult) -> bool:

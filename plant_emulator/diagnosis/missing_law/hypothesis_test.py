@@ -118,7 +118,7 @@ def finish_law(model: Model, trial: tuple[DraftedLaw, FitResult]) -> FitResult:
 
 def explains(found: FitResult, null: FitResult) -> bool:
     """Whether a fit with a law leaves a worthwhile part less than the fit without one."""
-    return null.mean_square - found.mean_square > WORTH_A_TERM * (null.mean_square - 1.0)
+    return null.mean_square - found.mean_square > WORTH_A_TERM * max(0.0, null.mean_square - 1.0)
 
 
 def laws_to_follow(trials: Sequence[FitResult], null: FitResult) -> list[bool]:
@@ -131,14 +131,15 @@ def laws_to_follow(trials: Sequence[FitResult], null: FitResult) -> list[bool]:
 
 
 def _squares_at(model: Model, law: DraftedLaw, start: Mapping[str, float]) -> float:
-    """Sum of squares that a start leaves in the states of the fit without effects."""
-    candidate = model.candidates[law.effect]
-    own = {u.name: u.start for u in (*candidate.sizes, *candidate.shapes, *candidate.states)}
-    told = law.states or [{} for _ in law.runs]
+    """Sum of squares that a start leaves in the states of the fit without effects.
+
+    To scan for the states of a run would take long where the law makes the machine unstable.
+    """
+    values, phases = _of_law(model, law, start)
+    own = {u.name: u.start for u in model.candidates[law.effect].states}
     total = 0.0
-    for run, known, phases in zip(law.runs, law.null.states, told, strict=True):
-        named = {f"{law.effect}_{name}": value for name, value in phases.items()}
-        residual = model.residual(run, (law.effect,))({**start, **own, **known, **named})
+    for run, known, told in zip(law.runs, law.null.states, phases, strict=True):
+        residual = model.residual(run, (law.effect,))({**values, **own, **known, **told})
         total += float(np.sum(residual**2))
     return total
 
@@ -150,21 +151,27 @@ def _fit_from_start(
     known_states: Sequence[Mapping[str, float]],
 ) -> FitResult:
     """A few iterations; known_states : of each run at the start, others follow from the values."""
+    values, phases = _of_law(model, law, start)
+    effects = (law.effect,)
+    states = [
+        {**model.initial_states(run, effects, values), **known, **told}
+        for run, known, told in zip(law.runs, known_states, phases, strict=True)
+    ]
+    return fit(model, effects, law.runs, values, states, ROUGH_ITERATIONS, over_kinks=False)
+
+
+def _of_law(
+    model: Model, law: DraftedLaw, start: Mapping[str, float]
+) -> tuple[dict[str, float], list[dict[str, float]]]:
+    """Values with the law at a start, and the law's states of each run as far as they are told."""
     candidate = model.candidates[law.effect]
     own = {u.name: u.start for u in (*candidate.sizes, *candidate.shapes)}
     known = {name: value for name, value in start.items() if name in law.null.values}
-    values = {**known, **own}
-    effects = (law.effect,)
-    told = law.states or [{} for _ in law.runs]
-    states = [
-        {
-            **model.initial_states(run, effects, values),
-            **known,
-            **{f"{law.effect}_{name}": value for name, value in phases.items()},
-        }
-        for run, known, phases in zip(law.runs, known_states, told, strict=True)
+    told = [
+        {f"{law.effect}_{name}": value for name, value in phases.items()}
+        for phases in law.states or [{} for _ in law.runs]
     ]
-    return fit(model, effects, law.runs, values, states, ROUGH_ITERATIONS, over_kinks=False)
+    return {**known, **own}, told
 
 
 def compare_laws(runner: TaskRunner, plan: Plan, laws: Sequence[DraftedLaw]) -> list[LawResult]:

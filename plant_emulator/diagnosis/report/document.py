@@ -104,7 +104,6 @@ def _verdict(part: Mapping[str, Any]) -> Verdict:
         statement=part["statement"],
         next_experiment=part["next_experiment"],
         log_odds=part.get("log_odds"),
-        unexplained=part.get("unexplained"),
     )
 
 

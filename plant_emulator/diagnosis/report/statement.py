@@ -43,7 +43,6 @@ def verdict(
         statement=sentence,
         next_experiment=next_experiment,
         log_odds=standing.log_odds,
-        unexplained=standing.unexplained,
     )
 
 

@@ -11,10 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.answer import SearchStep
 from plant_emulator.diagnosis.execution.pool import build_model
 from plant_emulator.diagnosis.fitting.evidence import (
-    CLASS_MARGIN,
     EVIDENCE_THRESHOLD,
     NOISE_MEAN_SQUARE,
     UNEXPLAINED_SHARE,
@@ -33,13 +31,16 @@ from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.summary import (
     alternatives,
     hypotheses,
+    log_odds,
     not_told_apart,
+    search_step,
     unconverged,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
+    from plant_emulator.diagnosis.answer import SearchStep
     from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model
@@ -114,7 +115,7 @@ class Search:
         self.sets = {}
         self._fits(advance, kept)
         self.null = self.sets[frozenset()]
-        self.trace.append(self._step("noise estimated", where))
+        self.trace.append(search_step(self.null, "noise estimated", where))
         return True
 
     def _task(self, base: FitResult) -> Task:
@@ -133,7 +134,7 @@ class Search:
         best = min(self.sets.values(), key=self._value)
         while len(best.effects) < most_effects:
             key = frozenset(best.effects)
-            if key in self.expanded or (best.effects and self._is_complete(best)):
+            if key in self.expanded or (best.effects and self._is_last(best)):
                 break
             self.expanded.add(key)
             self._expand(best)
@@ -142,12 +143,10 @@ class Search:
                 break
         return best
 
-    def _is_complete(self, found: FitResult) -> bool:
-        """Whether no effect is worth adding to a set: it leaves noise, or the cause is foreign."""
-        return self._foreign(found) or self._leaves_noise(found)
-
-    def _leaves_noise(self, found: FitResult) -> bool:
-        """Whether a fit leaves only noise, and no predicted gain is large enough."""
+    def _is_last(self, found: FitResult) -> bool:
+        """Whether no effect is worth adding: the cause is foreign, or only noise is left."""
+        if self._foreign(found):
+            return True
         most = max((p.gain for p in self._screen(found)), default=0.0)
         return found.mean_square <= NOISE_MEAN_SQUARE and most <= self._needed(found)
 
@@ -194,20 +193,8 @@ class Search:
         found = list(self.runner.map(confirm, trials))
         for promise, one in zip(promises, found, strict=True):
             self._keep(one)
-            self.trace.append(self._step("confirmed", one, promise.gains))
+            self.trace.append(search_step(self.null, "confirmed", one, promise.gains))
         return found
-
-    def _step(
-        self, action: str, found: FitResult, promised: Mapping[str, float] | None = None
-    ) -> SearchStep:
-        """A step that ended in this fit."""
-        return SearchStep(
-            action=action,
-            effects=found.effects,
-            promised=dict(promised or {}),
-            gain=0.5 * (self.null.cost - found.cost),
-            mean_square=found.mean_square,
-        )
 
     def _keep(self, found: FitResult) -> None:
         """Keep a fit if it is the best one of its set."""
@@ -243,7 +230,7 @@ class Search:
                 return best
             for one in self._fits(refit, near):
                 done.add(frozenset(one.effects))
-                self.trace.append(self._step("converged", one))
+                self.trace.append(search_step(self.null, "converged", one))
             if not self.restarted:
                 self.restarted = True
                 self._restart_null(best)
@@ -290,23 +277,12 @@ class Search:
         return self._without_needless(smaller)
 
     def _log_odds(self, final: FitResult) -> float:
-        """Log odds of a set against its best rival [nats], in the mean square that the set leaves.
-
-        A set that these logs cannot tell from it is no rival. The gain of an effect that was
-        screened beside the set, but not fitted, is the predicted one.
-        """
-        own, key = self._value(final), frozenset(final.effects)
-        rivals = [self._value(self.null)] if key else []
-        for names, one in self.sets.items():
-            alike = len(names) == len(key) == len(names & key) + 1 and (
-                evidence_of(one.cost - final.cost, final, self.null) < CLASS_MARGIN
-            )
-            if names != key and not alike:
-                rivals.append(self._value(one))
-        screened = self.promises.get(key, [])
-        larger = [p for p in screened if key | {p.effect} not in self.sets]
-        rivals += [own + self._needed(final) - p.gain for p in larger]
-        return (min(rivals, default=own) - own) / max(1.0, final.mean_square)
+        """Log odds of a set against its best rival; see `summary.log_odds`."""
+        screened = self.promises.get(frozenset(final.effects), [])
+        price = SETTINGS.needed_again if final.effects or self.random_evidence else SETTINGS.needed
+        values = {key: self._value(one) for key, one in self.sets.items()}
+        larger = {p.effect: price - p.gain for p in screened}
+        return log_odds(self.sets, values, final, larger)
 
     def _explanation(self, final: FitResult) -> Explanation:
         (shown,) = self.runner.map(visibilities, [self._task(self.null)])

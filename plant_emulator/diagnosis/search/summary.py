@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from plant_emulator.diagnosis.answer import SearchStep
+from plant_emulator.diagnosis.fitting.evidence import CLASS_MARGIN, evidence_of
 from plant_emulator.diagnosis.fitting.explanation import Hypothesis
 from plant_emulator.diagnosis.search.settings import SETTINGS
 
@@ -44,6 +46,45 @@ def alternatives(sets: Sets, final: FitResult, name: str) -> dict[str, float]:
         for key, one in sets.items()
         if len(key) == len(final.effects) and key >= others
     }
+
+
+def log_odds(
+    sets: Sets,
+    values: Mapping[frozenset[str], float],
+    final: FitResult,
+    larger: Mapping[str, float],
+) -> float:
+    """Log odds of a set against its best rival [nats], in the mean square that the set leaves.
+
+    A set that these logs cannot tell from it is no rival. Sets that the search has dropped are not
+    known any more.
+
+    values : negative log evidence of each set
+    larger : by how much it rises with one more effect, as predicted; of an effect that was screened
+        beside the set
+    """
+    key, null = frozenset(final.effects), sets[frozenset()]
+    rivals = [price for name, price in larger.items() if key | {name} not in sets]
+    for names, one in sets.items():
+        alike = len(names) == len(key) == len(names & key) + 1 and (
+            evidence_of(one.cost - final.cost, final, null) < CLASS_MARGIN
+        )
+        if names != key and not alike:
+            rivals.append(values[names] - values[key])
+    return min(rivals, default=0.0) / max(1.0, final.mean_square)
+
+
+def search_step(
+    null: FitResult, action: str, found: FitResult, promised: Mapping[str, float] | None = None
+) -> SearchStep:
+    """A step of the search that ended in this fit."""
+    return SearchStep(
+        action=action,
+        effects=found.effects,
+        promised=dict(promised or {}),
+        gain=0.5 * (null.cost - found.cost),
+        mean_square=found.mean_square,
+    )
 
 
 def unconverged(final: FitResult) -> str:

@@ -19,7 +19,6 @@ def trial_cases() -> list[TrialVerdict]:
         TrialVerdict(
             kind=row["kind"],
             log_odds=float(row["log_odds"]),
-            unexplained=float(row["unexplained"]),
             right=row["right"] == "True",
         )
         for row in _rows("calibration.csv")

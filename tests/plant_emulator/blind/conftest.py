@@ -61,5 +61,5 @@ def finished(number: int, *, right: bool) -> CaseResult:
         verdict="none" if right else "unknown", effects=(), classes=(), answered="none",
         evidence=3.0, confidence=None, right=right, top1=False, false_alarm=not right,
         subsystem=None, located=False, closed_fraction=None, closed_fraction_ci95=None,
-        closed_fraction_true=None, sizes=(), seconds=1.0, log_odds=12.0, unexplained=0.5,
+        closed_fraction_true=None, sizes=(), seconds=1.0, log_odds=12.0,
     )  # fmt: skip

@@ -43,7 +43,7 @@ def answer(
     verdict = Verdict(
         kind=kind, effects=effects, confidence=0.9, parameters=(), statement="",
         classes=tuple(map(tuple, classes or [[name] for name in effects])), next_experiment=None,
-        log_odds=12.0, unexplained=0.5,
+        log_odds=12.0,
     )  # fmt: skip
     gap = HeldOutGap(
         nominal={}, recalibrated={}, explained={}, noise_floor={}, closed_fraction=0.97,
@@ -199,7 +199,7 @@ def test_detail_of_a_case_has_the_keys_of_its_schema(results: tuple[CaseResult, 
         "case", "kind", "truth", "hidden", "programs", "detectable", "verdict", "effects", "class",
         "answered", "evidence", "confidence", "right", "top1", "false_alarm", "subsystem",
         "located", "closed_fraction", "closed_fraction_ci95", "closed_fraction_true", "sizes",
-        "seconds", "error", "dirt", "log_odds", "unexplained",
+        "seconds", "error", "dirt", "log_odds",
     ]  # fmt: skip
 
 
@@ -229,5 +229,5 @@ def test_spreadsheet_has_a_line_a_case_and_calibration_a_pair_an_answer(
 ) -> None:
     assert len(table.cases(results).splitlines()) == 6
     assert table.evidence_table(results).splitlines()[:3] == [
-        "kind,log_odds,unexplained,right", "none,12.0,0.5,True", "effect,12.0,0.5,False",
+        "kind,log_odds,right", "none,12.0,True", "effect,12.0,False",
     ]  # fmt: skip

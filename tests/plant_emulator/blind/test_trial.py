@@ -109,7 +109,7 @@ def test_a_finished_case_is_not_repeated(folder: Path) -> None:
     assert (found["cases"], found["correct"], found["false_alarms"]) == (2, 1, 1)
     assert len((folder / "cases.csv").read_text().splitlines()) == 3
     assert (folder / "evidence.csv").read_text() == (
-        "kind,log_odds,unexplained,right\nnone,12.0,0.5,True\nunknown,12.0,0.5,False\n"
+        "kind,log_odds,right\nnone,12.0,True\nunknown,12.0,False\n"
     )
 
 

@@ -121,7 +121,6 @@ def effect() -> dict[str, Any]:
             "next_experiment": "drive program1 in reverse from a cold start: it separates "
             "gear_oil_temperature from friction_asymmetry",
             "log_odds": 29.5,
-            "unexplained": 0.1,
         },
         "location": place(),
         "gap": {

@@ -124,7 +124,7 @@ def test_verdict_place_and_shrinkage_stand_first():
         "Effect found",
         "gear (81 % of the residual), armature current in field weakening: 1.25 A, noise 0.25 A",
         "98 % (95 % interval 96 % to 99 %)",
-        "98 %: share of such answers that were right",
+        "98 %: probability that it is right",
         "2 logs fitted, 1 log held out",
         "Next experiment: drive program1 in reverse from a cold start",
     ):

@@ -31,7 +31,7 @@ FORM: dict[str, Any] = {
         "parameters": [{"name": NAME, "nominal": Real, "estimated": Real, "standard_error": Real,
                         "unit": NAME}],
         "confidence": (Real, None), "statement": NAME, "next_experiment": (NAME, None),
-        "log_odds": (Real, None), "unexplained": (Real, None),
+        "log_odds": (Real, None),
     },
     "location": {
         "subsystem": (NAME, None), "channel": (NAME, None), "phase": (NAME, None),

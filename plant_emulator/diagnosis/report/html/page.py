@@ -120,10 +120,10 @@ def _verdict(answer: Answer, units: Mapping[str, str]) -> Markup:
     return tag("header", *parts)
 
 
-def _confidence(share: float | None) -> str | None:
-    if share is None:
+def _confidence(probability: float | None) -> str | None:
+    if probability is None:
         return None
-    return f"{percent(share)}: share of such answers that were right in trials with known truth"
+    return f"{percent(probability)}: probability that it is right, by trials of known truth"
 
 
 def _shrinkage(gap: HeldOutGap, details: Details) -> Markup:

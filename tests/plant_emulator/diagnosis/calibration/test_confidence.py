@@ -8,13 +8,13 @@ import pytest
 from plant_emulator.diagnosis.calibration.confidence import Standing, TrialVerdict, confidence
 
 
-def answer(log_odds: float, unexplained: float = 0.0, kind: str = "effect") -> Standing:
-    return Standing(kind=kind, log_odds=log_odds, unexplained=unexplained)
+def answer(log_odds: float, kind: str = "effect") -> Standing:
+    return Standing(kind=kind, log_odds=log_odds)
 
 
 def cases(kind: str, odds: Sequence[float], rights: Sequence[bool]) -> list[TrialVerdict]:
     return [
-        TrialVerdict(kind=kind, log_odds=float(one), unexplained=0.0, right=bool(right))
+        TrialVerdict(kind=kind, log_odds=float(one), right=bool(right))
         for one, right in zip(odds, rights, strict=True)
     ]
 
