@@ -10,9 +10,15 @@ from plant_emulator import effects, logs, parameter_sets
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import Log
 from plant_emulator.solver import compiler
-from plant_emulator.solver.kernel import Kernel, build
+from plant_emulator.solver.kernel import Kernel, build, use_own_effects
 
 DATA = Path(__file__).parents[1] / "data"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def no_own_effects() -> None:
+    """The kernels of a module's tests have the shipped effects only, whatever ran before."""
+    use_own_effects()
 
 
 @pytest.fixture(scope="session")

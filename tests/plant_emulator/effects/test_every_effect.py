@@ -14,7 +14,7 @@ from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.model.stage import STAGE
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
-from plant_emulator.solver.kernel import kernel, partial_kernel, use_own_effects
+from plant_emulator.solver.kernel import kernel, partial_kernel
 from tests.plant_emulator.runs import linear
 
 ReadLog = Callable[[str], Log]
@@ -92,7 +92,6 @@ def test_effects_are_absent_at_their_neutral_values(
 
 
 def test_every_effect_is_in_one_of_the_kernels_with_a_part_of_them() -> None:
-    use_own_effects()  # a test of this process may have left some
     parts = [{*partial_kernel(remembering=which).effects} for which in (True, False)]
     assert parts[0] | parts[1] == {*kernel().effects} == {*effects.names()}
 
