@@ -102,10 +102,11 @@ def try_law(model: Model, law: DraftedLaw) -> FitResult:
     starts = [(told, law.null.states), (nominal, [{} for _ in law.runs])]
     rough = model.rough()
     limit = FAR_OFF * law.null.sum_of_squares
+    # A law that no regression told begins at its plausible size, whatever that leaves.
     trials = [
         _fit_from_start(rough, law, values, states)
         for values, states in starts
-        if _squares_at(rough, law, values) < limit
+        if not law.values or _squares_at(rough, law, values) < limit
     ]
     return min(trials, key=lambda found: found.cost, default=law.null)
 

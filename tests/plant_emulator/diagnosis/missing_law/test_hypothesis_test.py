@@ -77,5 +77,5 @@ def test_law_whose_start_leaves_far_more_than_no_law_starts_no_fit(
     model = Line([noisy(2.0 + 3.0 * TIME + np.sin(20.0 * TIME))], ["wave"])
     model.candidates["wave"] = effect("wave", told)
     null = fit_null(model, [0])
-    found = try_law(model, DraftedLaw(effect="wave", values={}, null=null, runs=(0,)))
+    found = try_law(model, DraftedLaw(effect="wave", values=null.values, null=null, runs=(0,)))
     assert (found is not null) is fitted
