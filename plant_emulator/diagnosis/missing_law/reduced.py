@@ -112,7 +112,7 @@ class LawRows:
     columns: Callable[[int, Array], Array]
 
     def mapped(self, change: Callable[[int, Array], Array]) -> LawRows:
-        """The same with another map of the rows; change : of a run's rows, shape (rows, k)."""
+        """Rows that went through one more map; change : run and its rows, shape (rows, k)."""
         runs = [
             RunRows(change(k, one.y[:, None])[:, 0], change(k, one.shared), change(k, one.own))
             for k, one in enumerate(self.runs)
