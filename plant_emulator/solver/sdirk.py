@@ -20,7 +20,6 @@ from math import inf, sqrt
 from typing import TYPE_CHECKING
 
 from plant_emulator.model.implicit_stage import load, solve_stage, store
-from plant_emulator.model.stage import GEAR_SPEED, MOTOR_SPEED
 
 if TYPE_CHECKING:
     from plant_emulator.model.records import Record, State
@@ -55,16 +54,18 @@ def step(
     w : work space, four state vectors
     """
     first, base, last, slope = w[FIRST], w[BASE], w[LAST], w[SLOPE]
-    load(x, s)
-    s.motor_speed += GAMMA * h * slope[MOTOR_SPEED]
-    s.gear_speed += GAMMA * h * slope[GEAR_SPEED]
+    # Each stage starts from all states extrapolated. A law that follows an angle, a memory or the
+    # current would otherwise cost another pass at every stage.
+    for k in range(len(x)):
+        first[k] = x[k] + GAMMA * h * slope[k]
+    load(first, s)
     s.time, s.delayed_reference = t + GAMMA * h, r[0]
     solve_stage(x, GAMMA * h, s, p)
     store(s, first)
     for k in range(len(x)):
         base[k] = x[k] + (1.0 - GAMMA) / GAMMA * (first[k] - x[k])
-    s.motor_speed = x[MOTOR_SPEED] + (first[MOTOR_SPEED] - x[MOTOR_SPEED]) / GAMMA
-    s.gear_speed = x[GEAR_SPEED] + (first[GEAR_SPEED] - x[GEAR_SPEED]) / GAMMA
+        last[k] = x[k] + (first[k] - x[k]) / GAMMA
+    load(last, s)
     s.time, s.delayed_reference = t + h, r[1]
     solve_stage(base, GAMMA * h, s, p)
     store(s, last)
