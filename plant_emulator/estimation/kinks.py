@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from plant_emulator.estimation.unknowns import Residual, Unknown
 
 # Changes of an unknown that are tried, on the scale of the estimation: above the steps of the
-# slopes, up to where a fit would go by itself.
-CHANGES = tuple(1e-4 * 2.0**k for k in range(8))
+# slopes, up to where a fit would go by itself. Half and twice the best one are tried too.
+CHANGES = tuple(sign * 2e-4 * 4.0**k for k in range(4) for sign in (1.0, -1.0))
 # Fall of the cost that a kink must hide, as a share: below, what is left is another cause.
 WORTH = 0.1
 
@@ -33,17 +33,20 @@ def beyond_kink(
     """
     costs = [_cost(residual, unknowns, k) for k, residual in enumerate(residuals)]
     here = sum(costs)
-    best, start = (1.0 - WORTH) * here, None
-    for j, u in enumerate(unknowns):
-        for change in (sign * size for size in CHANGES for sign in (1.0, -1.0)):
-            scaled = u.scaled(u.start) + change
-            value = float(np.clip(u.value(scaled), u.lower, u.upper))
-            trial = (*unknowns[:j], replace(u, start=value), *unknowns[j + 1 :])
-            runs = range(len(residuals)) if u.run is None else (u.run,)
-            cost = here + sum(_cost(residuals[k], trial, k) - costs[k] for k in runs)
-            if cost < best:
-                best, start = cost, trial
-    return start
+
+    def changed(j: int, change: float) -> tuple[float, float, tuple[Unknown, ...]]:
+        u = unknowns[j]
+        value = float(np.clip(u.value(u.scaled(u.start) + change), u.lower, u.upper))
+        trial = (*unknowns[:j], replace(u, start=value), *unknowns[j + 1 :])
+        runs = range(len(residuals)) if u.run is None else (u.run,)
+        return here + sum(_cost(residuals[k], trial, k) - costs[k] for k in runs), change, trial
+
+    trials = [(*changed(j, change), j) for j in range(len(unknowns)) for change in CHANGES]
+    _, change, _, j = min(trials, key=lambda one: one[0])
+    cost, _, start = min(
+        (changed(j, factor * change) for factor in (0.5, 1.0, 2.0)), key=lambda one: one[0]
+    )
+    return start if cost < (1.0 - WORTH) * here else None
 
 
 def _cost(residual: Residual, unknowns: Sequence[Unknown], run: int) -> float:

@@ -56,6 +56,7 @@ def estimate(
     residuals: Sequence[Residual],
     *,
     settled: float = COST_SETTLED,
+    settled_far: float = 0.0,
     iterations: int | None = None,
     progress: Callable[[float], None] | None = None,
     follow: Estimate | None = None,
@@ -67,6 +68,7 @@ def estimate(
 
     residuals : one function a run, from the values by name to the whitened residual
     settled : relative fall of the cost that ends the fit
+    settled_far : the same, if it is more, where the mean square is above SUSPECT_MEAN_SQUARE
     iterations : at most so many; None: MAX_ITERATIONS
     progress : called with the sum of squares after every simulation of all runs
     follow : an estimate nearby, of the same runs; the columns of its unknowns are then not
@@ -81,7 +83,12 @@ def estimate(
     free = any(u.std is None for u in unknowns)
     if free and not any(slopes.any() for slopes in problem.jacobian(start)):
         return _estimate(problem, start, False, "no unknown changes the residual")
-    found = _minimise(problem, start, (lower, upper), settled, iterations or MAX_ITERATIONS)
+    most, bounds = iterations or MAX_ITERATIONS, (lower, upper)
+    found = _minimise(problem, start, bounds, max(settled, settled_far), most)
+    samples = sum(np.count_nonzero(r) for r in problem.residual(found.x))
+    near = 2.0 * found.cost <= SUSPECT_MEAN_SQUARE * samples
+    if near and settled < settled_far and found.nfev < most:
+        found = _minimise(problem, found.x, bounds, settled, most - found.nfev)
     return _estimate(problem, found.x, bool(found.status > 0), str(found.message))
 
 

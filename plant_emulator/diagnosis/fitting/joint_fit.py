@@ -31,10 +31,11 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.machine import Candidate, Model
     from plant_emulator.estimation.unknowns import Estimate, Residual, Unknown
 
-# Relative fall of the cost that ends a fit: a few hundredths in units of chi squared.
-COST_TOLERANCE = 1e-6
-# Relative fall of the cost that ends a fit whose slopes follow by secants.
-SECANT_COST_TOLERANCE = 1e-4
+# Relative fall of the cost that ends a fit near the noise: some tenths in units of chi squared.
+COST_TOLERANCE = 1e-5
+# Relative fall of the cost that ends a fit far from the noise, where it lacks a cause in any case,
+# or a fit whose slopes follow by secants.
+COARSE_COST_TOLERANCE = 1e-4
 # Iterations after which a fit shows whether it leads to a lower cost.
 TRIAL_ITERATIONS = 10
 # Iterations of the way to the data that tell the best start, and those of the rest of its way.
@@ -106,7 +107,8 @@ def fit(
     found = estimate(
         unknowns,
         residuals,
-        settled=COST_TOLERANCE if near is None else SECANT_COST_TOLERANCE,
+        settled=COST_TOLERANCE if near is None else COARSE_COST_TOLERANCE,
+        settled_far=COARSE_COST_TOLERANCE,
         iterations=iterations,
         follow=near,
     )
@@ -132,7 +134,13 @@ def _led_over_kinks(
         beyond = beyond_kink(found.started, rough)
         if beyond is None:
             break
-        other = estimate(beyond, residuals, settled=COST_TOLERANCE, iterations=iterations)
+        other = estimate(
+            beyond,
+            residuals,
+            settled=COST_TOLERANCE,
+            settled_far=COARSE_COST_TOLERANCE,
+            iterations=iterations,
+        )
         if other.cost > (1.0 - WORTH) * found.cost:
             return min(found, other, key=lambda one: one.cost + one.penalty)
         found = other

@@ -61,8 +61,6 @@ TRUCK_TOLERANCE = 1e-4
 # Tolerance and largest step [s] of rough runs. They take half the time, and change the residual by
 # some hundredths of the noise, which is more than a derivative bears.
 ROUGH = (1e-5, 0.03)
-# Simulated logs that are kept: the screening asks two questions about each.
-KEPT_LOGS = 120
 
 # Subsystem of each parameter of the model.
 SUBSYSTEMS = {
@@ -109,7 +107,6 @@ class BenchModel:
         self._effects = effects
         self._values = values_of(parameters)
         self.nominal_set = parameters
-        self._kept: dict[tuple[object, ...], Log] = {}
         self._roughly: BenchModel | None = None  # a rough model is its own
         known = {**kernel().effects, **effects}
         plausible = {name: effect.plausible() for name, effect in effects.items()}
@@ -169,19 +166,11 @@ class BenchModel:
         """See `Model`: simulated in longer steps."""
         if self._roughly is None:
             self._roughly = copy(self)
-            vars(self._roughly).update(_kept={}, _roughly=self._roughly)
+            vars(self._roughly).update(_roughly=self._roughly)
         return self._roughly
 
     def simulated(self, run: int, values: Mapping[str, float]) -> Log:
         """The log that a run would have given at these values of everything."""
-        key = (run, *sorted(values.items()))
-        if key not in self._kept:
-            if len(self._kept) >= KEPT_LOGS:
-                self._kept.clear()
-            self._kept[key] = self._simulate(run, values)
-        return self._kept[key]
-
-    def _simulate(self, run: int, values: Mapping[str, float]) -> Log:
         inputs = self._recordings[run].inputs
         own, gap = split_gap_position(values)
         tolerance, step = ROUGH if self._roughly is self else (TOLERANCE, None)
