@@ -22,8 +22,8 @@ from plant_emulator.diagnosis.localisation.drum_subsystem import (
     prior_means,
 )
 from plant_emulator.diagnosis.localisation.marginal_likelihood import (
+    GroupRegression,
     LinearModel,
-    Products,
     variance_gain,
 )
 from plant_emulator.diagnosis.localisation.measured_signals import interval_means, measured_signals
@@ -34,7 +34,11 @@ from plant_emulator.diagnosis.localisation.parity_relations import (
     GEAR,
     simulated_relations,
 )
-from plant_emulator.diagnosis.localisation.stacked_rows import StackedRows
+from plant_emulator.diagnosis.localisation.stacked_rows import (
+    ColumnGroup,
+    GroupedColumns,
+    StackedRows,
+)
 from plant_emulator.model.array_laws import base_speed
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import voltage_errors
@@ -43,7 +47,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.localisation.marginal_likelihood import MarginalLikelihood
     from plant_emulator.estimation.unknowns import Estimate
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
@@ -86,7 +89,6 @@ class BlockRegression:
         torques = [drum_basis.torque(m, p["gear_ratio"], top) for m in self.signals]
         self.drum = DrumSubsystem(recordings, self.signals, parameters, p, torques)
         self.drum_fit = self.drum.fit_null(null.values, [s[GAP_POSITION] for s in null.states])
-        self.products = Products()
         self.relations = [
             whitened_relations(m, p, simulated_relations(r, self.fitted, states[GAP_POSITION]))
             for m, r, states in zip(self.signals, recordings, null.states, strict=True)
@@ -179,7 +181,7 @@ class BlockRegression:
         scale = np.array([min(u.scaled_std, 1.0) for u in fitted.unknowns])
         slopes = [(fitted.jacobians[k][0] * scale)[:, ~is_torque_size(fitted)] for k in runs]
         own = self.rows.shared_columns([None] * len(self.signals), slopes)
-        return LinearModel(y[:, 0], [*self.nuisance, own], self.products)
+        return LinearModel(y[:, 0], [*self.nuisance, own])
 
     @cached_property
     def model(self) -> LinearModel:
@@ -187,11 +189,16 @@ class BlockRegression:
         return self.linear_model(self.drum_fit)
 
     @cached_property
-    def groups(self) -> dict[str, list[Array]]:
+    def groups(self) -> dict[str, list[ColumnGroup]]:
         """Columns of the unknown laws of every block but the drum, a group a law."""
         top = block_basis.largest(self.quantities)
         own = {name: self._block(laws, top) for name, laws in block_basis.BLOCKS.items()}
         return own | {"speed_sensor": self._speed_sensor(), "backlash_shaft": self._backlash()}
+
+    @cached_property
+    def laws(self) -> GroupedColumns:
+        """The whitened columns of these groups."""
+        return self.rows.grouped([g for groups in self.groups.values() for g in groups])
 
     def _block(
         self,
@@ -199,46 +206,47 @@ class BlockRegression:
             [block_basis.BlockQuantities, Mapping[str, float]], list[block_basis.UnknownLaw]
         ],
         top: Mapping[str, float],
-    ) -> list[Array]:
+    ) -> list[ColumnGroup]:
         """Columns of a block's laws; a law that acts in no relation of the runs has none."""
-        none = [None] * len(self.signals)
         runs = [block(q, top) for q in self.quantities]
         return [
-            self.rows.own_relations([law.rows for law in group])
-            if group[0].own
-            else self.rows.shared_columns([law.rows for law in group], none)
+            ColumnGroup([law.rows for law in group], own=group[0].own)
             for group in zip(*runs, strict=True)
             if any(
                 law.rows[: len(r.value)].any() for law, r in zip(group, self.relations, strict=True)
             )
         ]
 
-    def _speed_sensor(self) -> list[Array]:
+    def _speed_sensor(self) -> list[ColumnGroup]:
         """Columns of the errors of the drum's speed sensor."""
-        none = [None] * len(self.signals)
         laws = [drum_basis.speed_sensor(m, self.values["gear_ratio"]) for m in self.signals]
         *shared, own = zip(*laws, strict=True)
-        return [
-            *(self.rows.shared_columns(none, group) for group in shared),
-            self.rows.own_speed(own),
-        ]
+        return [*map(ColumnGroup, shared), ColumnGroup(own, own=True)]
 
-    def _backlash(self) -> list[Array]:
+    def _backlash(self) -> list[ColumnGroup]:
         """Columns of a gap and a damping that change in time."""
         slopes = [jacobian[0] for jacobian in self.drum_fit.jacobians]
         laws = [drum_basis.backlash(m, s) for m, s in zip(self.signals, slopes, strict=True)]
-        return [self.rows.own_speed(group) for group in zip(*laws, strict=True)]
+        return [ColumnGroup(group, own=True) for group in zip(*laws, strict=True)]
 
-    def _drum_torque(self, fitted: Estimate) -> list[Array]:
+    def _drum_torque(self, fitted: Estimate) -> Array:
         """Columns of an unknown torque on the drum, in the gear's relation and the drum speed."""
         torque = is_torque_size(fitted)
         speed = [-fitted.jacobians[k][0][:, torque] for k in range(len(self.signals))]
-        return [self.rows.shared_columns(self._torque_on_gear(), speed) * TORQUE_STD]
+        return self.rows.shared_columns(self._torque_on_gear(), speed) * TORQUE_STD
 
     @cached_property
-    def with_torque(self) -> list[tuple[LinearModel, list[Array]]]:
-        """Linear models and columns of an unknown torque on the drum, at each of its fits."""
-        return [(self.linear_model(f), self._drum_torque(f)) for f in self.torque_fits]
+    def without_torque(self) -> GroupRegression:
+        """The regression on the unknown laws of all blocks but the drum."""
+        return GroupRegression(self.model, [], self.laws)
+
+    @cached_property
+    def with_torque(self) -> list[GroupRegression]:
+        """The regressions that have an unknown torque on the drum too, at each of its fits."""
+        return [
+            GroupRegression(self.linear_model(f), [self._drum_torque(f)], self.laws)
+            for f in self.torque_fits
+        ]
 
     @cached_property
     def torque_fits(self) -> list[Estimate]:
@@ -271,24 +279,21 @@ class BlockRegression:
         mean = self.model.marginal_likelihood([group]).mean
         return np.asarray(TORQUE_STD * mean[-group.shape[1] :])
 
-    def marginal_likelihood(self, blocks: Sequence[str]) -> MarginalLikelihood:
-        """The largest marginal likelihood with unknown laws in these blocks."""
-        groups = [g for name in blocks if name != "drum" for g in self.groups[name]]
-        if "drum" not in blocks:
-            return self.model.marginal_likelihood(groups)
-        found = [model.marginal_likelihood([*groups, *drum]) for model, drum in self.with_torque]
-        return max(found, key=lambda e: e.log)
-
     def log_marginal_likelihood(self, blocks: Sequence[str]) -> float:
         """Log probability of all measurements with unknown laws in these blocks [1].
 
         With the drive among them, its dead time may also vary from scan to scan.
         """
-        found = self.marginal_likelihood(blocks)
+        drum = ["drum"] * ("drum" in blocks)
+        names = [*drum, *(name for name, groups in self.groups.items() for _ in groups)]
+        order = [*(name for name in blocks if name != "drum"), *drum]
+        chosen = [k for block in order for k, name in enumerate(names) if name == block]
+        trials = self.with_torque if drum else [self.without_torque]
+        found, regression = max(
+            ((one.search.largest(chosen), one) for one in trials), key=lambda pair: pair[0].log
+        )
         if "drive" not in blocks:
             return found.log
-        ends = np.cumsum([r.value.size for r in self.relations])
-        parts = np.split(found.residual, ends)[:-1]
-        own = [part[DRIVE :: len(r.value)] for part, r in zip(parts, self.relations, strict=True)]
+        rows = [slice(DRIVE, None, len(r.value)) for r in self.relations]
         slope = np.concatenate([q.demand_rate for q in self.quantities])
-        return found.log + variance_gain(np.concatenate(own), slope)
+        return found.log + variance_gain(regression.residual(found.mean, rows), slope)

@@ -18,13 +18,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.diagnosis.localisation.stacked_rows import NO_COLUMNS, GroupedColumns
+
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from plant_emulator.signals.log import Array
 
 # Sizes a_g that are tried.
 GROUP_SIZES = np.geomspace(1e-2, 30.0, 9)
+SIZES = np.append(0.0, GROUP_SIZES)
 # The sizes of all groups are chosen again at most so many times.
 MOST_SWEEPS = 3
 # Another group, or another sweep, is worth this gain of log probability.
@@ -37,12 +40,10 @@ class MarginalLikelihood:
 
     log : its logarithm
     mean : posterior mean of theta and beta, shape (k,)
-    residual : y without what they explain, shape (n,)
     """
 
     log: float
     mean: Array
-    residual: Array
 
 
 def log_marginal_likelihood(gram: Array, product: Array, deviations: Array) -> float:
@@ -56,48 +57,11 @@ def _system(gram: Array, deviations: Array) -> Array:
     return np.asarray(np.eye(len(gram)) + deviations[:, None] * gram * deviations)
 
 
-class Products:
-    """Products of groups of columns, each computed once; no array of a group ever changes."""
-
-    def __init__(self) -> None:
-        self._known: dict[tuple[int, int], tuple[Array, Array, Array]] = {}
-        self._rows: dict[int, tuple[int, int]] = {}
-
-    def of(self, a: Array, b: Array) -> Array:
-        """Product A' B of two arrays, over the rows where both are not zero."""
-        key = (id(a), id(b))
-        if key not in self._known:
-            transposed = self._known.get((id(b), id(a)))
-            found = self._product(a, b) if transposed is None else transposed[2].T
-            self._known[key] = (a, b, found)  # a kept array keeps its identity
-        return self._known[key][2]
-
-    def _product(self, a: Array, b: Array) -> Array:
-        (begin, end), (first, last) = self._within(a), self._within(b)
-        rows = slice(max(begin, first), max(min(end, last), begin, first))
-        return np.asarray(a[rows].T @ b[rows])
-
-    def _within(self, a: Array) -> tuple[int, int]:
-        """First row of an array that is not zero, and the row behind the last one."""
-        if id(a) not in self._rows:
-            filled = np.flatnonzero(np.any(a != 0.0, axis=1))
-            self._rows[id(a)] = (int(filled[0]), int(filled[-1]) + 1) if len(filled) else (0, 0)
-        return self._rows[id(a)]
-
-
 class LinearModel:
-    """Data y with the nuisance columns F, which are scaled to unit priors, in parts.
+    """Data y with the nuisance columns F, which are scaled to unit priors, in parts."""
 
-    products : of columns, shared with other data that have the same ones
-    """
-
-    def __init__(
-        self, y: Array, nuisance: Sequence[Array], products: Products | None = None
-    ) -> None:
+    def __init__(self, y: Array, nuisance: Sequence[Array]) -> None:
         self.y, self.nuisance = y, tuple(nuisance)
-        self.square = float(y @ y)
-        self._y = y[:, None]
-        self._products = products or Products()
 
     def left(self, rows: slice) -> float:
         """Sum of squares that the nuisance columns leave of these rows, with their penalty."""
@@ -108,91 +72,152 @@ class LinearModel:
 
     def marginal_likelihood(self, groups: Sequence[Array]) -> MarginalLikelihood:
         """The largest marginal likelihood over the sizes of these groups of columns."""
-        parts, of = [*self.nuisance, *groups], self._products.of
-        gram = np.block([[of(a, b) for b in parts] for a in parts])
-        product = np.concatenate([of(a, self._y)[:, 0] for a in parts])
-        known = sum(part.shape[1] for part in self.nuisance)
-        counts = [known, *(group.shape[1] for group in groups)]
-        search = _SizeSearch(gram, product, counts)
-        search.run()
-        deviations = np.repeat(search.sizes, counts)
-        system = _system(gram, deviations)
-        mean = deviations * np.linalg.solve(system, deviations * product)
-        residual = self.y.copy()
-        ends = np.cumsum([part.shape[1] for part in parts])[:-1]
-        for part, own in zip(parts, np.split(mean, ends), strict=True):
-            residual -= part @ own
-        return MarginalLikelihood(search.best - 0.5 * self.square, mean, residual)
+        return GroupRegression(self, groups).search.largest(range(len(groups)))
 
 
-class _SizeSearch:
-    """The search for the sizes: first the group of the largest gain, then all taken ones anew."""
+class GroupRegression:
+    """A linear model with all groups of columns that it may take.
 
-    def __init__(self, gram: Array, product: Array, counts: Sequence[int]) -> None:
-        self.gram, self.product, self.counts = gram, product, counts
-        self.group_of = np.repeat(np.arange(len(counts)), counts)
-        self.sizes = np.zeros(len(counts))
-        self.sizes[0] = 1.0
-        nuisance = self.group_of == 0
-        alone = np.ones(int(nuisance.sum()))
-        self.best = log_marginal_likelihood(
-            gram[np.ix_(nuisance, nuisance)], product[nuisance], alone
-        )
+    groups : columns over all rows; laws : further groups, which come behind
+    """
 
-    def run(self) -> None:
-        """Search the sizes of the largest marginal likelihood."""
-        for _ in range(MOST_SWEEPS):
-            before = self.best
-            self._take_groups()
-            for k in np.flatnonzero(self.sizes[1:]) + 1:
-                ((value, group, size),) = self._trials([int(k)], np.append(0.0, GROUP_SIZES))
-                if value > self.best:
-                    self.best, self.sizes[group] = value, size
-            if self.best - before < LEAST_LOG_GAIN:
-                break
+    def __init__(
+        self, model: LinearModel, groups: Sequence[Array], laws: GroupedColumns = NO_COLUMNS
+    ) -> None:
+        self._dense = np.concatenate([*model.nuisance, model.y[:, None], *groups], axis=1)
+        self._laws, self._known = laws, sum(part.shape[1] for part in model.nuisance)
+        cross = laws.product(self._dense)
+        products = np.block([[self._dense.T @ self._dense, cross.T], [cross, laws.gram]])
+        widths = [*(group.shape[1] for group in groups), *laws.widths]
+        self.search = SizeSearch(products, self._known, widths)
 
-    def _take_groups(self) -> None:
-        """Take the group of the largest gain, until none is worth it."""
-        while absent := [int(k) for k in np.flatnonzero(self.sizes == 0.0)]:
-            value, group, size = max(self._trials(absent, GROUP_SIZES))
-            if value <= self.best + LEAST_LOG_GAIN:
-                break
-            self.best, self.sizes[group] = value, size
+    def residual(self, mean: Array, chosen: Sequence[slice]) -> Array:
+        """y without what these coefficients explain, in rows chosen of each of the first segments.
 
-    def _trials(self, groups: Sequence[int], sizes: Array) -> list[tuple[float, int, float]]:
-        """The best of these sizes of each of these groups alone: value, group, size.
-
-        The other groups stay as they are. With them integrated out, a group's own products give all
-        sizes at once.
+        mean : shape (k,); the result has the shape (n,)
         """
-        from scipy.linalg import solve_triangular
-
-        rest = np.isin(self.group_of, groups)
-        used = (self.sizes[self.group_of] > 0.0) & ~rest
-        deviations = self.sizes[self.group_of][used]
-        lower = np.linalg.cholesky(_system(self.gram[np.ix_(used, used)], deviations))
-        right = np.column_stack([self.product[used], self.gram[np.ix_(used, rest)]])
-        solved = solve_triangular(lower, deviations[:, None] * right, lower=True)
-        v, cross = solved[:, 0], solved[:, 1:]
-        others = float(0.5 * v @ v - np.log(np.diag(lower)).sum())
-        found = []
-        for group in groups:
-            own, column = self.group_of == group, self.group_of[rest] == group
-            along = self.product[own] - cross[:, column].T @ v
-            gram = self.gram[np.ix_(own, own)] - cross[:, column].T @ cross[:, column]
-            value, size = _best_size(gram, along, sizes)
-            found.append((others + value, group, size))
-        return found
+        dense, laws = np.split(mean, [self._dense.shape[1] - 1])
+        explaining, found, begin = np.insert(-dense, self._known, 1.0), [], 0
+        for (columns, numbers), rows in zip(self._laws.segments, chosen, strict=False):
+            others = self._dense[begin : begin + len(columns)]
+            found.append((others @ explaining - columns @ laws[numbers])[rows])
+            begin += len(columns)
+        return np.concatenate(found)
 
 
-def _best_size(gram: Array, along: Array, sizes: Array) -> tuple[float, float]:
-    """Gain of a group of columns at the best of these sizes, and that size."""
+class SizeSearch:
+    """The search for the sizes: first the group of the largest gain, then all taken ones anew.
+
+    The nuisance coefficients are integrated out once for all sets of groups. What a group gains
+    beside others is kept: the searches of several sets meet the same groups at the same sizes.
+
+    products : X' X of the nuisance columns, y and the columns of all groups
+    known : number of the nuisance columns; widths : number of columns of each group
+    """
+
+    def __init__(self, products: Array, known: int, widths: Sequence[int]) -> None:
+        from scipy.sparse.csgraph import connected_components
+
+        gram, cross, ones = products[:known, :known], products[:known, known:], np.ones(known)
+        square = products[known, known]
+        self._alone = log_marginal_likelihood(gram, cross[:, 0], ones) - 0.5 * square
+        self._solved = np.linalg.solve(_system(gram, ones), cross)
+        left = products[known:, known:] - cross.T @ self._solved
+        self._gram, self._product = left[1:, 1:], left[1:, 0]
+        ends = np.cumsum(widths)
+        self._columns = [np.arange(end - n, end) for end, n in zip(ends, widths, strict=True)]
+        begins, linked = [int(own[0]) for own in self._columns], self._gram != 0.0
+        for axis in (0, 1) if widths else ():
+            linked = np.logical_or.reduceat(linked, begins, axis=axis)
+        # Groups of different parts have nothing to say of each other.
+        self._parts = connected_components(linked)[1]
+        self._gains: dict[tuple[object, ...], Array] = {}
+        self._factored: tuple[dict[int, int], tuple[Array, Array, Array]] | None = None
+
+    def largest(self, groups: Sequence[int]) -> MarginalLikelihood:
+        """The largest marginal likelihood over the sizes of these groups, by their numbers."""
+        taken: dict[int, int] = {}
+        log = self._alone
+        for _ in range(MOST_SWEEPS):
+            gain = self._take_groups(groups, taken) + self._choose_again(groups, taken)
+            log += gain
+            if gain < LEAST_LOG_GAIN:
+                break
+        return MarginalLikelihood(log, self._mean(taken))
+
+    def _take_groups(self, groups: Sequence[int], taken: dict[int, int]) -> float:
+        """Take the group of the largest gain, until none is worth it; the gain of all."""
+        whole = 0.0
+        while absent := [k for k in groups if k not in taken]:
+            gains = {k: self._gain(taken, k) for k in absent}
+            best = max(absent, key=lambda k: float(gains[k].max()))
+            if gains[best].max() <= LEAST_LOG_GAIN:
+                break
+            taken[best] = int(gains[best].argmax())
+            whole += float(gains[best].max())
+        return whole
+
+    def _choose_again(self, groups: Sequence[int], taken: dict[int, int]) -> float:
+        """Choose the size of each taken group again, which may leave it out; the gain of all."""
+        whole = 0.0
+        for k in [k for k in groups if k in taken]:
+            gains = self._gain(taken, k)
+            whole += float(gains.max() - gains[taken[k]])
+            taken[k] = int(gains.argmax())
+            if taken[k] == 0:
+                del taken[k]
+        return whole
+
+    def _gain(self, taken: Mapping[int, int], group: int) -> Array:
+        """Gain of a group beside the taken ones at each of the sizes 0 and GROUP_SIZES."""
+        taken = {k: size for k, size in taken.items() if self._parts[k] == self._parts[group]}
+        key = (group, *sorted(pair for pair in taken.items() if pair[0] != group))
+        if key not in self._gains:
+            own = self._columns[group]
+            used, inverse, v = self._factor(taken)
+            # The other groups are integrated out: a taken group's posterior tells its own.
+            if group in taken:
+                cross = inverse[:, np.isin(used, own)]
+                precision = np.linalg.inv(cross.T @ cross)
+                gram = precision - np.eye(len(own)) / SIZES[taken[group]] ** 2
+                along = precision @ (cross.T @ v)
+            else:
+                cross = inverse @ self._gram[used[:, None], own]
+                gram = self._gram[own[:, None], own] - cross.T @ cross
+                along = self._product[own] - cross.T @ v
+            self._gains[key] = _gains_by_size(gram, along)
+        return self._gains[key]
+
+    def _factor(self, taken: Mapping[int, int]) -> tuple[Array, Array, Array]:
+        """Columns of the taken groups, and L^-1 and L^-1 X'y; L L' is the posterior precision."""
+        from scipy.linalg.lapack import dtrtri
+
+        if self._factored is None or self._factored[0] != taken:
+            own = [self._columns[k] for k in taken]
+            used = np.concatenate([np.zeros(0, int), *own])
+            precision = self._gram[used[:, None], used]
+            sizes = [np.full(len(c), SIZES[j]) for c, j in zip(own, taken.values(), strict=True)]
+            precision[np.diag_indices(len(used))] += np.concatenate([np.zeros(0), *sizes]) ** -2.0
+            lower = np.linalg.cholesky(precision)
+            inverse = dtrtri(lower.T)[0].T if taken else lower
+            self._factored = dict(taken), (used, inverse, inverse @ self._product[used])
+        return self._factored[1]
+
+    def _mean(self, taken: Mapping[int, int]) -> Array:
+        """Posterior mean of all coefficients, shape (k,); 0 for groups that are not taken."""
+        used, inverse, v = self._factor(taken)
+        mean = np.zeros(len(self._product))
+        mean[used] = inverse.T @ v
+        return np.concatenate([self._solved[:, 0] - self._solved[:, 1:] @ mean, mean])
+
+
+def _gains_by_size(gram: Array, along: Array) -> Array:
+    """Gain of a group of columns at each of SIZES."""
     spectrum, vectors = np.linalg.eigh(gram)
     seen = (vectors.T @ along) ** 2
-    grown = 1.0 + np.outer(sizes**2, np.maximum(spectrum, 0.0))
-    values = 0.5 * ((sizes**2)[:, None] * seen / grown - np.log(grown)).sum(axis=1)
-    k = int(np.argmax(values))
-    return float(values[k]), float(sizes[k])
+    variance = SIZES[:, None] ** 2
+    grown = 1.0 + variance * np.maximum(spectrum, 0.0)
+    return np.asarray(0.5 * (variance * seen / grown - np.log(grown)).sum(axis=1))
 
 
 def variance_gain(residual: Array, weight: Array) -> float:

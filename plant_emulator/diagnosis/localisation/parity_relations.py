@@ -168,8 +168,9 @@ class WhitenedRelations:
         from scipy.linalg.lapack import dtbtrs
 
         count = len(self.value)
-        stacked = np.moveaxis(rows[:count], 0, 1).reshape(count * rows.shape[1], -1)
-        return np.asarray(dtbtrs(self.factor, stacked, uplo="L")[0])
+        # LAPACK wants each column in one piece of memory.
+        stacked = rows[:count].T.copy().reshape(-1, count * rows.shape[1]).T
+        return np.asarray(dtbtrs(self.factor, stacked, uplo="L", overwrite_b=True)[0])
 
 
 def relation_residuals(
