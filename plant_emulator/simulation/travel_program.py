@@ -72,20 +72,22 @@ def simulate_travel(
     *,
     gap_position: float = 0.0,
     driver: Driver | None = None,
+    step: float = TRAVEL_STEP,
 ) -> Log:
     """Simulate a travel program in closed loop: truck, bench and regulator; all signals SI.
 
     effects : effect -> parameter -> value [SI]; gap_position : start in the backlash gap, -1 to 1
     driver : the truck's driver; None: the torque that the cycle takes on the road
+    step : of the bench [s], a part of SAMPLE_PERIOD
     """
     truck = Forklift(mass=program.mass)
     who = driver or ReplayedTorque(truck)
-    bench = Bench(parameters, effects, gap_position=gap_position, truck=True, step=TRAVEL_STEP)
+    bench = Bench(parameters, effects, gap_position=gap_position, truck=True, step=step)
     regulator = ThesisReference(parameters, truck)
     time = sample_times(program.duration)
     rows = np.zeros((len(time), 7))
     rows[:, 6] = NOMINAL_SHELL_TEMPERATURE
-    steps = round(SAMPLE_PERIOD / TRAVEL_STEP)
+    steps = round(SAMPLE_PERIOD / step)
     drum_speed, reference = 0.0, 0.0
     for k in range(1, len(time)):
         drive, brake = who.torques(float(time[k - 1]), drum_speed * truck.drum_radius)

@@ -36,6 +36,9 @@ if TYPE_CHECKING:
 SAME_REFERENCE, SHOWN_SHARE = 5.0, 0.9
 # Temperature of the gear's shell after a night, and the temperature below which it is cold [K].
 COLD_SHELL, COLD_BELOW = 293.15, 298.15
+# Step of the bench that a planned truck's reference comes from [s]. The run itself is simulated
+# afterwards with this reference, so that a coarse one serves.
+PLANNED_STEP = 1e-3
 
 
 def shows_program(log: Log, program: Program) -> bool:
@@ -89,7 +92,7 @@ def planned_runs(
         )
     for cycle in (p for p in rest if isinstance(p, TravelProgram)):
         with suppress(UnsettledError):
-            inputs = simulate_travel(cycle, parameters)
+            inputs = simulate_travel(cycle, parameters, step=PLANNED_STEP)
             yield from _simulate_recording(describe(cycle), inputs, warm, levels, shell, sensors)
 
 
