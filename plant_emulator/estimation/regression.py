@@ -26,12 +26,13 @@ class Regression:
     """Data beside nuisance columns that are integrated out.
 
     y : data, shape (n,); nuisance : F, scaled to unit priors, shape (n, k)
-    lower : Cholesky factor of 1 + F'F; left : M y
+    lower : Cholesky factor L of 1 + F'F; seen : L^-1 F' y; left : M y
     """
 
     y: Array
     nuisance: Array
     lower: Array
+    seen: Array
     left: Array
 
     @classmethod
@@ -39,26 +40,34 @@ class Regression:
         """Factor the nuisance's precision once; y : shape (n,), nuisance : shape (n, k)."""
         gram = np.eye(nuisance.shape[1]) + nuisance.T @ nuisance
         lower = np.asarray(np.linalg.cholesky(gram), float)
-        return cls(y, nuisance, lower, y - nuisance @ _solve(lower, nuisance.T @ y))
+        seen = _forward(lower, nuisance.T @ y)
+        return cls(y, nuisance, lower, seen, y - nuisance @ _backward(lower, seen))
 
-    def along(self, columns: Array) -> Array:
-        """Products C' M y, shape (k,)."""
-        return np.asarray(columns.T @ self.left)
+    def products(self, columns: Array) -> Products:
+        """Compute what the data say of columns, shape (n, k)."""
+        seen = _forward(self.lower, self.nuisance.T @ columns)
+        gram = columns.T @ columns - seen.T @ seen
+        return Products(columns.T @ self.left, gram, seen)
 
-    def gram(self, columns: Array) -> Array:
-        """Products C' M C, shape (k, k)."""
-        from scipy.linalg import solve_triangular
-
-        seen = solve_triangular(self.lower, self.nuisance.T @ columns, lower=True)
-        return np.asarray(columns.T @ columns - seen.T @ seen)
-
-    def theta(self, columns: Array, beta: Array) -> Array:
-        """Nuisance coefficients beside these columns at these coefficients, shape (k,)."""
-        return _solve(self.lower, self.nuisance.T @ (self.y - columns @ beta))
+    def theta(self, products: Products, beta: Array) -> Array:
+        """Nuisance coefficients beside columns at these coefficients, shape (k,)."""
+        return _backward(self.lower, self.seen - products.seen @ beta)
 
     def follow(self, column: Array) -> Array:
         """Nuisance coefficients that follow a column best, shape (k,)."""
-        return _solve(self.lower, self.nuisance.T @ column)
+        return _backward(self.lower, _forward(self.lower, self.nuisance.T @ column))
+
+
+@dataclass(frozen=True)
+class Products:
+    """Products of columns C with the data and each other, the nuisance integrated out.
+
+    along : C' M y, shape (k,); gram : C' M C, shape (k, k); seen : L^-1 F' C
+    """
+
+    along: Array
+    gram: Array
+    seen: Array
 
 
 def gain(gram: Array, along: Array) -> tuple[float, Array]:
@@ -67,11 +76,19 @@ def gain(gram: Array, along: Array) -> tuple[float, Array]:
     gram : C' M C, shape (k, k); along : C' M y, shape (k,)
     """
     lower = np.asarray(np.linalg.cholesky(np.eye(len(gram)) + gram), float)
-    mean = _solve(lower, along)
+    mean = _backward(lower, _forward(lower, along))
     return float(0.5 * along @ mean - np.log(np.diag(lower)).sum()), mean
 
 
-def _solve(lower: Array, right: Array) -> Array:
-    from scipy.linalg import cho_solve
+def _forward(lower: Array, right: Array) -> Array:
+    """L^-1 times an array."""
+    from scipy.linalg import solve_triangular
 
-    return np.asarray(cho_solve((lower, True), right))
+    return np.asarray(solve_triangular(lower, right, lower=True))
+
+
+def _backward(lower: Array, right: Array) -> Array:
+    """L'^-1 times an array."""
+    from scipy.linalg import solve_triangular
+
+    return np.asarray(solve_triangular(lower, right, lower=True, trans="T"))

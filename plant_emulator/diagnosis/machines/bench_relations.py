@@ -16,7 +16,12 @@ import numpy as np
 from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
 from plant_emulator.diagnosis.localisation.drum_subsystem import prior_means
 from plant_emulator.diagnosis.localisation.measured_signals import NOISES
-from plant_emulator.diagnosis.localisation.parity_relations import DRIVE, GEAR, relation_residuals
+from plant_emulator.diagnosis.localisation.parity_relations import (
+    DRIVE,
+    GEAR,
+    ROWS,
+    relation_residuals,
+)
 from plant_emulator.diagnosis.machines.thinning import thin
 from plant_emulator.diagnosis.search.rich_model import rich_columns
 from plant_emulator.errors import UnsettledError
@@ -95,6 +100,7 @@ class BenchRelations:
         drift = replace(where, values={k: v for k, v in where.values.items() if k in own})
         self.site = BlockRegression(self.recordings, model.nominal_set, drift)
         self._known: dict[tuple[object, ...], Array | None] = {}
+        self._driven: dict[tuple[int, bytes], Array] = {}
         plain = self._rows((), [{}] * len(runs))
         if plain is None:
             raise UnsettledError("the fit cannot be simulated")
@@ -108,14 +114,20 @@ class BenchRelations:
             for t, r in zip(self.thinned, self.site.relations, strict=True)
         ]
         counted = np.concatenate([*relation, *(~t.void for t in self.thinned)])
-        open_drum = np.array([m.unknown_torque for m in self.site.signals])[self.owners]
-        return counted & ~(open_drum & np.isin(self.kinds, (GEAR, -1)))
+        for kind, k, rows in self._series:
+            counted[rows] &= not (self.site.signals[k].unknown_torque and kind in {GEAR, -1})
+        return counted
 
     @cached_property
-    def kinds(self) -> NDArray[np.int_]:
-        """Number of the relation of each row, -1 for the drum speed, shape (n,)."""
-        relation = [np.tile(np.arange(len(r.value)), r.value.shape[1]) for r in self.site.relations]
-        return np.concatenate([*relation, *(np.full(len(m.time), -1) for m in self.site.signals)])
+    def _series(self) -> list[tuple[int, int, slice]]:
+        """Number of the relation, or -1 for the drum speed, run and rows of each series."""
+        sizes, found = [r.value.size for r in self.site.relations], []
+        ends = np.cumsum([0, *sizes, *(len(m.time) for m in self.site.signals)]).tolist()
+        for k, (r, first) in enumerate(zip(self.site.relations, ends, strict=False)):
+            count, drum = len(r.value), slice(*ends[len(sizes) + k :][:2])
+            found.append((-1, k, drum))
+            found += [(n, k, slice(first + n, ends[k + 1], count)) for n in range(count)]
+        return found
 
     @cached_property
     def owners(self) -> NDArray[np.int_]:
@@ -126,44 +138,41 @@ class BenchRelations:
         return np.concatenate([np.repeat(order, counts), np.repeat(order, samples)])
 
     @cached_property
-    def whiteners(self) -> list[tuple[NDArray[np.int_], Whitener]]:
+    def whiteners(self) -> list[tuple[slice, Whitener]]:
         """The rows of each kind in each run that has some that count, and their whitening filters.
 
         The noise is estimated on what a rich model leaves: see `rich_columns`.
         """
-        y = np.where(self.use, self._data, 0.0)
-        rich = np.concatenate([self.nuisance, *rich_columns(self.model.candidates, self)], axis=1)
-        rest = Regression.of(y, rich * self.use[:, None]).left
-        found: list[tuple[NDArray[np.int_], Whitener]] = []
-        for kind in np.unique(self.kinds):
-            index, series = [], []
-            for k, m in enumerate(self.site.signals):
-                rows = np.flatnonzero((self.kinds == kind) & (self.owners == k))
-                if not self.use[rows].any():
-                    continue
-                time = m.time if kind < 0 else m.time[1:]
-                index.append(rows)
-                series.append(NoiseSeries(time=time, value=rest[rows], use=self.use[rows]))
-            if index:
-                found += zip(index, estimate_channel_noise(series, disturbed=False)[1], strict=True)
+        columns = [c.T for c in (self.nuisance, *rich_columns(self.model.candidates, self))]
+        rich = np.concatenate([self._data[None], *columns])
+        rich[:, ~self.use] = 0.0
+        rest = Regression.of(rich[0], rich[1:].T).left
+        found: list[tuple[slice, Whitener]] = []
+        for kind in range(-1, ROWS):
+            places, series = [], []
+            for own, k, rows in self._series:
+                if own == kind and self.use[rows].any():
+                    time = self.site.signals[k].time[0 if kind < 0 else 1 :]
+                    places.append(rows)
+                    series.append(NoiseSeries(time=time, value=rest[rows], use=self.use[rows]))
+            if places:
+                noise = estimate_channel_noise(series, disturbed=False)
+                found += zip(places, noise[1], strict=True)
         return found
 
     def white(self, rows: Array) -> Array:
-        """Whiten rows of shape (n,) or (n, k) in the noise that they show themselves."""
+        """Whiten rows of shape (n,) in the noise that they show themselves."""
         found = np.zeros_like(rows)
-        for index, whitener in self.whiteners:
-            if rows.ndim == 1:
-                found[index] = whitener.innovations(rows[index])
-            else:
-                own = rows[index]
-                for k in np.flatnonzero(own.any(axis=0)):
-                    found[index, k] = whitener.innovations(own[:, k])
+        for place, whitener in self.whiteners:
+            if rows[place].any():
+                found[place] = whitener.innovations(rows[place])
         return found
 
     @cached_property
     def data(self) -> Regression:
         """Data and nuisance, whitened."""
-        return Regression.of(self.white(self._data), self.white(self.nuisance))
+        nuisance = np.stack([self.white(column) for column in self.nuisance.T])
+        return Regression.of(self.white(self._data), nuisance.T)
 
     @cached_property
     def _data(self) -> Array:
@@ -181,18 +190,22 @@ class BenchRelations:
         """Response of the rows to the mains lines in a channel."""
         for k, own in enumerate(self.channels):
             m, names = self.site.signals[k], self.recordings[k].channels
+            plain = relation_residuals(m, self.site.values)[0]
             for name, whitener in zip(names, own, strict=bool(own)):
                 noise = whitener.noise
                 level = LINE_PRIOR * noise.deviation * m.noise[NOISES.index(name)]
                 for column in line_columns(m.time, whitener.lines).T:
-                    yield self._perturb(k, name, level * column)[:, None]
+                    yield self._perturb(k, name, level * column, plain)[:, None]
 
-    def _perturb(self, k: int, name: str, change: Array) -> Array:
-        """Response of the rows to an error of one channel of one run, shape (n,)."""
-        m, p = self.site.signals[k], self.site.values
+    def _perturb(self, k: int, name: str, change: Array, plain: Array) -> Array:
+        """Response of the rows to an error of one channel of one run, shape (n,).
+
+        plain : residuals of the run's relations without the error
+        """
+        m = self.site.signals[k]
         field, none = FIELDS[name], [None] * len(self.runs)
         other = replace(m, **{field: getattr(m, field) + change})
-        left = relation_residuals(other, p)[0] - relation_residuals(m, p)[0]
+        left = relation_residuals(other, self.site.values)[0] - plain
         speed = change / m.noise[1] if name == "drum_speed" else np.zeros(len(change))
         relation: list[Array | None] = [*none]
         drum: list[Array | None] = [*none]
@@ -253,8 +266,12 @@ class BenchRelations:
         )
         left, limited = relation_residuals(m, site.values)
         left[DRIVE, limited] = 0.0
-        driven = site.drum.simulate(k, start, m.speed)
-        return left, (log["drum_speed"] - driven) / m.noise[NOISES.index("drum_speed")]
+        # Many effects, as those of most sensors, leave the motor speed of a run as it is.
+        key = (k, m.speed.tobytes())
+        if key not in self._driven:
+            self._driven[key] = site.drum.simulate(k, start, m.speed)
+        drum = m.drum_speed - self._driven[key]
+        return left, drum / m.noise[NOISES.index("drum_speed")]
 
     def _simulate(self, k: int, trial: Mapping[str, float]) -> Log:
         """The run's log at these values, at the samples of the thinned recording."""

@@ -101,12 +101,11 @@ def _score(
     fidelity: Fidelity, candidate: Candidate, size: float, columns: Sequence[Column], states: States
 ) -> Score | None:
     """The gain with one-sided sizes kept on their side; None: all are on the other side."""
-    matrix = np.stack([c.change for c in columns], axis=1)
-    along, gram = fidelity.data.along(matrix), fidelity.data.gram(matrix)
+    products = fidelity.data.products(np.stack([c.change for c in columns]).T)
     two_sided = np.array([c.run is not None for c in columns])
     keep = np.arange(len(columns))
     while len(keep):
-        value, mean = gain(gram[np.ix_(keep, keep)], along[keep])
+        value, mean = gain(products.gram[np.ix_(keep, keep)], products.along[keep])
         wrong = (mean < 0.0) & ~two_sided[keep]
         if not wrong.any():
             break
@@ -116,7 +115,7 @@ def _score(
     beta = np.zeros(len(columns))
     beta[keep] = mean
     values, own = _estimate(candidate, size, columns, beta, states)
-    theta = fidelity.data.theta(matrix, beta)
+    theta = fidelity.data.theta(products, beta)
     return Score(gain=value, values=values, states=own, theta=theta)
 
 

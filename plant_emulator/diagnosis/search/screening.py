@@ -83,7 +83,7 @@ def _visibility(simulation: SimulationColumns, candidate: Candidate) -> Visibili
     column = simulation.column(candidate.name, values_at_size(candidate, 1.0), states)
     if column is None or not column.any():
         return Visibility()
-    square = float(simulation.data.gram(column[:, None])[0, 0])
+    square = float(simulation.data.products(column[:, None]).gram[0, 0])
     return Visibility(
         orthogonal_norm=float(np.sqrt(max(0.0, square))),
         total_norm=float(np.linalg.norm(column)),

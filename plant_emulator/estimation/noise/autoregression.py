@@ -79,19 +79,19 @@ class Autoregression:
 
         known : number of samples that precede each one without a break
         """
+        left = series / self.innovation_deviation
         if self.order == 0:
-            return series / self.deviations[0]
-        used = np.where(known >= self.order, self.order, np.minimum(known, SHORT))
-        left = series.copy()
-        for m in {self.order, min(self.order, SHORT)}:
-            whole = series.copy()
-            whole[1:] -= np.convolve(series, self.predictors[m])[: len(series) - 1]
-            left = np.where(used == m, whole, left)
-        for m in range(1, min(self.order, SHORT)):
-            behind_break = np.flatnonzero(used == m)
-            past = series[behind_break[:, None] - np.arange(1, m + 1)]
-            left[behind_break] -= past @ self.predictors[m]
-        return np.asarray(left / np.asarray(self.deviations)[used])
+            return left
+        left[1:] -= np.convolve(left, self.predictors[-1])[: len(series) - 1]
+        behind_break = np.flatnonzero(known < self.order)
+        used = np.minimum(known[behind_break], SHORT)
+        shorter = np.zeros((SHORT + 1, SHORT))
+        for m, coefficients in enumerate(self.predictors[: SHORT + 1]):
+            shorter[m, :m] = coefficients
+        past = series.take(behind_break[:, None] - np.arange(1, SHORT + 1), mode="clip")
+        unpredicted = series[behind_break] - np.einsum("ij,ij->i", past, shorter[used])
+        left[behind_break] = unpredicted / np.take(self.deviations, used)
+        return left
 
 
 def samples_since_break(time: Array) -> NDArray[np.int_]:

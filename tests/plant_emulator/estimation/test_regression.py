@@ -26,7 +26,8 @@ def test_gain_is_the_ratio_of_the_probabilities(
 ) -> None:
     y, nuisance, columns = problem
     data = Regression.of(y, nuisance)
-    found, _ = gain(data.gram(columns), data.along(columns))
+    products = data.products(columns)
+    found, _ = gain(products.gram, products.along)
     without = np.eye(60) + nuisance @ nuisance.T
     with_them = without + columns @ columns.T
     assert found == pytest.approx(log_density(y, with_them) - log_density(y, without))
@@ -37,8 +38,9 @@ def test_coefficients_are_the_joint_posterior_mean(
 ) -> None:
     y, nuisance, columns = problem
     data = Regression.of(y, nuisance)
-    _, beta = gain(data.gram(columns), data.along(columns))
+    products = data.products(columns)
+    _, beta = gain(products.gram, products.along)
     both = np.concatenate([nuisance, columns], axis=1)
     joint = np.linalg.solve(np.eye(6) + both.T @ both, both.T @ y)
     assert beta == pytest.approx(joint[4:])
-    assert data.theta(columns, beta) == pytest.approx(joint[:4])
+    assert data.theta(products, beta) == pytest.approx(joint[:4])
