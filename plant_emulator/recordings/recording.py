@@ -9,7 +9,14 @@ import numpy as np
 
 from plant_emulator.errors import IdentificationError, UnsettledError
 from plant_emulator.recordings.wheel_torque import is_estimated
-from plant_emulator.signals.log import VOLTAGE, Array, Log, compared_channels, without_voltage
+from plant_emulator.signals.log import (
+    TIMING_ERROR,
+    VOLTAGE,
+    Array,
+    Log,
+    compared_channels,
+    without_voltage,
+)
 from plant_emulator.signals.mains import noise_beside_lines
 from plant_emulator.signals.noise import FLOOR, noise
 from plant_emulator.simulation.simulate import TOLERANCE, Hold, RunInputs, inputs_of, simulate
@@ -47,6 +54,21 @@ class Recording:
     def estimated_torque(self) -> bool:
         """Whether a truck's wheel torque is unknown, and its input an estimate."""
         return is_estimated(self.log)
+
+    @property
+    def noise_ratio(self) -> Array:
+        """Deviation of each sample's noise over its channel's [1], shape (channels, samples).
+
+        A row that was taken early or late is off by the rate of change of each channel. The rate is
+        the measured one, so that all hypotheses are judged alike. It is the larger one of both
+        sides, because nobody knows on which side of a sample a contact falls.
+        """
+        if TIMING_ERROR not in self.log:
+            return np.ones(self.use.shape)
+        measured = np.stack([self.log[name] for name in self.channels])
+        rate = np.abs(np.diff(measured) / np.diff(self.log.time))
+        larger = np.maximum(np.pad(rate, ((0, 0), (1, 0))), np.pad(rate, ((0, 0), (0, 1))))
+        return np.asarray(np.hypot(1.0, self.log[TIMING_ERROR] * larger / self.noise[:, None]))
 
     def residual(
         self,
@@ -89,10 +111,11 @@ class Recording:
     def residual_of(self, found: Log) -> Array:
         """Residual as in `residual`, of a simulated log."""
         difference = np.stack([self.log[name] - found[name] for name in self.channels])
-        white = np.where(self.use, difference / self.noise[:, None], 0.0)
+        deviation = self.noise[:, None] * self.noise_ratio
+        white = np.where(self.use, difference / deviation, 0.0)
         if VOLTAGE in self.channels:
             row = self.channels.index(VOLTAGE)
-            errors = voltage_errors(found[VOLTAGE]) / self.noise[row]
+            errors = voltage_errors(found[VOLTAGE]) / deviation[row][:, None]
             white[row] = whiten_sensor_errors(white[row], errors * self.use[row][:, None])
         return white
 

@@ -25,6 +25,8 @@ VOLTAGE = "armature_voltage"
 WHEEL_TORQUE, TRUCK = "wheel_torque", "truck_on_drum"
 # Knee of the speed reference after each sample: seconds after it, and value.
 KNEE_TIME, KNEE = "reference_knee_time", "reference_knee"
+# Standard deviation of what is not known of the time that a row was taken at [s].
+TIMING_ERROR = "timing_error"
 # A channel that moves by less than this share of its largest value shows rounding only [1].
 CONSTANT_WITHIN = 1e-9
 

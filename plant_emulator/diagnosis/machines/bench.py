@@ -131,6 +131,7 @@ class BenchModel:
                 time=r.log.time,
                 measured=np.stack([r.log[name] for name in r.channels]),
                 noise=r.noise,
+                noise_ratio=r.noise_ratio,
                 measured_input=r.inputs.truck,
                 hides=own,
             )

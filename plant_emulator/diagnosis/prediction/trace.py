@@ -72,4 +72,5 @@ def _prediction(run: MeasuredRun, channel: int, residual: Array) -> Array:
     The prediction of a voltage contains the error of its sensor.
     """
     whitened = np.where(residual[channel] == 0.0, np.nan, residual[channel])
-    return np.asarray(run.measured[channel] - whitened * run.noise[channel])
+    deviation = run.noise[channel] * run.noise_ratio[channel]
+    return np.asarray(run.measured[channel] - whitened * deviation)

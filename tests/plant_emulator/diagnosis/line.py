@@ -65,6 +65,7 @@ class Line:
                 time=TIME,
                 measured=y[None, :],
                 noise=np.ones(1),
+                noise_ratio=np.ones((1, len(TIME))),
             )
             for k, y in enumerate(measured)
         ]

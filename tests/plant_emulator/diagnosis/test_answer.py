@@ -83,6 +83,7 @@ def run(measured: Array, noise: float) -> MeasuredRun:
         time=np.arange(float(len(measured))),
         measured=measured[None, :],
         noise=np.array([noise]),
+        noise_ratio=np.ones((1, len(measured))),
     )
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from plant_emulator.recordings.recording import recording
 from plant_emulator.recordings.stamps import lateness, restamp
-from plant_emulator.signals.log import Log
+from plant_emulator.signals.log import TIMING_ERROR, Log
 
 RATE = 75.0
 
@@ -25,11 +26,29 @@ def test_rows_off_their_stamps_get_the_times_they_were_taken_at() -> None:
     off = np.random.default_rng(1).uniform(-2e-3, 2e-3, len(time))
     found, jitter = restamp(log(time, time + off))
     ramp = np.abs(np.gradient(reference(time), time)) > 50.0
-    assert jitter == pytest.approx(2e-3 / np.sqrt(3.0), rel=0.35)
+    assert jitter == pytest.approx(2e-3 / np.sqrt(3.0), rel=0.1)
     error = (found.time - time - off)[ramp]
     assert np.sqrt(np.mean(error**2)) < 0.3 * 2e-3 / np.sqrt(3.0)
     steady = (time > 5.5) & (time < 9.5)
     assert np.array_equal(found.time[steady], time[steady])
+    uncertain = found[TIMING_ERROR]
+    assert np.mean((error / uncertain[ramp]) ** 2) == pytest.approx(1.0, abs=0.25)
+    assert uncertain[steady] == pytest.approx(jitter)
+
+
+def test_an_uncertain_time_is_noise_in_proportion_to_the_rate_of_change() -> None:
+    time = np.arange(0.0, 15.0, 0.01)
+    random = np.random.default_rng(1)
+    step = np.where(time < 7.0, 0.0, 20.0)
+    torque = step + random.normal(0.0, 0.25, len(time))
+    given = log(time, time + random.uniform(-2e-3, 2e-3, len(time)), shaft_torque=torque)
+    found, jitter = restamp(given)
+    ratio = recording(found).noise_ratio[1]
+    at_step = np.flatnonzero(np.diff(step))[0]
+    beside = 20.0 / 0.01 * jitter / 0.25
+    assert ratio[at_step : at_step + 2] == pytest.approx([beside, beside], rel=0.15)
+    assert np.median(ratio) == pytest.approx(1.0, abs=0.05)
+    assert np.all(recording(given).noise_ratio == 1.0)
 
 
 def test_rows_on_their_stamps_stay() -> None:
@@ -49,6 +68,6 @@ def test_a_staircase_tells_nothing() -> None:
 def test_a_sine_is_no_jitter() -> None:
     time = np.arange(0.0, 15.0, 0.01)
     given = Log(time, {"speed_reference": 200.0 + 50.0 * np.sin(2.0 * time)})
-    _, told = lateness(given.time, given["speed_reference"])
-    assert told.any()
+    _, leverage = lateness(given.time, given["speed_reference"])
+    assert (leverage < 1.0).any()
     assert restamp(given)[1] == 0.0

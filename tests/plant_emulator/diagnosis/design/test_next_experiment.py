@@ -87,6 +87,7 @@ class Slope:
                 time=x,
                 measured=y[None, :],
                 noise=np.array([0.01]),
+                noise_ratio=np.ones((1, len(x))),
             )
             for source, x, y in zip(sources, speeds, measured, strict=True)
         ]
