@@ -45,7 +45,7 @@ class Settings:
     # Positions in the gap that a start is tried from, because contact comes at once or not at all.
     gap_positions: int = 9
     # Sizes that the best start is tried at: a limit does not scale as its column does.
-    trial_sizes: tuple[float, ...] = tuple(0.1 * 1.6**k for k in range(8))
+    trial_sizes: tuple[float, ...] = tuple(0.1 * 1.25**k for k in range(17))
 
 
 SETTINGS = Settings()
