@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.task import Task
     from plant_emulator.diagnosis.machine import Model
-    from plant_emulator.diagnosis.search.screening import Start
+    from plant_emulator.diagnosis.search.promise import Start
 
 
 @dataclass(frozen=True, kw_only=True)

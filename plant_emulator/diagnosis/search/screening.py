@@ -1,9 +1,10 @@
-"""Screens the effects: the gain of log evidence that a linear regression predicts for each.
+"""Screens the effects: the gain of log evidence that each promises on top of a fit.
 
-Each effect has two scores on top of a fit, in the relations and in the simulation's residual. What
-is local is clean in the first; what is slow and faint adds up in the second. The larger counts.
-A large gap bends the parameters of the fit without effects, and slopes there mislead. The relations
-at the nominal parameters give a third score then.
+A linear regression predicts it, in the relations and in the simulation's residual. What is local is
+clean in the first; what is slow and faint adds up in the second. The larger counts. A large gap
+bends the parameters of the fit without effects, and slopes there mislead. The relations at the
+nominal parameters give a third score then. Where the first of these scores does not lead to the
+noise, `secant_fits` tells the others apart.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.columns import best_score
+from plant_emulator.diagnosis.search.promise import Promise, Start
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.simulation_columns import SimulationColumns
 from plant_emulator.estimation.robust_scan import scan_unknowns
@@ -30,28 +32,6 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.machine import Candidate, Model
     from plant_emulator.diagnosis.search.columns import Score
     from plant_emulator.estimation.unknowns import Residual, Unknown
-
-
-@dataclass(frozen=True, kw_only=True)
-class Start:
-    """A start of a joint fit: values by name, and the states of each run."""
-
-    values: Mapping[str, float]
-    states: tuple[Mapping[str, float], ...]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Promise:
-    """Predicted gain of log evidence of one more effect, by regression."""
-
-    effect: str
-    gains: Mapping[str, float]
-    starts: tuple[Start, ...]
-
-    @property
-    def gain(self) -> float:
-        """The larger score."""
-        return max(self.gains.values(), default=0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,14 +106,13 @@ def promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
     if not base.effects and base.mean_square > SETTINGS.linear_mean_square:
         asked.append(replace(asked[0], nominal=True))
     found: dict[str, Promise] = {}
-    for some in runner.map(screen, asked):
-        for one in some:
-            known = found.get(one.effect, Promise(effect=one.effect, gains={}, starts=()))
-            found[one.effect] = Promise(
-                effect=one.effect,
-                gains={**known.gains, **one.gains},
-                starts=(*known.starts, *one.starts),
-            )
+    for one in (one for some in runner.map(screen, asked) for one in some):
+        known = found.get(one.effect, Promise(effect=one.effect, gains={}, starts=()))
+        found[one.effect] = Promise(
+            effect=one.effect,
+            gains={**known.gains, **one.gains},
+            starts=(*known.starts, *one.starts),
+        )
     return sorted(found.values(), key=lambda p: -p.gain)
 
 
@@ -144,9 +123,7 @@ def screen(model: Model, asked: Screening) -> list[Promise]:
     """
     from threadpoolctl import threadpool_limits
 
-    base, library = asked.base, _library(model, asked.base)
-    hidden = frozenset.intersection(*(model.runs[k].hides for k in asked.runs))
-    library = {name: one for name, one in library.items() if name not in hidden}
+    base, library = asked.base, visible(model, asked.base, asked.runs)
     if asked.nominal:
         base = _at_nominal(model, asked)
     last = bool(base.effects) and base.mean_square <= NOISE_MEAN_SQUARE
@@ -183,6 +160,12 @@ def _library(model: Model, base: FitResult) -> dict[str, Candidate]:
         for name, one in model.candidates.items()
         if name not in base.effects and not one.stochastic
     }
+
+
+def visible(model: Model, base: FitResult, runs: Sequence[int]) -> dict[str, Candidate]:
+    """Effects that a fit lacks and that a run can show."""
+    hidden = frozenset.intersection(*(model.runs[k].hides for k in runs))
+    return {name: one for name, one in _library(model, base).items() if name not in hidden}
 
 
 def start_states(model: Model, task: Task) -> dict[str, dict[str, float]]:

@@ -26,7 +26,10 @@ from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.confirmation import Trial, advance, confirm, look
 from plant_emulator.diagnosis.search.law_error import LawErrors
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
-from plant_emulator.diagnosis.search.screening import Start, promises, visibilities
+from plant_emulator.diagnosis.search.promise import Start
+from plant_emulator.diagnosis.search.rivals import fitted_rivals, predicted_rivals
+from plant_emulator.diagnosis.search.screening import promises, visibilities
+from plant_emulator.diagnosis.search.secant_fits import fitted_promises
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.summary import (
     alternatives,
@@ -44,7 +47,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model
-    from plant_emulator.diagnosis.search.screening import Promise
+    from plant_emulator.diagnosis.search.promise import Promise
     from plant_emulator.estimation.noise.logged_noise import LoggedNoise
 
 
@@ -173,16 +176,11 @@ class Search:
         if not (found := [p for p in self._screen(base) if p.gain > needed]):
             return
         (best,) = self._confirm(base, found[:1])
-        leaves_noise = best.mean_square <= NOISE_MEAN_SQUARE
-        share = SETTINGS.rival_share if leaves_noise else SETTINGS.hopeless_share
-        rivals = SETTINGS.rivals_beside if base.effects else SETTINGS.rivals
-        near: dict[str, Promise] = {}
-        for score in found[0].gains:
-            order = sorted(found, key=lambda p: -p.gains.get(score, 0.0))
-            least = share * order[0].gains.get(score, 0.0)
-            rest = [p for p in order if p is not found[0]][:rivals]
-            near |= {p.effect: p for p in rest if p.gains.get(score, 0.0) > least}
-        self._confirm(base, list(near.values()))
+        if base.effects or best.mean_square <= SETTINGS.linear_mean_square:
+            rivals = predicted_rivals(found, base, best)
+        else:
+            rivals = fitted_rivals(found, fitted_promises(self.runner, base))
+        self._confirm(base, rivals)
 
     def _confirm(self, base: FitResult, promises: Sequence[Promise]) -> list[FitResult]:
         """Fit these effects on top of a set, each for a few iterations."""

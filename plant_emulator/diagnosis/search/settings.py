@@ -13,6 +13,9 @@ class Settings:
     # effects are tried at the first size; the best are tried at the others too, and those that do
     # nothing at the first, as a limit that is not reached.
     sizes: tuple[float, ...] = (0.3, 0.1, 1.0, 3.0)
+    # Sizes that a fit by secants begins at: most laws bend less at the first, and a limit does not
+    # act there.
+    secant_sizes: tuple[float, ...] = (0.3, 1.0)
     # Prior standard deviation of a size in the rich model that noise is estimated beside.
     largest_size: float = 3.0
     # So many effects of each score are tried at the other sizes; the true one was among three.

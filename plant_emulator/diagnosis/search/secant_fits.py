@@ -1,0 +1,78 @@
+"""Fits each effect on top of a fit, while the slopes of all else follow by secants.
+
+Far from the noise a linear regression misleads: without its cause, a fit has bent the parameters,
+and the slopes there hardly know the cause. Some iterations of a fit unbend them. They are cheap,
+because only the slopes of the effect itself are simulated anew (see `least_squares.estimate`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
+from plant_emulator.diagnosis.fitting.signature import signs, values_at_size
+from plant_emulator.diagnosis.search.promise import Promise, Start
+from plant_emulator.diagnosis.search.screening import visible
+from plant_emulator.diagnosis.search.settings import SETTINGS
+
+if TYPE_CHECKING:
+    from plant_emulator.diagnosis.execution.pool import TaskRunner
+    from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.machine import Candidate, Model
+    from plant_emulator.estimation.unknowns import Estimate
+
+# Name of the score in the trace.
+SECANTS = "fit by secants"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SecantFits:
+    """Effects to fit on top of a fit."""
+
+    base: FitResult
+    runs: tuple[int, ...]
+    effects: tuple[str, ...]
+
+
+def fitted_promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
+    """Gains of all effects on top of a fit, each fitted by secants, the largest first."""
+    names = tuple(visible(runner.model, base, runner.runs))
+    halves = [SecantFits(base=base, runs=runner.runs, effects=names[k::2]) for k in range(2)]
+    found = [one for half in runner.map(fit_by_secants, halves) for one in half]
+    return sorted(found, key=lambda p: -p.gain)
+
+
+def fit_by_secants(model: Model, asked: SecantFits) -> list[Promise]:
+    """Gain of each of these effects after some iterations of its fit (a step)."""
+    near = linearise(model, asked.base, asked.runs)
+    return [_promise(model, asked, name, near) for name in asked.effects]
+
+
+def _promise(model: Model, asked: SecantFits, name: str, near: Estimate) -> Promise:
+    """The gain of an effect from the better of its sizes, and where that fit has come to."""
+    base, candidate = asked.base, model.candidates[name]
+    found = min(
+        (
+            fit(
+                model,
+                (*base.effects, name),
+                asked.runs,
+                {**base.values, **values_at_size(candidate, size)},
+                base.states,
+                SETTINGS.iterations,
+                near,
+            )
+            for size in _sizes(candidate)
+        ),
+        key=lambda one: one.cost,
+    )
+    start = Start(values=found.values, states=found.states)
+    gain = 0.5 * (base.cost - found.cost)
+    return Promise(effect=name, gains={SECANTS: gain}, starts=(start,))
+
+
+def _sizes(candidate: Candidate) -> tuple[float, ...]:
+    """Sizes to begin at; a size that may have either sign finds its own by crossing neutral."""
+    two_sided = len(signs(candidate.sizes)) > 1
+    return SETTINGS.secant_sizes[:1] if two_sided else SETTINGS.secant_sizes
