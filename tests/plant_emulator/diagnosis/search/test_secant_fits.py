@@ -1,0 +1,73 @@
+"""Each effect fitted by secants, on a machine so small that it can be checked by hand."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
+from plant_emulator.diagnosis.search.promise import Promise
+from plant_emulator.diagnosis.search.rivals import fitted_rivals
+from plant_emulator.diagnosis.search.secant_fits import SECANTS, SecantFits, fit_by_secants
+from plant_emulator.signals.log import Array
+from tests.plant_emulator.diagnosis.line import TIME, Line, noisy
+
+
+def promised(model: Line) -> dict[str, Promise]:
+    asked = SecantFits(base=fit_null(model, (0,)), runs=(0,), effects=tuple(model.candidates))
+    return {p.effect: p for p in fit_by_secants(model, asked)}
+
+
+def test_gain_is_that_of_the_whole_fit_where_all_is_linear() -> None:
+    """By hand: a wave of size A takes n A^2 / 2 from the squares, and half of it is the gain."""
+    found = promised(Line([noisy(2.0 + 3.0 * TIME - 3.0 * np.sin(20.0 * TIME))]))
+    assert found["wave"].gain == pytest.approx(3.0**2 * 2000 / 4, rel=0.06)
+    assert found["cube"].gain < 10.0
+    (start,) = found["wave"].starts
+    assert start.values["wave_size"] == pytest.approx(-3.0, abs=0.1)
+
+
+class Decaying(Line):
+    """y = a exp(b x), and effects."""
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+        plain = super().residual(run, effects)
+
+        def residual(v: Mapping[str, float]) -> Array:
+            law = v["a"] * np.exp(v["b"] * TIME)
+            return plain({**v, "a": 0.0, "b": 0.0}) - law[None, :]
+
+        return residual
+
+
+def test_parameters_that_bent_without_the_cause_unbend() -> None:
+    """The cube passes for decay: without it b is below -0.7 for -0.5."""
+    model = Decaying([noisy(10.0 * np.exp(-0.5 * TIME) - 5.0 * TIME**3)], ["wave", "cube"])
+    base = fit_null(model, (0,))
+    assert base.values["b"] < -0.7
+    whole = fit(model, ("cube",), (0,), {"a": 10.0, "b": -0.5, "cube_size": -5.0}, [{}])
+    found = promised(model)
+    assert found["cube"].gain == pytest.approx(0.5 * (base.cost - whole.cost), rel=0.02)
+    (start,) = found["cube"].starts
+    assert start.values["b"] == pytest.approx(-0.5, abs=0.05)
+
+
+def promise(effect: str, **gains: float) -> Promise:
+    return Promise(effect=effect, gains=gains, starts=())
+
+
+def test_rivals_are_the_leaders_of_each_score_and_of_the_fits() -> None:
+    """b leads the relations; of the fits d and e gain half of the most or more, and c does not."""
+    found = [
+        promise("a", relations=1.0, simulation=90.0),
+        promise("b", relations=20.0, simulation=5.0),
+        promise("c", relations=8.0, simulation=30.0),
+    ]
+    fits = {"a": 300.0, "d": 200.0, "e": 110.0, "c": 90.0}
+    fitted = [replace(promise(name), gains={SECANTS: gain}) for name, gain in fits.items()]
+    assert [p.effect for p in fitted_rivals(found, fitted)] == ["d", "b"]
+    near = [replace(p, gains={SECANTS: 160.0}) if p.effect == "e" else p for p in fitted]
+    assert [p.effect for p in fitted_rivals(found, near)] == ["d", "e", "b"]
+    assert [p.effect for p in fitted_rivals(found, [])] == ["b"]
