@@ -63,7 +63,8 @@ class MeasuredRun:
     time : of the samples [s], shape (n,)
     measured : the channels [units], shape (channels, n)
     noise : standard deviation of each channel's noise [units], shape (channels,)
-    noise_ratio : deviation of each sample's noise over its channel's [1], shape (channels, n)
+    noise_ratio : deviation of each sample's noise over its channel's [1], shape (channels, n);
+        (channels, 1) where all samples are alike
     measured_input : whether an input of the simulation is a measurement with noise of its own
     hides : effects that an unknown input of the run explains, or that need an input it lacks
     """

@@ -59,12 +59,14 @@ class Recording:
     def noise_ratio(self) -> Array:
         """Deviation of each sample's noise over its channel's [1], shape (channels, samples).
 
+        The shape is (channels, 1) where all samples are alike.
+
         A row that was taken early or late is off by the rate of change of each channel. The rate is
         the measured one, so that all hypotheses are judged alike. It is the larger one of both
         sides, because nobody knows on which side of a sample a contact falls.
         """
         if TIMING_ERROR not in self.log:
-            return np.ones(self.use.shape)
+            return np.ones((len(self.channels), 1))
         measured = np.stack([self.log[name] for name in self.channels])
         rate = np.abs(np.diff(measured) / np.diff(self.log.time))
         larger = np.maximum(np.pad(rate, ((0, 0), (1, 0))), np.pad(rate, ((0, 0), (0, 1))))
