@@ -42,10 +42,9 @@ def beyond_kink(
         return here + sum(_cost(residuals[k], trial, k) - costs[k] for k in runs), change, trial
 
     trials = [(*changed(j, change), j) for j in range(len(unknowns)) for change in CHANGES]
-    _, change, _, j = min(trials, key=lambda one: one[0])
-    cost, _, start = min(
-        (changed(j, factor * change) for factor in (0.5, 1.0, 2.0)), key=lambda one: one[0]
-    )
+    best = min(trials, key=lambda one: one[0])
+    nearby = [(*changed(best[3], factor * best[1]), best[3]) for factor in (0.5, 2.0)]
+    cost, _, start, _ = min((best, *nearby), key=lambda one: one[0])
     return start if cost < (1.0 - WORTH) * here else None
 
 

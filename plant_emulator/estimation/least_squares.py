@@ -85,8 +85,9 @@ def estimate(
         return _estimate(problem, start, False, "no unknown changes the residual")
     most, bounds = iterations or MAX_ITERATIONS, (lower, upper)
     found = _minimise(problem, start, bounds, max(settled, settled_far), most)
-    samples = sum(np.count_nonzero(r) for r in problem.residual(found.x))
-    near = 2.0 * found.cost <= SUSPECT_MEAN_SQUARE * samples
+    rows = problem.residual(found.x)
+    samples = sum(np.count_nonzero(r) for r in rows)
+    near = sum(float(np.sum(r**2)) for r in rows) <= SUSPECT_MEAN_SQUARE * samples
     if near and settled < settled_far and found.nfev < most:
         found = _minimise(problem, found.x, bounds, settled, most - found.nfev)
     return _estimate(problem, found.x, bool(found.status > 0), str(found.message))

@@ -62,15 +62,20 @@ class Recording:
         The shape is (channels, 1) where all samples are alike.
 
         A row that was taken early or late is off by the rate of change of each channel. The rate is
-        the measured one, so that all hypotheses are judged alike. It is the larger one of both
-        sides, because nobody knows on which side of a sample a contact falls.
+        the measured one, so that all hypotheses are judged alike; that of samples that count, so
+        that a held channel does not jump; and that of medians of three, so that a spike has none.
+        It is the larger one of both sides, because nobody knows on which side of a sample a contact
+        falls.
         """
         if TIMING_ERROR not in self.log:
             return np.ones((len(self.channels), 1))
-        measured = np.stack([self.log[name] for name in self.channels])
-        rate = np.abs(np.diff(measured) / np.diff(self.log.time))
-        larger = np.maximum(np.pad(rate, ((0, 0), (1, 0))), np.pad(rate, ((0, 0), (0, 1))))
-        return np.asarray(np.hypot(1.0, self.log[TIMING_ERROR] * larger / self.noise[:, None]))
+        rates = np.zeros(self.use.shape)
+        for row, (name, use) in enumerate(zip(self.channels, self.use, strict=True)):
+            time, value = self.log.time[use], np.pad(self.log[name][use], 1, mode="edge")
+            middle = np.median(np.stack([value[:-2], value[1:-1], value[2:]]), axis=0)
+            rate = np.abs(np.diff(middle) / np.diff(time))
+            rates[row, use] = np.maximum(np.pad(rate, (1, 0)), np.pad(rate, (0, 1)))
+        return np.asarray(np.hypot(1.0, self.log[TIMING_ERROR] * rates / self.noise[:, None]))
 
     def residual(
         self,

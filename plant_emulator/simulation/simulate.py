@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 Hold = Literal["linear", "staircase"]
 
-# Error per step over the range of a run at full speed [1].
+# Error per step over what `sdirk.WEIGHT` allows [1].
 TOLERANCE = 1e-6
 # Largest step [s], or one sample if that is shorter. The step control watches the nominal states,
 # but not the memories of effects. With such steps a run also changes smoothly with its parameters,
@@ -148,7 +148,7 @@ def simulate(
     values : parameters of the bench, and of effects as <effect>_<parameter> [SI]
     gap_position : start in the backlash gap (theta_g - theta_d) / alpha, -1 to 1 [1]; at +1 the
         driving flank is in contact
-    tolerance : error per step over the range of a run at full speed [1]
+    tolerance : error per step over what `sdirk.WEIGHT` allows of each state [1]
     largest_step : largest adapted step [s]; None: one sample of the log, at most 10 ms. Longer
         steps pass over samples. Without effects they make smooth runs two to three times faster.
     step : a fixed step in place of adapted steps [s]

@@ -93,10 +93,11 @@ def _cells(
             if channel not in r.channels or key not in mask:
                 continue
             row = r.channels.index(channel)
-            inside = residual[row][mask[key] & r.use[row]]
-            squares += float(np.sum(inside**2)) * r.noise[row] ** 2
-            variance += len(inside) * r.noise[row] ** 2
-            samples += len(inside)
+            inside = mask[key] & r.use[row]
+            deviation = np.broadcast_to(r.noise[row] * r.noise_ratio[row], inside.shape)[inside]
+            squares += float(np.sum((residual[row][inside] * deviation) ** 2))
+            variance += float(np.sum(deviation**2))
+            samples += len(deviation)
         if samples:
             yield _cell(channel, key, squares / samples, variance / samples, samples)
 

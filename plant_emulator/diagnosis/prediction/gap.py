@@ -178,8 +178,11 @@ def measure_gap(
             n for run, r in pairs for n, row in zip(run.channels, r, strict=True) if row.any()
         )
     )
-    squares = [_rows(names, run, (r * run.noise[:, None]) ** 2) for run, r in pairs]
-    weights = [_rows(names, run, (r != 0.0) * run.noise[:, None] ** 2) for run, r in pairs]
+    levels = [run.noise[:, None] * run.noise_ratio for run, _ in pairs]
+    squares = [_rows(names, run, (r * d) ** 2) for (run, r), d in zip(pairs, levels, strict=True)]
+    weights = [
+        _rows(names, run, (r != 0.0) * d**2) for (run, r), d in zip(pairs, levels, strict=True)
+    ]
     counts = [_rows(names, run, (r != 0.0).astype(float)) for run, r in pairs]
     variance = sum(w.sum(axis=1) for w in weights) / sum(c.sum(axis=1) for c in counts)
     return Gap(

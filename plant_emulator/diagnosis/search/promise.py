@@ -19,7 +19,7 @@ class Start:
 
 @dataclass(frozen=True, kw_only=True)
 class Promise:
-    """Predicted gain of log evidence of one more effect, by each score."""
+    """Gain of log evidence of one more effect, by each score: predicted, or reached by a fit."""
 
     effect: str
     gains: Mapping[str, float]
@@ -27,5 +27,5 @@ class Promise:
 
     @property
     def gain(self) -> float:
-        """The larger score."""
+        """The largest score."""
         return max(self.gains.values(), default=0.0)

@@ -22,27 +22,34 @@ def predicted_rivals(found: Sequence[Promise], base: FitResult, best: FitResult)
     most = SETTINGS.rivals_beside if base.effects else SETTINGS.rivals
     leaves_noise = best.mean_square <= NOISE_MEAN_SQUARE
     share = SETTINGS.rival_share if leaves_noise else SETTINGS.hopeless_share
-    return _leading(found, found[0], most, share)
+    return _leading(found, (found[0].effect,), most, share)
 
 
-def fitted_rivals(found: Sequence[Promise], fitted: Sequence[Promise]) -> list[Promise]:
+def fitted_rivals(
+    found: Sequence[Promise], fitted: Sequence[Promise], base: FitResult, best: FitResult
+) -> list[Promise]:
     """Effects that gain most in their fits by secants, and the effect that leads by each score.
 
-    found : predicted, the largest first; fitted : by secants, the largest first
+    The first effect is one of them where its fit by secants is the better one.
+
+    found : predicted, the largest first; fitted : by secants
+    best : fit with the first effect on top of `base`
     """
-    gaining = [p for p in fitted if p.gain > SETTINGS.promising]
-    rivals = _leading(gaining, found[0], SETTINGS.rivals, SETTINGS.rival_share)
-    known = {p.effect for p in rivals}
-    leaders = _leading(found, found[0], 1, SETTINGS.rival_share)
-    return [*rivals, *(p for p in leaders if p.effect not in known)]
+    first, reached = found[0].effect, 0.5 * (base.cost - best.cost)
+    gaining = [p for p in fitted if p.gain > (reached if p.effect == first else SETTINGS.promising)]
+    rivals = _leading(gaining, (), SETTINGS.rivals, SETTINGS.rival_share)
+    known = (first, *(p.effect for p in rivals))
+    return [*rivals, *_leading(found, known, 1, SETTINGS.rival_share)]
 
 
-def _leading(found: Sequence[Promise], first: Promise, most: int, share: float) -> list[Promise]:
-    """So many effects of each score beside the first, with this share of the score's largest."""
+def _leading(
+    found: Sequence[Promise], known: Sequence[str], most: int, share: float
+) -> list[Promise]:
+    """So many effects of each score beside those known, with this share of the score's largest."""
     near: dict[str, Promise] = {}
-    for score in found[0].gains if found else ():
+    for score in dict.fromkeys(score for p in found for score in p.gains):
         order = sorted(found, key=lambda p: -p.gains.get(score, 0.0))
         least = share * order[0].gains.get(score, 0.0)
-        rest = [p for p in order if p.effect != first.effect][:most]
+        rest = [p for p in order if p.effect not in known][:most]
         near |= {p.effect: p for p in rest if p.gains.get(score, 0.0) > least}
     return list(near.values())

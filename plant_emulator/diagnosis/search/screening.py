@@ -51,9 +51,9 @@ class Visibility:
 def visibilities(model: Model, task: Task) -> dict[str, Visibility]:
     """Compute the visibility of each effect in the runs of `task.base` (a task)."""
     simulation = SimulationColumns(model, task.base, task.runs)
-    hidden = frozenset.intersection(*(model.runs[k].hides for k in task.runs))
+    seen = visible(model, replace(task.base, effects=()), task.runs)
     return {
-        name: Visibility() if one.stochastic or name in hidden else _visibility(simulation, one)
+        name: _visibility(simulation, one) if name in seen else Visibility()
         for name, one in model.candidates.items()
     }
 

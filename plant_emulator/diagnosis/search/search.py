@@ -179,7 +179,8 @@ class Search:
         if base.effects or best.mean_square <= SETTINGS.linear_mean_square:
             rivals = predicted_rivals(found, base, best)
         else:
-            rivals = fitted_rivals(found, fitted_promises(self.runner, base))
+            fitted = fitted_promises(self.runner, base, found)
+            rivals = fitted_rivals(found, fitted, base, best)
         self._confirm(base, rivals)
 
     def _confirm(self, base: FitResult, promises: Sequence[Promise]) -> list[FitResult]:

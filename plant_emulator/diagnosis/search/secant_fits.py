@@ -17,6 +17,8 @@ from plant_emulator.diagnosis.search.screening import visible
 from plant_emulator.diagnosis.search.settings import SETTINGS
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Candidate, Model
@@ -26,21 +28,36 @@ if TYPE_CHECKING:
 SECANTS = "fit by secants"
 
 
+# Parts of the library that are fitted at once: each needs the slopes of the base once.
+PARTS = 2
+
+
 @dataclass(frozen=True, kw_only=True)
 class SecantFits:
-    """Effects to fit on top of a fit."""
+    """Effects to fit on top of a fit.
+
+    states : of the runs, by effect, where a regression told those that the effect adds
+    """
 
     base: FitResult
     runs: tuple[int, ...]
     effects: tuple[str, ...]
+    states: Mapping[str, Sequence[Mapping[str, float]]]
 
 
-def fitted_promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
-    """Gains of all effects on top of a fit, each fitted by secants, the largest first."""
+def fitted_promises(runner: TaskRunner, base: FitResult, found: Sequence[Promise]) -> list[Promise]:
+    """Gains of all effects on top of a fit, each fitted by secants, the largest first.
+
+    found : predicted gains of the effects, with starts
+    """
     names = tuple(visible(runner.model, base, runner.runs))
-    halves = [SecantFits(base=base, runs=runner.runs, effects=names[k::2]) for k in range(2)]
-    found = [one for half in runner.map(fit_by_secants, halves) for one in half]
-    return sorted(found, key=lambda p: -p.gain)
+    states = {p.effect: p.starts[0].states for p in found if p.starts}
+    parts = [
+        SecantFits(base=base, runs=runner.runs, effects=names[k::PARTS], states=states)
+        for k in range(min(PARTS, len(names)))
+    ]
+    fitted = [one for part in runner.map(fit_by_secants, parts) for one in part]
+    return sorted(fitted, key=lambda p: -p.gain)
 
 
 def fit_by_secants(model: Model, asked: SecantFits) -> list[Promise]:
@@ -52,6 +69,11 @@ def fit_by_secants(model: Model, asked: SecantFits) -> list[Promise]:
 def _promise(model: Model, asked: SecantFits, name: str, near: Estimate) -> Promise:
     """The gain of an effect from the better of its sizes, and where that fit has come to."""
     base, candidate = asked.base, model.candidates[name]
+    own = [u.name for u in candidate.states]
+    states = [
+        {**fitted, **{name: told[name] for name in own if name in told}}
+        for fitted, told in zip(base.states, asked.states.get(name, base.states), strict=True)
+    ]
     found = min(
         (
             fit(
@@ -59,7 +81,7 @@ def _promise(model: Model, asked: SecantFits, name: str, near: Estimate) -> Prom
                 (*base.effects, name),
                 asked.runs,
                 {**base.values, **values_at_size(candidate, size)},
-                base.states,
+                states,
                 SETTINGS.iterations,
                 near,
             )

@@ -20,7 +20,8 @@ class Settings:
     largest_size: float = 3.0
     # So many effects of each score are tried at the other sizes; the true one was among three.
     tried_further: int = 6
-    # Mean square up to which the linear rich model around a fit is as good as the fit with a cause.
+    # Mean square up to which a linear model around a fit is as good as a fit with the cause: noise
+    # is estimated beside it, and regressions choose the rivals.
     linear_mean_square: float = 1.5
     # Gain that an effect needs: odds of e^15, one of 30 effects by chance in 100 000 logs.
     needed: float = 15.0
@@ -33,12 +34,13 @@ class Settings:
     most_effects: int = 3
     # Relative error of an approximate law: other laws of the same effect differed by up to this.
     law_error: float = 0.1
-    # Promising effects of each score that are fitted beside the best one. Contact and limits move
-    # with the fit, so that the order by promise is not yet that by fit. Beside other effects the
-    # fit is near, and the order is nearly right.
+    # Leading effects of each score, or of the fits by secants, that are fitted beside the best one.
+    # Contact and limits move with the fit, so that the order by promise is not yet that by fit.
+    # Beside other effects the fit is near, and the order is nearly right.
     rivals: int = 2
     rivals_beside: int = 1
-    # Gain over the best one's that a rival needs where the best one leaves noise, and elsewhere.
+    # Gain over the largest one that a rival needs. Where the first effect leaves more than noise,
+    # but the regressions hold, a rival may have the second share.
     rival_share: float = 0.5
     hopeless_share: float = 0.05
     # Iterations of a first fit, enough to tell a basin from a slope.

@@ -40,7 +40,7 @@ def measured_run(*channels: str, samples: int = 100, noise: float = 1.0) -> Meas
         time=np.arange(float(samples)),
         measured=np.zeros((len(channels), samples)),
         noise=np.full(len(channels), noise),
-        noise_ratio=np.ones((len(channels), samples)),
+        noise_ratio=np.ones((len(channels), 1)),
     )
 
 

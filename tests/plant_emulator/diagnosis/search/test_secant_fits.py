@@ -15,7 +15,8 @@ from tests.plant_emulator.diagnosis.line import TIME, Line, noisy
 
 
 def promised(model: Line) -> dict[str, Promise]:
-    asked = SecantFits(base=fit_null(model, (0,)), runs=(0,), effects=tuple(model.candidates))
+    base = fit_null(model, (0,))
+    asked = SecantFits(base=base, runs=(0,), effects=tuple(model.candidates), states={})
     return {p.effect: p for p in fit_by_secants(model, asked)}
 
 
@@ -59,15 +60,23 @@ def promise(effect: str, **gains: float) -> Promise:
 
 
 def test_rivals_are_the_leaders_of_each_score_and_of_the_fits() -> None:
-    """b leads the relations; of the fits d and e gain half of the most or more, and c does not."""
+    """b leads the relations; of the fits d and e gain half of the most or more, and c does not.
+
+    The fit with a gains 250: its fit by secants counts where it gains more than that.
+    """
+    base = fit_null(Line([noisy(2.0 + 3.0 * TIME)]), (0,))
+    best = replace(base, cost=base.cost - 500.0)
     found = [
         promise("a", relations=1.0, simulation=90.0),
         promise("b", relations=20.0, simulation=5.0),
         promise("c", relations=8.0, simulation=30.0),
     ]
-    fits = {"a": 300.0, "d": 200.0, "e": 110.0, "c": 90.0}
-    fitted = [replace(promise(name), gains={SECANTS: gain}) for name, gain in fits.items()]
-    assert [p.effect for p in fitted_rivals(found, fitted)] == ["d", "b"]
-    near = [replace(p, gains={SECANTS: 160.0}) if p.effect == "e" else p for p in fitted]
-    assert [p.effect for p in fitted_rivals(found, near)] == ["d", "e", "b"]
-    assert [p.effect for p in fitted_rivals(found, [])] == ["b"]
+
+    def rivals(**gains: float) -> list[str]:
+        fitted = [promise(name, **{SECANTS: gain}) for name, gain in gains.items()]
+        return [p.effect for p in fitted_rivals(found, fitted, base, best)]
+
+    assert rivals(d=200.0, e=90.0, a=249.0) == ["d", "b"]
+    assert rivals(d=200.0, e=160.0, c=150.0) == ["d", "e", "b"]
+    assert rivals(a=300.0, d=160.0) == ["a", "d", "b"]
+    assert rivals() == ["b"]
