@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -49,6 +51,24 @@ def test_an_uncertain_time_is_noise_in_proportion_to_the_rate_of_change() -> Non
     assert ratio[at_step : at_step + 2] == pytest.approx([beside, beside], rel=0.15)
     assert np.median(ratio) == pytest.approx(1.0, abs=0.05)
     assert np.all(recording(given).noise_ratio == 1.0)
+
+
+def test_neither_a_spike_nor_a_held_channel_makes_noise_of_a_rows_time() -> None:
+    """By hand: torque at 63 N m/s off by 1.2 ms is 0.07 N m, where its noise is 0.25 N m."""
+    time = np.arange(0.0, 15.0, 0.01)
+    random = np.random.default_rng(1)
+    torque = 20.0 * np.sin(np.pi * time) + random.normal(0.0, 0.25, len(time))
+    late = random.uniform(-2e-3, 2e-3, len(time))
+    spiked = torque.copy()
+    spiked[700] += 25.0
+    found, _ = restamp(log(time, time + late, shaft_torque=spiked))
+    assert recording(found).noise_ratio[1, 699:702] == pytest.approx(1.0, abs=0.25)
+    fresh = np.arange(len(time)) // 10 * 10
+    found, _ = restamp(log(time, time + late, shaft_torque=torque[fresh]))
+    own = recording(found)
+    own.noise[1] = 0.25
+    counted = replace(own, use=own.use & (fresh == np.arange(len(time))))
+    assert np.median(counted.noise_ratio[1, ::10]) == pytest.approx(1.03, abs=0.05)
 
 
 def test_rows_on_their_stamps_stay() -> None:
