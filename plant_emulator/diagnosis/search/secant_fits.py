@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 # Name of the score in the trace.
 SECANTS = "fit by secants"
-
-
 # Parts of the library that are fitted at once: each needs the slopes of the base once.
 PARTS = 2
 
@@ -71,7 +69,7 @@ def _promise(model: Model, asked: SecantFits, name: str, near: Estimate) -> Prom
     base, candidate = asked.base, model.candidates[name]
     own = [u.name for u in candidate.states]
     states = [
-        {**fitted, **{name: told[name] for name in own if name in told}}
+        {**fitted, **{state: told[state] for state in own if state in told}}
         for fitted, told in zip(base.states, asked.states.get(name, base.states), strict=True)
     ]
     found = min(
