@@ -1,10 +1,16 @@
 """The drive limits the armature current below its nominal largest current.
 
-    |i_ref| <= i_max - R
+    |i_ref| <= I = i_max - R
 
-Source: W. Leonhard, Control of Electrical Drives, chapter on the cascade control of drives: the
-limit of the speed controller's output is the limit of the current. R is the distance of the limit
-below i_max.
+The limit of an analogue controller sets in gradually: between (1 - r) I and (1 + r) I the current
+follows the parabola that joins the line |i| and the constant I without a corner,
+
+    |i_ref| = |i| - (|i| - (1 - r) I)^2 / (4 r I)
+
+Sources: W. Leonhard, Control of Electrical Drives, chapter on the cascade control of drives: the
+limit of the speed controller's output is the limit of the current; D. Giannoulis, M. Massberg,
+J. D. Reiss, J. Audio Eng. Soc. 60 (2012) 399, on limits with a soft knee. R is the distance of the
+limit below i_max, r the rounding of the corner. R = 0: the nominal limit, with its corner.
 """
 
 from __future__ import annotations
@@ -21,9 +27,21 @@ PARAMETERS = {
     "reduction": EffectParameter(
         neutral=0.0, lower=0.0, upper=71.0, plausible=50.0, unit="A", meaning="R"
     ),
+    "rounding": EffectParameter(
+        neutral=0.0, lower=0.0, upper=0.5, plausible=0.0, unit="1", meaning="r", std=0.1
+    ),
 }
 
 
 def current_limit(value: float, s: Record, p: Record) -> float:
-    """Largest current reference [A]."""
-    return max(0.0, value - p.current_limit_reduction)
+    """Limit of the current reference at the wanted current [A]."""
+    if p.current_limit_reduction == 0.0:
+        return value
+    limit = max(0.0, value - p.current_limit_reduction)
+    half = p.current_limit_rounding * limit
+    wanted = abs(s.wanted_current)
+    beyond = wanted - (limit - half)
+    if beyond <= 0.0 or beyond >= 2.0 * half:
+        return limit
+    rounded: float = wanted - beyond * beyond / (4.0 * half)
+    return rounded

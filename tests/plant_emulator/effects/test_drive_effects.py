@@ -36,6 +36,17 @@ def test_ramp_limit_lets_the_motor_reach_full_speed_in_the_ramp_time(nominal: Pa
         assert slope == pytest.approx(sign * 505.796417 / 8.0, rel=3e-3)
 
 
+def test_smoothed_ramp_lags_behind_by_slope_times_smoothing_time(nominal: ParameterSet) -> None:
+    """505.8 rad/s in 8 s and 0.05 s of smoothing: 3.16 rad/s; the end of the ramp comes late."""
+    step = linear((0.2, 0.0), (0.21, 200.0), duration=5.0)
+    ramp = simulate(step, effect(nominal, "reference_ramp_limit", ramp_time=8.0))
+    values = effect(nominal, "reference_ramp_limit", ramp_time=8.0, smoothing_time=0.05)
+    behind = ramp["motor_speed"] - simulate(step, values)["motor_speed"]
+    steady = (ramp.time > 2.0) & (ramp.time < 3.0)
+    assert behind[steady].mean() == pytest.approx(505.796417 / 8.0 * 0.05, rel=3e-3)
+    assert abs(behind[-1]) < 1e-2
+
+
 def test_ramp_that_is_slow_enough_passes_the_limit(nominal: ParameterSet) -> None:
     slow = linear((0.2, 0.0), (3.2, 150.0), (4.0, 150.0), duration=5.0)
     plain = simulate(slow, nominal.values())
@@ -117,6 +128,28 @@ def test_current_is_limited_to_what_is_left_of_72_ampere(
     assert 20.5 < current.max() <= 21.0
     plain = direction * simulate(step, nominal.values())["armature_current"]
     assert plain.max() > 60.0
+
+
+@pytest.mark.parametrize(
+    ("wanted", "current"),
+    [(15.9, 15.9), (16.0, 16.0), (18.0, 17.75), (-20.0, 19.0), (22.0, 19.75), (24.0, 20.0)],
+)
+def test_rounded_limit_is_a_parabola_between_two_lines(wanted: float, current: float) -> None:
+    """Limit 20 A, rounding 0.2: the line up to 16 A, 20 A from 24 A on; (i - 16)^2 / 16 less."""
+    p = SimpleNamespace(current_limit_reduction=52.0, current_limit_rounding=0.2)
+    law = effects.load("current_limit").laws["current_limit"]
+    limit = law(72.0, SimpleNamespace(wanted_current=wanted), p)
+    assert min(abs(wanted), limit) == pytest.approx(current)
+
+
+def test_rounded_limit_needs_no_shorter_steps(nominal: ParameterSet) -> None:
+    step = linear((0.2, 0.0), (0.3, 150.0), duration=2.0)
+    values = effect(nominal, "current_limit", reduction=51.0, rounding=0.2)
+    found = simulate(step, values)["armature_current"]
+    fine = simulate(step, values, largest_step=2e-4)["armature_current"]
+    np.testing.assert_allclose(found, fine, atol=0.02)
+    sharp = simulate(step, effect(nominal, "current_limit", reduction=51.0))["armature_current"]
+    assert np.max(sharp - found) > 0.5
 
 
 def test_sagging_voltage_sets_the_top_speed(nominal: ParameterSet) -> None:
