@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fit_result import FitValues
-from plant_emulator.diagnosis.fitting.joint_fit import approach, fit, fit_from, linearise
+from plant_emulator.diagnosis.fitting.joint_fit import approach, fit, linearise
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.estimation.robust_scan import cauchy_loss
@@ -20,7 +20,6 @@ from plant_emulator.model.stage import GAP_POSITION
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.fitting.task import Task
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.search.promise import Start
 
@@ -75,11 +74,6 @@ def look(model: Model, trial: Trial) -> FitResult:
         SETTINGS.iterations,
         near=near,
     )
-
-
-def advance(model: Model, task: Task) -> FitResult:
-    """A few iterations of the fit `task.base` (a step)."""
-    return fit_from(model, task.base.effects, task.runs, task.base, SETTINGS.iterations)
 
 
 def _scan_gap_positions(model: Model, trial: Trial, start: Start) -> tuple[float, Start]:

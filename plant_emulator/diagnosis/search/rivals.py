@@ -1,4 +1,4 @@
-"""Chooses the rivals of the first effect that is fitted on top of a fit."""
+"""Chooses the effects that are fitted on top of a fit."""
 
 from __future__ import annotations
 
@@ -40,6 +40,16 @@ def fitted_rivals(
     rivals = _leading(gaining, (), SETTINGS.rivals, SETTINGS.rival_share)
     known = (first, *(p.effect for p in rivals))
     return [*rivals, *_leading(found, known, 1, SETTINGS.rival_share)]
+
+
+def gaining(fitted: Sequence[Promise], needed: float) -> list[Promise]:
+    """The next effect of a set that leaves more than the noise, and its rivals.
+
+    What such a set leaves has bent its parameters, so that predictions mislead.
+
+    fitted : by secants, the largest first; needed : least gain
+    """
+    return [p for p in fitted if p.gain > needed][: 1 + SETTINGS.rivals_beside]
 
 
 def _leading(

@@ -23,11 +23,11 @@ from plant_emulator.diagnosis.fitting.evidence import (
 from plant_emulator.diagnosis.fitting.explanation import Explanation
 from plant_emulator.diagnosis.fitting.fit_steps import refit
 from plant_emulator.diagnosis.fitting.task import Task
-from plant_emulator.diagnosis.search.confirmation import Trial, advance, confirm, look
+from plant_emulator.diagnosis.search.confirmation import Trial, confirm, look
 from plant_emulator.diagnosis.search.law_error import LawErrors
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
 from plant_emulator.diagnosis.search.promise import Start
-from plant_emulator.diagnosis.search.rivals import fitted_rivals, predicted_rivals
+from plant_emulator.diagnosis.search.rivals import fitted_rivals, gaining, predicted_rivals
 from plant_emulator.diagnosis.search.screening import promises, visibilities
 from plant_emulator.diagnosis.search.secant_fits import fitted_promises
 from plant_emulator.diagnosis.search.settings import SETTINGS
@@ -116,7 +116,7 @@ class Search:
         self.expanded.clear()
         kept = not_told_apart(self.sets)
         self.sets = {}
-        self._fits(advance, kept)
+        self._fits(refit, kept)
         self.null = self.sets[frozenset()]
         self.trace.append(search_step(self.null, "noise estimated", where))
         return True
@@ -171,17 +171,19 @@ class Search:
         return needed + SETTINGS.law_error**2 * 0.5 * self.random_evidence
 
     def _expand(self, base: FitResult) -> None:
-        """Fit the effect of the largest predicted gain on top of a set, then its rivals."""
+        """Fit the effects of the largest gain on top of a set: predicted, or by secants."""
         needed = self._needed(base) if base.effects else SETTINGS.promising
-        if not (found := [p for p in self._screen(base) if p.gain > needed]):
-            return
-        (best,) = self._confirm(base, found[:1])
-        if base.effects or best.mean_square <= SETTINGS.linear_mean_square:
-            rivals = predicted_rivals(found, base, best)
-        else:
+        found = [p for p in self._screen(base) if p.gain > needed]
+        if base.effects and base.mean_square > NOISE_MEAN_SQUARE:
             fitted = fitted_promises(self.runner, base, found)
-            rivals = fitted_rivals(found, fitted, base, best)
-        self._confirm(base, rivals)
+            self._confirm(base, gaining(fitted, needed))
+        elif found:
+            (best,) = self._confirm(base, found[:1])
+            rivals = predicted_rivals(found, base, best)
+            if not base.effects and best.mean_square > SETTINGS.linear_mean_square:
+                fitted = fitted_promises(self.runner, base, found)
+                rivals = fitted_rivals(found, fitted, base, best)
+            self._confirm(base, rivals)
 
     def _confirm(self, base: FitResult, promises: Sequence[Promise]) -> list[FitResult]:
         """Fit these effects on top of a set, each for a few iterations."""
