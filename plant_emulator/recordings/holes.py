@@ -2,7 +2,8 @@
 
 A hole gets regular rows. The rows do not count, but the simulation has to know there what the bench
 was asked to do. The reference is continued from both sides as straight lines. They meet at the
-corner that the hole hides. Where they do not meet within the hole the reference is straight.
+corner that the hole hides. Where they do not meet within the hole, or the reference beside it is
+curved, the reference is straight.
 """
 
 from __future__ import annotations
@@ -23,17 +24,23 @@ if TYPE_CHECKING:
 
     Use = Mapping[str, NDArray[np.bool_]]
 
-# A hole of this many usual intervals gets rows. Lines bridge a shorter one.
-SHORTEST_HOLE = 5.5
+# A hole of this many usual intervals gets rows: a single lost row may have been a corner, and a
+# corner that comes late looks like a dead time that varies. Where the log itself tells the corners
+# between its samples, a hole gets rows from the second length on.
+SHORTEST_HOLE, SHORTEST_WITH_KNEES = 1.5, 5.5
 # Intervals beside a hole that its lines are laid through.
 BESIDE = 10
+# Lines count that change the reference in the hole by so many times what they miss it by beside
+# the hole. A line beside a parabola misses it in the hole by 1.7 times as much as beside it.
+STRAIGHT = 3.0
 
 
 def bridge_holes(log: Log, use: Use) -> tuple[Log, Use]:
     """Give a log and its samples that count with rows in the holes; the rows do not count."""
     time = log.time
     interval = float(np.median(np.diff(time)))
-    holes = np.flatnonzero(np.diff(time) > SHORTEST_HOLE * interval)
+    shortest = SHORTEST_WITH_KNEES if KNEE_TIME in log else SHORTEST_HOLE
+    holes = np.flatnonzero(np.diff(time) > shortest * interval)
     if len(holes) == 0:
         return log, use
     inserted = np.concatenate([_regular(time[k], time[k + 1], interval) for k in holes])
@@ -76,6 +83,10 @@ def _continue_reference(time: Array, reference: Array, hole: int, at: Array) -> 
     corner = (second[1] - first[1]) / turn if turn != 0.0 else -1.0
     if not 0.0 < corner < end - start:
         return np.interp(at, time, reference)
-    since = at - start
+    since, straight = at - start, np.interp(at, time, reference)
     line = np.where(since < corner, np.polyval(first, since), np.polyval(second, since))
-    return np.asarray(line)
+    bend = max(
+        float(np.abs(np.polyval(own, time[side] - start) - reference[side]).max())
+        for own, side in ((first, before), (second, after))
+    )
+    return np.asarray(line if np.abs(line - straight).max() > STRAIGHT * bend else straight)

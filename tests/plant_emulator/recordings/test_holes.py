@@ -35,6 +35,20 @@ def test_hole_over_a_corner_gets_the_corner_back() -> None:
     assert log.time[~use] == pytest.approx(np.arange(3.71, 4.195, 0.01))
 
 
+def test_lost_row_of_a_corner_comes_back() -> None:
+    log, use = bridged(3.99, 4.01)
+    assert log["speed_reference"] == pytest.approx(reference(TIME), abs=1e-6)
+    assert log.time[~use] == pytest.approx([4.0])
+
+
+def test_lost_row_of_a_curve_lies_on_the_chord() -> None:
+    """20 sin(3 t): the chord over 20 ms is off by at most 20 * 3^2 * 0.01^2 / 2 = 0.009 rad/s."""
+    time = np.delete(TIME, [50, 300, 755])
+    log, _ = bridge_holes(Log(time, {"speed_reference": 20.0 * np.sin(3.0 * time)}), {})
+    assert log.time == pytest.approx(TIME)
+    assert log["speed_reference"] == pytest.approx(20.0 * np.sin(3.0 * TIME), abs=0.0095)
+
+
 def test_hole_in_a_straight_stretch_stays_straight() -> None:
     log, _ = bridged(6.0, 6.5)
     assert log["speed_reference"] == pytest.approx(reference(TIME))
