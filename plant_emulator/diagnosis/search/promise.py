@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from plant_emulator.diagnosis.fit_result import FitResult
+
 
 @dataclass(frozen=True, kw_only=True)
 class Start:
@@ -29,3 +31,18 @@ class Promise:
     def gain(self) -> float:
         """The largest score."""
         return max(self.gains.values(), default=0.0)
+
+
+def starts_of(promise: Promise, base: FitResult) -> tuple[Start, ...]:
+    """Starts of an effect on top of a fit, and one with the parameters and states of that fit.
+
+    A linear estimate moves all unknowns at once, and may miss contact by that.
+    """
+    kept = [
+        Start(
+            values={**one.values, **base.values},
+            states=tuple({**own, **fit} for own, fit in zip(one.states, base.states, strict=True)),
+        )
+        for one in promise.starts[:1]
+    ]
+    return (*promise.starts, *kept)

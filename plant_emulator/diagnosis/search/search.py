@@ -26,7 +26,7 @@ from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.confirmation import Trial, confirm, look
 from plant_emulator.diagnosis.search.law_error import LawErrors
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
-from plant_emulator.diagnosis.search.promise import Start
+from plant_emulator.diagnosis.search.promise import Start, starts_of
 from plant_emulator.diagnosis.search.rivals import fitted_rivals, gaining, predicted_rivals
 from plant_emulator.diagnosis.search.screening import promises, visibilities
 from plant_emulator.diagnosis.search.secant_fits import fitted_promises
@@ -188,7 +188,9 @@ class Search:
     def _confirm(self, base: FitResult, promises: Sequence[Promise]) -> list[FitResult]:
         """Fit these effects on top of a set, each for a few iterations."""
         trials = [
-            Trial(effects=(*base.effects, p.effect), runs=self.runner.runs, starts=p.starts)
+            Trial(
+                effects=(*base.effects, p.effect), runs=self.runner.runs, starts=starts_of(p, base)
+            )
             for p in promises
         ]
         found = list(self.runner.map(confirm, trials))
