@@ -175,8 +175,7 @@ class Search:
         needed = self._needed(base) if base.effects else SETTINGS.promising
         found = [p for p in self._screen(base) if p.gain > needed]
         if base.effects and base.mean_square > NOISE_MEAN_SQUARE:
-            fitted = fitted_promises(self.runner, base, found)
-            self._confirm(base, gaining(fitted, needed))
+            self._confirm(base, gaining(fitted_promises(self.runner, base, found), needed))
         elif found:
             (best,) = self._confirm(base, found[:1])
             rivals = predicted_rivals(found, base, best)
@@ -187,10 +186,9 @@ class Search:
 
     def _confirm(self, base: FitResult, promises: Sequence[Promise]) -> list[FitResult]:
         """Fit these effects on top of a set, each for a few iterations."""
+        runs = self.runner.runs
         trials = [
-            Trial(
-                effects=(*base.effects, p.effect), runs=self.runner.runs, starts=starts_of(p, base)
-            )
+            Trial(effects=(*base.effects, p.effect), runs=runs, starts=starts_of(p, base))
             for p in promises
         ]
         found = list(self.runner.map(confirm, trials))
