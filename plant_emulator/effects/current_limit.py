@@ -2,15 +2,16 @@
 
     |i_ref| <= I = i_max - R
 
-The limit of an analogue controller sets in gradually: between (1 - r) I and (1 + r) I the current
-follows the parabola that joins the line |i| and the constant I without a corner,
+The limit of an analogue controller sets in gradually: between I - w and I + w the current follows
+the parabola that joins the line |i| and the constant I without a corner,
 
-    |i_ref| = |i| - (|i| - (1 - r) I)^2 / (4 r I)
+    |i_ref| = |i| - (|i| - I + w)^2 / (4 w),   w = min(r I, R)
 
 Sources: W. Leonhard, Control of Electrical Drives, chapter on the cascade control of drives: the
 limit of the speed controller's output is the limit of the current; D. Giannoulis, M. Massberg,
 J. D. Reiss, J. Audio Eng. Soc. 60 (2012) 399, on limits with a soft knee. R is the distance of the
-limit below i_max, r the rounding of the corner. R = 0: the nominal limit, with its corner.
+limit below i_max, r the rounding of the corner, which vanishes with R: the nominal limit has a
+corner.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ def current_limit(value: float, s: Record, p: Record) -> float:
     if p.current_limit_reduction == 0.0:
         return value
     limit = max(0.0, value - p.current_limit_reduction)
-    half = p.current_limit_rounding * limit
+    half = min(p.current_limit_rounding * limit, p.current_limit_reduction)
     wanted = abs(s.wanted_current)
     beyond = wanted - (limit - half)
     if beyond <= 0.0 or beyond >= 2.0 * half:

@@ -1,12 +1,10 @@
 """The drive limits the slope of its speed reference, as a ramp generator does.
 
-    |dv/dt| <= omega_max / T,   v follows the reference within that
-    T_s domega_r/dt + omega_r = v
+    |domega_r/dt| <= omega_max / T,   omega_r follows the reference within that
 
 Source: W. Leonhard, Control of Electrical Drives, chapter on the cascade control of drives
 (reference generators in front of the speed controller). omega_max is the drive's largest speed. T
-is the time from standstill to omega_max, which drives call ramp-up time; T_s is the smoothing time
-that rounds the corners of the ramp. T = 0: neither.
+is the time from standstill to omega_max, which drives call ramp-up time. T = 0: no limit.
 """
 
 from __future__ import annotations
@@ -22,9 +20,6 @@ SUBSYSTEM = "drive"
 PARAMETERS = {
     "ramp_time": EffectParameter(
         neutral=0.0, lower=0.0, upper=100.0, plausible=8.0, unit="s", meaning="T"
-    ),
-    "smoothing_time": EffectParameter(
-        neutral=0.0, lower=0.0, upper=1.0, plausible=0.0, unit="s", meaning="T_s", std=0.05
     ),
 }
 
@@ -43,20 +38,11 @@ def advance(base: float, a: float, value: float, s: Record, p: Record) -> float:
     return base + max(-reach, min(reach, value - base))
 
 
-def advance_smooth(base: float, a: float, s: Record, p: Record) -> float:
-    """Smoothed reference at the end of an implicit stage [rad/s]; it runs after `advance`."""
-    limited, lag = s.reference_ramp_limit_limited, p.reference_ramp_limit_smoothing_time
-    return limited if lag == 0.0 else limited + (base - limited) * (lag / (lag + a))
-
-
-MEMORIES = {
-    "limited": Memory(start, advance, follows="reference"),
-    "smooth": Memory(start, advance_smooth),
-}
+MEMORIES = {"reference": Memory(start, advance, follows="reference")}
 
 
 def reference(value: float, s: Record, p: Record) -> float:
     """Reference behind the ramp generator [rad/s]."""
     if p.reference_ramp_limit_ramp_time == 0.0:
         return value
-    return s.reference_ramp_limit_smooth
+    return s.reference_ramp_limit_reference

@@ -26,13 +26,14 @@ if TYPE_CHECKING:
 
 # A hole of this many usual intervals gets rows: a single lost row may have been a corner, and a
 # corner that comes late looks like a dead time that varies. Where the log itself tells the corners
-# between its samples, a hole gets rows from the second length on.
-SHORTEST_HOLE, SHORTEST_WITH_KNEES = 1.5, 5.5
+# between its samples, a hole gets rows from the second length on. Rows that are each 0.35 intervals
+# off their time leave no hole.
+SHORTEST_HOLE, SHORTEST_WITH_KNEES = 1.75, 5.5
 # Intervals beside a hole that its lines are laid through.
 BESIDE = 10
-# Lines count that change the reference in the hole by so many times what they miss it by beside
-# the hole. A line beside a parabola misses it in the hole by 1.7 times as much as beside it.
-STRAIGHT = 3.0
+# Lines count that differ from the straight reference in the hole by so many times what they miss
+# beside it. Beside a parabola that is 1.7 times in one lost row, and 4.2 times in five.
+STRAIGHT = 5.0
 
 
 def bridge_holes(log: Log, use: Use) -> tuple[Log, Use]:

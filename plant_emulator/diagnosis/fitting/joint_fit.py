@@ -37,8 +37,9 @@ COST_TOLERANCE = 1e-5
 # Relative fall of the cost that ends a fit far from the noise, where it lacks a cause in any case,
 # or a fit whose slopes follow by secants.
 COARSE_COST_TOLERANCE = 1e-4
-# Norm of the change that wide slopes are taken over, as a share of the residual's norm. Minima that
-# other effects had passed for a gain were 2 and 7 % deep: 0.15 and 0.27 of the norm.
+# Norm of the change that wide slopes are taken over, as a share of the residual's norm. Of 0.05,
+# 0.15 and 0.5 it led out of most of the minima where another effect had passed for a cause; these
+# were 2 % of the cost deep.
 WIDE_SHARE = 0.15
 # Iterations after which a fit shows whether it leads to a lower cost.
 TRIAL_ITERATIONS = 10
@@ -102,7 +103,8 @@ def fit(
     iterations : at most so many; None: as many as `estimate` allows
     near : an estimate of the same runs; slopes of its unknowns follow by secants, see `estimate`
     shrinkage : see `joint_unknowns`
-    over_kinks : whether a fit from far off, without `near`, is led over the kinks of its cost
+    over_kinks : whether a fit without `near` is led over the kinks of its cost from far off, and
+        out of narrow minima where it has converged
     """
     unknowns = with_starts(
         joint_unknowns(model, effects, runs, shrinkage=shrinkage), values, states
@@ -119,7 +121,7 @@ def fit(
     if near is None and over_kinks:
         rough = [model.rough().residual(k, effects) for k in runs]
         found = _led_over_kinks(found, residuals, rough, iterations)
-        if iterations is None:
+        if iterations is None and found.converged:
             found = _with_wide_slopes(found, residuals)
     reached = to_result(effects, found, len(runs))
     candidates = {name: model.candidates[name] for name in effects}
@@ -156,8 +158,8 @@ def _led_over_kinks(
 def _with_wide_slopes(found: Estimate, residuals: Sequence[Residual]) -> Estimate:
     """The fit, or a better one that wide slopes lead to.
 
-    Instants of contact leave minima in the cost, up to a few per cent deep. Slopes over a change
-    as large as what such a minimum hides do not see it.
+    Instants of contact leave narrow minima in the cost, a few per cent deep. Slopes over a wide
+    change pass over most of them.
     """
     other = found
     for difference in (WIDE_SHARE * found.cost**0.5, DIFFERENCE_NORM):
@@ -168,7 +170,10 @@ def _with_wide_slopes(found: Estimate, residuals: Sequence[Residual]) -> Estimat
             settled_far=COARSE_COST_TOLERANCE,
             difference=difference,
         )
-    return min(found, other, key=lambda one: one.cost + one.penalty)
+    lower = other.cost + other.penalty < (1.0 - COARSE_COST_TOLERANCE) * (
+        found.cost + found.penalty
+    )
+    return other if lower else found
 
 
 def approach(model: Model, starts: Sequence[FitValues], runs: Sequence[int]) -> FitValues:

@@ -36,7 +36,7 @@ class Promise:
 def starts_of(promise: Promise, base: FitResult) -> tuple[Start, ...]:
     """Starts of an effect on top of a fit, and one with the parameters and states of that fit.
 
-    A linear estimate moves all unknowns at once, and may miss contact by that.
+    An estimate moves all unknowns at once, and may miss contact by that.
     """
     kept = [
         Start(

@@ -49,7 +49,8 @@ def gaining(fitted: Sequence[Promise], needed: float) -> list[Promise]:
 
     fitted : by secants, the largest first; needed : least gain
     """
-    return [p for p in fitted if p.gain > needed][: 1 + SETTINGS.rivals_beside]
+    least = max(needed, SETTINGS.hopeless_share * max((p.gain for p in fitted), default=0.0))
+    return [p for p in fitted if p.gain > least][: 1 + SETTINGS.rivals_beside]
 
 
 def _leading(

@@ -3,8 +3,8 @@
 A linear regression predicts it, in the relations and in the simulation's residual. What is local is
 clean in the first; what is slow and faint adds up in the second. The larger counts. A large gap
 bends the parameters of the fit without effects, and slopes there mislead. The relations at the
-nominal parameters give a third score then. Where the first of these scores does not lead to the
-noise, `secant_fits` tells the others apart.
+nominal parameters give a third score then. Where the first effect does not lead to the noise, or a
+set of effects leaves more, `secant_fits` tells the effects apart.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Searches the set of effects of largest log evidence: expand the best set, then drop the needless.
 
 The log evidence of a set is half the fall of its penalised cost, less the gain that each of its
-effects needs. The best set is expanded by the effects of largest predicted gain, until it leaves
-only noise or no predicted gain is large enough. An effect beside an approximate law needs so much
-more gain as the error of this law may feign (`law_error`).
+effects needs. The best set is expanded by the effects of largest gain, predicted or by secants,
+until it leaves only noise or no gain is large enough. An effect beside an approximate law needs so
+much more gain as the error of this law may feign (`law_error`).
 """
 
 from __future__ import annotations
@@ -171,11 +171,12 @@ class Search:
         return needed + SETTINGS.law_error**2 * 0.5 * self.random_evidence
 
     def _expand(self, base: FitResult) -> None:
-        """Fit the effects of the largest gain on top of a set: predicted, or by secants."""
+        """Fit the effects of largest gain on top of a set."""
         needed = self._needed(base) if base.effects else SETTINGS.promising
         found = [p for p in self._screen(base) if p.gain > needed]
         if base.effects and base.mean_square > NOISE_MEAN_SQUARE:
-            self._confirm(base, gaining(fitted_promises(self.runner, base, found), needed))
+            fitted = fitted_promises(self.runner, base, self._screen(base))
+            self._confirm(base, gaining(fitted, needed))
         elif found:
             (best,) = self._confirm(base, found[:1])
             rivals = predicted_rivals(found, base, best)
@@ -186,10 +187,9 @@ class Search:
 
     def _confirm(self, base: FitResult, promises: Sequence[Promise]) -> list[FitResult]:
         """Fit these effects on top of a set, each for a few iterations."""
-        runs = self.runner.runs
+        runs, own = self.runner.runs, base.effects
         trials = [
-            Trial(effects=(*base.effects, p.effect), runs=runs, starts=starts_of(p, base))
-            for p in promises
+            Trial(effects=(*own, p.effect), runs=runs, starts=starts_of(p, base)) for p in promises
         ]
         found = list(self.runner.map(confirm, trials))
         for promise, one in zip(promises, found, strict=True):

@@ -1,8 +1,9 @@
 """Fits each effect on top of a fit, while the slopes of all else follow by secants.
 
-Far from the noise a linear regression misleads: without its cause, a fit has bent the parameters,
-and the slopes there hardly know the cause. Some iterations of a fit unbend them. They are cheap,
-because only the slopes of the effect itself are simulated anew (see `least_squares.estimate`).
+Where more than noise is left a linear regression misleads: without a cause, a fit has bent the
+parameters, and the slopes there hardly know the cause. Some iterations of a fit unbend them. They
+are cheap, because only the slopes of the effect itself are simulated anew (see
+`least_squares.estimate`).
 """
 
 from __future__ import annotations

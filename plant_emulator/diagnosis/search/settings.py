@@ -21,7 +21,7 @@ class Settings:
     # So many effects of each score are tried at the other sizes; the true one was among three.
     tried_further: int = 6
     # Mean square up to which a linear model around a fit is as good as a fit with the cause: noise
-    # is estimated beside it, and regressions choose the rivals.
+    # is estimated beside it, and regressions choose the rivals of the first effect.
     linear_mean_square: float = 1.5
     # Gain that an effect needs: odds of e^15, one of 30 effects by chance in 100 000 logs.
     needed: float = 15.0
@@ -36,7 +36,8 @@ class Settings:
     law_error: float = 0.1
     # Leading effects of each score, or of the fits by secants, that are fitted beside the best one.
     # Contact and limits move with the fit, so that the order by promise is not yet that by fit.
-    # Beside other effects the fit is near, and the order is nearly right.
+    # Beside other effects the order is nearly right: that of the regressions where only noise is
+    # left, that of the fits by secants elsewhere.
     rivals: int = 2
     rivals_beside: int = 1
     # Gain over the largest one that a rival needs. Where the first effect leaves more than noise,

@@ -41,12 +41,21 @@ def test_lost_row_of_a_corner_comes_back() -> None:
     assert log.time[~use] == pytest.approx([4.0])
 
 
-def test_lost_row_of_a_curve_lies_on_the_chord() -> None:
-    """20 sin(3 t): the chord over 20 ms is off by at most 20 * 3^2 * 0.01^2 / 2 = 0.009 rad/s."""
-    time = np.delete(TIME, [50, 300, 755])
+@pytest.mark.parametrize("rows", [1, 2, 3, 4, 5])
+def test_lost_rows_of_a_curve_lie_on_the_chord(rows: int) -> None:
+    """20 sin(3 t): the chord over h is off by at most 20 * 3^2 * h^2 / 8."""
+    time = np.delete(TIME, [k + j for k in (50, 300, 755) for j in range(rows)])
     log, _ = bridge_holes(Log(time, {"speed_reference": 20.0 * np.sin(3.0 * time)}), {})
     assert log.time == pytest.approx(TIME)
-    assert log["speed_reference"] == pytest.approx(20.0 * np.sin(3.0 * TIME), abs=0.0095)
+    chord = 20.0 * 9.0 * (0.01 * (rows + 1)) ** 2 / 8.0
+    assert log["speed_reference"] == pytest.approx(20.0 * np.sin(3.0 * TIME), abs=1.05 * chord)
+
+
+def test_jittered_log_that_lost_no_row_stays() -> None:
+    random = np.random.default_rng(1)
+    time = TIME + random.uniform(-0.0035, 0.0035, len(TIME))
+    log = Log(time, {"speed_reference": reference(time)})
+    assert bridge_holes(log, {})[0] is log
 
 
 def test_hole_in_a_straight_stretch_stays_straight() -> None:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
-from plant_emulator.diagnosis.search.promise import Promise
-from plant_emulator.diagnosis.search.rivals import fitted_rivals
+from plant_emulator.diagnosis.search.promise import Promise, Start, starts_of
+from plant_emulator.diagnosis.search.rivals import fitted_rivals, gaining
 from plant_emulator.diagnosis.search.secant_fits import SECANTS, SecantFits, fit_by_secants
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import TIME, Line, noisy
@@ -80,3 +80,26 @@ def test_rivals_are_the_leaders_of_each_score_and_of_the_fits() -> None:
     assert rivals(d=200.0, e=160.0, c=150.0) == ["d", "e", "b"]
     assert rivals(a=300.0, d=160.0) == ["a", "d", "b"]
     assert rivals() == ["b"]
+
+
+def test_next_effect_of_a_set_is_that_of_largest_gain_with_one_rival() -> None:
+    """30 is needed; a gain of a twentieth of the largest one is hopeless."""
+    fitted = [promise(name, fit=gain) for name, gain in (("a", 900.0), ("b", 46.0), ("c", 40.0))]
+    assert [p.effect for p in gaining(fitted, 30.0)] == ["a", "b"]
+    assert [p.effect for p in gaining(fitted, 50.0)] == ["a"]
+    assert gaining(fitted[1:], 50.0) == []
+
+
+def test_effect_also_starts_at_the_parameters_of_the_set() -> None:
+    base = replace(
+        fit_null(Line([noisy(2.0 + 3.0 * TIME)]), (0,)),
+        values={"a": 2.0, "b": 3.0},
+        states=({"angle": 0.5},),
+    )
+    estimated = Start(
+        values={"a": 7.0, "b": 8.0, "wave_size": 0.3}, states=({"angle": 0.9, "phase": 0.1},)
+    )
+    first, kept = starts_of(Promise(effect="wave", gains={}, starts=(estimated,)), base)
+    assert first == estimated
+    assert kept.values == {"a": 2.0, "b": 3.0, "wave_size": 0.3}
+    assert kept.states == ({"angle": 0.5, "phase": 0.1},)
