@@ -20,27 +20,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fit_result import FitResult, FitValues
+from plant_emulator.diagnosis.fitting.local_minima import (
+    COARSE_COST_TOLERANCE,
+    COST_TOLERANCE,
+    led_over_kinks,
+    with_wide_slopes,
+)
 from plant_emulator.estimation import least_squares
 from plant_emulator.estimation.covariance import correlation_time, structure
-from plant_emulator.estimation.kinks import WORTH, beyond_kink
 from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE, estimate, linearise_at
-from plant_emulator.estimation.simulated_problem import DIFFERENCE_NORM
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.machine import Candidate, Model
-    from plant_emulator.estimation.unknowns import Estimate, Residual, Unknown
+    from plant_emulator.estimation.unknowns import Estimate, Unknown
 
-# Relative fall of the cost that ends a fit near the noise: some tenths in units of chi squared.
-COST_TOLERANCE = 1e-5
-# Relative fall of the cost that ends a fit far from the noise, where it lacks a cause in any case,
-# or a fit whose slopes follow by secants.
-COARSE_COST_TOLERANCE = 1e-4
-# Norm of the change that wide slopes are taken over, as a share of the residual's norm. Of 0.05,
-# 0.15 and 0.5 it led out of most of the minima where another effect had passed for a cause; these
-# were 2 % of the cost deep.
-WIDE_SHARE = 0.15
 # Iterations after which a fit shows whether it leads to a lower cost.
 TRIAL_ITERATIONS = 10
 # Iterations of the way to the data that tell the best start, and those of the rest of its way.
@@ -120,60 +115,15 @@ def fit(
     )
     if near is None and over_kinks:
         rough = [model.rough().residual(k, effects) for k in runs]
-        found = _led_over_kinks(found, residuals, rough, iterations)
+        found = led_over_kinks(found, residuals, rough, iterations)
         if iterations is None and found.converged:
-            found = _with_wide_slopes(found, residuals)
+            found = with_wide_slopes(found, residuals)
     reached = to_result(effects, found, len(runs))
     candidates = {name: model.candidates[name] for name in effects}
     return replace(
         reached,
         insignificant=tuple(n for n, c in candidates.items() if not _significant(c, reached)),
     )
-
-
-def _led_over_kinks(
-    found: Estimate,
-    residuals: Sequence[Residual],
-    rough: Sequence[Residual],
-    iterations: int | None,
-) -> Estimate:
-    """The fit, led over the kinks of its cost as long as that is worth it."""
-    while found.cost > SUSPECT_MEAN_SQUARE * found.samples:
-        beyond = beyond_kink(found.started, rough)
-        if beyond is None:
-            break
-        other = estimate(
-            beyond,
-            residuals,
-            settled=COST_TOLERANCE,
-            settled_far=COARSE_COST_TOLERANCE,
-            iterations=iterations,
-        )
-        if other.cost > (1.0 - WORTH) * found.cost:
-            return min(found, other, key=lambda one: one.cost + one.penalty)
-        found = other
-    return found
-
-
-def _with_wide_slopes(found: Estimate, residuals: Sequence[Residual]) -> Estimate:
-    """The fit, or a better one that wide slopes lead to.
-
-    Instants of contact leave narrow minima in the cost, a few per cent deep. Slopes over a wide
-    change pass over most of them.
-    """
-    other = found
-    for difference in (WIDE_SHARE * found.cost**0.5, DIFFERENCE_NORM):
-        other = estimate(
-            other.started,
-            residuals,
-            settled=COST_TOLERANCE,
-            settled_far=COARSE_COST_TOLERANCE,
-            difference=difference,
-        )
-    lower = other.cost + other.penalty < (1.0 - COARSE_COST_TOLERANCE) * (
-        found.cost + found.penalty
-    )
-    return other if lower else found
 
 
 def approach(model: Model, starts: Sequence[FitValues], runs: Sequence[int]) -> FitValues:
