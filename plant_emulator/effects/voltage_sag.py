@@ -1,11 +1,13 @@
 """The available armature voltage falls under load.
 
-    |u_a| <= u_max - U_s,   tau dU_s/dt = R_s |i| - U_s
+    |u_a| <= u_max - U_s,   tau dU_s/dt = R_s i_max (|i| / i_max)^n - U_s
 
 Sources: N. Mohan, T. M. Undeland, W. P. Robbins, Power Electronics, chapter on line-frequency
 controlled rectifiers: commutation and supply let their direct voltage fall in proportion to the
-current, by R_s; W. Leonhard, Control of Electrical Drives, chapter on line-commutated converters:
-the supply's inductance delays the fall by tau. tau = 0: the voltage falls at once.
+current, by R_s (n = 1), and faster where the commutations of two pairs of valves overlap (n > 1);
+W. Leonhard, Control of Electrical Drives, chapter on line-commutated converters: the supply's
+inductance delays the fall by tau. tau = 0: the voltage falls at once. i_max is the drive's nominal
+current limit, at which all n give the same fall.
 """
 
 from __future__ import annotations
@@ -26,6 +28,9 @@ PARAMETERS = {
     "time_constant": EffectParameter(
         neutral=0.0, lower=0.0, upper=1.0, plausible=0.0, unit="s", meaning="tau", std=0.05
     ),
+    "exponent": EffectParameter(
+        neutral=1.0, lower=0.5, upper=3.0, plausible=1.0, unit="1", meaning="n", std=0.5
+    ),
 }
 
 
@@ -36,7 +41,9 @@ def start(p: Record) -> float:
 
 def drop(s: Record, p: Record) -> float:
     """Sag under a constant current [V]."""
-    return p.voltage_sag_source_resistance * abs(s.armature_current)
+    current = abs(s.armature_current) / p.armature_current_limit
+    fall: float = current**p.voltage_sag_exponent
+    return p.voltage_sag_source_resistance * p.armature_current_limit * fall
 
 
 def advance(base: float, a: float, s: Record, p: Record) -> float:

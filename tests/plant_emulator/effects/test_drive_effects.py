@@ -164,6 +164,16 @@ def test_sagging_voltage_sets_the_top_speed(nominal: ParameterSet) -> None:
     assert log["motor_speed"][-1] < 450.0
 
 
+def test_sag_that_grows_with_the_square_of_the_current(nominal: ParameterSet) -> None:
+    """|u| <= 400 - R_s i_max (i / i_max)^2, i_max being 72 A."""
+    inputs = linear((0.2, 0.0), (0.25, 400.0), (3.0, 400.0), duration=3.0, period=0.001)
+    log = simulate(inputs, effect(nominal, "voltage_sag", source_resistance=2.0, exponent=2.0))
+    sag = 2.0 * 72.0 * (log["armature_current"] / 72.0) ** 2
+    room = 400.0 - sag - np.abs(log["armature_voltage"])
+    assert room.min() > -0.2
+    assert np.count_nonzero(room < 0.2) > 500
+
+
 def test_voltage_limit_follows_the_current_through_the_lag_of_the_supply(
     nominal: ParameterSet,
 ) -> None:
