@@ -123,6 +123,13 @@ class Model(Protocol):
     def rough(self) -> Model:
         """Give the machine with residuals that are good enough to compare, not to differentiate."""
 
+    def observer(self, interval: float) -> Model:
+        """Give the machine with rough residuals that are led along the measured outputs.
+
+        A fault then shows where and when it acts, and does not move all that follows: the cost has
+        far fewer local minima than that of a free simulation, and another least value.
+        """
+
     def input_noise(
         self, run: int, where: FitResult, state: Mapping[str, float]
     ) -> NoiseDirections | None:

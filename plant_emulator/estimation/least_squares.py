@@ -13,8 +13,7 @@ Standard errors come from the residuals themselves, see `covariance`.
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -38,14 +37,6 @@ if TYPE_CHECKING:
 MAX_ITERATIONS = 60
 # Mean square above which a fit may lie in a local minimum, so that other starts are tried.
 SUSPECT_MEAN_SQUARE = 1.5
-# Far from the data the slopes are taken over this share of the norm of what exceeds the noise. Each
-# instant of contact that the model misses is a step of the cost, and slopes over less see one step.
-APPROACH_SHARE = 0.3
-# Residual from which on the loss grows only linearly there [noise]. Samples near missed instants of
-# contact are far off, and would hold the parameters where these samples are least.
-APPROACH_SCALE = 1.0
-# Relative fall of the loss that ends the way to the data.
-APPROACH_SETTLED = 1e-4
 # Relative fall of the cost that ends a fit: some 1e-6 in units of chi squared.
 COST_SETTLED = 1e-10
 Z_SETTLED = 1e-9
@@ -93,24 +84,6 @@ def estimate(
     return _estimate(problem, found.x, bool(found.status > 0), str(found.message))
 
 
-def approach(
-    unknowns: Sequence[Unknown], residuals: Sequence[Residual], *, iterations: int
-) -> tuple[float, tuple[Unknown, ...]]:
-    """The least loss and unknowns that start there, where the cost is rough on the way.
-
-    The loss of large residuals is linear (soft l1), and slopes are taken over a share of what
-    exceeds the noise.
-
-    residuals : see `estimate`; iterations : at most so many
-    """
-    unknowns = tuple(unknowns)
-    problem = SimulatedProblem(unknowns, residuals, None, share=APPROACH_SHARE)
-    start, lower, upper = _start(unknowns)
-    found = _minimise(problem, start, (lower, upper), APPROACH_SETTLED, iterations, loss="soft_l1")
-    starts = zip(unknowns, found.x, strict=True)
-    return float(found.cost), tuple(replace(u, start=u.value(float(z))) for u, z in starts)
-
-
 def _start(unknowns: Sequence[Unknown]) -> tuple[Array, Array, Array]:
     """Start of z within its bounds, the lower and the upper bounds."""
     lower = np.array([u.scaled(u.lower) for u in unknowns])
@@ -126,7 +99,6 @@ def _minimise(
     bounds: tuple[Array, Array],
     settled: float,
     iterations: int,
-    loss: Literal["linear", "soft_l1"] = "linear",
 ) -> OptimizeResult:
     from scipy.optimize import least_squares
     from threadpoolctl import threadpool_limits
@@ -139,8 +111,6 @@ def _minimise(
             problem.slopes,
             bounds=bounds,
             x_scale="jac",
-            loss=loss,
-            f_scale=APPROACH_SCALE,
             ftol=settled,
             xtol=Z_SETTLED,
             gtol=None,
@@ -153,13 +123,15 @@ def linearise_at(
     residuals: Sequence[Residual],
     *,
     near: Estimate | None = None,
+    difference: float = DIFFERENCE_NORM,
 ) -> Estimate:
     """Linearise the residuals at the starts of the unknowns, and return it as an estimate there.
 
     near : a linearisation nearby, whose slopes set the steps of the differences. Without it they
         follow from a first differencing
+    difference : see `estimate`
     """
-    problem = SimulatedProblem(tuple(unknowns), residuals, None)
+    problem = SimulatedProblem(tuple(unknowns), residuals, None, difference=difference)
     z = np.array([u.scaled(u.start) for u in unknowns])
     if near is None:
         problem.learn_steps(z)

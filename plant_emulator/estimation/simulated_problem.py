@@ -35,8 +35,7 @@ class SimulatedProblem:
     """Residuals and Jacobians of all runs at z, each simulated once.
 
     follow : columns that are not differenced; None: every column is
-    difference, share : slopes are taken over a change of the residual of this norm, or of this
-        share of the norm of what exceeds the noise, if that is more
+    difference : norm of the change of the residual vector that slopes are taken over
     """
 
     unknowns: tuple[Unknown, ...]
@@ -44,7 +43,6 @@ class SimulatedProblem:
     progress: Callable[[float], None] | None
     follow: FollowedColumns | None = None
     difference: float = DIFFERENCE_NORM
-    share: float = 0.0
     simulations: int = 0
     known: tuple[bytes, list[Array]] = (b"", [])
     based: tuple[bytes, list[Array]] = (b"", [])
@@ -87,7 +85,7 @@ class SimulatedProblem:
         base = self.residual(z)
         self.based = z.tobytes(), base
         jacobians = [np.zeros((*r.shape, len(z))) for r in base]
-        steps = self._steps(base)
+        steps = self._steps()
         for j in range(len(z)):
             if self.follow is None or not self.follow.has[j]:
                 self._difference(z, j, steps[j], jacobians)
@@ -96,12 +94,13 @@ class SimulatedProblem:
         self.lengths = column_lengths(jacobians)
         return jacobians
 
-    def _steps(self, base: Sequence[Array], most: float = LARGEST_DIFFERENCE) -> Array:
+    def _steps(self, most: float = LARGEST_DIFFERENCE) -> Array:
         """Steps of z that change the residual vector by a norm, within their bounds."""
         if self.lengths is None:
             return np.full(len(self.unknowns), FIRST_DIFFERENCE)
-        norm = max(self.difference, self.share * _excess_norm(base))
-        steps = np.clip(norm / self.lengths, SMALLEST_DIFFERENCE, most * max(1.0, norm))
+        steps = np.clip(
+            self.difference / self.lengths, SMALLEST_DIFFERENCE, most * max(1.0, self.difference)
+        )
         return np.asarray(steps)
 
     def _difference(self, z: Array, j: int, step: float, jacobians: Sequence[Array]) -> None:
@@ -119,8 +118,7 @@ class SimulatedProblem:
         jacobians = [j.copy() for j in self.jacobian(z)]
         if self.follow is not None:
             return jacobians
-        base = self.residual(z)
-        narrow, wide = self._steps(base), self._steps(base, WIDEST_DIFFERENCE)
+        narrow, wide = self._steps(), self._steps(WIDEST_DIFFERENCE)
         for j in np.flatnonzero(wide > narrow):
             self._difference(z, int(j), wide[j], jacobians)
         return jacobians
@@ -182,9 +180,3 @@ def column_lengths(jacobians: Sequence[Array]) -> Array:
     """Norm of the column of each unknown, shape (unknowns,)."""
     squares = np.sum([np.einsum("cnj,cnj->j", j, j) for j in jacobians], axis=0)
     return np.asarray(np.sqrt(np.maximum(squares, 1e-300)))
-
-
-def _excess_norm(residuals: Sequence[Array]) -> float:
-    """Norm of what residuals hold beyond the noise."""
-    excess = sum(float(np.sum(r**2)) - np.count_nonzero(r) for r in residuals)
-    return float(np.sqrt(max(0.0, excess)))

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from math import nan
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from plant_emulator.errors import IdentificationError, UnsettledError
 from plant_emulator.recordings.wheel_torque import is_estimated
@@ -19,7 +21,14 @@ from plant_emulator.signals.log import (
 )
 from plant_emulator.signals.mains import noise_beside_lines
 from plant_emulator.signals.noise import FLOOR, noise
-from plant_emulator.simulation.simulate import TOLERANCE, Hold, RunInputs, inputs_of, simulate
+from plant_emulator.simulation.simulate import (
+    TOLERANCE,
+    Hold,
+    MeasuredSpeeds,
+    RunInputs,
+    inputs_of,
+    simulate,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -31,6 +40,9 @@ if TYPE_CHECKING:
 # What is known of the voltage's sensor beforehand: its offset [V] and the error of its gain, each
 # run's own. An isolating amplifier of 500 V and 0.2 % is off by 1 V; a divider by some 0.5 %.
 OFFSET, GAIN_ERROR = 1.0, 0.005
+# Time between corrections of a simulation that is led along the measured speeds [s]. In this time a
+# speed that is off by some percent crosses a tenth of the backlash.
+CORRECTION_INTERVAL = 0.2
 # Residual where the model cannot be simulated [noise]: a search turns back there, and goes on.
 IMPOSSIBLE = 100.0
 
@@ -76,6 +88,17 @@ class Recording:
             rate = np.abs(np.diff(middle) / np.diff(time))
             rates[row, use] = np.maximum(np.pad(rate, (1, 0)), np.pad(rate, (0, 1)))
         return np.asarray(np.hypot(1.0, self.log[TIMING_ERROR] * rates / self.noise[:, None]))
+
+    def measured_speeds(self, interval: float) -> MeasuredSpeeds:
+        """The speeds that count, to lead a simulation along; medians of five, without spikes."""
+        speeds = {}
+        for name in ("motor_speed", "drum_speed"):
+            speeds[name] = np.full(len(self.log.time), nan)
+            if name in self.channels:
+                use = self.use[self.channels.index(name)]
+                value = np.pad(self.log[name][use], 2, mode="edge")
+                speeds[name][use] = np.median(sliding_window_view(value, 5), axis=-1)
+        return MeasuredSpeeds(**speeds, interval=interval)
 
     def residual(
         self,

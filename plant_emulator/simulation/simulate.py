@@ -8,7 +8,7 @@ during the interval before the sample.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import inf
+from math import inf, nan
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -40,6 +40,19 @@ LARGEST_STEP = 0.01
 CORNER = 1.0
 # A truck has started when its torque exceeds the noise of a parked truck [N m at the wheel].
 WHEEL_TORQUE_STARTS = 10.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeasuredSpeeds:
+    """Speeds that a simulation is led along, as an observer is; see `stepper`.
+
+    motor_speed, drum_speed : of the samples of the run; NaN: not measured [rad/s], shape (n,)
+    interval : least time between two corrections [s]
+    """
+
+    motor_speed: Array
+    drum_speed: Array
+    interval: float
 
 
 @dataclass(frozen=True)
@@ -141,6 +154,7 @@ def simulate(
     tolerance: float = TOLERANCE,
     largest_step: float | None = None,
     step: float | None = None,
+    along: MeasuredSpeeds | None = None,
     kernel: Kernel | None = None,
 ) -> Log:
     """Simulate a run; the resulting log has the inputs and all channels of the bench [SI].
@@ -152,6 +166,7 @@ def simulate(
     largest_step : largest adapted step [s]; None: one sample of the log, at most 10 ms. Longer
         steps pass over samples. Without effects they make smooth runs two to three times faster.
     step : a fixed step in place of adapted steps [s]
+    along : measured speeds to lead the simulation along; None: it runs freely
     kernel : the kernel to use; None: the smallest that has the effects
     Raises ParameterError for a name in `values` that is no parameter, and UnsettledError where the
     equations were not solved.
@@ -167,7 +182,15 @@ def simulate(
     stage = model.stage_record()
     stage.truck = float(run.truck)
     model.run(
-        Inputs(run.time, run.reference, run.slope, run.corners, run.wheel_torque, run.parked),
+        Inputs(
+            run.time,
+            run.reference,
+            run.slope,
+            run.corners,
+            run.wheel_torque,
+            run.parked,
+            *_corrections(coarse, run, along),
+        ),
         settings,
         x,
         model.work(),
@@ -182,6 +205,24 @@ def simulate(
     if not run.truck:  # a log with this column would be read as a staircase with a parked truck
         del signals["wheel_torque"]
     return Log(coarse.time, {"speed_reference": coarse.reference, **signals}, run.source)
+
+
+def _corrections(
+    coarse: RunInputs, run: RunInputs, along: MeasuredSpeeds | None
+) -> tuple[Array, ...]:
+    """Samples to correct the speeds at, and the measured speeds, as `stepper.Inputs` has them.
+
+    coarse, run : inputs at the samples of the log, and at those that are simulated
+    along : None: none, for a free run
+    """
+    if along is None:
+        return ()
+    rows = np.arange(len(run.time)) if run.sensing is None else run.sensing.rows
+    passed = np.floor((coarse.time - coarse.time[0]) / along.interval)
+    due = rows[1:][np.diff(passed) > 0.0]
+    motor, drum = np.full((2, len(run.time)), nan)
+    motor[rows], drum[rows] = along.motor_speed, along.drum_speed
+    return np.append(due, len(run.time)), motor, drum
 
 
 def _refuse_unsolved(run: RunInputs, unsettled: float, out: Array) -> None:

@@ -2,12 +2,18 @@
 
 Steps end on samples and on every corner of the delayed reference. A step may pass samples while the
 truck's torque does not change. The states at these samples come from cubic interpolation.
+
+A run may be led along a measured one, as an observer is (D. Luenberger, IEEE Trans. Autom. Control
+16 (1971) 596): at some samples the speeds are corrected by a share of what they have missed since
+the sample before.
 """
 
 from __future__ import annotations
 
-from math import ceil, inf
+from math import ceil, inf, isnan
 from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from plant_emulator.model.implicit_stage import acting_wheel_torque, evaluate_laws, load, show
 from plant_emulator.model.laws import (
@@ -17,6 +23,7 @@ from plant_emulator.model.laws import (
     measured_shaft_torque,
     shell_temperature,
 )
+from plant_emulator.model.stage import BACKLASH, DRUM_SPEED, GEAR_SPEED, MOTOR_SPEED
 from plant_emulator.solver.dead_time import (
     past_reference,
     reference_at,
@@ -48,6 +55,12 @@ CHANNELS = (
     "wheel_torque",
 )
 
+# Share of the missed speed that one correction gives back: enough to end a drift within some of
+# them, and little enough to average the noise.
+CORRECTED_SHARE = 0.6
+# Corrections of a free run: the first one is due past its last sample.
+NEVER, NOT_MEASURED = np.array([np.iinfo(np.int64).max]), np.empty(0)
+
 
 class Inputs(NamedTuple):
     """The inputs of a log: one value a sample, but for the corners.
@@ -56,6 +69,8 @@ class Inputs(NamedTuple):
     corners : times of the corners of the reference, before the dead time, ascending [s]
     wheel_torque : torque of the truck at its wheel in the interval that ends at the sample [N m]
     parked : 1 for an interval in which the truck is parked, else 0
+    corrections : samples to correct the speeds at, ascending; then one past the last sample
+    motor_speed, drum_speed : measured, for these corrections; NaN: not measured [rad/s]
     """
 
     time: State
@@ -64,6 +79,9 @@ class Inputs(NamedTuple):
     corners: State
     wheel_torque: State
     parked: State
+    corrections: State = NEVER
+    motor_speed: State = NOT_MEASURED
+    drum_speed: State = NOT_MEASURED
 
 
 def observe(row: int, out: State, s: Record, p: Record) -> None:
@@ -87,6 +105,33 @@ def landing_sample(row: int, reach: float, time: State, wheel_torque: State, par
     ):
         row += 1
     return row
+
+
+def missed(first: int, last: int, measured: State, column: int, out: State) -> float:
+    """Mean of measured minus simulated in these samples, of those that are measured [rad/s]."""
+    total, count = 0.0, 0
+    for row in range(first, last + 1):
+        difference = measured[row] - out[row, column]
+        if not isnan(difference):
+            total += difference
+            count += 1
+    return total / count if count > 0 else 0.0
+
+
+def correct(
+    first: int, last: int, inputs: Inputs, out: State, x: State, s: Record, p: Record
+) -> None:
+    """Correct the speeds by a share of what they have missed in these samples.
+
+    Motor and gear move together, and in contact the drum moves with them, so that no torque jumps.
+    """
+    motor = CORRECTED_SHARE * missed(first, last, inputs.motor_speed, 0, out)
+    drum = motor / p.gear_ratio
+    x[MOTOR_SPEED] += motor
+    x[GEAR_SPEED] += drum
+    if abs(x[BACKLASH]) < s.backlash_half_gap:
+        drum = CORRECTED_SHARE * missed(first, last, inputs.drum_speed, 1, out)
+    x[DRUM_SPEED] += drum
 
 
 def private_copy(stage: Record) -> Record:
@@ -127,14 +172,14 @@ def run(
     x, w : state at the first sample, work space; stage, p : stage record and parameter record
     out : the channels at every sample, shape (samples, channels); it is filled
     """
-    time, value, slope, edges, wheel_torque, parked = inputs
+    time, value, slope, edges, wheel_torque, parked, corrections, _, _ = inputs
     tolerance, largest = settings
     s, p = private_copy(stage), private_copy(p)
     load(x, s)
     s.time, s.delayed_reference = time[0], value[0]
     evaluate_laws(s, p)
     observe(0, out, s, p)
-    t, h, segment, edge, steps, row = time[0], largest, 0, 0, 0, 1
+    t, h, segment, edge, steps, row, due, corrected = time[0], largest, 0, 0, 0, 1, 0, 0
     while row < len(time):
         s.time, s.wheel_torque, s.parked = t, wheel_torque[row], parked[row]
         b = dead_time(s, p)
@@ -143,7 +188,7 @@ def run(
         # These lines are no function: a call with all these arrays costs a twelfth of a run.
         corner = edges[edge] + b if edge < len(edges) else inf
         reach = min(t + h, corner + SMALLEST_STEP)
-        landing = landing_sample(row, reach, time, wheel_torque, parked)
+        landing = min(landing_sample(row, reach, time, wheel_torque, parked), corrections[due])
         end = corner if corner < time[landing] - SMALLEST_STEP else time[landing]
         pieces = 1 if landing > row else ceil((end - t) / h - 1e-9)
         length = (end - t) / pieces
@@ -172,6 +217,9 @@ def run(
                 observe(k, out, s, p)
             row = landing + 1
         accept(length, x, w)
+        if row > corrections[due]:
+            correct(corrected + 1, landing, inputs, out, x, s, p)
+            due, corrected = due + 1, landing
         t = end if pieces == 1 else t + length
     write_back(s, stage)
     return steps

@@ -78,6 +78,10 @@ class _InputNoiseModel:
         """See `Model`."""
         return cast("Model", _InputNoiseModel(self._model.rough(), self._noise))
 
+    def observer(self, interval: float) -> Model:
+        """See `Model`."""
+        return cast("Model", _InputNoiseModel(self._model.observer(interval), self._noise))
+
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
         """See `Model`."""
         return whiten_function(self._model.residual(run, effects), self._noise.get(run))

@@ -20,15 +20,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fit_result import FitResult, FitValues
-from plant_emulator.diagnosis.fitting.local_minima import (
-    COARSE_COST_TOLERANCE,
-    COST_TOLERANCE,
-    led_over_kinks,
-    with_wide_slopes,
-)
-from plant_emulator.estimation import least_squares
 from plant_emulator.estimation.covariance import correlation_time, structure
 from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE, estimate, linearise_at
+from plant_emulator.estimation.simulated_problem import DIFFERENCE_NORM
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -36,10 +30,22 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.machine import Candidate, Model
     from plant_emulator.estimation.unknowns import Estimate, Unknown
 
+# Relative fall of the cost that ends a fit near the noise: some tenths in units of chi squared.
+COST_TOLERANCE = 1e-5
+# Relative fall of the cost that ends a fit far from the noise, where it lacks a cause in any case,
+# or a fit whose slopes follow by secants.
+COARSE_COST_TOLERANCE = 1e-4
 # Iterations after which a fit shows whether it leads to a lower cost.
 TRIAL_ITERATIONS = 10
-# Iterations of the way to the data that tell the best start, and those of the rest of its way.
-FIRST_ITERATIONS, APPROACH_ITERATIONS = 4, 15
+# Iterations of a fit along the measured outputs that tell the best start, and at most so many more.
+FIRST_ITERATIONS, APPROACH_ITERATIONS = 3, 25
+# Relative fall of the cost that ends a fit along the measured outputs, and norm of the change that
+# its slopes are taken over: it is a start only, and its residuals are rough.
+LED_COST_TOLERANCE = 1e-3
+LED_DIFFERENCE = 10.0
+# Times between the corrections that lead a simulation along the measured outputs [s]: in the first
+# a speed that is off by some percent crosses a tenth of the backlash, in the second most of it.
+CORRECTION_INTERVALS = (0.2, 1.0)
 # A size differs from neutral for certain from so many of its standard errors on.
 SIGNIFICANT_ERRORS = 3.0
 # Share of the largest size allowed from which on an effect stands for something else. An effect
@@ -91,15 +97,14 @@ def fit(
     near: Estimate | None = None,
     *,
     shrinkage: bool = False,
-    over_kinks: bool = True,
+    difference: float = DIFFERENCE_NORM,
 ) -> FitResult:
     """Fit parameters, states and these effects to these runs, from these start values.
 
     iterations : at most so many; None: as many as `estimate` allows
     near : an estimate of the same runs; slopes of its unknowns follow by secants, see `estimate`
     shrinkage : see `joint_unknowns`
-    over_kinks : whether a fit without `near` is led over the kinks of its cost from far off, and
-        out of narrow minima where it has converged
+    difference : norm of the change that slopes are taken over
     """
     unknowns = with_starts(
         joint_unknowns(model, effects, runs, shrinkage=shrinkage), values, states
@@ -112,12 +117,8 @@ def fit(
         settled_far=COARSE_COST_TOLERANCE,
         iterations=iterations,
         follow=near,
+        difference=difference,
     )
-    if near is None and over_kinks:
-        rough = [model.rough().residual(k, effects) for k in runs]
-        found = led_over_kinks(found, residuals, rough, iterations)
-        if iterations is None and found.converged:
-            found = with_wide_slopes(found, residuals)
     reached = to_result(effects, found, len(runs))
     candidates = {name: model.candidates[name] for name in effects}
     return replace(
@@ -126,44 +127,59 @@ def fit(
     )
 
 
-def approach(model: Model, starts: Sequence[FitValues], runs: Sequence[int]) -> FitValues:
+def approach(
+    model: Model,
+    starts: Sequence[FitValues],
+    runs: Sequence[int],
+    near: float = SUSPECT_MEAN_SQUARE,
+) -> FitValues:
     """Values and states near the data, from which a fit of these effects may begin.
 
-    They are those of the first start where this is near: a fit from far off ends in a local
-    minimum. Elsewhere each start is led a part of the way, and the one of least loss all the way.
+    They are those of the first start where this is near. Elsewhere a free simulation has one local
+    minimum for every way in which contact may come and go. The fit is led along the measured
+    outputs first, from the best start, and then left to run freely for longer and longer times
+    (homotopy from prediction errors to simulation errors).
 
-    starts : all with the same effects
+    starts : all with the same effects; near : mean square of a start that is near
     """
-    first = starts[0]
+    if _mean_square(model, starts[0], runs) <= near:
+        return starts[0]
+    best: FitValues = min(
+        (lead(model, one, runs, iterations=FIRST_ITERATIONS) for one in starts),
+        key=lambda one: one.cost,
+    )
+    for interval in CORRECTION_INTERVALS:
+        best = lead(model, best, runs, interval)
+    return best
+
+
+def _mean_square(model: Model, start: FitValues, runs: Sequence[int]) -> float:
+    """Mean square of the whitened residual at a start."""
     rows = [
-        model.residual(k, first.effects)({**first.values, **own})
-        for k, own in zip(runs, first.states, strict=True)
+        model.residual(k, start.effects)({**start.values, **own})
+        for k, own in zip(runs, start.states, strict=True)
     ]
-    squares = sum(float(np.sum(r**2)) for r in rows)
-    if squares <= SUSPECT_MEAN_SQUARE * sum(np.count_nonzero(r) for r in rows):
-        return first
-    best = first
-    if len(starts) > 1:
-        led = [_approach_from(model, one, runs, FIRST_ITERATIONS) for one in starts]
-        _, best = min(led, key=lambda pair: pair[0])
-    return _approach_from(model, best, runs, APPROACH_ITERATIONS)[1]
+    return sum(float(np.sum(r**2)) for r in rows) / sum(np.count_nonzero(r) for r in rows)
 
 
-def _approach_from(
-    model: Model, start: FitValues, runs: Sequence[int], iterations: int
-) -> tuple[float, FitValues]:
-    """The loss near the data, and the values and states there."""
-    loss, near = least_squares.approach(
-        with_starts(joint_unknowns(model, start.effects, runs), start.values, start.states),
-        [model.rough().residual(k, start.effects) for k in runs],
+def lead(
+    model: Model,
+    start: FitValues,
+    runs: Sequence[int],
+    interval: float = CORRECTION_INTERVALS[0],
+    iterations: int = APPROACH_ITERATIONS,
+) -> FitResult:
+    """Fit by a simulation that is led along the measured outputs; see `Model.observer`."""
+    unknowns = with_starts(joint_unknowns(model, start.effects, runs), start.values, start.states)
+    observer = model.observer(interval).rough()
+    found = estimate(
+        unknowns,
+        [observer.residual(k, start.effects) for k in runs],
+        settled=LED_COST_TOLERANCE,
         iterations=iterations,
+        difference=LED_DIFFERENCE,
     )
-    values = {**start.values, **{u.name: u.start for u in near if u.run is None}}
-    states = tuple(
-        {**own, **{u.name: u.start for u in near if u.run == k}}
-        for k, own in enumerate(start.states)
-    )
-    return loss, FitValues(effects=start.effects, values=values, states=states)
+    return to_result(start.effects, found, len(runs))
 
 
 def _significant(candidate: Candidate, found: FitResult) -> bool:
@@ -191,10 +207,13 @@ def fit_from(
     return fit(model, effects, runs, start.values, start.states, iterations)
 
 
-def linearise(model: Model, found: FitValues, runs: Sequence[int]) -> Estimate:
+def linearise(
+    model: Model, found: FitValues, runs: Sequence[int], difference: float = DIFFERENCE_NORM
+) -> Estimate:
     """Compute residuals, Jacobians and covariance at the values of a fit, without fitting."""
     unknowns = with_starts(joint_unknowns(model, found.effects, runs), found.values, found.states)
-    return linearise_at(unknowns, [model.residual(k, found.effects) for k in runs])
+    residuals = [model.residual(k, found.effects) for k in runs]
+    return linearise_at(unknowns, residuals, difference=difference)
 
 
 def to_result(effects: Sequence[str], found: Estimate, runs: int) -> FitResult:

@@ -194,6 +194,10 @@ class _WeightedModel:
         """See `Model`."""
         return cast("Model", _WeightedModel(self._model.rough(), self._weights))
 
+    def observer(self, interval: float) -> Model:
+        """See `Model`."""
+        return cast("Model", _WeightedModel(self._model.observer(interval), self._weights))
+
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
         """See `Model`."""
         plain, weight = self._model.residual(run, effects), self._weights.get(run, 1.0)

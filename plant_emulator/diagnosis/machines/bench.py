@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from plant_emulator.recordings.input_noise import NoiseDirections
     from plant_emulator.recordings.recording import Recording
     from plant_emulator.signals.log import Array, Log
+    from plant_emulator.simulation.simulate import MeasuredSpeeds
 
 # Tolerance of a run with a truck. It takes half the time of the usual tolerance, because every
 # sample of such a run is a corner; it changes the residual by less than a hundredth of the noise.
@@ -108,6 +109,7 @@ class BenchModel:
         self._values = values_of(parameters)
         self.nominal_set = parameters
         self._roughly: BenchModel | None = None  # a rough model is its own
+        self._along: list[MeasuredSpeeds] | None = None
         known = {**kernel().effects, **effects}
         plausible = {name: effect.plausible() for name, effect in effects.items()}
         everything = {**plausible, **parameters.effects}
@@ -170,14 +172,24 @@ class BenchModel:
             vars(self._roughly).update(_roughly=self._roughly)
         return self._roughly
 
+    def observer(self, interval: float) -> BenchModel:
+        """See `Model`: led along the measured speeds."""
+        found = copy(self)
+        along = [r.measured_speeds(interval) for r in self._recordings]
+        vars(found).update(_roughly=None, _along=along)
+        return found
+
     def simulated(self, run: int, values: Mapping[str, float]) -> Log:
         """The log that a run would have given at these values of everything."""
         inputs = self._recordings[run].inputs
+        along = None if self._along is None else self._along[run]
         own, gap = split_gap_position(values)
         tolerance, step = ROUGH if self._roughly is self else (TOLERANCE, None)
         if inputs.truck:
             tolerance = TRUCK_TOLERANCE
-        return simulate(inputs, own, gap_position=gap, tolerance=tolerance, largest_step=step)
+        return simulate(
+            inputs, own, gap_position=gap, tolerance=tolerance, largest_step=step, along=along
+        )
 
     def relations(
         self,

@@ -158,7 +158,7 @@ def _fit_from_start(
         {**model.initial_states(run, effects, values), **known, **told}
         for run, known, told in zip(law.runs, known_states, phases, strict=True)
     ]
-    return fit(model, effects, law.runs, values, states, ROUGH_ITERATIONS, over_kinks=False)
+    return fit(model, effects, law.runs, values, states, ROUGH_ITERATIONS)
 
 
 def _of_law(

@@ -95,6 +95,10 @@ class _WhitenedModel:
         """See `Model`."""
         return cast("Model", _WhitenedModel(self._model.rough(), self.noise))
 
+    def observer(self, interval: float) -> Model:
+        """See `Model`."""
+        return cast("Model", _WhitenedModel(self._model.observer(interval), self.noise))
+
     def relations(
         self, where: FitResult, runs: Sequence[int], whiteners: Whiteners | None = None
     ) -> Fidelity | None:

@@ -1,10 +1,8 @@
 """Screens the effects: the gain of log evidence that each promises on top of a fit.
 
 A linear regression predicts it, in the relations and in the simulation's residual. What is local is
-clean in the first; what is slow and faint adds up in the second. The larger counts. A large gap
-bends the parameters of the fit without effects, and slopes there mislead. The relations at the
-nominal parameters give a third score then. Where the first effect does not lead to the noise, or a
-set of effects leaves more, `secant_fits` tells the effects apart.
+clean in the first; what is slow and faint adds up in the second. The larger counts. Where a fit
+leaves more than the noise, it has bent its parameters, and `secant_fits` tells the effects apart.
 """
 
 from __future__ import annotations
@@ -15,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
+from plant_emulator.diagnosis.fitting.joint_fit import CORRECTION_INTERVALS
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.columns import best_score
@@ -32,6 +31,10 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.machine import Candidate, Model
     from plant_emulator.diagnosis.search.columns import Score
     from plant_emulator.estimation.unknowns import Residual, Unknown
+
+
+# The residuals of a regression, and its name in the trace.
+RELATIONS, SIMULATION, OBSERVER = "relations", "simulation", "observer"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,24 +78,19 @@ def _visibility(simulation: SimulationColumns, candidate: Candidate) -> Visibili
 class Screening:
     """A screening of all effects on top of one fit, by one regression.
 
-    fidelity : simulation or relations; states : of each effect in each run, by effect
-    nominal : whether the slopes are those at the nominal parameters
+    fidelity : residuals of the regression; states : of each effect in each run, by effect
     """
 
     base: FitResult
     runs: tuple[int, ...]
     fidelity: str
     states: Mapping[str, Sequence[Mapping[str, float]]]
-    nominal: bool = False
-
-    @property
-    def name(self) -> str:
-        """The regression's name in the trace."""
-        return f"{self.fidelity} at nominal parameters" if self.nominal else self.fidelity
 
 
-def promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
-    """Predicted gains of all effects on top of a fit, the largest first."""
+def promises(
+    runner: TaskRunner, base: FitResult, fidelities: Sequence[str] = (RELATIONS, SIMULATION)
+) -> list[Promise]:
+    """Predicted gains of all effects on top of a fit, the largest first, by these regressions."""
     alone = [
         Task(base=replace(base, states=(own,)), runs=(run,))
         for run, own in zip(runner.runs, base.states, strict=True)
@@ -101,10 +99,8 @@ def promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
     states = {name: [own[name] for own in of_runs] for name in of_runs[0]}
     asked = [
         Screening(base=base, runs=runner.runs, fidelity=fidelity, states=states)
-        for fidelity in ("relations", "simulation")
+        for fidelity in fidelities
     ]
-    if not base.effects and base.mean_square > SETTINGS.linear_mean_square:
-        asked.append(replace(asked[0], nominal=True))
     found: dict[str, Promise] = {}
     for one in (one for some in runner.map(screen, asked) for one in some):
         known = found.get(one.effect, Promise(effect=one.effect, gains={}, starts=()))
@@ -124,33 +120,28 @@ def screen(model: Model, asked: Screening) -> list[Promise]:
     from threadpoolctl import threadpool_limits
 
     base, library = asked.base, visible(model, asked.base, asked.runs)
-    if asked.nominal:
-        base = _at_nominal(model, asked)
     last = bool(base.effects) and base.mean_square <= NOISE_MEAN_SQUARE
     sizes = SETTINGS.sizes[:1] if last else SETTINGS.sizes
     with threadpool_limits(1):
-        fidelity: Fidelity | None = (
-            SimulationColumns(model, base, asked.runs)
-            if asked.fidelity == "simulation"
-            else model.relations(base, asked.runs)
-        )
+        fidelity = _fidelity(model, asked)
         if fidelity is None:
             return []
         return [
             Promise(
                 effect=name,
-                gains={} if score is None else {asked.name: score.gain},
+                gains={} if score is None else {asked.fidelity: score.gain},
                 starts=() if score is None else (_start(fidelity, score, base),),
             )
             for name, score in _scores(library, fidelity, sizes, asked.states).items()
         ]
 
 
-def _at_nominal(model: Model, asked: Screening) -> FitResult:
-    """The base of a screening with the nominal parameters, and the states that suit them."""
-    values = model.nominal(asked.runs)
-    states = tuple(model.initial_states(k, asked.base.effects, values) for k in asked.runs)
-    return replace(asked.base, values={**asked.base.values, **values}, states=states)
+def _fidelity(model: Model, asked: Screening) -> Fidelity | None:
+    if asked.fidelity == RELATIONS:
+        return model.relations(asked.base, asked.runs)
+    if asked.fidelity == OBSERVER:
+        model = model.observer(CORRECTION_INTERVALS[0])
+    return SimulationColumns(model, asked.base, asked.runs)
 
 
 def _library(model: Model, base: FitResult) -> dict[str, Candidate]:

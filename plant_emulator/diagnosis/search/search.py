@@ -23,11 +23,11 @@ from plant_emulator.diagnosis.fitting.evidence import (
 from plant_emulator.diagnosis.fitting.explanation import Explanation
 from plant_emulator.diagnosis.fitting.fit_steps import refit
 from plant_emulator.diagnosis.fitting.task import Task
-from plant_emulator.diagnosis.search.confirmation import Trial, confirm, look
+from plant_emulator.diagnosis.search.confirmation import Trial, confirm
 from plant_emulator.diagnosis.search.law_error import LawErrors
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
 from plant_emulator.diagnosis.search.promise import Start, starts_of
-from plant_emulator.diagnosis.search.rivals import fitted_rivals, gaining, predicted_rivals
+from plant_emulator.diagnosis.search.rivals import rivals
 from plant_emulator.diagnosis.search.screening import promises, visibilities
 from plant_emulator.diagnosis.search.secant_fits import fitted_promises
 from plant_emulator.diagnosis.search.settings import SETTINGS
@@ -72,7 +72,6 @@ class Search:
     trace: list[SearchStep] = field(default_factory=list)
     law_errors: LawErrors = field(default_factory=LawErrors)
     reduced_costs: dict[str, float] = field(default_factory=dict)
-    restarted: bool = False
 
     def explain(self) -> Explanation:
         """Go through the queue in the logs' own noise.
@@ -150,8 +149,9 @@ class Search:
         """Whether no effect is worth adding: the cause is foreign, or only noise is left."""
         if self._foreign(found):
             return True
-        most = max((p.gain for p in self._screen(found)), default=0.0)
-        return found.mean_square <= NOISE_MEAN_SQUARE and most <= self._needed(found)
+        return found.mean_square <= NOISE_MEAN_SQUARE and all(
+            p.gain <= self._needed(found) for p in self._screen(found)
+        )
 
     def _foreign(self, found: FitResult) -> bool:
         """Whether a set leaves most of the gap, so that the library lacks the cause."""
@@ -171,26 +171,29 @@ class Search:
         return needed + SETTINGS.law_error**2 * 0.5 * self.random_evidence
 
     def _expand(self, base: FitResult) -> None:
-        """Fit the effects of largest gain on top of a set."""
-        needed = self._needed(base) if base.effects else SETTINGS.promising
-        found = [p for p in self._screen(base) if p.gain > needed]
-        if base.effects and base.mean_square > NOISE_MEAN_SQUARE:
-            fitted = fitted_promises(self.runner, base, self._screen(base))
-            self._confirm(base, gaining(fitted, needed))
-        elif found:
-            (best,) = self._confirm(base, found[:1])
-            rivals = predicted_rivals(found, base, best)
-            if not base.effects and best.mean_square > SETTINGS.linear_mean_square:
-                fitted = fitted_promises(self.runner, base, found)
-                rivals = fitted_rivals(found, fitted, base, best)
-            self._confirm(base, rivals)
+        """Fit the effects of largest gain on top of a set.
 
-    def _confirm(self, base: FitResult, promises: Sequence[Promise]) -> list[FitResult]:
-        """Fit these effects on top of a set, each for a few iterations."""
+        Regressions predict the gain. Where a set of effects leaves more than the noise, or the
+        first effect does, fits by secants tell. A rival of an effect that leaves only noise is
+        fitted for some iterations.
+        """
+        least = self._needed(base) if base.effects else SETTINGS.promising
+        found, best = [], base
+        if not base.effects or base.mean_square <= NOISE_MEAN_SQUARE:
+            found = self._screen(base)
+            first = [p for p in found[:1] if p.gain > least]
+            (best,) = self._confirm(base, first) or (base,)
+        if best.mean_square > NOISE_MEAN_SQUARE:
+            found = fitted_promises(self.runner, base)
+        few = None if best.mean_square > NOISE_MEAN_SQUARE else SETTINGS.iterations
+        self._confirm(base, rivals(found, base, best, least), few)
+
+    def _confirm(
+        self, base: FitResult, promises: Sequence[Promise], iterations: int | None = None
+    ) -> list[FitResult]:
+        """Fit these effects on top of a set, each for at most so many iterations."""
         runs, own = self.runner.runs, base.effects
-        trials = [
-            Trial(effects=(*own, p.effect), runs=runs, starts=starts_of(p, base)) for p in promises
-        ]
+        trials = [Trial((*own, p.effect), runs, starts_of(p, base), iterations) for p in promises]
         found = list(self.runner.map(confirm, trials))
         for promise, one in zip(promises, found, strict=True):
             self._keep(one)
@@ -232,19 +235,6 @@ class Search:
             for one in self._fits(refit, near):
                 done.add(frozenset(one.effects))
                 self.trace.append(search_step(self.null, "converged", one))
-            if not self.restarted:
-                self.restarted = True
-                self._restart_null(best)
-
-    def _restart_null(self, found: FitResult) -> None:
-        """Fit without effects once more, from the parameters of a fit with some."""
-        own = {u.name for u in self.runner.model.parameters}
-        values = {k: v for k, v in found.values.items() if k in own}
-        start = Start(values=values, states=found.states)
-        trial = Trial(effects=(), runs=self.runner.runs, starts=(start,))
-        (other,) = self.runner.map(look, [trial])
-        if other.cost < self.null.cost - SETTINGS.needed:
-            (self.null,) = self._fits(refit, [other])
 
     def _without_needless(self, best: FitResult) -> FitResult:
         """Drop the effect that closes least until each one closes enough; return the set.
@@ -259,7 +249,7 @@ class Search:
         for name in best.effects:
             rest = tuple(e for e in best.effects if e != name)
             start = Start(values=best.values, states=best.states)
-            trial = Trial(effects=rest, runs=self.runner.runs, starts=(start,))
+            trial = Trial(rest, self.runner.runs, (start,))
             (found,) = self.runner.map(confirm, [trial])
             self._keep(found)
             self.reduced_costs[name] = self.sets[frozenset(rest)].cost

@@ -1,8 +1,9 @@
 """Fits each effect on top of a fit, while the slopes of all else follow by secants.
 
 Where more than noise is left a linear regression misleads: without a cause, a fit has bent the
-parameters, and the slopes there hardly know the cause. Some iterations of a fit unbend them. They
-are cheap, because only the slopes of the effect itself are simulated anew (see
+parameters, and the slopes there hardly know the cause. Some iterations of a fit unbend them. The
+simulation is led along the measured outputs, so that contact comes in time meanwhile. The fits are
+cheap, because only the slopes of the effect itself are simulated anew (see
 `least_squares.estimate`).
 """
 
@@ -11,10 +12,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
+from plant_emulator.diagnosis.fitting.fit_steps import refit_along
+from plant_emulator.diagnosis.fitting.joint_fit import (
+    CORRECTION_INTERVALS,
+    LED_DIFFERENCE,
+    fit,
+    linearise,
+)
 from plant_emulator.diagnosis.fitting.signature import signs, values_at_size
+from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.promise import Promise, Start
-from plant_emulator.diagnosis.search.screening import visible
+from plant_emulator.diagnosis.search.screening import OBSERVER, promises, visible
 from plant_emulator.diagnosis.search.settings import SETTINGS
 
 if TYPE_CHECKING:
@@ -31,37 +39,46 @@ SECANTS = "fit by secants"
 PARTS = 2
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class SecantFits:
     """Effects to fit on top of a fit.
 
     states : of the runs, by effect, where a regression told those that the effect adds
+    iterations : at most so many
     """
 
     base: FitResult
     runs: tuple[int, ...]
     effects: tuple[str, ...]
     states: Mapping[str, Sequence[Mapping[str, float]]]
+    iterations: int
 
 
-def fitted_promises(runner: TaskRunner, base: FitResult, found: Sequence[Promise]) -> list[Promise]:
-    """Gains of all effects on top of a fit, each fitted by secants, the largest first.
+def fitted_promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
+    """Gains of effects on top of a fit, each fitted by secants, the largest first.
 
-    found : predicted gains of the effects, with starts
+    All effects are fitted for some iterations, and the best for more.
     """
+    fitted: list[Promise] = []
+    (base,) = runner.map(refit_along, [Task(base=base, runs=runner.runs)])
+    found = promises(runner, base, (OBSERVER,))
     names = tuple(visible(runner.model, base, runner.runs))
     states = {p.effect: p.starts[0].states for p in found if p.starts}
-    parts = [
-        SecantFits(base=base, runs=runner.runs, effects=names[k::PARTS], states=states)
-        for k in range(min(PARTS, len(names)))
-    ]
-    fitted = [one for part in runner.map(fit_by_secants, parts) for one in part]
-    return sorted(fitted, key=lambda p: -p.gain)
+    for iterations in SETTINGS.secant_iterations:
+        parts = [
+            SecantFits(base, runner.runs, names[k::PARTS], states, iterations)
+            for k in range(min(PARTS, len(names)))
+        ]
+        fitted = [one for part in runner.map(fit_by_secants, parts) for one in part]
+        fitted.sort(key=lambda p: -p.gain)
+        names = tuple(p.effect for p in fitted[: SETTINGS.tried_further])
+    return fitted
 
 
 def fit_by_secants(model: Model, asked: SecantFits) -> list[Promise]:
     """Gain of each of these effects after some iterations of its fit (a step)."""
-    near = linearise(model, asked.base, asked.runs)
+    model = model.observer(CORRECTION_INTERVALS[0]).rough()
+    near = linearise(model, asked.base, asked.runs, LED_DIFFERENCE)
     return [_promise(model, asked, name, near) for name in asked.effects]
 
 
@@ -81,8 +98,9 @@ def _promise(model: Model, asked: SecantFits, name: str, near: Estimate) -> Prom
                 asked.runs,
                 {**base.values, **values_at_size(candidate, size)},
                 states,
-                SETTINGS.iterations,
+                asked.iterations,
                 near,
+                difference=LED_DIFFERENCE,
             )
             for size in _sizes(candidate)
         ),

@@ -16,12 +16,14 @@ class Settings:
     # Sizes that a fit by secants begins at: most laws bend less at the first, and a limit does not
     # act there.
     secant_sizes: tuple[float, ...] = (0.3, 1.0)
+    # Iterations of fits by secants: of all effects, and of the best `tried_further`.
+    secant_iterations: tuple[int, ...] = (2, 5)
     # Prior standard deviation of a size in the rich model that noise is estimated beside.
     largest_size: float = 3.0
     # So many effects of each score are tried at the other sizes; the true one was among three.
     tried_further: int = 6
     # Mean square up to which a linear model around a fit is as good as a fit with the cause: noise
-    # is estimated beside it, and regressions choose the rivals of the first effect.
+    # is estimated beside it.
     linear_mean_square: float = 1.5
     # Gain that an effect needs: odds of e^15, one of 30 effects by chance in 100 000 logs.
     needed: float = 15.0
@@ -34,24 +36,17 @@ class Settings:
     most_effects: int = 3
     # Relative error of an approximate law: other laws of the same effect differed by up to this.
     law_error: float = 0.1
-    # Leading effects of each score, or of the fits by secants, that are fitted beside the best one.
-    # Contact and limits move with the fit, so that the order by promise is not yet that by fit.
-    # Beside other effects the order is nearly right: that of the regressions where only noise is
-    # left, that of the fits by secants elsewhere.
+    # Leading effects of each score that are fitted beside the best one: contact and limits move
+    # with the fit, so that the order by promise is not yet that by fit. Beside other effects the
+    # order is nearly right.
     rivals: int = 2
     rivals_beside: int = 1
-    # Gain over the largest one that a rival needs. Where the first effect leaves more than noise,
-    # but the regressions hold, a rival may have the second share.
+    # Gain over the largest one that a rival needs.
     rival_share: float = 0.5
-    hopeless_share: float = 0.05
     # Iterations of a first fit, enough to tell a basin from a slope.
     iterations: int = 5
     # Cost above the best one's up to which a first fit may still win [chi squared].
     near: float = 100.0
-    # Positions in the gap that a start is tried from, because contact comes at once or not at all.
-    gap_positions: int = 9
-    # Sizes that the best start is tried at: a limit does not scale as its column does.
-    trial_sizes: tuple[float, ...] = tuple(0.1 * 1.25**k for k in range(17))
 
 
 SETTINGS = Settings()

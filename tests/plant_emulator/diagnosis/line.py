@@ -85,6 +85,10 @@ class Line:
         """See `Model`."""
         return self
 
+    def observer(self, interval: float) -> "Line":
+        """See `Model`: a line has nothing to lead it along."""
+        return self
+
     def input_noise(
         self, run: int, where: FitResult, state: Mapping[str, float]
     ) -> NoiseDirections | None:

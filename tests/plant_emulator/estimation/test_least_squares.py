@@ -12,7 +12,7 @@ from plant_emulator.estimation.covariance import (
     sandwich,
     structure,
 )
-from plant_emulator.estimation.least_squares import approach, estimate, linearise_at
+from plant_emulator.estimation.least_squares import estimate, linearise_at
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.signals.log import Array
 
@@ -275,28 +275,3 @@ def test_a_variance_that_a_tapered_autocovariance_makes_negative_is_that_of_whit
         variances.append(found[0, 0])
     assert min(variances) > 0.0
     assert min(abs(v * 300.0 - 1.0) for v in variances) < 0.05  # some of them are of the white kind
-
-
-TIMES = np.linspace(0.0, 10.0, 1001)
-
-
-def pulses(contact: float) -> Array:
-    """A ramp, and ten instants of contact that move with one unknown, as those of a gear do."""
-    late = TIMES[:, None] - contact * np.arange(1.0, 11.0)
-    return TIMES + 20.0 * np.sum((late > 0.0) & (late < 0.05), axis=1)
-
-
-def test_approach_passes_over_the_steps_that_instants_of_contact_make() -> None:
-    """Over a small difference no pulse moves by a sample, and the fit hardly moves."""
-    measured = pulses(0.9)
-
-    def residual(v: Mapping[str, float]) -> Array:
-        return (measured - v["slope"] * TIMES - pulses(v["contact"]) + TIMES)[None, :] / 0.1
-
-    starts = [number("slope", 1.1), number("contact", 0.896)]
-    stuck = estimate(starts, [residual])
-    assert stuck.parameters()["contact"] < 0.898
-    _, found = approach(starts, [residual], iterations=30)
-    near = {u.name: u.start for u in found}
-    assert near["slope"] == pytest.approx(1.0, abs=0.01)
-    assert near["contact"] == pytest.approx(0.9, abs=0.0025)  # two samples at the last pulse

@@ -103,6 +103,10 @@ class Slope:
         """See `Model`."""
         return self
 
+    def observer(self, interval: float) -> "Slope":
+        """See `Model`."""
+        return self
+
     def input_noise(
         self, run: int, where: FitResult, state: Mapping[str, float]
     ) -> NoiseDirections | None:

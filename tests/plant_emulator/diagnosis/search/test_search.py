@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, adequat
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
 from plant_emulator.diagnosis.report.ranking import undetectable
 from plant_emulator.diagnosis.search.search import Search
-from plant_emulator.diagnosis.search.simulation_columns import SimulationColumns
 from plant_emulator.diagnosis.search.summary import not_told_apart
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import (
@@ -167,32 +165,6 @@ def test_limit_that_small_sizes_do_not_reach_is_found() -> None:
     assert found.final.values["wave_size"] == pytest.approx(0.51, abs=0.01)
 
 
-class Bent(Line):
-    """The line with a wave on a step of 30, that acts only near the nominal level."""
-
-    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
-        """See `Model`."""
-        plain = super().residual(run, effects)
-
-        def residual(v: Mapping[str, float]) -> Array:
-            size = v.get("wave_size", 0.0) * float(abs(v["a"]) < 8.0)
-            return plain({**v, "wave_size": 3.0 * size}) - 30.0 * size
-
-        return residual
-
-    def relations(self, where: FitResult, runs: Sequence[int], whiteners: object = None) -> Any:
-        """See `Model`: the line has no state, so they are the simulation."""
-        return SimulationColumns(self, where, runs)
-
-
-def test_effect_whose_gap_bends_the_parameters_is_found_at_the_nominal_ones() -> None:
-    """The fit without effects has the level 24, where the wave does nothing."""
-    model = Bent([noisy(3.0 * TIME + 0.8 * (30.0 + 3.0 * np.sin(20.0 * TIME)))], ["wave", "cube"])
-    found = explained(model)
-    assert found.null.values["a"] == pytest.approx(24.0, rel=0.01)
-    assert found.final.effects == ("wave",)
-
-
 class Partly(Line):
     """The line, whose runs after the second alone show its effects."""
 
@@ -277,9 +249,13 @@ class Stuck(Line):
 
         return falling
 
+    def observer(self, interval: float) -> Line:
+        """See `Model`: the line itself."""
+        return Line(self.measured, list(self.candidates))
+
 
 def test_fit_without_effects_that_does_not_converge_lets_nothing_be_named() -> None:
-    model = Stuck([noisy(2.0 + 3.0 * TIME + 0.8 * np.sin(20.0 * TIME))], ["wave"])
+    model = Stuck([noisy(2.0 + 3.0 * TIME + 0.8 * np.sin(20.0 * TIME))], [])
     found = decide(model, explained(model))
     assert (found.kind, found.effects) == ("unknown", ())
     assert "did not converge" in found.reason

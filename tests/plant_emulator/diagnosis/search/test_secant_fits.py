@@ -8,15 +8,15 @@ import pytest
 
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
 from plant_emulator.diagnosis.search.promise import Promise, Start, starts_of
-from plant_emulator.diagnosis.search.rivals import fitted_rivals, gaining
-from plant_emulator.diagnosis.search.secant_fits import SECANTS, SecantFits, fit_by_secants
+from plant_emulator.diagnosis.search.rivals import rivals
+from plant_emulator.diagnosis.search.secant_fits import SecantFits, fit_by_secants
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import TIME, Line, noisy
 
 
 def promised(model: Line) -> dict[str, Promise]:
     base = fit_null(model, (0,))
-    asked = SecantFits(base=base, runs=(0,), effects=tuple(model.candidates), states={})
+    asked = SecantFits(base, (0,), tuple(model.candidates), {}, 5)
     return {p.effect: p for p in fit_by_secants(model, asked)}
 
 
@@ -59,35 +59,29 @@ def promise(effect: str, **gains: float) -> Promise:
     return Promise(effect=effect, gains=gains, starts=())
 
 
-def test_rivals_are_the_leaders_of_each_score_and_of_the_fits() -> None:
-    """b leads the relations; of the fits d and e gain half of the most or more, and c does not.
+def test_rivals_are_the_leaders_of_each_score() -> None:
+    """a is fitted already; b leads the relations, and c gains a third of the simulation's most.
 
-    The fit with a gains 250: its fit by secants counts where it gains more than that.
+    Two rivals of each score are fitted, with half of its largest gain.
     """
     base = fit_null(Line([noisy(2.0 + 3.0 * TIME)]), (0,))
-    best = replace(base, cost=base.cost - 500.0)
     found = [
         promise("a", relations=1.0, simulation=90.0),
-        promise("b", relations=20.0, simulation=5.0),
-        promise("c", relations=8.0, simulation=30.0),
+        promise("b", relations=20.0, simulation=6.0),
+        promise("c", relations=8.0, simulation=50.0),
+        promise("d", relations=15.0, simulation=47.0),
+        promise("e", relations=13.0, simulation=46.0),
     ]
-
-    def rivals(**gains: float) -> list[str]:
-        fitted = [promise(name, **{SECANTS: gain}) for name, gain in gains.items()]
-        return [p.effect for p in fitted_rivals(found, fitted, base, best)]
-
-    assert rivals(d=200.0, e=90.0, a=249.0) == ["d", "b"]
-    assert rivals(d=200.0, e=160.0, c=150.0) == ["d", "e", "b"]
-    assert rivals(a=300.0, d=160.0) == ["a", "d", "b"]
-    assert rivals() == ["b"]
+    best = replace(base, effects=("a",))
+    assert [p.effect for p in rivals(found, base, best, 5.0)] == ["b", "d", "c"]
+    assert [p.effect for p in rivals(found, base, best, 25.0)] == ["c", "d"]
 
 
-def test_next_effect_of_a_set_is_that_of_largest_gain_with_one_rival() -> None:
-    """30 is needed; a gain of a twentieth of the largest one is hopeless."""
-    fitted = [promise(name, fit=gain) for name, gain in (("a", 900.0), ("b", 46.0), ("c", 40.0))]
-    assert [p.effect for p in gaining(fitted, 30.0)] == ["a", "b"]
-    assert [p.effect for p in gaining(fitted, 50.0)] == ["a"]
-    assert gaining(fitted[1:], 50.0) == []
+def test_one_rival_is_fitted_beside_other_effects() -> None:
+    base = replace(fit_null(Line([noisy(2.0 + 3.0 * TIME)]), (0,)), effects=("z",))
+    found = [promise(name, fit=gain) for name, gain in (("a", 90.0), ("b", 46.0), ("c", 45.5))]
+    assert [p.effect for p in rivals(found, base, replace(base, effects=("z", "a")), 30.0)] == ["b"]
+    assert [p.effect for p in rivals(found, base, base, 30.0)] == ["a", "b"]
 
 
 def test_effect_also_starts_at_the_parameters_of_the_set() -> None:

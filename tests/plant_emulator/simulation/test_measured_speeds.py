@@ -1,0 +1,92 @@
+"""Simulations that are led along the speeds of a log of the independent bench."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from plant_emulator.model.parameters import ParameterSet
+from plant_emulator.recordings.recording import recording
+from plant_emulator.signals.log import Log
+from plant_emulator.simulation.simulate import (
+    MeasuredSpeeds,
+    inputs_of,
+    mean_square_residual,
+    simulate,
+)
+
+ReadLog = Callable[[str], Log]
+INTERVAL = 0.2
+
+
+def speeds(log: Log) -> MeasuredSpeeds:
+    """The speeds of a log, each sample measured."""
+    return MeasuredSpeeds(
+        motor_speed=log["motor_speed"], drum_speed=log["drum_speed"], interval=INTERVAL
+    )
+
+
+@pytest.mark.parametrize("program", ["program1", "program2", "program3"])
+def test_right_simulation_needs_no_correction(
+    nominal: ParameterSet, bench_log: ReadLog, program: str
+) -> None:
+    """Without noise and gap, free and led simulation are the same within a tenth of the noise."""
+    log = bench_log(f"bench_nominal/{program}")
+    free = simulate(inputs_of(log), nominal.values())
+    led = simulate(inputs_of(log), nominal.values(), along=speeds(log))
+    assert mean_square_residual(free, led) < 0.01
+
+
+def test_contact_comes_in_time_at_wrong_friction(nominal: ParameterSet, bench_log: ReadLog) -> None:
+    """Half of the friction moves every contact of a free simulation, and hardly those of a led one.
+
+    The shaft's torque shows contact; friction itself acts between motor and shaft.
+    """
+    log = bench_log("bench_nominal/program2")
+    values = {
+        **nominal.values(),
+        "gear_coulomb_friction": 0.5 * nominal.value("gear_coulomb_friction"),
+    }
+    run = inputs_of(log)
+    missed = [
+        np.abs(log["drum_speed"] - simulate(run, values, along=along)["drum_speed"]).mean()
+        for along in (None, speeds(log))
+    ]
+    assert missed[1] < 0.5 * missed[0]
+
+
+def test_wrong_start_is_forgotten(nominal: ParameterSet, bench_log: ReadLog) -> None:
+    """The bench starts in the middle of its gap; a simulation that starts elsewhere catches up."""
+    log = bench_log("bench_nominal/program1")
+    run = inputs_of(log)
+    led = simulate(run, nominal.values(), gap_position=-1.0, along=speeds(log))
+    free = simulate(run, nominal.values(), gap_position=-1.0)
+    assert mean_square_residual(log, led) < mean_square_residual(log, free)
+
+
+def test_samples_that_are_not_measured_correct_nothing(
+    nominal: ParameterSet, bench_log: ReadLog
+) -> None:
+    log = bench_log("bench_nominal/program1")
+    none = np.full(len(log.time), np.nan)
+    along = MeasuredSpeeds(motor_speed=none, drum_speed=none, interval=INTERVAL)
+    free = simulate(inputs_of(log), nominal.values(), gap_position=0.5)
+    led = simulate(inputs_of(log), nominal.values(), gap_position=0.5, along=along)
+    assert mean_square_residual(free, led) < 1e-4
+
+
+def test_spikes_and_masked_samples_lead_nothing_astray(bench_log: ReadLog) -> None:
+    run = recording(bench_log("bench_practice/practice_004/program2"))
+    log = run.log
+    spoilt = log["drum_speed"].copy()
+    spoilt[200] = 100.0
+    use = run.use.copy()
+    use[run.channels.index("drum_speed"), 500:600] = False
+    damaged = replace(
+        run, log=Log(log.time, {**log.signals, "drum_speed": spoilt}, log.source), use=use
+    )
+    found = damaged.measured_speeds(INTERVAL).drum_speed
+    assert np.isnan(found[500:600]).all()
+    kept = np.r_[0:500, 600 : len(log.time)]
+    assert np.abs(found[kept] - log["drum_speed"][kept]).max() < 0.1
