@@ -174,8 +174,8 @@ class Search:
         """Fit the effects of largest gain on top of a set.
 
         Regressions predict the gain. Where a set of effects leaves more than the noise, or the
-        first effect does, fits by secants tell. A rival of an effect that leaves only noise is
-        fitted for some iterations.
+        first effect is left far from it, fits by secants tell. A rival of an effect that leaves
+        only noise is fitted for some iterations.
         """
         least = self._needed(base) if base.effects else SETTINGS.promising
         found, best = [], base
@@ -183,7 +183,8 @@ class Search:
             found = self._screen(base)
             first = [p for p in found[:1] if p.gain > least]
             (best,) = self._confirm(base, first) or (base,)
-        if best.mean_square > NOISE_MEAN_SQUARE:
+        most = NOISE_MEAN_SQUARE if base.effects else SETTINGS.linear_mean_square
+        if best.mean_square > most:
             found = fitted_promises(self.runner, base)
         few = None if best.mean_square > NOISE_MEAN_SQUARE else SETTINGS.iterations
         self._confirm(base, rivals(found, base, best, least), few)
