@@ -124,10 +124,13 @@ class Model(Protocol):
         """Give the machine with residuals that are good enough to compare, not to differentiate."""
 
     def observer(self, interval: float) -> Model:
-        """Give the machine with rough residuals that are led along the measured outputs.
+        """Give the machine with residuals that are led along the measured outputs.
 
         A fault then shows where and when it acts, and does not move all that follows: the cost has
-        far fewer local minima than that of a free simulation, and another least value.
+        far fewer local minima than that of a free simulation. Its least value is above the noise,
+        because the noise of the measured outputs moves contact.
+
+        interval : between two corrections [s]
         """
 
     def input_noise(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -91,11 +91,6 @@ class Estimate:
     simulations: int
     converged: bool
     message: str
-
-    @property
-    def started(self) -> tuple[Unknown, ...]:
-        """The unknowns, each starting at its value."""
-        return tuple(replace(u, start=u.value(z)) for u, z in self._pairs())
 
     def parameters(self) -> dict[str, float]:
         """Values of the parameters by name [SI]."""

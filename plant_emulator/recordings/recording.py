@@ -40,9 +40,6 @@ if TYPE_CHECKING:
 # What is known of the voltage's sensor beforehand: its offset [V] and the error of its gain, each
 # run's own. An isolating amplifier of 500 V and 0.2 % is off by 1 V; a divider by some 0.5 %.
 OFFSET, GAIN_ERROR = 1.0, 0.005
-# Time between corrections of a simulation that is led along the measured speeds [s]. In this time a
-# speed that is off by some percent crosses a tenth of the backlash.
-CORRECTION_INTERVAL = 0.2
 # Residual where the model cannot be simulated [noise]: a search turns back there, and goes on.
 IMPOSSIBLE = 100.0
 
@@ -90,12 +87,15 @@ class Recording:
         return np.asarray(np.hypot(1.0, self.log[TIMING_ERROR] * rates / self.noise[:, None]))
 
     def measured_speeds(self, interval: float) -> MeasuredSpeeds:
-        """The speeds that count, to lead a simulation along; medians of five, without spikes."""
+        """The speeds that count, to lead a simulation along.
+
+        They are medians of five, without spikes of up to two samples.
+        """
         speeds = {}
         for name in ("motor_speed", "drum_speed"):
             speeds[name] = np.full(len(self.log.time), nan)
-            if name in self.channels:
-                use = self.use[self.channels.index(name)]
+            use = self.use[self.channels.index(name)] if name in self.channels else np.array(False)
+            if use.any():
                 value = np.pad(self.log[name][use], 2, mode="edge")
                 speeds[name][use] = np.median(sliding_window_view(value, 5), axis=-1)
         return MeasuredSpeeds(**speeds, interval=interval)

@@ -47,7 +47,7 @@ class MeasuredSpeeds:
     """Speeds that a simulation is led along, as an observer is; see `stepper`.
 
     motor_speed, drum_speed : of the samples of the run; NaN: not measured [rad/s], shape (n,)
-    interval : least time between two corrections [s]
+    interval : the speeds are corrected at the first sample of each such interval [s]
     """
 
     motor_speed: Array
@@ -221,8 +221,19 @@ def _corrections(
     passed = np.floor((coarse.time - coarse.time[0]) / along.interval)
     due = rows[1:][np.diff(passed) > 0.0]
     motor, drum = np.full((2, len(run.time)), nan)
-    motor[rows], drum[rows] = along.motor_speed, along.drum_speed
+    motor[rows] = _without_lag(coarse, "motor_speed", along.motor_speed)
+    drum[rows] = _without_lag(coarse, "drum_speed", along.drum_speed)
     return np.append(due, len(run.time)), motor, drum
+
+
+def _without_lag(run: RunInputs, channel: str, measured: Array) -> Array:
+    """The measured values, earlier by the lag that the channel's declared sensor has."""
+    sensor = None if run.sensing is None else run.sensing.sensors.get(channel)
+    known = np.isfinite(measured)
+    if sensor is None or not known.any():
+        return measured
+    earlier = np.interp(run.time + sensor.time_constant, run.time[known], measured[known])
+    return np.where(known, earlier, nan)
 
 
 def _refuse_unsolved(run: RunInputs, unsettled: float, out: Array) -> None:

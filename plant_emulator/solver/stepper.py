@@ -5,7 +5,7 @@ truck's torque does not change. The states at these samples come from cubic inte
 
 A run may be led along a measured one, as an observer is (D. Luenberger, IEEE Trans. Autom. Control
 16 (1971) 596): at some samples the speeds are corrected by a share of what they have missed since
-the sample before.
+the correction before.
 """
 
 from __future__ import annotations
@@ -55,9 +55,9 @@ CHANNELS = (
     "wheel_torque",
 )
 
-# Share of the missed speed that one correction gives back: enough to end a drift within some of
-# them, and little enough to average the noise.
-CORRECTED_SHARE = 0.6
+# Gain of the observer: share of the missed speed that one correction gives back, enough to end a
+# drift within some of them.
+OBSERVER_GAIN = 0.6
 # Corrections of a free run: the first one is due past its last sample.
 NEVER, NOT_MEASURED = np.array([np.iinfo(np.int64).max]), np.empty(0)
 
@@ -123,14 +123,15 @@ def correct(
 ) -> None:
     """Correct the speeds by a share of what they have missed in these samples.
 
-    Motor and gear move together, and in contact the drum moves with them, so that no torque jumps.
+    Motor and gear move together, and in contact the drum moves with them, so that its torque does
+    not jump.
     """
-    motor = CORRECTED_SHARE * missed(first, last, inputs.motor_speed, 0, out)
+    motor = OBSERVER_GAIN * missed(first, last, inputs.motor_speed, 0, out)
     drum = motor / p.gear_ratio
     x[MOTOR_SPEED] += motor
     x[GEAR_SPEED] += drum
     if abs(x[BACKLASH]) < s.backlash_half_gap:
-        drum = CORRECTED_SHARE * missed(first, last, inputs.drum_speed, 1, out)
+        drum = OBSERVER_GAIN * missed(first, last, inputs.drum_speed, 1, out)
     x[DRUM_SPEED] += drum
 
 

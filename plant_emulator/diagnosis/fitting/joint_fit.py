@@ -35,8 +35,6 @@ COST_TOLERANCE = 1e-5
 # Relative fall of the cost that ends a fit far from the noise, where it lacks a cause in any case,
 # or a fit whose slopes follow by secants.
 COARSE_COST_TOLERANCE = 1e-4
-# Iterations after which a fit shows whether it leads to a lower cost.
-TRIAL_ITERATIONS = 10
 # Iterations of a fit along the measured outputs that tell the best start, and at most so many more.
 FIRST_ITERATIONS, APPROACH_ITERATIONS = 3, 25
 # Relative fall of the cost that ends a fit along the measured outputs, and norm of the change that
@@ -131,7 +129,7 @@ def approach(
     model: Model,
     starts: Sequence[FitValues],
     runs: Sequence[int],
-    near: float = SUSPECT_MEAN_SQUARE,
+    far: float = SUSPECT_MEAN_SQUARE,
 ) -> FitValues:
     """Values and states near the data, from which a fit of these effects may begin.
 
@@ -140,9 +138,9 @@ def approach(
     outputs first, from the best start, and then left to run freely for longer and longer times
     (homotopy from prediction errors to simulation errors).
 
-    starts : all with the same effects; near : mean square of a start that is near
+    starts : all with the same effects; far : mean square above which a start is far
     """
-    if _mean_square(model, starts[0], runs) <= near:
+    if _mean_square(model, starts[0], runs) <= far:
         return starts[0]
     best: FitValues = min(
         (lead(model, one, runs, iterations=FIRST_ITERATIONS) for one in starts),

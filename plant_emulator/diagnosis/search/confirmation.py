@@ -9,6 +9,7 @@ from plant_emulator.diagnosis.fit_result import FitValues
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.joint_fit import approach, fit
 from plant_emulator.diagnosis.fitting.signature import values_at_size
+from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
@@ -44,11 +45,11 @@ def confirm(model: Model, trial: Trial) -> FitResult:
         FitValues(effects=trial.effects, values=one.values, states=one.states)
         for one in (*trial.starts, *nominal)
     ]
-    if len(trial.effects) > 1:
-        own = len(trial.starts) - 1
-        near = [approach(model, starts, trial.runs, NOISE_MEAN_SQUARE), starts[own]]
-    else:
-        near = [approach(model, starts, trial.runs)]
+    far = NOISE_MEAN_SQUARE if len(trial.effects) > 1 else SUSPECT_MEAN_SQUARE
+    near = [approach(model, starts, trial.runs, far)]
+    own = starts[len(trial.starts) - 1]
+    if len(trial.effects) > 1 and near[0] is not own:
+        near.append(own)
     found = [
         fit(model, trial.effects, trial.runs, one.values, one.states, trial.iterations)
         for one in near

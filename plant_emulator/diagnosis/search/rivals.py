@@ -24,10 +24,20 @@ def rivals(
     """
     most = SETTINGS.rivals_beside if base.effects else SETTINGS.rivals
     most += best is base
+    return leading(found, best.effects, most, least)
+
+
+def leading(
+    found: Sequence[Promise], known: Sequence[str], most: int, least: float
+) -> list[Promise]:
+    """So many effects of each score, beside those known, that gain half of its most or more.
+
+    least : gain that an effect must promise
+    """
     near: dict[str, Promise] = {}
     for score in dict.fromkeys(score for p in found for score in p.gains):
         order = sorted(found, key=lambda p: -p.gains.get(score, 0.0))
         needed = max(least, SETTINGS.rival_share * order[0].gains.get(score, 0.0))
-        rest = [p for p in order if p.effect not in best.effects][:most]
+        rest = [p for p in order if p.effect not in known][:most]
         near |= {p.effect: p for p in rest if p.gains.get(score, 0.0) > needed}
     return list(near.values())

@@ -1,8 +1,9 @@
 """Screens the effects: the gain of log evidence that each promises on top of a fit.
 
 A linear regression predicts it, in the relations and in the simulation's residual. What is local is
-clean in the first; what is slow and faint adds up in the second. The larger counts. Where a fit
-leaves more than the noise, it has bent its parameters, and `secant_fits` tells the effects apart.
+clean in the first; what is slow and faint adds up in the second. The larger counts. A large gap
+bends the parameters of the fit without effects, and slopes there mislead. The relations at the
+nominal parameters give a third score then, and `secant_fits` tells the effects apart.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 
 # The residuals of a regression, and its name in the trace.
 RELATIONS, SIMULATION, OBSERVER = "relations", "simulation", "observer"
+NOMINAL_RELATIONS = "relations at nominal parameters"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,23 +76,32 @@ def _visibility(simulation: SimulationColumns, candidate: Candidate) -> Visibili
     )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Screening:
-    """A screening of all effects on top of one fit, by one regression.
+    """A screening of effects on top of one fit, by one regression.
 
     fidelity : residuals of the regression; states : of each effect in each run, by effect
     """
 
     base: FitResult
     runs: tuple[int, ...]
+    effects: tuple[str, ...]
     fidelity: str
     states: Mapping[str, Sequence[Mapping[str, float]]]
 
 
-def promises(
-    runner: TaskRunner, base: FitResult, fidelities: Sequence[str] = (RELATIONS, SIMULATION)
+def promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
+    """Predicted gains of all effects on top of a fit, the largest first."""
+    fidelities = [RELATIONS, SIMULATION]
+    if not base.effects and base.mean_square > SETTINGS.linear_mean_square:
+        fidelities.append(NOMINAL_RELATIONS)
+    return regressions(runner, base, tuple(visible(runner.model, base, runner.runs)), fidelities)
+
+
+def regressions(
+    runner: TaskRunner, base: FitResult, effects: Sequence[str], fidelities: Sequence[str]
 ) -> list[Promise]:
-    """Predicted gains of all effects on top of a fit, the largest first, by these regressions."""
+    """Predicted gains of these effects on top of a fit, the largest first, by these regressions."""
     alone = [
         Task(base=replace(base, states=(own,)), runs=(run,))
         for run, own in zip(runner.runs, base.states, strict=True)
@@ -98,8 +109,7 @@ def promises(
     of_runs = list(runner.map(start_states, alone))
     states = {name: [own[name] for own in of_runs] for name in of_runs[0]}
     asked = [
-        Screening(base=base, runs=runner.runs, fidelity=fidelity, states=states)
-        for fidelity in fidelities
+        Screening(base, runner.runs, tuple(effects), fidelity, states) for fidelity in fidelities
     ]
     found: dict[str, Promise] = {}
     for one in (one for some in runner.map(screen, asked) for one in some):
@@ -113,17 +123,19 @@ def promises(
 
 
 def screen(model: Model, asked: Screening) -> list[Promise]:
-    """Predicted gains of all effects by one regression (a step).
+    """Predicted gains of effects by one regression (a step).
 
     On top of a fit with effects that leaves noise, another effect is tried at one size only.
     """
     from threadpoolctl import threadpool_limits
 
-    base, library = asked.base, visible(model, asked.base, asked.runs)
+    base, library = asked.base, {name: model.candidates[name] for name in asked.effects}
+    if asked.fidelity == NOMINAL_RELATIONS:
+        base = _at_nominal(model, asked)
     last = bool(base.effects) and base.mean_square <= NOISE_MEAN_SQUARE
     sizes = SETTINGS.sizes[:1] if last else SETTINGS.sizes
     with threadpool_limits(1):
-        fidelity = _fidelity(model, asked)
+        fidelity = _fidelity(model, replace(asked, base=base))
         if fidelity is None:
             return []
         return [
@@ -136,8 +148,15 @@ def screen(model: Model, asked: Screening) -> list[Promise]:
         ]
 
 
+def _at_nominal(model: Model, asked: Screening) -> FitResult:
+    """The base of a screening with the nominal parameters, and the states that suit them."""
+    values = model.nominal(asked.runs)
+    states = tuple(model.initial_states(k, asked.base.effects, values) for k in asked.runs)
+    return replace(asked.base, values={**asked.base.values, **values}, states=states)
+
+
 def _fidelity(model: Model, asked: Screening) -> Fidelity | None:
-    if asked.fidelity == RELATIONS:
+    if asked.fidelity in {RELATIONS, NOMINAL_RELATIONS}:
         return model.relations(asked.base, asked.runs)
     if asked.fidelity == OBSERVER:
         model = model.observer(CORRECTION_INTERVALS[0])

@@ -27,7 +27,7 @@ from plant_emulator.diagnosis.search.confirmation import Trial, confirm
 from plant_emulator.diagnosis.search.law_error import LawErrors
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
 from plant_emulator.diagnosis.search.promise import Start, starts_of
-from plant_emulator.diagnosis.search.rivals import rivals
+from plant_emulator.diagnosis.search.rivals import leading, rivals
 from plant_emulator.diagnosis.search.screening import promises, visibilities
 from plant_emulator.diagnosis.search.secant_fits import fitted_promises
 from plant_emulator.diagnosis.search.settings import SETTINGS
@@ -183,11 +183,16 @@ class Search:
             found = self._screen(base)
             first = [p for p in found[:1] if p.gain > least]
             (best,) = self._confirm(base, first) or (base,)
-        most = NOISE_MEAN_SQUARE if base.effects else SETTINGS.linear_mean_square
-        if best.mean_square > most:
-            found = fitted_promises(self.runner, base)
-        few = None if best.mean_square > NOISE_MEAN_SQUARE else SETTINGS.iterations
-        self._confirm(base, rivals(found, base, best, least), few)
+        far = NOISE_MEAN_SQUARE if base.effects else SETTINGS.linear_mean_square
+        if best.mean_square > far:
+            fitted = fitted_promises(self.runner, base)
+            near = rivals(fitted, base, best, least)
+            known = (*best.effects, *(p.effect for p in near))
+            near += leading(found, known, 1, least)
+        else:
+            near = rivals(found, base, best, least)
+        few = SETTINGS.iterations if best.mean_square <= NOISE_MEAN_SQUARE else None
+        self._confirm(base, near, few)
 
     def _confirm(
         self, base: FitResult, promises: Sequence[Promise], iterations: int | None = None

@@ -22,7 +22,7 @@ from plant_emulator.diagnosis.fitting.joint_fit import (
 from plant_emulator.diagnosis.fitting.signature import signs, values_at_size
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.promise import Promise, Start
-from plant_emulator.diagnosis.search.screening import OBSERVER, promises, visible
+from plant_emulator.diagnosis.search.screening import OBSERVER, regressions, visible
 from plant_emulator.diagnosis.search.settings import SETTINGS
 
 if TYPE_CHECKING:
@@ -61,8 +61,9 @@ def fitted_promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
     """
     fitted: list[Promise] = []
     (base,) = runner.map(refit_along, [Task(base=base, runs=runner.runs)])
-    found = promises(runner, base, (OBSERVER,))
-    names = tuple(visible(runner.model, base, runner.runs))
+    library = visible(runner.model, base, runner.runs)
+    names, with_states = tuple(library), [n for n, c in library.items() if c.states]
+    found = regressions(runner, base, with_states, (OBSERVER,))
     states = {p.effect: p.starts[0].states for p in found if p.starts}
     for iterations in SETTINGS.secant_iterations:
         parts = [

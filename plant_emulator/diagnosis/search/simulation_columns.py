@@ -1,4 +1,4 @@
-"""The residual of the free simulation around a fit, and what effects do to it."""
+"""The residual of the simulation around a fit, and what effects do to it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class SimulationColumns:
-    """The residual of the free simulation and its tangents; see `Fidelity`."""
+    """The residual of the simulation, free or led, and its tangents; see `Fidelity`."""
 
     def __init__(self, model: Model, where: FitValues, runs: Sequence[int]) -> None:
         self.model, self.where, self.runs = model, where, tuple(runs)

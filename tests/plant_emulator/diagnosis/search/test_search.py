@@ -254,7 +254,7 @@ class Stuck(Line):
         return Line(self.measured, list(self.candidates))
 
 
-def test_fit_without_effects_that_does_not_converge_lets_nothing_be_named() -> None:
+def test_fit_without_effects_that_does_not_converge_is_unknown() -> None:
     model = Stuck([noisy(2.0 + 3.0 * TIME + 0.8 * np.sin(20.0 * TIME))], [])
     found = decide(model, explained(model))
     assert (found.kind, found.effects) == ("unknown", ())
