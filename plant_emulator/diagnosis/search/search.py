@@ -174,8 +174,9 @@ class Search:
         """Fit the effects of largest gain on top of a set.
 
         Regressions predict the gain. Where a set of effects leaves more than the noise, or the
-        first effect is left far from it, fits by secants tell. A rival of an effect that leaves
-        only noise is fitted for some iterations.
+        first effect is left far from it, fits by secants tell, and at last the leader of each
+        regression is fitted. A rival of an effect that leaves only noise is fitted for some
+        iterations.
         """
         least = self._needed(base) if base.effects else SETTINGS.promising
         found, best = [], base
@@ -184,15 +185,14 @@ class Search:
             first = [p for p in found[:1] if p.gain > least]
             (best,) = self._confirm(base, first) or (base,)
         far = NOISE_MEAN_SQUARE if base.effects else SETTINGS.linear_mean_square
+        if best.mean_square <= far:
+            few = SETTINGS.iterations if best.mean_square <= NOISE_MEAN_SQUARE else None
+            self._confirm(base, rivals(found, base, best, least), few)
+            return
+        fitted = rivals(fitted_promises(self.runner, base), base, best, least)
+        best = min((best, *self._confirm(base, fitted)), key=lambda one: one.cost)
         if best.mean_square > far:
-            fitted = fitted_promises(self.runner, base)
-            near = rivals(fitted, base, best, least)
-            known = (*best.effects, *(p.effect for p in near))
-            near += leading(found, known, 1, least)
-        else:
-            near = rivals(found, base, best, least)
-        few = SETTINGS.iterations if best.mean_square <= NOISE_MEAN_SQUARE else None
-        self._confirm(base, near, few)
+            self._confirm(base, leading(found, best.effects, 1, least))
 
     def _confirm(
         self, base: FitResult, promises: Sequence[Promise], iterations: int | None = None
