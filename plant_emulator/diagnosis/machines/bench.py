@@ -13,7 +13,11 @@ import numpy as np
 
 from plant_emulator.diagnosis.localisation.locate import locate
 from plant_emulator.diagnosis.machine import MeasuredRun
-from plant_emulator.diagnosis.machines.bench_candidates import candidate, hidden_effects
+from plant_emulator.diagnosis.machines.bench_candidates import (
+    SUBSYSTEM_OF,
+    candidate,
+    hidden_effects,
+)
 from plant_emulator.diagnosis.machines.bench_programs import (
     COLD_SHELL,
     missing_experiments,
@@ -62,29 +66,6 @@ TRUCK_TOLERANCE = 1e-4
 # Tolerance and largest step [s] of rough runs. They take half the time, and change the residual by
 # some hundredths of the noise, which is more than a derivative bears.
 ROUGH = (1e-5, 0.03)
-
-# Subsystem of each parameter of the model.
-SUBSYSTEMS = {
-    "drive": ("dead_time", "speed_gain", "speed_integral_time", "current_gain"),
-    "motor": (
-        "armature_resistance",
-        "flux_constant",
-        "flux_constant_1",
-        "flux_constant_2",
-        "motor_inertia",
-    ),
-    "motor_shaft": ("motor_shaft_stiffness",),
-    "gear": (
-        "gear_inertia",
-        "gear_ratio",
-        "gear_coulomb_friction",
-        "gear_viscous_friction",
-        "gear_friction_exponent",
-    ),
-    "backlash_shaft": ("backlash_half_gap", "drum_shaft_damping", "drum_shaft_stiffness"),
-    "drum": ("drum_inertia",),
-}
-SUBSYSTEM_OF = {name: subsystem for subsystem, names in SUBSYSTEMS.items() for name in names}
 
 
 class BenchModel:

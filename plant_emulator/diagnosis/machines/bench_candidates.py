@@ -1,4 +1,4 @@
-"""The effects of the library as unknowns of a fit to logs of the bench."""
+"""Effects of the library as unknowns of a fit to logs of the bench; subsystems of parameters."""
 
 from __future__ import annotations
 
@@ -25,6 +25,29 @@ WHEEL = frozenset({"wheel_contact"})
 # What would show them.
 LOG_WHEEL_TORQUE = f"log {NAMES[WHEEL_TORQUE]}"
 OR_NO_TRUCK = ", or give a run without a truck"
+
+# Subsystem of each parameter of the model.
+SUBSYSTEMS = {
+    "drive": ("dead_time", "speed_gain", "speed_integral_time", "current_gain"),
+    "motor": (
+        "armature_resistance",
+        "flux_constant",
+        "flux_constant_1",
+        "flux_constant_2",
+        "motor_inertia",
+    ),
+    "motor_shaft": ("motor_shaft_stiffness",),
+    "gear": (
+        "gear_inertia",
+        "gear_ratio",
+        "gear_coulomb_friction",
+        "gear_viscous_friction",
+        "gear_friction_exponent",
+    ),
+    "backlash_shaft": ("backlash_half_gap", "drum_shaft_damping", "drum_shaft_stiffness"),
+    "drum": ("drum_inertia",),
+}
+SUBSYSTEM_OF = {name: subsystem for subsystem, names in SUBSYSTEMS.items() for name in names}
 
 
 def candidate(effect: Effect, *, voltage: bool = False, unknown_torque: bool = False) -> Candidate:
