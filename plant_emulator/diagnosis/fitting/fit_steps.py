@@ -29,5 +29,8 @@ def refit(model: Model, task: Task) -> FitResult:
 
 
 def refit_along(model: Model, task: Task) -> FitResult:
-    """The same fit, led along the measured outputs (a step); see `joint_fit.lead`."""
+    """The fit of `task.base` with its effects, led along the measured outputs (a step).
+
+    See `joint_fit.lead`.
+    """
     return lead(model, task.base, task.runs)

@@ -156,6 +156,7 @@ def _at_nominal(model: Model, asked: Screening) -> FitResult:
 
 
 def _fidelity(model: Model, asked: Screening) -> Fidelity | None:
+    """The residuals and tangents that a screening asks for; None: the fit cannot be simulated."""
     if asked.fidelity in {RELATIONS, NOMINAL_RELATIONS}:
         return model.relations(asked.base, asked.runs)
     if asked.fidelity == OBSERVER:
