@@ -42,8 +42,9 @@ FIRST_ITERATIONS, APPROACH_ITERATIONS = 3, 25
 LED_COST_TOLERANCE = 1e-3
 LED_DIFFERENCE = 10.0
 # Times between the corrections that lead a simulation along the measured outputs [s]: in the first
-# a speed that is off by some percent crosses a tenth of the backlash, in the second most of it.
-CORRECTION_INTERVALS = (0.2, 1.0)
+# a speed that is off by some percent crosses a tenth of the backlash, in the second most of it. The
+# third leaves it the length of a step of the programs.
+CORRECTION_INTERVALS = (0.2, 1.0, 5.0)
 # A size differs from neutral for certain from so many of its standard errors on.
 SIGNIFICANT_ERRORS = 3.0
 # Share of the largest size allowed from which on an effect stands for something else. An effect
@@ -125,29 +126,42 @@ def fit(
     )
 
 
-def approach(
+def nearest(
     model: Model,
     starts: Sequence[FitValues],
     runs: Sequence[int],
     far: float = SUSPECT_MEAN_SQUARE,
+) -> FitValues | None:
+    """The start that leaves least, all with the same effects; None where it is far from the data.
+
+    far : mean square above which a start is far
+    """
+    squares = [_mean_square(model, one, runs) for one in starts]
+    return starts[int(np.argmin(squares))] if min(squares) <= far else None
+
+
+def approach(
+    model: Model,
+    starts: Sequence[FitValues],
+    runs: Sequence[int],
+    iterations: int = APPROACH_ITERATIONS,
 ) -> FitValues:
     """Values and states near the data, from which a fit of these effects may begin.
 
-    They are those of the first start where this is near. Elsewhere a free simulation has one local
-    minimum for every way in which contact may come and go. The fit is led along the measured
-    outputs first, from the best start, and then left to run freely for longer and longer times
-    (homotopy from prediction errors to simulation errors).
+    Far from the data a free simulation has one local minimum for every way in which contact may
+    come and go. The fit is led along the measured outputs first, from the start that a few such
+    iterations find best, and then left to run freely for longer and longer times (homotopy from
+    prediction errors to simulation errors).
 
-    starts : all with the same effects; far : mean square above which a start is far
+    starts : all with the same effects
+    iterations : of each fit along the measured outputs at most so many
     """
-    if _mean_square(model, starts[0], runs) <= far:
-        return starts[0]
     best: FitValues = min(
         (lead(model, one, runs, iterations=FIRST_ITERATIONS) for one in starts),
         key=lambda one: one.cost,
     )
     for interval in CORRECTION_INTERVALS:
-        best = lead(model, best, runs, interval)
+        best = lead(model, best, runs, interval, iterations)
     return best
 
 
@@ -267,5 +281,5 @@ def fit_null(model: Model, runs: Sequence[int]) -> FitResult:
     """Fit without effects from the model's own start values."""
     values, states = model.start_values(runs)
     start = FitValues(effects=(), values=values, states=tuple(states))
-    near = approach(model, [start], runs)
+    near = nearest(model, [start], runs) or approach(model, [start], runs)
     return fit(model, (), runs, near.values, near.states)

@@ -60,9 +60,10 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array, Log
     from plant_emulator.simulation.simulate import MeasuredSpeeds
 
-# Tolerance of a run with a truck. It takes half the time of the usual tolerance, because every
-# sample of such a run is a corner; it changes the residual by less than a hundredth of the noise.
-TRUCK_TOLERANCE = 1e-4
+# Tolerance of a run with a truck or of one that is led. It takes half the time of the others or
+# less, because every sample of the one is a corner and every correction of the other is a jump. It
+# changes the residual by a hundredth of the noise.
+COARSE_TOLERANCE = 1e-4
 # Tolerance and largest step [s] of rough runs. They take half the time, and change the residual by
 # some hundredths of the noise, which is more than a derivative bears.
 ROUGH = (1e-5, 0.03)
@@ -166,8 +167,8 @@ class BenchModel:
         along = None if self._along is None else self._along[run]
         own, gap = split_gap_position(values)
         tolerance, step = ROUGH if self._roughly is self else (TOLERANCE, None)
-        if inputs.truck:
-            tolerance = TRUCK_TOLERANCE
+        if inputs.truck or along is not None:
+            tolerance = COARSE_TOLERANCE
         return simulate(
             inputs, own, gap_position=gap, tolerance=tolerance, largest_step=step, along=along
         )

@@ -7,7 +7,12 @@ from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fit_result import FitValues
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
-from plant_emulator.diagnosis.fitting.joint_fit import approach, fit
+from plant_emulator.diagnosis.fitting.joint_fit import (
+    APPROACH_ITERATIONS,
+    approach,
+    fit,
+    nearest,
+)
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE
 
@@ -21,7 +26,7 @@ if TYPE_CHECKING:
 class Trial:
     """A hypothesis to fit: its effects, the runs, and where the fit may begin.
 
-    iterations : of the last, free fit at most so many; None: until it converges
+    iterations : of each fit at most so many; None: until it converges
     """
 
     effects: tuple[str, ...]
@@ -33,37 +38,37 @@ class Trial:
 def confirm(model: Model, trial: Trial) -> FitResult:
     """Fit a hypothesis from its best start (a step).
 
-    The nominal parameters with the plausible size are one more start: far from the data the linear
-    estimate of a size says little. A set of effects is also fitted from its starts as they are,
-    which are hardly worse than the smaller set.
+    Where all starts are far from the data, the linear estimate of a size says little, and the
+    nominal parameters with the plausible size are one more start. A set of effects is also fitted
+    from its starts as they are, which are hardly worse than the smaller set.
     """
-    nominal = [
-        _plausible(model, trial, replace(one, values={**one.values, **model.nominal(trial.runs)}))
-        for one in trial.starts[:1]
-    ]
-    starts = [
-        FitValues(effects=trial.effects, values=one.values, states=one.states)
-        for one in (*trial.starts, *nominal)
-    ]
-    far = NOISE_MEAN_SQUARE if len(trial.effects) > 1 else SUSPECT_MEAN_SQUARE
-    near = [approach(model, starts, trial.runs, far)]
+    starts = [_values(trial, one) for one in trial.starts]
+    several = len(trial.effects) > 1
+    far = NOISE_MEAN_SQUARE if several else SUSPECT_MEAN_SQUARE
+    near = nearest(model, starts, trial.runs, far)
+    if near is None:
+        starts += [_values(trial, _plausible(model, trial, one)) for one in trial.starts[:1]]
+        near = approach(model, starts, trial.runs, trial.iterations or APPROACH_ITERATIONS)
     own = starts[len(trial.starts) - 1]
-    if len(trial.effects) > 1 and near[0] is not own:
-        near.append(own)
     found = [
         fit(model, trial.effects, trial.runs, one.values, one.states, trial.iterations)
-        for one in near
+        for one in ([near, own] if several and near is not own else [near])
     ]
     return min(found, key=lambda one: one.cost)
 
 
+def _values(trial: Trial, start: Start) -> FitValues:
+    return FitValues(effects=trial.effects, values=start.values, states=start.states)
+
+
 def _plausible(model: Model, trial: Trial, start: Start) -> Start:
-    """The start with the plausible size of the last effect, and the states that suit it.
+    """The nominal parameters with the plausible size of the last effect, and states that suit them.
 
     The size is on the start's side of neutral.
     """
+    nominal = {**start.values, **model.nominal(trial.runs)}
     if not trial.effects:
-        return start
+        return replace(start, values=nominal)
     candidate = model.candidates[trial.effects[-1]]
     neutral = candidate.neutral
     sides = [
@@ -71,6 +76,6 @@ def _plausible(model: Model, trial: Trial, start: Start) -> Start:
         for u in candidate.sizes
     ]
     size = -1.0 if sum(sides) < 0.0 else 1.0
-    values = {**start.values, **values_at_size(candidate, size)}
+    values = {**nominal, **values_at_size(candidate, size)}
     states = tuple(model.initial_states(k, trial.effects, values) for k in trial.runs)
     return replace(start, values=values, states=states)

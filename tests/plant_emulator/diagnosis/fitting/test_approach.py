@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from plant_emulator.diagnosis.fit_result import FitValues
-from plant_emulator.diagnosis.fitting.joint_fit import approach, fit
+from plant_emulator.diagnosis.fitting.joint_fit import approach, fit, nearest
 from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.model.stage import GAP_POSITION
@@ -54,4 +54,5 @@ def test_best_of_the_starts_is_led_on(model: BenchModel) -> None:
 def test_start_near_the_noise_is_kept(model: BenchModel) -> None:
     near = approach(model, [nominal_start(model)], RUNS)
     reached = fit(model, (), RUNS, near.values, near.states)
-    assert approach(model, [reached, nominal_start(model)], RUNS) is reached
+    assert nearest(model, [nominal_start(model), reached], RUNS) is reached
+    assert nearest(model, [nominal_start(model)], RUNS) is None
