@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from plant_emulator.diagnosis.search.settings import SETTINGS
+
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping, Sequence
 
     from plant_emulator.diagnosis.fit_result import FitResult
 
@@ -46,3 +48,19 @@ def starts_of(promise: Promise, base: FitResult) -> tuple[Start, ...]:
         for one in promise.starts[:1]
     ]
     return (*promise.starts, *kept)
+
+
+def leading(
+    found: Sequence[Promise], known: Collection[str], most: int, least: float
+) -> list[Promise]:
+    """So many effects of each score, beside those known, that gain half of its most or more.
+
+    least : gain that an effect must promise
+    """
+    near: dict[str, Promise] = {}
+    for score in dict.fromkeys(score for p in found for score in p.gains):
+        order = sorted(found, key=lambda p: -p.gains.get(score, 0.0))
+        needed = max(least, SETTINGS.rival_share * order[0].gains.get(score, 0.0))
+        rest = [p for p in order if p.effect not in known][:most]
+        near |= {p.effect: p for p in rest if p.gains.get(score, 0.0) > needed}
+    return list(near.values())

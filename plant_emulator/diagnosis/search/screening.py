@@ -1,9 +1,9 @@
 """Screens the effects: the gain of log evidence that each promises on top of a fit.
 
 A linear regression predicts it, in the relations and in the simulation's residual. What is local is
-clean in the first; what is slow and faint adds up in the second. The larger counts. A large gap
-bends the parameters of the fit without effects, and slopes there mislead. The relations at the
-nominal parameters give a third score then, and `secant_fits` tells the effects apart.
+clean in the first; what is slow and faint adds up in the second. A large gap bends the parameters
+of the fit without effects, and slopes there mislead. The relations are those at the nominal
+parameters then.
 """
 
 from __future__ import annotations
@@ -92,9 +92,8 @@ class Screening:
 
 def promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
     """Predicted gains of all effects on top of a fit, the largest first."""
-    fidelities = [RELATIONS, SIMULATION]
-    if not base.effects and base.mean_square > SETTINGS.linear_mean_square:
-        fidelities.append(NOMINAL_RELATIONS)
+    far = not base.effects and base.mean_square > SETTINGS.linear_mean_square
+    fidelities = (NOMINAL_RELATIONS if far else RELATIONS, SIMULATION)
     return regressions(runner, base, tuple(visible(runner.model, base, runner.runs)), fidelities)
 
 

@@ -16,6 +16,7 @@ from plant_emulator.diagnosis.fitting.evidence import (
     EVIDENCE_THRESHOLD,
     NOISE_MEAN_SQUARE,
     UNEXPLAINED_SHARE,
+    adequate,
     evidence_of,
     excess,
     leaves_little,
@@ -26,8 +27,7 @@ from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.confirmation import Trial, confirm
 from plant_emulator.diagnosis.search.law_error import LawErrors
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
-from plant_emulator.diagnosis.search.promise import Start, starts_of
-from plant_emulator.diagnosis.search.rivals import leading, rivals
+from plant_emulator.diagnosis.search.promise import Start, leading, starts_of
 from plant_emulator.diagnosis.search.screening import promises, visibilities
 from plant_emulator.diagnosis.search.secant_fits import fitted_promises
 from plant_emulator.diagnosis.search.settings import SETTINGS
@@ -173,26 +173,32 @@ class Search:
     def _expand(self, base: FitResult) -> None:
         """Fit the effects of largest gain on top of a set.
 
-        Regressions predict the gain. Where a set of effects leaves more than the noise, or the
-        first effect is left far from it, fits by secants tell, and at last the leader of each
-        regression is fitted. A rival of an effect that leaves only noise is fitted for some
-        iterations.
+        Regressions predict the gain; the leader of each is fitted until one leaves little, and
+        then its rivals for some iterations. Where a set of effects leaves more than the noise, or
+        no leader is the cause, fits by secants tell.
         """
         least = self._needed(base) if base.effects else SETTINGS.promising
-        found, best = [], base
+        known, best = set(base.effects), base
         if not base.effects or base.mean_square <= NOISE_MEAN_SQUARE:
             found = self._screen(base)
-            first = [p for p in found[:1] if p.gain > least]
-            (best,) = self._confirm(base, first) or (base,)
-        far = NOISE_MEAN_SQUARE if base.effects else SETTINGS.linear_mean_square
-        if best.mean_square <= far:
-            few = SETTINGS.iterations if best.mean_square <= NOISE_MEAN_SQUARE else None
-            self._confirm(base, rivals(found, base, best, least), few)
-            return
-        fitted = rivals(fitted_promises(self.runner, base), base, best, least)
-        best = min((best, *self._confirm(base, fitted)), key=lambda one: one.cost)
-        if best.mean_square > far:
-            self._confirm(base, leading(found, best.effects, 1, least))
+            for one in leading(found, known, 1, least):
+                best = min((best, *self._confirm(base, [one])), key=lambda fit: fit.cost)
+                known.add(one.effect)
+                if self._little(best):
+                    break
+            if self._little(best):
+                most = SETTINGS.rivals_beside if base.effects else SETTINGS.rivals
+                self._confirm(base, leading(found, known, most, least), SETTINGS.iterations)
+                return
+        fitted = fitted_promises(self.runner, base)
+        self._confirm(base, leading(fitted, base.effects, SETTINGS.rivals, least))
+
+    def _little(self, found: FitResult) -> bool:
+        """Whether a set leaves so little that regressions can choose its rivals."""
+        if len(found.effects) > 1:
+            return found.mean_square <= NOISE_MEAN_SQUARE
+        near = found.mean_square <= SETTINGS.linear_mean_square
+        return near or (bool(found.effects) and adequate(found, self.null))
 
     def _confirm(
         self, base: FitResult, promises: Sequence[Promise], iterations: int | None = None
@@ -223,7 +229,10 @@ class Search:
         return 0.5 * found.cost + price
 
     def _settled(self) -> FitResult:
-        """Refit all sets near the best one until they converge; return the best."""
+        """Refit all sets near the best one until they converge; return the best.
+
+        What the best one leaves beyond the noise another one may explain.
+        """
         done: set[frozenset[str]] = set()
         while True:
             order = sorted(self.sets.values(), key=self._value)
@@ -234,7 +243,7 @@ class Search:
                 if one.effects
                 and frozenset(one.effects) not in done
                 and len(one.effects) == len(best.effects)
-                and one.cost < best.cost + SETTINGS.near
+                and one.cost < best.cost + SETTINGS.near + excess(best)
             ]
             if not near:
                 return best

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
-from plant_emulator.diagnosis.search.promise import Promise, Start, starts_of
-from plant_emulator.diagnosis.search.rivals import rivals
+from plant_emulator.diagnosis.search.promise import Promise, Start, leading, starts_of
 from plant_emulator.diagnosis.search.secant_fits import SecantFits, fit_by_secants
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import TIME, Line, noisy
@@ -59,29 +58,18 @@ def promise(effect: str, **gains: float) -> Promise:
     return Promise(effect=effect, gains=gains, starts=())
 
 
-def test_rivals_are_the_leaders_of_each_score() -> None:
-    """a is fitted already; b leads the relations, and c gains a third of the simulation's most.
-
-    Two rivals of each score are fitted, with half of its largest gain.
-    """
-    base = fit_null(Line([noisy(2.0 + 3.0 * TIME)]), (0,))
+def test_leaders_of_each_score_gain_half_of_its_most() -> None:
+    """a is fitted already; b leads the relations, and c gains half of the simulation's most."""
     found = [
         promise("a", relations=1.0, simulation=90.0),
         promise("b", relations=20.0, simulation=6.0),
         promise("c", relations=8.0, simulation=50.0),
         promise("d", relations=15.0, simulation=47.0),
-        promise("e", relations=13.0, simulation=46.0),
+        promise("e", relations=13.0, simulation=44.0),
     ]
-    best = replace(base, effects=("a",))
-    assert [p.effect for p in rivals(found, base, best, 5.0)] == ["b", "d", "c"]
-    assert [p.effect for p in rivals(found, base, best, 25.0)] == ["c", "d"]
-
-
-def test_one_rival_is_fitted_beside_other_effects() -> None:
-    base = replace(fit_null(Line([noisy(2.0 + 3.0 * TIME)]), (0,)), effects=("z",))
-    found = [promise(name, fit=gain) for name, gain in (("a", 90.0), ("b", 46.0), ("c", 45.5))]
-    assert [p.effect for p in rivals(found, base, replace(base, effects=("z", "a")), 30.0)] == ["b"]
-    assert [p.effect for p in rivals(found, base, base, 30.0)] == ["a", "b"]
+    assert [p.effect for p in leading(found, ["a"], 2, 5.0)] == ["b", "d", "c"]
+    assert [p.effect for p in leading(found, ["a"], 2, 25.0)] == ["c", "d"]
+    assert [p.effect for p in leading(found, [], 1, 5.0)] == ["b", "a"]
 
 
 def test_effect_also_starts_at_the_parameters_of_the_set() -> None:
