@@ -3,8 +3,8 @@
     1 - sum (rms of truth minus model)^2 / sum ((reference / floor)^2 - 1)
 
 The sums run over the channels that the answer's closed fraction counts. Both are in units of the
-noise. The truth has no noise, so no noise is subtracted in the numerator. The model keeps all its
-parameters; only its initial states are fitted to each run.
+noise that the answer tells. The truth has no noise, so no noise is subtracted in the numerator. The
+model keeps all its parameters; only its initial states are fitted to each run.
 """
 
 from __future__ import annotations
@@ -44,7 +44,9 @@ def true_closed_fraction(answer: Answer, saved: ParameterSet, logs: Sequence[Log
     ratios = np.array([reference[name] / gap.noise_floor[name] for name in COMPARED])
     counting = ratios >= OPEN
     residuals = np.concatenate([_residual(log, saved) for log in logs], axis=1)
-    squares = np.mean(residuals**2, axis=1)
+    told = {noise.channel: noise.deviation for noise in answer.noise}
+    units = noise_levels(COMPARED) / np.array([told[name] for name in COMPARED])
+    squares = np.mean(residuals**2, axis=1) * units**2
     return 1.0 - float(np.sum(squares[counting]) / np.sum(ratios[counting] ** 2 - 1.0))
 
 

@@ -232,12 +232,14 @@ def closed_fraction_interval(reference: Gap, explained: Gap) -> tuple[float, flo
     """95 % interval of the closed fraction [1].
 
     Each draw has a noise variance of its own in every channel, as uncertain as the estimate of it.
-    Draws without samples of a channel do not count.
+    A channel that leaves less than its noise shows that the noise is smaller, not that nothing is
+    left: it counts as one that leaves the noise. Draws without samples of a channel do not count.
     """
     if closed_fraction(reference, explained) is None:
         return None
     with np.errstate(invalid="ignore"):
         before, after = (np.divide(*found.resampled) for found in (reference, explained))
+        after /= np.minimum(1.0, explained.mean_squares)
     errors = np.random.default_rng(block_bootstrap.SEED).standard_normal(before.shape)
     noise = 1.0 + NOISE_UNCERTAINTY * errors
     drawn = _closed_fractions(reference, before * noise, after * noise)

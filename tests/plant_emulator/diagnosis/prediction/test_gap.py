@@ -84,6 +84,15 @@ def test_only_a_prediction_that_is_better_for_certain_shows_shrinkage() -> None:
     assert shows_shrinkage(nothing, nothing)
 
 
+def test_residual_below_the_noise_does_not_prove_that_nothing_is_left() -> None:
+    """The noise's variance is known to 2 %, and 1.96 of that may be left: 1 - 0.039 / 3.16."""
+    before = measure_gap(NAMES[:1], [constant(2.0, 1.0)], [10])
+    after = measure_gap(NAMES[:1], [constant(0.8, 1.0)], [10])
+    assert closed_fraction(before, after) == 1.0
+    found = closed_fraction_interval(before, after)
+    assert found == (pytest.approx(1 - 0.0392 / (4 * 1.0392 - 1), abs=2e-3), 1.0)
+
+
 def test_samples_of_all_runs_are_pooled() -> None:
     both = measure_gap(
         [measured_run("a"), measured_run("a")],
@@ -188,6 +197,8 @@ def test_interval_reaches_from_fits_to_fewer_runs_to_the_fit_to_all() -> None:
     moving = replace(NAMES[0], measured=np.tile(np.arange(100.0), (2, 1)))
     found = held_out_gap(gaps, [moving], ("wave",), before, fitted)
     assert found.closed_fraction == pytest.approx(1 - 3 / 8)
-    # d(closed)/d(noise) = -(4 * 8 - 3 * 9) / 8^2
+    # d(closed)/d(noise) = -(4 * 8 - 3 * 9) / 8^2 of the predictions, -(2.25 * 8 - 1.25 * 9) / 8^2
+    # of the fit
     low = 1 - 3 / 8 - 1.96 * 0.02 * 5 / 64
-    assert found.closed_fraction_ci95 == pytest.approx((low, 1 - 1.25 / 8), abs=5e-4)
+    high = 1 - 1.25 / 8 + 1.96 * 0.02 * 6.75 / 64
+    assert found.closed_fraction_ci95 == pytest.approx((low, high), abs=5e-4)
