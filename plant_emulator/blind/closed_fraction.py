@@ -44,10 +44,20 @@ def true_closed_fraction(answer: Answer, saved: ParameterSet, logs: Sequence[Log
     ratios = np.array([reference[name] / gap.noise_floor[name] for name in COMPARED])
     counting = ratios >= OPEN
     residuals = np.concatenate([_residual(log, saved) for log in logs], axis=1)
-    told = {noise.channel: noise.deviation for noise in answer.noise}
-    units = noise_levels(COMPARED) / np.array([told[name] for name in COMPARED])
-    squares = np.mean(residuals**2, axis=1) * units**2
+    squares = np.mean(residuals**2, axis=1) * (noise_levels(COMPARED) / _units(answer, logs)) ** 2
     return 1.0 - float(np.sum(squares[counting]) / np.sum(ratios[counting] ** 2 - 1.0))
+
+
+def _units(answer: Answer, logs: Sequence[Log]) -> Array:
+    """Noise of the answer's gap [SI], shape (channels,).
+
+    The answer tells it over the measured range, which spikes widen, and without the uncertain time
+    of the rows. Both are too small there, and the larger counts.
+    """
+    told = {noise.channel: noise.deviation for noise in answer.noise}
+    ranges = {name: np.ptp(np.concatenate([log[name] for log in logs])) for name in COMPARED}
+    floor = answer.gap.noise_floor
+    return np.array([max(told.get(name, 0.0), floor[name] * ranges[name]) for name in COMPARED])
 
 
 def _residual(log: Log, saved: ParameterSet) -> Array:

@@ -233,21 +233,22 @@ def closed_fraction_interval(reference: Gap, explained: Gap) -> tuple[float, flo
 
     Each draw has a noise variance of its own in every channel, as uncertain as the estimate of it.
     A channel that leaves less than its noise shows that the noise is smaller, not that nothing is
-    left: it counts as one that leaves the noise. Draws without samples of a channel do not count.
+    left: its noise is what it leaves. Draws without samples of a channel do not count.
     """
-    if closed_fraction(reference, explained) is None:
+    closed = closed_fraction(reference, explained)
+    if closed is None:
         return None
     with np.errstate(invalid="ignore"):
         before, after = (np.divide(*found.resampled) for found in (reference, explained))
-        after /= np.minimum(1.0, explained.mean_squares)
+    level = np.minimum(1.0, explained.mean_squares)
     errors = np.random.default_rng(block_bootstrap.SEED).standard_normal(before.shape)
     noise = 1.0 + NOISE_UNCERTAINTY * errors
-    drawn = _closed_fractions(reference, before * noise, after * noise)
+    drawn = _closed_fractions(reference, before / level * noise, after / level * noise)
     drawn = drawn[np.isfinite(drawn)]
     if not len(drawn):
         return None
     low, high = np.quantile(drawn, [0.025, 0.975])
-    return float(low), float(high)
+    return min(closed, float(low)), max(closed, float(high))
 
 
 def shows_shrinkage(reference: Gap, explained: Gap) -> bool:

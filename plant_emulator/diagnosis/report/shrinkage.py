@@ -53,11 +53,11 @@ def held_out_gap(
 
 def _interval(reference: Gap, explained: Gap, fitted: Gap | None) -> tuple[float, float] | None:
     """95 % interval of the closed fraction of the fit to all runs [1]."""
-    found = [
-        closed_fraction_interval(reference, gap) for gap in (explained, fitted) if gap is not None
-    ]
-    ends = [interval for interval in found if interval is not None]
-    return (ends[0][0], max(high for _, high in ends)) if ends else None
+    interval = closed_fraction_interval(reference, explained)
+    most = None if fitted is None else closed_fraction_interval(reference, fitted)
+    if interval is None or most is None:
+        return interval
+    return interval[0], max(interval[1], most[1])
 
 
 def nrmsd(gap: Gap, runs: Sequence[MeasuredRun]) -> dict[str, float]:

@@ -66,9 +66,6 @@ def _plausible(model: Model, trial: Trial, start: Start) -> Start:
 
     The size is on the start's side of neutral.
     """
-    nominal = {**start.values, **model.nominal(trial.runs)}
-    if not trial.effects:
-        return replace(start, values=nominal)
     candidate = model.candidates[trial.effects[-1]]
     neutral = candidate.neutral
     sides = [
@@ -76,6 +73,6 @@ def _plausible(model: Model, trial: Trial, start: Start) -> Start:
         for u in candidate.sizes
     ]
     size = -1.0 if sum(sides) < 0.0 else 1.0
-    values = {**nominal, **values_at_size(candidate, size)}
+    values = {**start.values, **model.nominal(trial.runs), **values_at_size(candidate, size)}
     states = tuple(model.initial_states(k, trial.effects, values) for k in trial.runs)
     return replace(start, values=values, states=states)

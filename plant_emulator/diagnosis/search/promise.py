@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from plant_emulator.diagnosis.search.settings import SETTINGS
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.fit_result import FitResult
 
@@ -51,16 +51,16 @@ def starts_of(promise: Promise, base: FitResult) -> tuple[Start, ...]:
 
 
 def leading(
-    found: Sequence[Promise], known: Collection[str], most: int, least: float
+    found: Sequence[Promise], most: int, least: float, tried: Sequence[str] = ()
 ) -> list[Promise]:
-    """So many effects of each score, beside those known, that gain half of its most or more.
+    """So many effects of each score that gain half of its most or more, score by score.
 
-    least : gain that an effect must promise
+    least : gain that an effect must promise; tried : effects to leave out
     """
     near: dict[str, Promise] = {}
     for score in dict.fromkeys(score for p in found for score in p.gains):
         order = sorted(found, key=lambda p: -p.gains.get(score, 0.0))
         needed = max(least, SETTINGS.rival_share * order[0].gains.get(score, 0.0))
-        rest = [p for p in order if p.effect not in known][:most]
+        rest = [p for p in order if p.effect not in tried][:most]
         near |= {p.effect: p for p in rest if p.gains.get(score, 0.0) > needed}
     return list(near.values())

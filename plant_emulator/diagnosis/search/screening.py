@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
-from plant_emulator.diagnosis.fitting.joint_fit import CORRECTION_INTERVALS
+from plant_emulator.diagnosis.fitting.joint_fit import CORRECTION_INTERVALS, LED_DIFFERENCE
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.columns import best_score
@@ -140,7 +140,7 @@ def screen(model: Model, asked: Screening) -> list[Promise]:
         return [
             Promise(
                 effect=name,
-                gains={} if score is None else {asked.fidelity: score.gain},
+                gains={asked.fidelity: 0.0 if score is None else score.gain},
                 starts=() if score is None else (_start(fidelity, score, base),),
             )
             for name, score in _scores(library, fidelity, sizes, asked.states).items()
@@ -159,7 +159,8 @@ def _fidelity(model: Model, asked: Screening) -> Fidelity | None:
     if asked.fidelity in {RELATIONS, NOMINAL_RELATIONS}:
         return model.relations(asked.base, asked.runs)
     if asked.fidelity == OBSERVER:
-        model = model.observer(CORRECTION_INTERVALS[0])
+        observer = model.observer(CORRECTION_INTERVALS[0])
+        return SimulationColumns(observer, asked.base, asked.runs, LED_DIFFERENCE)
     return SimulationColumns(model, asked.base, asked.runs)
 
 

@@ -147,10 +147,9 @@ class Search:
 
     def _is_last(self, found: FitResult) -> bool:
         """Whether no effect is worth adding: the cause is foreign, or only noise is left."""
-        if self._foreign(found):
-            return True
-        return found.mean_square <= NOISE_MEAN_SQUARE and all(
-            p.gain <= self._needed(found) for p in self._screen(found)
+        return self._foreign(found) or (
+            found.mean_square <= NOISE_MEAN_SQUARE
+            and all(p.gain <= self._needed(found) for p in self._screen(found))
         )
 
     def _foreign(self, found: FitResult) -> bool:
@@ -178,27 +177,25 @@ class Search:
         no leader is the cause, fits by secants tell.
         """
         least = self._needed(base) if base.effects else SETTINGS.promising
-        known, best = set(base.effects), base
         if not base.effects or base.mean_square <= NOISE_MEAN_SQUARE:
-            found = self._screen(base)
-            for one in leading(found, known, 1, least):
+            found, tried, best = self._screen(base), [], base
+            for one in leading(found, 1, least):
                 best = min((best, *self._confirm(base, [one])), key=lambda fit: fit.cost)
-                known.add(one.effect)
-                if self._little(best):
+                tried.append(one.effect)
+                if best is not base and self._little(best):
                     break
             if self._little(best):
                 most = SETTINGS.rivals_beside if base.effects else SETTINGS.rivals
-                self._confirm(base, leading(found, known, most, least), SETTINGS.iterations)
+                self._confirm(base, leading(found, most, least, tried), SETTINGS.iterations)
                 return
         fitted = fitted_promises(self.runner, base)
-        self._confirm(base, leading(fitted, base.effects, SETTINGS.rivals, least))
+        self._confirm(base, leading(fitted, SETTINGS.fitted_whole, least))
 
     def _little(self, found: FitResult) -> bool:
         """Whether a set leaves so little that regressions can choose its rivals."""
         if len(found.effects) > 1:
             return found.mean_square <= NOISE_MEAN_SQUARE
-        near = found.mean_square <= SETTINGS.linear_mean_square
-        return near or (bool(found.effects) and adequate(found, self.null))
+        return found.mean_square <= SETTINGS.linear_mean_square or adequate(found, self.null)
 
     def _confirm(
         self, base: FitResult, promises: Sequence[Promise], iterations: int | None = None
@@ -231,7 +228,7 @@ class Search:
     def _settled(self) -> FitResult:
         """Refit all sets near the best one until they converge; return the best.
 
-        What the best one leaves beyond the noise another one may explain.
+        What the best one leaves beyond the noise a set may explain whose fit has not ended.
         """
         done: set[frozenset[str]] = set()
         while True:
@@ -240,10 +237,9 @@ class Search:
             near = [
                 one
                 for one in order
-                if one.effects
-                and frozenset(one.effects) not in done
-                and len(one.effects) == len(best.effects)
-                and one.cost < best.cost + SETTINGS.near + excess(best)
+                if frozenset(one.effects) not in done
+                and len(one.effects) == max(1, len(best.effects))
+                and one.cost < best.cost + SETTINGS.near + (not one.converged) * excess(best)
             ]
             if not near:
                 return best
@@ -285,9 +281,8 @@ class Search:
     def _log_odds(self, final: FitResult) -> float:
         """Log odds of a set against its best rival; see `summary.log_odds`."""
         screened = self.promises.get(frozenset(final.effects), [])
-        price = SETTINGS.needed_again if final.effects or self.random_evidence else SETTINGS.needed
         values = {key: self._value(one) for key, one in self.sets.items()}
-        larger = {p.effect: price - p.gain for p in screened}
+        larger = {p.effect: self._needed(final) - p.gain for p in screened}
         return log_odds(self.sets, values, final, larger)
 
     def _explanation(self, final: FitResult) -> Explanation:

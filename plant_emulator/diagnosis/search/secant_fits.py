@@ -1,10 +1,10 @@
 """Fits each effect on top of a fit, while the slopes of all else follow by secants.
 
-Where more than noise is left a linear regression misleads: without a cause, a fit has bent the
-parameters, and the slopes there hardly know the cause. Some iterations of a fit unbend them. The
-simulation is led along the measured outputs, so that contact comes in time meanwhile. The fits are
-cheap, because only the slopes of the effect itself are simulated anew (see
-`least_squares.estimate`).
+Where more than noise is left and no leader of a regression explains it, the regressions mislead:
+without a cause, a fit has bent the parameters, and the slopes there hardly know the cause. Some
+iterations of a fit unbend them. The simulation is led along the measured outputs, so that contact
+comes in time meanwhile. The fits are cheap, because only the slopes of the effect itself are
+simulated anew (see `least_squares.estimate`).
 """
 
 from __future__ import annotations

@@ -36,16 +36,19 @@ class Settings:
     most_effects: int = 3
     # Relative error of an approximate law: other laws of the same effect differed by up to this.
     law_error: float = 0.1
-    # Leading effects of each score that are fitted beside the best one: contact and limits move
+    # Leading effects of each regression that are fitted beside its leader: contact and limits move
     # with the fit, so that the order by promise is not yet that by fit. Beside other effects the
     # order is nearly right.
     rivals: int = 2
     rivals_beside: int = 1
+    # Leading effects of the fits by secants that are fitted whole.
+    fitted_whole: int = 2
     # Gain over the largest one that a rival needs.
     rival_share: float = 0.5
     # Iterations of a first fit, enough to tell a basin from a slope.
     iterations: int = 5
-    # Cost above the best one's up to which a first fit may still win [chi squared].
+    # Cost above the best one's up to which a fit may still win [chi squared]. Where the best one
+    # leaves more than noise, one that has not ended may win from further off.
     near: float = 100.0
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.fitting.joint_fit import linearise
 from plant_emulator.estimation.regression import Regression
+from plant_emulator.estimation.simulated_problem import DIFFERENCE_NORM
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -25,9 +26,15 @@ if TYPE_CHECKING:
 class SimulationColumns:
     """The residual of the simulation, free or led, and its tangents; see `Fidelity`."""
 
-    def __init__(self, model: Model, where: FitValues, runs: Sequence[int]) -> None:
+    def __init__(
+        self,
+        model: Model,
+        where: FitValues,
+        runs: Sequence[int],
+        difference: float = DIFFERENCE_NORM,
+    ) -> None:
         self.model, self.where, self.runs = model, where, tuple(runs)
-        self.found = linearise(model, where, runs)
+        self.found = linearise(model, where, runs, difference)
         self.base = np.concatenate([r.ravel() for r in self.found.residuals])
         self._rough = model.rough()
         self._plain = self._residual(where.effects, {}, [{} for _ in runs])

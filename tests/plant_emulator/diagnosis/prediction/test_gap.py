@@ -85,12 +85,12 @@ def test_only_a_prediction_that_is_better_for_certain_shows_shrinkage() -> None:
 
 
 def test_residual_below_the_noise_does_not_prove_that_nothing_is_left() -> None:
-    """The noise's variance is known to 2 %, and 1.96 of that may be left: 1 - 0.039 / 3.16."""
+    """Its variance is 0.64, known to 2 %; 1.96 of that may be left: 1 - 0.039 / (6.25 - 1)."""
     before = measure_gap(NAMES[:1], [constant(2.0, 1.0)], [10])
     after = measure_gap(NAMES[:1], [constant(0.8, 1.0)], [10])
     assert closed_fraction(before, after) == 1.0
     found = closed_fraction_interval(before, after)
-    assert found == (pytest.approx(1 - 0.0392 / (4 * 1.0392 - 1), abs=2e-3), 1.0)
+    assert found == (pytest.approx(1 - 0.0392 / (6.25 * 1.0392 - 1), abs=2e-3), 1.0)
 
 
 def test_samples_of_all_runs_are_pooled() -> None:

@@ -67,9 +67,9 @@ def test_leaders_of_each_score_gain_half_of_its_most() -> None:
         promise("d", relations=15.0, simulation=47.0),
         promise("e", relations=13.0, simulation=44.0),
     ]
-    assert [p.effect for p in leading(found, ["a"], 2, 5.0)] == ["b", "d", "c"]
-    assert [p.effect for p in leading(found, ["a"], 2, 25.0)] == ["c", "d"]
-    assert [p.effect for p in leading(found, [], 1, 5.0)] == ["b", "a"]
+    assert [p.effect for p in leading(found, 2, 5.0, ["a"])] == ["b", "d", "c"]
+    assert [p.effect for p in leading(found, 2, 25.0, ["a"])] == ["c", "d"]
+    assert [p.effect for p in leading(found, 1, 5.0)] == ["b", "a"]
 
 
 def test_effect_also_starts_at_the_parameters_of_the_set() -> None:

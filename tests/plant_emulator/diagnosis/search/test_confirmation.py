@@ -1,0 +1,57 @@
+"""Fits of a hypothesis from its starts, and the order in which hypotheses are fitted."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from plant_emulator.diagnosis.execution.pool import TaskRunner
+from plant_emulator.diagnosis.fit_result import FitResult
+from plant_emulator.diagnosis.search import search
+from plant_emulator.diagnosis.search.confirmation import Trial, confirm
+from plant_emulator.diagnosis.search.promise import Promise, Start
+from plant_emulator.diagnosis.search.screening import promises
+from tests.plant_emulator.diagnosis.line import TIME, Line, explained, noisy
+
+WAVE = noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME))
+
+
+class Counting(Line):
+    """A line that counts how often states are looked for."""
+
+    looked = 0
+
+    def initial_states(
+        self, run: int, effects: Sequence[str], values: Mapping[str, float]
+    ) -> dict[str, float]:
+        """See `Model`."""
+        self.looked += 1
+        return {}
+
+
+@pytest.mark.parametrize(("size", "looked"), [(4.1, 0), (-20.0, 1)])
+def test_plausible_size_is_a_start_only_where_all_starts_are_far(size: float, looked: int) -> None:
+    model = Counting([WAVE])
+    start = Start(values={"a": 2.0, "b": 3.0, "wave_size": size}, states=({},))
+    found = confirm(model, Trial(("wave",), (0,), (start,)))
+    assert model.looked == looked
+    assert found.values["wave_size"] == pytest.approx(4.0, abs=0.1)
+
+
+def test_leaders_of_each_regression_are_fitted_until_one_leaves_little(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The relations, as the first score, stand for a cube where a wave acts."""
+
+    def with_relations(runner: TaskRunner, base: FitResult) -> list[Promise]:
+        found = promises(runner, base)
+        wrong = {"cube": 900.0, "wave": 90.0}
+        return [replace(p, gains={"relations": wrong.get(p.effect, 0.0), **p.gains}) for p in found]
+
+    monkeypatch.setattr(search, "promises", with_relations)
+    found = explained(Line([WAVE]))
+    confirmed = [step.effects for step in found.trace if step.action == "confirmed"]
+    assert confirmed[:2] == [("cube",), ("wave",)]
+    assert "fit by secants" not in {name for step in found.trace for name in step.promised or {}}
+    assert found.final.effects == ("wave",)
