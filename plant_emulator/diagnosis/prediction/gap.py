@@ -228,27 +228,30 @@ def _closed_fractions(reference: Gap, before: Array, after: Array) -> Array:
     return np.where(there, 1.0 - left / np.where(there, gap_before, 1.0), np.nan)
 
 
-def closed_fraction_interval(reference: Gap, explained: Gap) -> tuple[float, float] | None:
+def closed_fraction_interval(
+    reference: Gap, explained: Gap, noise_mean_square: float = 1.0
+) -> tuple[float, float] | None:
     """95 % interval of the closed fraction [1].
 
+    noise_mean_square : mean square up to which what is left counts as noise [1]
     Each draw has a noise variance of its own in every channel, as uncertain as the estimate of it.
     A channel that leaves less than its noise shows that the noise is smaller, not that nothing is
     left: its noise is what it leaves. Draws without samples of a channel do not count.
     """
-    closed = closed_fraction(reference, explained)
-    if closed is None:
+    if closed_fraction(reference, explained) is None:
         return None
     with np.errstate(invalid="ignore"):
         before, after = (np.divide(*found.resampled) for found in (reference, explained))
     level = np.minimum(1.0, explained.mean_squares)
+    before, after = before / level, after / level / noise_mean_square
     errors = np.random.default_rng(block_bootstrap.SEED).standard_normal(before.shape)
     noise = 1.0 + NOISE_UNCERTAINTY * errors
-    drawn = _closed_fractions(reference, before / level * noise, after / level * noise)
+    drawn = _closed_fractions(reference, before * noise, after * noise)
     drawn = drawn[np.isfinite(drawn)]
     if not len(drawn):
         return None
     low, high = np.quantile(drawn, [0.025, 0.975])
-    return min(closed, float(low)), max(closed, float(high))
+    return float(low), float(high)
 
 
 def shows_shrinkage(reference: Gap, explained: Gap) -> bool:

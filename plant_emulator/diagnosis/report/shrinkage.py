@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.answer import HeldOutGap
+from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.prediction.gap import (
     closed_fraction,
     closed_fraction_interval,
@@ -52,12 +53,15 @@ def held_out_gap(
 
 
 def _interval(reference: Gap, explained: Gap, fitted: Gap | None) -> tuple[float, float] | None:
-    """95 % interval of the closed fraction of the fit to all runs [1]."""
+    """95 % interval of the closed fraction of the fit to all runs [1].
+
+    What that fit leaves may be noise up to NOISE_MEAN_SQUARE.
+    """
     interval = closed_fraction_interval(reference, explained)
-    most = None if fitted is None else closed_fraction_interval(reference, fitted)
-    if interval is None or most is None:
+    if interval is None or fitted is None:
         return interval
-    return interval[0], max(interval[1], most[1])
+    most = closed_fraction_interval(reference, fitted, NOISE_MEAN_SQUARE)
+    return None if most is None else (interval[0], max(interval[1], most[1]))
 
 
 def nrmsd(gap: Gap, runs: Sequence[MeasuredRun]) -> dict[str, float]:

@@ -191,14 +191,17 @@ def test_combined_gap_is_the_rms_over_all_channels() -> None:
 
 
 def test_interval_reaches_from_fits_to_fewer_runs_to_the_fit_to_all() -> None:
-    """They leave 2 and 1.5 times the noise of 3; the noise is known to 2 % of its variance."""
+    """They leave 2 and 1.5 times the noise of 3; the noise is known to 2 % of its variance.
+
+    What the fit to all leaves may be noise up to 1.05: 1 - (2.25 / 1.05 - 1) / 8.
+    """
     before, left, fitted = (measure_gap(NAMES[:1], [constant(x, 1.0)], [10]) for x in (3, 2, 1.5))
     gaps = {NOMINAL: before, (): before, ("wave",): left}
     moving = replace(NAMES[0], measured=np.tile(np.arange(100.0), (2, 1)))
     found = held_out_gap(gaps, [moving], ("wave",), before, fitted)
     assert found.closed_fraction == pytest.approx(1 - 3 / 8)
-    # d(closed)/d(noise) = -(4 * 8 - 3 * 9) / 8^2 of the predictions, -(2.25 * 8 - 1.25 * 9) / 8^2
-    # of the fit
+    # d(closed)/d(noise) = -(4 * 8 - 3 * 9) / 8^2 of the predictions
+    # and -(2.143 * 8 - 1.143 * 9) / 8^2 of the fit
     low = 1 - 3 / 8 - 1.96 * 0.02 * 5 / 64
-    high = 1 - 1.25 / 8 + 1.96 * 0.02 * 6.75 / 64
+    high = 1 - 1.143 / 8 + 1.96 * 0.02 * 6.857 / 64
     assert found.closed_fraction_ci95 == pytest.approx((low, high), abs=5e-4)
