@@ -71,10 +71,11 @@ def _features(answer: Standing) -> Array:
     The best rival of an answer that tells all is the same with one more effect, which gains nothing
     and needs its gain. Smaller odds say that a rival is near. Odds far above say that no other
     effect was asked for beside the set, and negative ones that the set is not the best: both where
-    more than noise is left.
+    more than noise is left, and then the odds say no more than that.
     """
     complete = SETTINGS.needed_again if answer.kind == "effect" else SETTINGS.needed
-    return np.array([1.0, np.log1p(abs(complete - answer.log_odds))])
+    distance = min(abs(complete - answer.log_odds), SETTINGS.needed_again)
+    return np.array([1.0, np.log1p(distance)])
 
 
 def _regress(x: Array, right: Array) -> Array:
