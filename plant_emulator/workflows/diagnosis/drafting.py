@@ -98,7 +98,9 @@ def draft(runs: Runs[Any], null: FitResult | None, pool: Pool, folder: Path) -> 
         for one, file in zip(found, files, strict=True)
     ]
     drafted = _rank(book, files, compare_laws(runner, runs.plan, alternatives))
-    remove_rejected(files, [Path(one.file) for one in drafted.drafts], before)
+    kept = [Path(one.file) for one in drafted.drafts]
+    remove_rejected(files, kept, before)
+    replace(recipe, own=(*recipe.own, *kept)).build()  # else this process knows files that are gone
     return replace(drafted, next_program=_next_program(runs.fitted, recipe, drafted.fits))
 
 
