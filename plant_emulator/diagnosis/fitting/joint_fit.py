@@ -42,8 +42,8 @@ FIRST_ITERATIONS, APPROACH_ITERATIONS = 3, 25
 LED_COST_TOLERANCE = 1e-3
 LED_DIFFERENCE = 10.0
 # Times between the corrections that lead a simulation along the measured outputs [s]: in the first
-# a speed that is off by some percent crosses a tenth of the backlash, in the second most of it. The
-# third leaves it the length of a step of the programs.
+# a speed that is off by some percent crosses a tenth of the backlash, in the second most of it.
+# Each is five times the one before: a longer jump ended in local minima.
 CORRECTION_INTERVALS = (0.2, 1.0, 5.0)
 # A size differs from neutral for certain from so many of its standard errors on.
 SIGNIFICANT_ERRORS = 3.0

@@ -1,13 +1,12 @@
 """Each effect fitted by secants, on a machine so small that it can be checked by hand."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
-from plant_emulator.diagnosis.search.promise import Promise, Start, leading, starts_of
+from plant_emulator.diagnosis.search.promise import Promise
 from plant_emulator.diagnosis.search.secant_fits import SecantFits, fit_by_secants
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import TIME, Line, noisy
@@ -52,36 +51,3 @@ def test_parameters_that_bent_without_the_cause_unbend() -> None:
     assert found["cube"].gain == pytest.approx(0.5 * (base.cost - whole.cost), rel=0.02)
     (start,) = found["cube"].starts
     assert start.values["b"] == pytest.approx(-0.5, abs=0.05)
-
-
-def promise(effect: str, **gains: float) -> Promise:
-    return Promise(effect=effect, gains=gains, starts=())
-
-
-def test_leaders_of_each_score_gain_half_of_its_most() -> None:
-    """a is fitted already; b leads the relations, and c gains half of the simulation's most."""
-    found = [
-        promise("a", relations=1.0, simulation=90.0),
-        promise("b", relations=20.0, simulation=6.0),
-        promise("c", relations=8.0, simulation=50.0),
-        promise("d", relations=15.0, simulation=47.0),
-        promise("e", relations=13.0, simulation=44.0),
-    ]
-    assert [p.effect for p in leading(found, 2, 5.0, ["a"])] == ["b", "d", "c"]
-    assert [p.effect for p in leading(found, 2, 25.0, ["a"])] == ["c", "d"]
-    assert [p.effect for p in leading(found, 1, 5.0)] == ["b", "a"]
-
-
-def test_effect_also_starts_at_the_parameters_of_the_set() -> None:
-    base = replace(
-        fit_null(Line([noisy(2.0 + 3.0 * TIME)]), (0,)),
-        values={"a": 2.0, "b": 3.0},
-        states=({"angle": 0.5},),
-    )
-    estimated = Start(
-        values={"a": 7.0, "b": 8.0, "wave_size": 0.3}, states=({"angle": 0.9, "phase": 0.1},)
-    )
-    first, kept = starts_of(Promise(effect="wave", gains={}, starts=(estimated,)), base)
-    assert first == estimated
-    assert kept.values == {"a": 2.0, "b": 3.0, "wave_size": 0.3}
-    assert kept.states == ({"angle": 0.5, "phase": 0.1},)
