@@ -207,6 +207,10 @@ _LOG_COLUMNS: tuple[tuple[str, str, str, bool, str | None, int], ...] = (
     ("shell_temperature_degC", "shell_temperature", "degC", False, "shell_temperature_1", 2),
     ("reference_knee_time_s", "reference_knee_time", "s", False, None, 6),
     ("reference_knee_rad_s", "reference_knee", "rad/s", False, None, 5),
+    ("reference_knee_2_time_s", "reference_knee_2_time", "s", False, None, 6),
+    ("reference_knee_2_rad_s", "reference_knee_2", "rad/s", False, None, 5),
+    ("reference_knee_3_time_s", "reference_knee_3_time", "s", False, None, 6),
+    ("reference_knee_3_rad_s", "reference_knee_3", "rad/s", False, None, 5),
     ("truck_on_drum", "truck_on_drum", "1", False, None, 4),
 )
 

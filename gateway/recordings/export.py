@@ -5,8 +5,9 @@ repeated samples and samples without a needed value have no row, because the tim
 and its values are finite. With every tick, the time is that of the gateway, and cells may be empty.
 
 The PLC says at a sample which reference it will have reached at the end of the next scan. The
-reference of a log is that at the sample. It goes to the line of a new command as fast as the slew
-rate allows; a log tells where it meets the line, between two samples, as the knee.
+reference of a log is that at the sample. A log tells the corners of the reference between two
+samples, as knees: where it meets the line of a new command and, in a scan without a sample, what
+the PLC made of the command that it had.
 
 A recording may be large. It is read twice, piece by piece: to see what it holds, and to write.
 """
@@ -23,6 +24,13 @@ from numpy.typing import NDArray
 from gateway.arrays import Array
 from gateway.cycle.record import READ, WRITTEN
 from gateway.recordings.header import map_of
+from gateway.recordings.plc_reference import (
+    NO_COMMANDS,
+    Followed,
+    Samples,
+    commands,
+    path_between,
+)
 from gateway.recordings.recording import GatewayRecording, Stream
 from register_maps.logs.poll_quality import PollQuality
 from register_maps.signals import LOG_COLUMNS, SIGNALS, Status
@@ -61,10 +69,11 @@ NEEDED: Final = tuple(
     if c.needed and c.measured not in (None, "speed_reference")
 )
 REFERENCE: Final = "measured_speed_reference"
-KNEE: Final = ("reference_knee_time_s", "reference_knee_rad_s")
+SAID: Final = ("measured_command_sequence_echo", "measured_command_age")
+KNEES: Final = tuple(
+    f"reference_knee{number}_{unit}" for number in ("", "_2", "_3") for unit in ("time_s", "rad_s")
+)
 TRUCK: Final = "truck_on_drum"
-LIMITED: Final = 0.98
-"""Share of a scan that a limited PLC needs at least; its registers round."""
 CLOCK_DIGITS: Final = 6
 """Digits of the time in seconds: finer than any PLC's clock, coarser than sums of floats."""
 
@@ -87,18 +96,20 @@ class Survey:
 
     waited : from the start of the recording to time zero [s]
     truck : whether the bench was in road load, with a truck on the drum
+    hidden : whether the reference of a scan without a sample is known
     """
 
     samples: int = 0
     waited: float = 0.0
     truck: bool = False
+    hidden: bool = False
     finite: dict[str, int] = field(default_factory=dict)
     quality: PollQuality = field(default_factory=lambda: PollQuality(interval=SCAN))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Piece:
-    """Some rows: records, times [s], and the knees of the reference, if known; see `knees_of`."""
+    """Some rows: records, times [s], and the knees of the reference, if known; see `Path`."""
 
     rows: Any
     time: Array
@@ -129,6 +140,7 @@ class Export:
         status = rows["measured_status"]
         driven = np.nan_to_num(status).astype(int) & int(Status.ROAD_LOAD)
         known.truck = known.truck or bool(np.any(driven))
+        known.hidden = known.hidden or (piece.knees is not None and bool(np.any(piece.knees[2])))
         inside = rows[self._inside(piece.time)]
         known.samples += len(inside)
         for name in (n for n in rows.dtype.names if rows[n].dtype.kind == "f"):
@@ -145,7 +157,8 @@ class Export:
                 yield {k: v[inside] for k, v in self._columns(piece).items()}
         if not begun:
             empty = np.zeros(0, dtype=np.dtype(self.recording.header.layout.formats))
-            yield self._columns(Piece(rows=empty, time=np.zeros(0), knees=np.zeros((2, 0))))
+            knees = np.zeros((len(KNEES), 0))
+            yield self._columns(Piece(rows=empty, time=np.zeros(0), knees=knees))
 
     def _inside(self, time: Array) -> NDArray[np.bool_]:
         return np.asarray((time >= self.extent.begin) & (time <= self.extent.end))
@@ -162,12 +175,12 @@ class Export:
     def _samples(self) -> Iterator[Piece]:
         """New samples with their times since the first one, by the PLC's clock."""
         self.survey.quality = PollQuality(interval=SCAN)
-        last, elapsed, echo = np.nan, 0.0, 0.0
-        before = np.full((3, 2), np.nan)
+        last, elapsed = np.nan, 0.0
+        before, ended = NO_COMMANDS, Samples(*np.array([[np.nan], [np.nan], [0.0]]))
         for rows in self.recording.chunks():
             new, repeated = new_samples(rows, last)
             self.survey.quality.repeated += repeated
-            asked, before = commands(rows, before)
+            followed, before = commands(rows, before)
             if not len(new):
                 continue
             found = rows[new].copy()
@@ -176,11 +189,13 @@ class Export:
             time = np.round(time, CLOCK_DIGITS)
             steps = np.diff(time, prepend=elapsed)
             self.survey.quality.count(steps[0 if np.isfinite(last) else 1 :].tolist())
-            told = self._next_reference(found)
-            begin = interpolate_reference(np.append(echo, told[:-1]), told, steps)
-            knees = knees_of(begin, told, *asked[:, new])
-            found[REFERENCE] = begin
-            last, elapsed, echo = clock[-1], float(time[-1]), float(told[-1])
+            own = Followed(*(command[:, new] for command in followed))
+            number, age = (found[name] for name in SAID)
+            said = Samples(number, age, self._next_reference(found))
+            ahead = Samples(*(np.append(o, s[:-1]) for o, s in zip(ended, said, strict=True)))
+            found[REFERENCE], knees = path_between(ahead, said, own, steps)
+            ended = Samples(*(one[-1:] for one in said))
+            last, elapsed = clock[-1], float(time[-1])
             whole = np.all([np.isfinite(found[name]) for name in NEEDED], axis=0)
             yield Piece(rows=found[whole], time=time[whole], knees=knees[:, whole])
 
@@ -201,7 +216,8 @@ class Export:
                 found[column.column] = values
         found["time_s"] = piece.time
         if piece.knees is not None:
-            found |= dict(zip(KNEE, piece.knees, strict=True))
+            used = len(KNEES) if self.survey.hidden else 2
+            found |= dict(zip(KNEES[:used], piece.knees, strict=False))
         if self.survey.truck:
             found[TRUCK] = np.ones(len(rows))
         kept = {name: key for name, key in OWN.items() if self.survey.finite.get(key, 1)}
@@ -231,46 +247,6 @@ class Export:
             and signal.name not in taken
             and self._has_values(signal.name, log=False)
         }
-
-
-def interpolate_reference(before: Array, told: Array, steps: Array) -> Array:
-    """Reference at each sample [rad/s]: what the sample before said, or a line across a hole.
-
-    before, told : what the sample before and this one said of the end of the next scan [rad/s]
-    steps : since the sample before [s]
-    """
-    share = np.maximum(steps - SCAN, 0.0) / np.maximum(steps, SCAN)
-    return before + share * (told - before)
-
-
-def knees_of(begin: Array, told: Array, rate: Array, slew: Array) -> Array:
-    """Knee of the reference in the scan after each sample: seconds after it, and value [rad/s].
-
-    From where it is, the PLC goes to the line of the command at its slew rate, and then along the
-    line. Where it does not reach the line, the knee is the end of the scan. Shape (2, n).
-
-    begin, told : where the scan begins and ends [rad/s]
-    rate, slew : slope of the command's line, and largest slope [rad/s^2]; slew 0: not known
-    """
-    jump = told - begin - rate * SCAN
-    needed = np.abs(jump) / np.maximum(slew - np.sign(jump) * rate, 1e-9)
-    limited = needed >= LIMITED * SCAN
-    after = np.where(limited, SCAN, needed)
-    return np.stack([after, told - rate * (SCAN - after)])
-
-
-def commands(records: Any, before: Array) -> tuple[Array, Array]:
-    """Slope and slew rate that the PLC follows at each tick [rad/s^2], shape (2, ticks).
-
-    The PLC follows the command of the tick before, or of the one before that, and tells its number.
-    Also returned: slope, slew rate and number of the last two commands, shape (3, 2), as `before`.
-    """
-    names = ("speed_rate", "ramp_limit", "command_sequence")
-    written = np.stack([records[f"setpoint_{name}"] for name in names])
-    known = np.concatenate([before, written], axis=1)
-    last, second_last = known[:, 1:-1], known[:, :-2]
-    older = records["measured_command_sequence_echo"] == second_last[2]
-    return np.nan_to_num(np.where(older, second_last, last)[:2]), known[:, -2:]
 
 
 def new_samples(records: Any, last: float = np.nan) -> tuple[NDArray[np.intp], int]:

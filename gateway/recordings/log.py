@@ -12,7 +12,8 @@ from register_maps.logs import csv_log, mdf4_log, parquet_log
 from register_maps.logs.log_table import LogTableError, check_sampling
 from register_maps.signals import LOG_COLUMNS
 
-NO_SENSORS: Final = ("time", "reference_knee_time", "reference_knee", "truck_on_drum")
+NO_SENSORS: Final = ("time", "truck_on_drum")
+"""Columns of no sensor, beside the knees of the reference."""
 
 
 class LogError(ConfigError):
@@ -32,7 +33,9 @@ class Log:
         return [
             column.column
             for column in LOG_COLUMNS.values()
-            if column.signal not in self.columns and column.signal not in NO_SENSORS
+            if column.signal not in self.columns
+            and column.signal not in NO_SENSORS
+            and not column.signal.startswith("reference_knee")
         ]
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.signals.log import KNEE_TIME
+from plant_emulator.signals.log import KNEE_TIME, KNEES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -56,8 +56,9 @@ def bridge_holes(log: Log, use: Use) -> tuple[Log, Use]:
             signals["speed_reference"][within] = _continue_reference(
                 time, reference, int(k), whole[within]
             )
-    if KNEE_TIME in log:  # a knee of 0 s is none: the reference is straight in the hole
-        signals[KNEE_TIME][~logged] = 0.0
+    for knee_time, _ in KNEES:
+        if knee_time in log:  # a knee of 0 s is none: the reference is straight in the hole
+            signals[knee_time][~logged] = 0.0
     counted = {}
     for name, own in use.items():
         counted[name] = np.zeros(len(whole), bool)

@@ -152,9 +152,10 @@ class Recording:
     def with_noise_beside(self, values: Mapping[str, float]) -> Recording:
         """The recording with the noise that shows beside a simulation, where that is less.
 
-        A regulator that answers the noise of its torque sensor moves the reference at every sample.
-        Third differences then take what the bench does for noise: 13 A of current for 0.3 A. Most
-        of it is in a simulation too, even at parameters that are some percent off.
+        A regulator that answers the noise of its torque sensor moves the reference at every sample,
+        and so do commands that reach the PLC now early, now late. Third differences then take what
+        the bench does for noise: 13 A of current for 0.3 A. Most of it is in a simulation too, even
+        at parameters that are some percent off.
 
         values : of the model [SI]
         """

@@ -23,8 +23,13 @@ COMPARED = ("motor_speed", "drum_speed", "armature_current", "shaft_torque")
 VOLTAGE = "armature_voltage"
 # Torque of a truck on the drum, and the mark of a truck whose torque nobody measured.
 WHEEL_TORQUE, TRUCK = "wheel_torque", "truck_on_drum"
-# Knee of the speed reference after each sample: seconds after it, and value.
+# Knees of the speed reference after each sample: seconds after it (0: none), and value.
 KNEE_TIME, KNEE = "reference_knee_time", "reference_knee"
+KNEES = (
+    (KNEE_TIME, KNEE),
+    ("reference_knee_2_time", "reference_knee_2"),
+    ("reference_knee_3_time", "reference_knee_3"),
+)
 # Standard deviation of what is not known of the time that a row was taken at [s].
 TIMING_ERROR = "timing_error"
 # A channel that moves by less than this share of its largest value shows rounding only [1].

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.signals.log import KNEE, KNEE_TIME
+from plant_emulator.signals.log import KNEE, KNEES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -147,14 +147,17 @@ def sensing_of(log: Log, sensors: Mapping[str, Sensor]) -> Sensing | None:
 def reference_nodes(log: Log) -> tuple[Array, Array]:
     """Times [s] and values [rad/s] between which the speed reference of a log is straight."""
     time, reference = log.time, log["speed_reference"]
-    if KNEE not in log or KNEE_TIME not in log:
-        return time, reference
-    after, value = log[KNEE_TIME][:-1], log[KNEE][:-1]
-    # A knee in the rounding of a sample is the sample.
-    inside = (after > TIME_ROUNDING) & (after < np.diff(time) - TIME_ROUNDING)
-    times = np.concatenate([time, (time[:-1] + after)[inside]])
-    order = np.argsort(times, kind="stable")
-    return times[order], np.concatenate([reference, value[inside]])[order]
+    times, values, last = [time], [reference], np.zeros(len(time) - 1)
+    for knee_time, knee in KNEES:
+        if knee in log and knee_time in log:
+            after = log[knee_time][:-1]
+            # A knee in the rounding of a sample, or of the knee before it, is that one.
+            inside = (after > last + TIME_ROUNDING) & (after < np.diff(time) - TIME_ROUNDING)
+            last = np.where(inside, after, last)
+            times.append((time[:-1] + after)[inside])
+            values.append(log[knee][:-1][inside])
+    order = np.argsort(np.concatenate(times), kind="stable")
+    return np.concatenate(times)[order], np.concatenate(values)[order]
 
 
 def finer(time: Array) -> Array:

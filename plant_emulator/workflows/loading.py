@@ -21,7 +21,7 @@ from plant_emulator.recordings.recording import recording
 from plant_emulator.recordings.same_bench import check_same_bench
 from plant_emulator.recordings.stamps import restamp
 from plant_emulator.recordings.wheel_torque import mark_informative, with_estimated_torque
-from plant_emulator.signals.log import VOLTAGE, Log
+from plant_emulator.signals.log import KNEE_TIME, VOLTAGE, Log
 from plant_emulator.simulation.simulate import values_of
 from plant_emulator.workflows.arguments import check_signals
 
@@ -111,11 +111,12 @@ def load_recordings(
 
 
 def _weighed(loaded: Recording, parameters: ParameterSet) -> Recording:
-    """The recording, with the noise beside a simulation where a truck's torque is estimated.
+    """The recording of a gateway, with the noise beside a simulation.
 
-    A noise that the user declared stays.
+    A truck's torque, or commands that reach the PLC early or late, move the reference from sample
+    to sample. A noise that the user declared stays.
     """
-    if not loaded.estimated_torque:
+    if not loaded.estimated_torque and KNEE_TIME not in loaded.log:
         return loaded
     beside = loaded.with_noise_beside(values_of(parameters))
     declared = [bool(getattr(parameters.sensors.get(n), "noise", 0.0)) for n in loaded.channels]

@@ -231,6 +231,10 @@ def test_log_columns_are_those_of_the_log_file():
         "shell_temperature_degC": ("degC", False),
         "reference_knee_time_s": ("s", False),
         "reference_knee_rad_s": ("rad/s", False),
+        "reference_knee_2_time_s": ("s", False),
+        "reference_knee_2_rad_s": ("rad/s", False),
+        "reference_knee_3_time_s": ("s", False),
+        "reference_knee_3_rad_s": ("rad/s", False),
         "truck_on_drum": ("1", False),
     }
     for column in LOG_COLUMNS.values():

@@ -17,8 +17,15 @@ from gateway.cycle.record import NOTHING, Layout, Tick
 from gateway.cycle.supervisor import State
 from gateway.reasons import Reason
 from gateway.recordings import log, recording
-from gateway.recordings.export import commands, knees_of
 from gateway.recordings.header import Header
+from gateway.recordings.plc_reference import (
+    NO_COMMANDS,
+    Followed,
+    Samples,
+    commands,
+    knees_of,
+    path_between,
+)
 from register_maps.signals import Measurement, Status
 
 MAP = register_maps.load("bench_int16")
@@ -130,22 +137,68 @@ def test_knee_is_where_the_reference_meets_the_line_of_the_command() -> None:
 def test_command_that_the_plc_follows_is_the_one_whose_number_it_tells() -> None:
     """The PLC has command 7 at tick 2, still 7 at tick 3, then 9; at tick 0 it tells nothing."""
     fields = [
-        *("setpoint_speed_rate", "setpoint_ramp_limit", "setpoint_command_sequence"),
-        "measured_command_sequence_echo",
+        *("setpoint_speed_setpoint", "setpoint_speed_rate", "setpoint_ramp_limit"),
+        *("setpoint_command_sequence", "measured_command_sequence_echo"),
     ]
     rows = [
-        (10, 300, 6, np.nan),
-        (20, 300, 7, 6),
-        (30, 300, 8, 7),
-        (40, 300, 9, 7),
-        (50, 300, 10, 9),
+        (1, 10, 300, 6, np.nan),
+        (2, 20, 300, 7, 6),
+        (3, 30, 300, 8, 7),
+        (4, 40, 300, 9, 7),
+        (5, 50, 300, 10, 9),
     ]
     records = np.array([(*row,) for row in rows], dtype=[(name, float) for name in fields])
-    (rate, _slew), before = commands(records[:3], np.full((3, 2), np.nan))
-    assert rate == pytest.approx([0.0, 10.0, 20.0])
-    (rate, slew), _ = commands(records[3:], before)
-    assert rate == pytest.approx([20.0, 40.0])
-    assert slew == pytest.approx([300.0, 300.0])
+    followed, last = commands(records[:3], NO_COMMANDS)
+    assert followed.now[1] == pytest.approx([np.nan, 10.0, 20.0], nan_ok=True)
+    followed, _ = commands(records[3:], last)
+    assert followed.now == pytest.approx(np.array([[2, 4], [20, 40], [300, 300], [7, 9]]))
+    assert followed.before == pytest.approx(np.array([[1, 3], [10, 30], [300, 300], [6, 8]]))
+
+
+@pytest.mark.parametrize(
+    ("number", "age", "lost", "knee"),
+    [
+        # command 8 reached the PLC in the lost scan: 2 + 0.5 at its end, at once on its line
+        (9.0, 0.0, 2.5, (0.0, 2.0)),
+        # command 7 stayed in force: 1 + 100 (0.01 + 0.01)
+        (8.0, 0.0, 3.0, (0.0, 2.0)),
+        # command 8 was taken in the lost scan already: a jump by 4 to 6 + 100 0.01 at 500 rad/s^2
+        (8.0, 0.01, 7.0, (0.01, 7.0)),
+    ],
+)
+def test_reference_of_a_scan_without_a_sample_follows_the_command_that_the_plc_had(
+    number: float, age: float, lost: float, knee: tuple[float, float]
+) -> None:
+    """The PLC says 2 rad/s for 10 ms after a sample; the next sample comes 20 ms after it."""
+    seven, eight, line = (1.0, 100.0, 500.0, 7.0), (2.0, 50.0, 500.0, 8.0), (6.0, 100.0, 500.0, 8.0)
+    own, older = {
+        (9.0, 0.0): ((3.0, 100.0, 500.0, 9.0), eight),
+        (8.0, 0.0): ((3.0, 100.0, 500.0, 8.0), seven),
+        (8.0, 0.01): (line, seven),
+    }[number, age]
+    told = own[0] + own[1] * (age + 0.01)
+    begin, knees = path_between(
+        before=Samples(np.array([7.0, 7.0]), np.array([0.0, 0.0]), np.array([0.0, 2.0])),
+        after=Samples(np.array([7.0, number]), np.array([0.0, age]), np.array([2.0, told])),
+        followed=Followed(np.array([seven, own]).T, np.array([seven, older]).T),
+        steps=np.array([0.01, 0.02]),
+    )
+    assert begin == pytest.approx([0.0, lost])
+    assert knees[2:, 0] == pytest.approx([0.01, 2.0, 0.01 + knee[0], knee[1]])
+    assert knees[2:, 1] == pytest.approx(np.zeros(4))
+
+
+def test_reference_across_a_lost_scan_is_a_line_where_the_plc_follows_another_law() -> None:
+    """The PLC tells 9 rad/s, which no command of 500 rad/s^2 reaches from 2 within two scans."""
+    command = np.array([[1.0, 100.0, 500.0, 7.0]]).T
+    begin, knees = path_between(
+        before=Samples(np.array([7.0]), np.array([0.0]), np.array([2.0])),
+        after=Samples(np.array([7.0]), np.array([0.0]), np.array([9.0])),
+        followed=Followed(command, command),
+        steps=np.array([0.02]),
+    )
+    assert begin == pytest.approx([5.5])
+    assert knees[2:] == pytest.approx(np.zeros((4, 1)))
 
 
 @pytest.mark.parametrize(("status", "marked"), [(Status.ROAD_LOAD, True), (STANDING, False)])

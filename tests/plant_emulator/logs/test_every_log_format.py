@@ -27,6 +27,10 @@ KNOWN = [
     ("shell_temperature_degC", "shell_temperature", False),
     ("reference_knee_time_s", "reference_knee_time", False),
     ("reference_knee_rad_s", "reference_knee", False),
+    ("reference_knee_2_time_s", "reference_knee_2_time", False),
+    ("reference_knee_2_rad_s", "reference_knee_2", False),
+    ("reference_knee_3_time_s", "reference_knee_3_time", False),
+    ("reference_knee_3_rad_s", "reference_knee_3", False),
     ("truck_on_drum", "truck_on_drum", False),
 ]
 HEADER = "time_s,speed_reference_rad_s,motor_speed_rad_s,drum_speed_rad_s,shaft_torque_Nm"

@@ -12,7 +12,7 @@ from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Array, Log
 from plant_emulator.simulation import simulate as level
 from plant_emulator.simulation.running_bench import Bench
-from plant_emulator.simulation.sensing import lag, phase_of
+from plant_emulator.simulation.sensing import lag, phase_of, reference_nodes
 from plant_emulator.simulation.sensor_noise import SENSORS
 from plant_emulator.simulation.simulate import inputs_of, values_of
 from plant_emulator.workflows.simulation import simulate
@@ -134,3 +134,20 @@ def test_without_declared_sensors_no_bit_changes(nominal: ParameterSet) -> None:
     plain, declared = shown(nominal), shown(nominal, shaft_torque=Sensor(noise=1.0))
     for name in plain.signals:
         np.testing.assert_array_equal(plain[name], declared[name])
+
+
+def test_reference_has_up_to_three_knees_between_two_samples() -> None:
+    """A knee at 0 s is none, and so is one at the knee before it, or beyond the next sample."""
+    knees = {
+        "reference_knee_time": [0.003, 0.01, 0.0],
+        "reference_knee": [5.0, 6.0, 0.0],
+        "reference_knee_2_time": [0.0, 0.01, 0.0],
+        "reference_knee_2": [0.0, 6.0, 0.0],
+        "reference_knee_3_time": [0.02, 0.013, 0.0],
+        "reference_knee_3": [9.0, 8.0, 0.0],
+    }
+    signals = {"speed_reference": np.array([1.0, 2.0, 9.0])}
+    signals |= {name: np.array(values) for name, values in knees.items()}
+    time, value = reference_nodes(Log(time=np.array([0.0, 0.01, 0.03]), signals=signals))
+    assert time == pytest.approx([0.0, 0.003, 0.01, 0.02, 0.023, 0.03])
+    assert value == pytest.approx([1.0, 5.0, 2.0, 6.0, 8.0, 9.0])
