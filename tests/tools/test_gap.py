@@ -86,9 +86,12 @@ def test_the_longest_stop_of_the_plc_is_the_largest_lateness_that_the_emulator_r
 
 @pytest.mark.slow
 @pytest.mark.realtime
-def test_a_hidden_offset_is_driven_named_and_taken_out_of_the_force(tmp_path, monkeypatch):
-    """Seed 19: 0.569 N m times 62.6 over 0.645 m are 55 N at the rim; one program of three."""
-    monkeypatch.setattr(gap, "PROGRAMS", ("program1",))
+def test_a_hidden_offset_is_driven_named_and_taken_out_of_the_force(tmp_path):
+    """Seed 19: 0.569 N m times 62.6 over 0.645 m are 55 N at the rim.
+
+    Program 1 alone does not do: its first part tells the backlash to 2 %, which leaves 2 to 8 times
+    the noise in its last part whatever the cause is.
+    """
     result = CliRunner().invoke(main, ["--seed", "19", "--out", str(tmp_path)])
     assert result.exit_code == 0, result.output
     left = tmp_path / "seed_19"
