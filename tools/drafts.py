@@ -166,7 +166,8 @@ def outside(seed: int, count: int, only: tuple[int, ...]) -> None:
             use_own_effects(*(laws.load(name) for name in laws.names()))
             case = draw.draw(seed, number, NOMINAL, kernel().effects)
             logs = [
-                measure(case, log, run) for run, log in enumerate(simulate_truth(case, NOMINAL))
+                measure(case, log, run, NOMINAL)
+                for run, log in enumerate(simulate_truth(case, NOMINAL))
             ]
             use_own_effects()
             (hidden,) = case.hidden

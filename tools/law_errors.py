@@ -75,7 +75,7 @@ def _recordings(case: Case, nominal: ParameterSet) -> Iterator[Recording]:
     with TemporaryDirectory() as folder:
         for run, log in enumerate(simulate_truth(case, nominal)):
             path = f"{folder}/{case.programs[run]}.csv.gz"
-            logs.write(measure(case, log, run), path)
+            logs.write(measure(case, log, run, nominal), path)
             yield recording(logs.read(path))
 
 

@@ -56,8 +56,24 @@ def draw_dirt(seed: int, number: int) -> Dirt | None:
 
 
 def soil(log: Log, dirt: Dirt, seed: int) -> Log:
-    """Give a measured log with dirt; seed : of what is drawn."""
+    """Give a measured log with dirt; seed : of what is drawn.
+
+    Jitter is no dirt of a measured log: `take_rows` makes it before there is noise.
+    """
+    if dirt.kind == "jitter":
+        return log
     return _SOILS[dirt.kind](log, dirt.size, np.random.default_rng([seed, 5]))
+
+
+def take_rows(fine: Log, time: Array, half_width: float, seed: int) -> Log:
+    """Take every row of a finer log a little early or late, and stamp it as if it were not.
+
+    time : stamps of the rows [s]; half_width : of their errors [s]; seed : of what is drawn
+    """
+    random = np.random.default_rng([seed, 5])
+    taken = time + random.uniform(-half_width, half_width, len(time))
+    signals = {name: np.interp(taken, fine.time, values) for name, values in fine.signals.items()}
+    return replace(fine, time=time, signals=signals)
 
 
 def _replace_signals(log: Log, changes: dict[str, Array]) -> Log:
@@ -111,13 +127,6 @@ def _coarse(log: Log, quantum: float, _: np.random.Generator) -> Log:
     return _replace_signals(log, {name: np.round(log[name] / q) * q for name, q in steps.items()})
 
 
-def _jitter(log: Log, half_width: float, random: np.random.Generator) -> Log:
-    """Take every row a little early or late, and stamp it as if it were not."""
-    taken = log.time + random.uniform(-half_width, half_width, len(log.time))
-    signals = {name: np.interp(taken, log.time, values) for name, values in log.signals.items()}
-    return replace(log, signals=signals)
-
-
 def _lose_rows(log: Log, share: float, random: np.random.Generator) -> Log:
     """Leave out this share of the rows, and a hole."""
     kept = random.random(len(log.time)) >= share
@@ -134,6 +143,5 @@ _SOILS: dict[DirtKind, Callable[[Log, float, np.random.Generator], Log]] = {
     "spikes": _spikes,
     "held": _hold_channels,
     "coarse": _coarse,
-    "jitter": _jitter,
     "lost": _lose_rows,
 }

@@ -90,7 +90,7 @@ class BlindTrial:
         folder = self.folder.logs(case.number)
         files = [folder / f"{name}.csv.gz" for name in case.programs]
         for run, (log, file) in enumerate(zip(truth, files, strict=True)):
-            logs.write(measure(case, log, run), file)
+            logs.write(measure(case, log, run, self.nominal), file)
         return files
 
     def _unseal(self, number: int, truth: Sequence[Log], outcome: Outcome) -> Unsealed:

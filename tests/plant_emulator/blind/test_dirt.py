@@ -9,7 +9,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from plant_emulator.blind.dirt import RANGES, Dirt, DirtKind, draw_dirt, soil
+from plant_emulator.blind.dirt import RANGES, Dirt, DirtKind, draw_dirt, soil, take_rows
 from plant_emulator.blind.sealing import seal, unseal
 from plant_emulator.signals.log import COMPARED, Log
 from plant_emulator.simulation.sensor_noise import SENSORS
@@ -68,7 +68,7 @@ def test_coarse_values_are_multiples_of_the_quantum(clean: Log) -> None:
 
 
 def test_rows_off_their_stamps_are_off_in_all_channels_alike(clean: Log) -> None:
-    soiled = soil(clean, Dirt(kind="jitter", size=2e-3), 1)
+    soiled = take_rows(clean, clean.time, 2e-3, 1)
     off = (soiled["speed_reference"] - clean["speed_reference"]) / 10.0
     assert np.max(np.abs(off)) <= 2e-3
     assert np.std(off[1:-1]) == pytest.approx(2e-3 / np.sqrt(3.0), rel=0.1)

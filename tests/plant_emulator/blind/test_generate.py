@@ -1,11 +1,13 @@
 """The logs of a case, and the orthogonal norm of its hidden effects."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from plant_emulator.blind import laws
+from plant_emulator.blind.dirt import Dirt
 from plant_emulator.blind.draw import draw
 from plant_emulator.blind.generate import measure, simulate_truth
 from plant_emulator.blind.orthogonal_norm import norms, or_impossible
@@ -43,7 +45,7 @@ def test_truth_that_does_not_converge_is_simulated_with_a_smaller_step(
 def test_measured_log_is_quantised_and_noisy(nominal: ParameterSet) -> None:
     case = case_with(kind="none")
     (true,) = simulate_truth(case, nominal)
-    seen = measure(case, true, 0)
+    seen = measure(case, true, 0, nominal)
     deviation, step = SENSORS["armature_current"]
     counts = seen["armature_current"] / step
     np.testing.assert_allclose(counts, np.round(counts), atol=1e-6)
@@ -51,6 +53,22 @@ def test_measured_log_is_quantised_and_noisy(nominal: ParameterSet) -> None:
         deviation, rel=0.1
     )
     np.testing.assert_array_equal(seen["speed_reference"], true["speed_reference"])
+
+
+def test_rows_off_their_stamps_show_the_bench_where_they_were_taken(nominal: ParameterSet) -> None:
+    """On a ramp the motor moves as far as its reference; rows on their stamps are as before."""
+    case = replace(case_with(kind="none"), dirt=Dirt(kind="jitter", size=1e-9))
+    (true,) = simulate_truth(case, nominal)
+    punctual = measure(case, true, 0, nominal)
+    plain = measure(replace(case, dirt=None), true, 0, nominal)
+    for name, (_, step) in SENSORS.items():
+        if name in true:
+            assert np.abs(punctual[name] - plain[name]).max() <= 1.001 * step
+    off = measure(replace(case, dirt=Dirt(kind="jitter", size=2e-3)), true, 0, nominal)
+    late = off["speed_reference"] - true["speed_reference"]
+    ramp = np.gradient(true["speed_reference"], true.time) > 75.0
+    moved = off["motor_speed"] - plain["motor_speed"]
+    assert np.polyfit(late[ramp], moved[ramp], 1)[0] == pytest.approx(1.0, abs=0.05)
 
 
 def test_log_has_the_columns_of_the_bench_and_no_voltage(nominal: ParameterSet) -> None:
