@@ -24,7 +24,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.fit_result import VarianceComponent
 from plant_emulator.diagnosis.fitting.evidence import EVIDENCE_THRESHOLD
-from plant_emulator.diagnosis.fitting.joint_fit import fit_from
+from plant_emulator.diagnosis.fitting.joint_fit import AT_BOUND, fit_from
 from plant_emulator.estimation.covariance import structure
 
 if TYPE_CHECKING:
@@ -58,14 +58,15 @@ def fit_random_effect(model: Model, task: Task) -> VarianceComponent:
     """Fit the random effect `task.effect` to the residual of the fit `task.base` (a step).
 
     A fit at the sensors' noise follows the chance course, and leaves a residual elsewhere that is
-    not random. The component is then fitted again on a fit with its own weights. Where the result
-    is white, the likeliest of several shapes counts: a scan of exactly the log's period shows one
-    phase only.
+    not random. The component is then fitted again on a fit with its own weights, unless it is as
+    large as it may be, and stands for something else. Where the result is white, the likeliest of
+    several shapes counts: a scan of exactly the log's period shows one phase only.
     """
     candidate = model.candidates[task.effect]
     usual = {u.name: u.start for u in candidate.shapes}
     found = _fit_component(model, task, usual)
-    if found.evidence <= EVIDENCE_THRESHOLD:
+    (size,) = candidate.sizes
+    if found.evidence <= EVIDENCE_THRESHOLD or found.size >= AT_BOUND * size.upper:
         return found
     if not found.consistent:
         weights = dict(zip(task.runs, found.weights, strict=True))

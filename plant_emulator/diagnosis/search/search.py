@@ -87,7 +87,7 @@ class Search:
             best = self._queue(1)
             self._estimate_noise(best)
             best = self._queue(SETTINGS.most_effects)
-        if best.effects and self._estimate_noise(best):
+        if best.effects and not self._foreign(best) and self._estimate_noise(best):
             best = self._queue(SETTINGS.most_effects)
         final = self._without_needless(best)
         if not final.converged:
@@ -180,7 +180,8 @@ class Search:
         if not base.effects or base.mean_square <= NOISE_MEAN_SQUARE:
             found, tried, best = self._screen(base), [], base
             for one in leading(found, 1, least):
-                best = min((best, *self._confirm(base, [one])), key=lambda fit: fit.cost)
+                fits = self._confirm(base, [one], SETTINGS.leader_iterations)
+                best = min((best, *fits), key=lambda fit: fit.cost)
                 tried.append(one.effect)
                 if best is not base and self._little(best):
                     break
@@ -188,8 +189,14 @@ class Search:
                 most = SETTINGS.rivals_beside if base.effects else SETTINGS.rivals
                 self._confirm(base, leading(found, most, least, tried), SETTINGS.iterations)
                 return
-        fitted = fitted_promises(self.runner, base)
-        self._confirm(base, leading(fitted, SETTINGS.fitted_whole, least))
+        reached = 0.0
+        for one in fitted_promises(self.runner, base)[: SETTINGS.fitted_whole]:
+            if one.gain <= max(least, SETTINGS.rival_share * reached):
+                break
+            known = self.sets.get(frozenset((*base.effects, one.effect)), base)
+            if one.gain > 0.5 * (base.cost - known.cost):
+                (known,) = self._confirm(base, [one])
+            reached = max(reached, 0.5 * (base.cost - known.cost))
 
     def _little(self, found: FitResult) -> bool:
         """Whether a set leaves so little that regressions can choose its rivals."""
@@ -252,10 +259,11 @@ class Search:
 
         The queue takes the noise for known. Where a set leaves something correlated, an effect that
         follows a little of it is needless too: its evidence among what is left is that of chance.
-        An effect is the cause of what the others leave only if it leaves little of that.
+        An effect is the cause of what the others leave only if it leaves little of that. Where the
+        set itself is no cause, nothing is dropped: a part of it is none either.
         """
         self.reduced_costs = {}
-        if len(best.effects) < 2:
+        if len(best.effects) < 2 or not adequate(best, self.null):
             return best
         for name in best.effects:
             rest = tuple(e for e in best.effects if e != name)

@@ -13,7 +13,10 @@ from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, adequate, excess
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
 from plant_emulator.diagnosis.report.ranking import undetectable
+from plant_emulator.diagnosis.search import search
+from plant_emulator.diagnosis.search.promise import Promise, Start
 from plant_emulator.diagnosis.search.search import Search
+from plant_emulator.diagnosis.search.secant_fits import SECANTS
 from plant_emulator.diagnosis.search.summary import not_told_apart
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import (
@@ -214,6 +217,24 @@ def test_faint_second_effect_beside_an_exact_one_is_named() -> None:
     found = explained(model)
     assert set(found.final.effects) == {"cube", "kink"}
     assert found.final.mean_square <= NOISE_MEAN_SQUARE
+
+
+def test_effect_follows_a_leader_that_does_not_keep_what_it_promised(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Regressions see nothing, and fits by secants promise a thousand times more of the kink."""
+    promised = [
+        Promise(
+            effect=name,
+            gains={SECANTS: gain},
+            starts=(Start(values={"a": 0.0, "b": 0.0, f"{name}_size": 1.0}, states=({},)),),
+        )
+        for name, gain in (("kink", 1e5), ("wave", 100.0))
+    ]
+    monkeypatch.setattr(search, "promises", lambda *_: [])
+    monkeypatch.setattr(search, "fitted_promises", lambda *_: promised)
+    found = explained(Line([noisy(3.0 * np.sin(20.0 * TIME))], NAMES))
+    assert found.final.effects == ("wave",)
 
 
 @pytest.mark.parametrize("measured", [6.0 * RIPPLE, CUBE + 10.0 * KINK + 6.0 * RIPPLE])
