@@ -176,6 +176,7 @@ class Export:
         """New samples with their times since the first one, by the PLC's clock."""
         self.survey.quality = PollQuality(interval=SCAN)
         last, elapsed = np.nan, 0.0
+        waiting: tuple[Any, Array, Array] | None = None
         before, ended = NO_COMMANDS, Samples(*np.array([[np.nan], [np.nan], [0.0]]))
         for rows in self.recording.chunks():
             new, repeated = new_samples(rows, last)
@@ -193,11 +194,15 @@ class Export:
             number, age = (found[name] for name in SAID)
             said = Samples(number, age, self._next_reference(found))
             ahead = Samples(*(np.append(o, s[:-1]) for o, s in zip(ended, said, strict=True)))
-            found[REFERENCE], knees = path_between(ahead, said, own, steps)
+            found[REFERENCE], knees, before_first = path_between(ahead, said, own, steps)
             ended = Samples(*(one[-1:] for one in said))
             last, elapsed = clock[-1], float(time[-1])
-            whole = np.all([np.isfinite(found[name]) for name in NEEDED], axis=0)
-            yield Piece(rows=found[whole], time=time[whole], knees=knees[:, whole])
+            if waiting is not None:  # only this piece tells the corners behind the last sample
+                waiting[2][2:, -1] = before_first
+                yield _of_whole_samples(*waiting)
+            waiting = found, time, knees
+        if waiting is not None:
+            yield _of_whole_samples(*waiting)
 
     def _next_reference(self, rows: Any) -> Array:
         """Reference at the end of the next scan [rad/s]; without its register, the setpoint."""
@@ -247,6 +252,12 @@ class Export:
             and signal.name not in taken
             and self._has_values(signal.name, log=False)
         }
+
+
+def _of_whole_samples(rows: Any, time: Array, knees: Array) -> Piece:
+    """The samples that have every needed value."""
+    whole = np.all([np.isfinite(rows[name]) for name in NEEDED], axis=0)
+    return Piece(rows=rows[whole], time=time[whole], knees=knees[:, whole])
 
 
 def new_samples(records: Any, last: float = np.nan) -> tuple[NDArray[np.intp], int]:

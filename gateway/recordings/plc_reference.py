@@ -19,19 +19,21 @@ LIKE_THE_PLC: Final = 0.05
 """Largest miss of a reference that follows a command as the PLC does [rad/s]. The registers round
 it: in 4566 scans, the largest miss was 0.019."""
 FIELDS: Final = ("speed_setpoint", "speed_rate", "ramp_limit", "command_sequence")
-KNOWN: Final = 3
-"""Number of commands before a tick that the PLC may follow at it, or in the scan before it."""
+KNOWN: Final = 4
+"""Number of commands before a tick that the PLC may follow at it or in the scan before it, and one
+more."""
 NO_COMMANDS: Final = np.full((len(FIELDS), KNOWN), np.nan)
 
 
 class Followed(NamedTuple):
     """Commands by tick, shape (4, ticks): speed [rad/s], rate, slew [rad/s^2] and number.
 
-    now : that the PLC follows at the tick; before : the one before it
+    now : that the PLC follows at the tick; before, earlier : the one before it, and before that
     """
 
     now: Array
     before: Array
+    earlier: Array
 
 
 class Samples(NamedTuple):
@@ -44,7 +46,7 @@ class Samples(NamedTuple):
 
 
 def commands(records: Any, before: Array) -> tuple[Followed, Array]:
-    """The commands that the PLC follows at each tick, and the last ones, shape (4, 3).
+    """The commands that the PLC follows at each tick, and the last ones, shape (4, 4).
 
     The PLC follows the command of the tick before, or of the one before that, and tells its number.
 
@@ -52,22 +54,24 @@ def commands(records: Any, before: Array) -> tuple[Followed, Array]:
     """
     written = np.stack([records[f"setpoint_{name}"] for name in FIELDS])
     known = np.concatenate([before, written], axis=1)
-    last, second, third = known[:, 2:-1], known[:, 1:-2], known[:, :-3]
+    last, second, third, fourth = (known[:, k : k - KNOWN] for k in range(KNOWN - 1, -1, -1))
     older = records["measured_command_sequence_echo"] == second[3]
-    followed = Followed(np.where(older, second, last), np.where(older, third, second))
-    return followed, known[:, -KNOWN:]
+    recent = ((second, last), (third, second), (fourth, third))
+    return Followed(*(np.where(older, *pair) for pair in recent)), known[:, -KNOWN:]
 
 
 class Path(NamedTuple):
-    """The reference of samples, shape (n,) or (6, n).
+    """The reference of samples.
 
-    begin : at each sample [rad/s]
-    knees : up to three corners behind each sample: seconds after it and value [rad/s], in turn. A
-        corner at 0 s is none.
+    begin : at each sample [rad/s], shape (n,)
+    knees : up to three corners behind each sample, seconds after it (0: none) and value [rad/s] in
+        turn, shape (6, n)
+    ahead : second and third corner of the sample before the first one, shape (4,)
     """
 
     begin: Array
     knees: Array
+    ahead: Array
 
 
 def path_between(before: Samples, after: Samples, followed: Followed, steps: Array) -> Path:
@@ -93,7 +97,7 @@ def path_between(before: Samples, after: Samples, followed: Followed, steps: Arr
     hidden = np.where(known, np.stack([np.full_like(lost, SCAN), before.told, *third]), 0.0)
     # The corners in the hole before a sample stand behind the sample before it.
     knees = np.concatenate([first, np.pad(hidden[:, 1:], ((0, 0), (0, 1)))])
-    return Path(begin, knees)
+    return Path(begin, knees, hidden[:, 0])
 
 
 def _lost_command(before: Samples, after: Samples, followed: Followed) -> tuple[Array, Array]:
@@ -101,6 +105,9 @@ def _lost_command(before: Samples, after: Samples, followed: Followed) -> tuple[
     taken = after.age >= 0.5 * SCAN  # the PLC took the command in the lost scan, or before it
     command = np.where(taken, followed.now, followed.before)
     repeated = command[3] == before.number
+    # A command between two that the PLC told may have been overwritten before the PLC took it.
+    sure = taken | repeated | (followed.earlier[3] == before.number)
+    command = np.where(sure, command, np.nan)
     age = np.where(taken, after.age - SCAN, np.where(repeated, before.age + SCAN, 0.0))
     return command, age
 

@@ -58,10 +58,8 @@ def draw_dirt(seed: int, number: int) -> Dirt | None:
 def soil(log: Log, dirt: Dirt, seed: int) -> Log:
     """Give a measured log with dirt; seed : of what is drawn.
 
-    Jitter is no dirt of a measured log: `take_rows` makes it before there is noise.
+    Jitter is no dirt of a measured log (KeyError): `take_rows` makes it before there is noise.
     """
-    if dirt.kind == "jitter":
-        return log
     return _SOILS[dirt.kind](log, dirt.size, np.random.default_rng([seed, 5]))
 
 

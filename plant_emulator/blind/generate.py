@@ -42,7 +42,7 @@ def simulate_truth(case: Case, parameters: ParameterSet) -> list[Log]:
 
 
 def _simulate_run(case: Case, run: int, parameters: ParameterSet, finer: int = 1) -> Log:
-    """Simulate a run; finer : rows of the log for each row of its program, without a truck."""
+    """Simulate a run; finer : rows of the log for each row of its program, 1 with a truck."""
     bench = parameters.with_values(case.parameters)
     effects = {hidden.law: hidden.in_run(run) for hidden in case.hidden}
     found = program(case.programs[run])
@@ -75,8 +75,11 @@ def measure(case: Case, log: Log, run: int, parameters: ParameterSet) -> Log:
     parameters : the nominal set
     """
     seed = case.noise + run
-    if case.dirt is not None and case.dirt.kind == "jitter":
+    if case.dirt is None:
+        return add_noise(log, seed)
+    if case.dirt.kind != "jitter":
+        return soil(add_noise(log, seed), case.dirt, seed)
+    fine = log
+    if isinstance(program(case.programs[run]), SpeedProgram):
         fine = _simulate_run(case, run, parameters, FINER)
-        log = take_rows(fine, log.time, case.dirt.size, seed)
-    measured = add_noise(log, seed)
-    return measured if case.dirt is None else soil(measured, case.dirt, seed)
+    return add_noise(take_rows(fine, log.time, case.dirt.size, seed), seed)

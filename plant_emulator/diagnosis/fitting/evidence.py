@@ -63,6 +63,11 @@ def leaves_little(found: FitResult, gap: float) -> bool:
     return excess(found) <= max(UNEXPLAINED_SHARE * gap, EVIDENCE_THRESHOLD)
 
 
+def leaves_most(found: FitResult, null: FitResult) -> bool:
+    """Whether a fit leaves most of the gap without effects, so that the library lacks the cause."""
+    return excess(found) > (1.0 - UNEXPLAINED_SHARE) * excess(null)
+
+
 def adequate(found: FitResult, null: FitResult) -> bool:
     """Whether a fit leaves so little of the gap without effects that its cause is known."""
     return leaves_little(found, excess(null))

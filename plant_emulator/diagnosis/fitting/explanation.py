@@ -43,7 +43,8 @@ class Explanation:
     alternatives : for each accepted effect, the costs of the fits with another effect in its place
     unconverged : reason why the result cannot be trusted; empty where it can
     random_effects : accepted random effects, beside the effects of `final`
-    reduced_costs : for each of several accepted effects, the least cost of a fit without it
+    reduced_costs : for each of several accepted effects, the least cost of a fit without it; empty
+        where the final fit is no cause
     trace : the search in its order
     noise : of every channel as the logs show it; empty where it is as declared
     log_odds : of the final set against its best rival, in the mean square that it leaves [nats]

@@ -65,10 +65,10 @@ def fit_random_effect(model: Model, task: Task) -> VarianceComponent:
     candidate = model.candidates[task.effect]
     usual = {u.name: u.start for u in candidate.shapes}
     found = _fit_component(model, task, usual)
-    (size,) = candidate.sizes
-    if found.evidence <= EVIDENCE_THRESHOLD or found.size >= AT_BOUND * size.upper:
+    if found.evidence <= EVIDENCE_THRESHOLD:
         return found
-    if not found.consistent:
+    (size,) = candidate.sizes
+    if not found.consistent and found.size < AT_BOUND * size.upper:
         weights = dict(zip(task.runs, found.weights, strict=True))
         weighted = cast("Model", _WeightedModel(model, weights))
         task = replace(task, base=fit_from(weighted, task.base.effects, task.runs, task.base))

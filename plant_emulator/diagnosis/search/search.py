@@ -15,11 +15,11 @@ from plant_emulator.diagnosis.execution.pool import build_model
 from plant_emulator.diagnosis.fitting.evidence import (
     EVIDENCE_THRESHOLD,
     NOISE_MEAN_SQUARE,
-    UNEXPLAINED_SHARE,
     adequate,
     evidence_of,
     excess,
     leaves_little,
+    leaves_most,
 )
 from plant_emulator.diagnosis.fitting.explanation import Explanation
 from plant_emulator.diagnosis.fitting.fit_steps import refit
@@ -80,14 +80,10 @@ class Search:
         around the best set. Where that shows another noise, the queue starts again.
         """
         self.sets = {frozenset(): self.null}
-        if self.null.mean_square <= SETTINGS.linear_mean_square:
-            self._estimate_noise(self.null)
-            best = self._queue(SETTINGS.most_effects)
-        else:
-            best = self._queue(1)
-            self._estimate_noise(best)
-            best = self._queue(SETTINGS.most_effects)
-        if best.effects and not self._foreign(best) and self._estimate_noise(best):
+        near = self.null.mean_square <= SETTINGS.linear_mean_square
+        self._estimate_noise(self.null if near else self._queue(1))
+        best = self._queue(SETTINGS.most_effects)
+        if best.effects and not leaves_most(best, self.null) and self._estimate_noise(best):
             best = self._queue(SETTINGS.most_effects)
         final = self._without_needless(best)
         if not final.converged:
@@ -147,15 +143,11 @@ class Search:
 
     def _is_last(self, found: FitResult) -> bool:
         """Whether no effect is worth adding: the cause is foreign, or only noise is left."""
-        return self._foreign(found) or (
+        foreign = excess(self.null) > SETTINGS.needed and leaves_most(found, self.null)
+        return foreign or (
             found.mean_square <= NOISE_MEAN_SQUARE
             and all(p.gain <= self._needed(found) for p in self._screen(found))
         )
-
-    def _foreign(self, found: FitResult) -> bool:
-        """Whether a set leaves most of the gap, so that the library lacks the cause."""
-        gap = excess(self.null)
-        return gap > SETTINGS.needed and excess(found) > (1.0 - UNEXPLAINED_SHARE) * gap
 
     def _screen(self, found: FitResult) -> list[Promise]:
         key = frozenset(found.effects)
@@ -172,9 +164,8 @@ class Search:
     def _expand(self, base: FitResult) -> None:
         """Fit the effects of largest gain on top of a set.
 
-        Regressions predict the gain; the leader of each is fitted until one leaves little, and
-        then its rivals for some iterations. Where a set of effects leaves more than the noise, or
-        no leader is the cause, fits by secants tell.
+        Regressions predict it; the leader of each is fitted until one leaves little, and then its
+        rivals. Where a set leaves more than the noise, or no leader is the cause, secants tell.
         """
         least = self._needed(base) if base.effects else SETTINGS.promising
         if not base.effects or base.mean_square <= NOISE_MEAN_SQUARE:
@@ -257,10 +248,9 @@ class Search:
     def _without_needless(self, best: FitResult) -> FitResult:
         """Drop the effect that closes least until each one closes enough; return the set.
 
-        The queue takes the noise for known. Where a set leaves something correlated, an effect that
-        follows a little of it is needless too: its evidence among what is left is that of chance.
-        An effect is the cause of what the others leave only if it leaves little of that. Where the
-        set itself is no cause, nothing is dropped: a part of it is none either.
+        Where a set leaves something correlated, an effect that follows a little of it is needless:
+        its evidence among what is left is that of chance. An effect is the cause of what the others
+        leave only if it leaves little of that. No part of a set is the cause where the set is none.
         """
         self.reduced_costs = {}
         if len(best.effects) < 2 or not adequate(best, self.null):

@@ -18,14 +18,6 @@ from gateway.cycle.supervisor import State
 from gateway.reasons import Reason
 from gateway.recordings import log, recording
 from gateway.recordings.header import Header
-from gateway.recordings.plc_reference import (
-    NO_COMMANDS,
-    Followed,
-    Samples,
-    commands,
-    knees_of,
-    path_between,
-)
 from register_maps.signals import Measurement, Status
 
 MAP = register_maps.load("bench_int16")
@@ -119,86 +111,6 @@ def test_times_in_the_wrong_order_are_refused_in_one_line(tmp_path: Path) -> Non
     assert result.exit_code == 2
     assert "--from before --to-time" in result.stderr
     assert result.stderr.count("\n") == 1
-
-
-def test_knee_is_where_the_reference_meets_the_line_of_the_command() -> None:
-    """From 5 rad/s at 300 rad/s^2.
-
-    To a constant 6 within 1 / 300 s. To the line 6 + 100 t, which is at 7 after the scan, within
-    5 ms. To 8, the whole scan.
-    """
-    begin, told = np.array([5.0, 5.0, 5.0]), np.array([6.0, 7.0, 8.0])
-    rate, slew = np.array([0.0, 100.0, 0.0]), np.full(3, 300.0)
-    after, value = knees_of(begin, told, rate, slew)
-    assert after == pytest.approx([1.0 / 300.0, 0.005, 0.01])
-    assert value == pytest.approx([6.0, 6.5, 8.0])
-
-
-def test_command_that_the_plc_follows_is_the_one_whose_number_it_tells() -> None:
-    """The PLC has command 7 at tick 2, still 7 at tick 3, then 9; at tick 0 it tells nothing."""
-    fields = [
-        *("setpoint_speed_setpoint", "setpoint_speed_rate", "setpoint_ramp_limit"),
-        *("setpoint_command_sequence", "measured_command_sequence_echo"),
-    ]
-    rows = [
-        (1, 10, 300, 6, np.nan),
-        (2, 20, 300, 7, 6),
-        (3, 30, 300, 8, 7),
-        (4, 40, 300, 9, 7),
-        (5, 50, 300, 10, 9),
-    ]
-    records = np.array([(*row,) for row in rows], dtype=[(name, float) for name in fields])
-    followed, last = commands(records[:3], NO_COMMANDS)
-    assert followed.now[1] == pytest.approx([np.nan, 10.0, 20.0], nan_ok=True)
-    followed, _ = commands(records[3:], last)
-    assert followed.now == pytest.approx(np.array([[2, 4], [20, 40], [300, 300], [7, 9]]))
-    assert followed.before == pytest.approx(np.array([[1, 3], [10, 30], [300, 300], [6, 8]]))
-
-
-@pytest.mark.parametrize(
-    ("number", "age", "lost", "knee"),
-    [
-        # command 8 reached the PLC in the lost scan: 2 + 0.5 at its end, at once on its line
-        (9.0, 0.0, 2.5, (0.0, 2.0)),
-        # command 7 stayed in force: 1 + 100 (0.01 + 0.01)
-        (8.0, 0.0, 3.0, (0.0, 2.0)),
-        # command 8 was taken in the lost scan already: a jump by 4 to 6 + 100 0.01 at 500 rad/s^2
-        (8.0, 0.01, 7.0, (0.01, 7.0)),
-    ],
-)
-def test_reference_of_a_scan_without_a_sample_follows_the_command_that_the_plc_had(
-    number: float, age: float, lost: float, knee: tuple[float, float]
-) -> None:
-    """The PLC says 2 rad/s for 10 ms after a sample; the next sample comes 20 ms after it."""
-    seven, eight, line = (1.0, 100.0, 500.0, 7.0), (2.0, 50.0, 500.0, 8.0), (6.0, 100.0, 500.0, 8.0)
-    own, older = {
-        (9.0, 0.0): ((3.0, 100.0, 500.0, 9.0), eight),
-        (8.0, 0.0): ((3.0, 100.0, 500.0, 8.0), seven),
-        (8.0, 0.01): (line, seven),
-    }[number, age]
-    told = own[0] + own[1] * (age + 0.01)
-    begin, knees = path_between(
-        before=Samples(np.array([7.0, 7.0]), np.array([0.0, 0.0]), np.array([0.0, 2.0])),
-        after=Samples(np.array([7.0, number]), np.array([0.0, age]), np.array([2.0, told])),
-        followed=Followed(np.array([seven, own]).T, np.array([seven, older]).T),
-        steps=np.array([0.01, 0.02]),
-    )
-    assert begin == pytest.approx([0.0, lost])
-    assert knees[2:, 0] == pytest.approx([0.01, 2.0, 0.01 + knee[0], knee[1]])
-    assert knees[2:, 1] == pytest.approx(np.zeros(4))
-
-
-def test_reference_across_a_lost_scan_is_a_line_where_the_plc_follows_another_law() -> None:
-    """The PLC tells 9 rad/s, which no command of 500 rad/s^2 reaches from 2 within two scans."""
-    command = np.array([[1.0, 100.0, 500.0, 7.0]]).T
-    begin, knees = path_between(
-        before=Samples(np.array([7.0]), np.array([0.0]), np.array([2.0])),
-        after=Samples(np.array([7.0]), np.array([0.0]), np.array([9.0])),
-        followed=Followed(command, command),
-        steps=np.array([0.02]),
-    )
-    assert begin == pytest.approx([5.5])
-    assert knees[2:] == pytest.approx(np.zeros((4, 1)))
 
 
 @pytest.mark.parametrize(("status", "marked"), [(Status.ROAD_LOAD, True), (STANDING, False)])

@@ -73,3 +73,16 @@ def test_rows_that_are_there_stay_as_they_are() -> None:
 def test_log_without_a_hole_stays() -> None:
     log = Log(TIME, {"speed_reference": reference(TIME)})
     assert bridge_holes(log, {})[0] is log
+
+
+def test_rows_of_a_hole_have_none_of_the_knees_beside_it() -> None:
+    """A log with knees tells its corners itself, but in a hole of 0.5 s nobody knows them."""
+    log = holed(3.7, 4.2)
+    knees = [f"reference_knee{number}_time" for number in ("", "_2", "_3")]
+    signals = {**log.signals, **{name: np.full(len(log.time), 0.004) for name in knees}}
+    log = Log(log.time, signals)
+    found, use = bridge_holes(log, {"motor_speed": np.ones(len(log.time), bool)})
+    rows = use["motor_speed"]
+    for name in knees:
+        assert found[name][rows] == pytest.approx(0.004)
+        assert found[name][~rows] == pytest.approx(0.0)

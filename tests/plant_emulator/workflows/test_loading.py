@@ -12,11 +12,15 @@ from click.testing import CliRunner
 from plant_emulator import logs
 from plant_emulator.cli import main
 from plant_emulator.errors import DiagnosisError, LogError
+from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.preflight import preflight
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
+from plant_emulator.signals.noise import noise
+from plant_emulator.simulation.sensor_noise import SENSORS, add_noise
 from plant_emulator.workflows.diagnosis.plan import plan_recordings
-from plant_emulator.workflows.loading import check_unlabelled
+from plant_emulator.workflows.loading import check_unlabelled, load_recordings
+from plant_emulator.workflows.simulation import simulate
 from register_maps.signals import LOG_COLUMNS
 
 DATA = Path(__file__).parents[2] / "data"
@@ -105,3 +109,21 @@ def test_single_log_that_moves_in_both_parts_is_taken(bench_log: BenchLog) -> No
     runs, plan = plan_recordings([recording(bench_log("bench_practice/practice_004/program2"))], 1)
     assert len(runs) == 2
     assert plan.as_fitted
+
+
+def test_noise_of_a_recording_is_that_beside_a_simulation(nominal: ParameterSet) -> None:
+    """The reference goes to and fro by 1 rad/s between samples; the current follows, by amperes."""
+    time = np.arange(0.0, 8.0, 0.01)
+    ramp = np.clip(60.0 * (time - 1.0), 0.0, 200.0)
+    zigzag = np.where(ramp > 0.0, np.random.default_rng(3).uniform(-0.5, 0.5, len(time)), 0.0)
+    asked = {
+        "speed_reference": ramp + zigzag,
+        "reference_knee_time": np.full(len(time), 0.004),
+        "reference_knee": ramp + zigzag,
+    }
+    true = simulate(Log(time, asked), parameters=nominal, start="middle")
+    measured = add_noise(Log(time, {**true.signals, **asked}), seed=5)
+    (loaded,), _ = load_recordings([measured], nominal)
+    assert noise(measured["armature_current"]) > 2.0 * SENSORS["armature_current"][0]
+    found = loaded.noise[loaded.channels.index("armature_current")]
+    assert found == pytest.approx(SENSORS["armature_current"][0], rel=0.1)

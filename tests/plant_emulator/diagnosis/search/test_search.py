@@ -219,30 +219,38 @@ def test_faint_second_effect_beside_an_exact_one_is_named() -> None:
     assert found.final.mean_square <= NOISE_MEAN_SQUARE
 
 
+@pytest.mark.parametrize(
+    ("of_the_kink", "confirmed"), [(1e5, [["kink"], ["wave"]]), (100.0, [["wave"]])]
+)
 def test_effect_follows_a_leader_that_does_not_keep_what_it_promised(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, of_the_kink: float, confirmed: list[list[str]]
 ) -> None:
-    """Regressions see nothing, and fits by secants promise a thousand times more of the kink."""
+    """Regressions see nothing. The wave promises 1000, and gains 9 n / 4, 4500 by hand."""
     promised = [
         Promise(
             effect=name,
             gains={SECANTS: gain},
             starts=(Start(values={"a": 0.0, "b": 0.0, f"{name}_size": 1.0}, states=({},)),),
         )
-        for name, gain in (("kink", 1e5), ("wave", 100.0))
+        for name, gain in sorted((("kink", of_the_kink), ("wave", 1000.0)), key=lambda one: -one[1])
     ]
     monkeypatch.setattr(search, "promises", lambda *_: [])
     monkeypatch.setattr(search, "fitted_promises", lambda *_: promised)
     found = explained(Line([noisy(3.0 * np.sin(20.0 * TIME))], NAMES))
     assert found.final.effects == ("wave",)
+    steps = [list(one.effects) for one in found.trace if one.action == "confirmed"]
+    assert steps[: len(confirmed)] == confirmed
+    assert ["kink"] not in steps[len(confirmed) :]
 
 
 @pytest.mark.parametrize("measured", [6.0 * RIPPLE, CUBE + 10.0 * KINK + 6.0 * RIPPLE])
 def test_ripple_that_no_effect_explains_is_unknown(measured: Array) -> None:
     """Its mean square is 18, alone and beside two effects; the noise has 1."""
     model = Line([noisy(measured)], NAMES)
-    found = decide(model, explained(model))
+    there = explained(model)
+    found = decide(model, there)
     assert (found.kind, found.effects) == ("unknown", ())
+    assert there.reduced_costs == {}
 
 
 def test_effect_of_chance_course_is_not_tried() -> None:
