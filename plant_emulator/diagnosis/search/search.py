@@ -181,12 +181,12 @@ class Search:
                 self._confirm(base, leading(found, most, least, tried), SETTINGS.iterations)
                 return
         reached = 0.0
-        for one in fitted_promises(self.runner, base)[: SETTINGS.fitted_whole]:
+        for one in fitted_promises(self.runner, base)[: SETTINGS.most_followed]:
             if one.gain <= max(least, SETTINGS.rival_share * reached):
                 break
             known = self.sets.get(frozenset((*base.effects, one.effect)), base)
             if one.gain > 0.5 * (base.cost - known.cost):
-                (known,) = self._confirm(base, [one])
+                (known,) = self._confirm(base, [one], SETTINGS.leader_iterations)
             reached = max(reached, 0.5 * (base.cost - known.cost))
 
     def _little(self, found: FitResult) -> bool:

@@ -41,12 +41,13 @@ class Settings:
     # order is nearly right.
     rivals: int = 2
     rivals_beside: int = 1
-    # Leading effects of the fits by secants that are fitted whole at most: the leader may not keep
+    # Effects that lead the fits by secants and are fitted freely, at most: a leader may not keep
     # what it promised.
-    fitted_whole: int = 3
+    most_followed: int = 3
     # Gain over the largest one that a rival needs, the largest promise or what a leader reached.
     rival_share: float = 0.5
     # Iterations of a first fit, enough to tell a basin from a slope: of a rival, and of a leader.
+    # Fits that may win go on.
     iterations: int = 5
     leader_iterations: int = 10
     # Cost above the best one's up to which a fit may still win [chi squared]. Where the best one
