@@ -109,7 +109,7 @@ class Survey:
 
 @dataclass(frozen=True, kw_only=True)
 class Piece:
-    """Some rows: records, times [s], and the knees of the reference, if known; see `Path`."""
+    """Some rows: records, times [s], and knees of the reference, if known; see `ReferencePath`."""
 
     rows: Any
     time: Array

@@ -60,7 +60,7 @@ def commands(records: Any, before: Array) -> tuple[Followed, Array]:
     return Followed(*(np.where(older, *pair) for pair in recent)), known[:, -KNOWN:]
 
 
-class Path(NamedTuple):
+class ReferencePath(NamedTuple):
     """The reference of samples.
 
     begin : at each sample [rad/s], shape (n,)
@@ -74,34 +74,40 @@ class Path(NamedTuple):
     ahead: Array
 
 
-def path_between(before: Samples, after: Samples, followed: Followed, steps: Array) -> Path:
+def path_between(
+    before: Samples, after: Samples, followed: Followed, steps: Array
+) -> ReferencePath:
     """The reference at samples, and its corners behind them.
 
     In the scan after a sample, it has the corner where it meets the line of the command. Where the
     gateway read no sample of just one scan, it has the end of the scan before that one as second
-    corner, and that of the lost scan as third. Across a longer hole it is a line.
+    corner, and that of the lost scan as third. Across a longer hole, or where the PLC does not
+    follow its commands as this module does, it is a line.
 
     before, after : what is said at the sample before each sample, and at the sample
     followed : commands at the samples; steps : since the sample before [s]
     """
-    end = _end_of_lost_scan(before, after, followed)
-    lost = np.where(np.rint(steps / SCAN) == 2.0, end, np.nan)
-    known = np.isfinite(lost)
+    command, age = _lost_command(before, after, followed)
+    lost = _follow(before.told, command, age)
+    missed = np.abs(_follow(lost, followed.now, after.age) - after.told)
+    known = (np.rint(steps / SCAN) == 2.0) & (missed < LIKE_THE_PLC)
     share = np.maximum(steps - SCAN, 0.0) / np.maximum(steps, SCAN)
     line = before.told + share * (after.told - before.told)
     begin = np.where(known, lost, line)
     first = knees_of(begin, after.told, *np.nan_to_num(followed.now[1:3]))
-    missing, _ = _lost_command(before, after, followed)
-    third = knees_of(before.told, lost, *np.nan_to_num(missing[1:3]))
+    third = knees_of(before.told, lost, *np.nan_to_num(command[1:3]))
     third[0] += SCAN
     hidden = np.where(known, np.stack([np.full_like(lost, SCAN), before.told, *third]), 0.0)
     # The corners in the hole before a sample stand behind the sample before it.
     knees = np.concatenate([first, np.pad(hidden[:, 1:], ((0, 0), (0, 1)))])
-    return Path(begin, knees, hidden[:, 0])
+    return ReferencePath(begin, knees, hidden[:, 0])
 
 
 def _lost_command(before: Samples, after: Samples, followed: Followed) -> tuple[Array, Array]:
-    """Command in the lost scan before each sample, and its age at the start of that scan [s]."""
+    """Command in the lost scan before each sample, and its age at the start of that scan [s].
+
+    NaN: nobody knows which command the PLC had.
+    """
     taken = after.age >= 0.5 * SCAN  # the PLC took the command in the lost scan, or before it
     command = np.where(taken, followed.now, followed.before)
     repeated = command[3] == before.number
@@ -110,16 +116,6 @@ def _lost_command(before: Samples, after: Samples, followed: Followed) -> tuple[
     command = np.where(sure, command, np.nan)
     age = np.where(taken, after.age - SCAN, np.where(repeated, before.age + SCAN, 0.0))
     return command, age
-
-
-def _end_of_lost_scan(before: Samples, after: Samples, followed: Followed) -> Array:
-    """Reference at the end of the lost scan before each sample [rad/s], shape (n,).
-
-    NaN: the PLC does not follow the commands as this module does.
-    """
-    lost = _follow(before.told, *_lost_command(before, after, followed))
-    missed = np.abs(_follow(lost, followed.now, after.age) - after.told)
-    return np.where(missed < LIKE_THE_PLC, lost, np.nan)
 
 
 def _follow(begin: Array, command: Array, age: Array) -> Array:

@@ -104,20 +104,6 @@ def test_reference_of_lost_scans_is_that_of_a_gateway_that_read_them(
     assert drawn == pytest.approx(np.interp(moments, *polyline(whole)), abs=1e-3)
 
 
-def test_a_command_that_another_one_may_have_overwritten_is_not_taken_for_the_plcs() -> None:
-    """Before, the PLC told command 7; then 8 to 10 were written, and it tells 10 at once."""
-    known = [(2.5, 0.0, 500.0, 8.0), (6.0, 0.0, 500.0, 9.0), (6.5, 0.0, 500.0, 10.0)]
-    earlier, before, now = (np.array([command]).T for command in known)
-    begin, knees, _ = path_between(
-        before=Samples(np.array([7.0]), np.array([0.0]), np.array([2.0])),
-        after=Samples(np.array([10.0]), np.array([0.0]), np.array([6.5])),
-        followed=Followed(now, before, earlier),
-        steps=np.array([0.02]),
-    )
-    assert begin == pytest.approx([4.25])
-    assert knees[2:] == pytest.approx(np.zeros((4, 1)))
-
-
 def test_knee_is_where_the_reference_meets_the_line_of_the_command() -> None:
     """From 5 rad/s at 300 rad/s^2.
 
@@ -187,14 +173,31 @@ def test_reference_of_a_scan_without_a_sample_follows_the_command_that_the_plc_h
     assert knees[2:, 1] == pytest.approx(np.zeros(4))
 
 
-def test_reference_across_a_lost_scan_is_a_line_where_the_plc_follows_another_law() -> None:
-    """The PLC tells 9 rad/s, which no command of 500 rad/s^2 reaches from 2 within two scans."""
-    command = np.array([[1.0, 100.0, 500.0, 7.0]]).T
+@pytest.mark.parametrize(
+    ("written", "number", "told", "middle"),
+    [
+        # the PLC tells 9 rad/s, which no command of 500 rad/s^2 reaches from 2 within two scans
+        ([(1.0, 100.0, 500.0, 7.0)] * 3, 7.0, 9.0, 5.5),
+        # command 9 may have overwritten command 8, or command 10 command 9, before the PLC took it
+        (
+            [(2.5, 0.0, 500.0, 8.0), (6.0, 0.0, 500.0, 9.0), (6.5, 0.0, 500.0, 10.0)],
+            10.0,
+            6.5,
+            4.25,
+        ),
+    ],
+    ids=["another law", "overwritten command"],
+)
+def test_reference_of_a_scan_that_nobody_knows_is_a_line(
+    written: list[tuple[float, ...]], number: float, told: float, middle: float
+) -> None:
+    """Before, the PLC tells command 7 and 2 rad/s."""
+    earlier, before, now = (np.array([command]).T for command in written)
     begin, knees, _ = path_between(
         before=Samples(np.array([7.0]), np.array([0.0]), np.array([2.0])),
-        after=Samples(np.array([7.0]), np.array([0.0]), np.array([9.0])),
-        followed=Followed(command, command, command),
+        after=Samples(np.array([number]), np.array([0.0]), np.array([told])),
+        followed=Followed(now, before, earlier),
         steps=np.array([0.02]),
     )
-    assert begin == pytest.approx([5.5])
+    assert begin == pytest.approx([middle])
     assert knees[2:] == pytest.approx(np.zeros((4, 1)))
