@@ -23,6 +23,8 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from plant_emulator.signals.log import Array
 
 # Eigenvalue of an information matrix of unit diagonal that is 0 but for rounding [the largest], and
@@ -61,20 +63,34 @@ def sandwich(
         for channel in range(len(residual)):
             slopes = jacobian[channel]
             middle += freedom * slopes.T @ colour(slopes, autocovariance(residual[channel]))
-    hessian = information + precision
-    scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
-    values, vectors = np.linalg.eigh(hessian / np.outer(scale, scale))
-    known = values > EIGENVALUE_ROUNDING * values[-1]
-    inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(scale, scale)
+    inverse, unknown = _inverse(information + precision)
     covariance = inverse @ middle @ inverse
     covariance = 0.5 * (covariance + covariance.T)
     # Between the frequencies where it was made positive, the spectrum of a tapered autocovariance
     # may be negative; a variance that comes out so is that of white residuals.
     for k in np.flatnonzero(np.diag(covariance) <= 0.0):
         covariance[k], covariance[:, k] = inverse[k], inverse[k]
-    unknown = np.flatnonzero(np.any(np.abs(vectors[:, ~known]) > LEAST_PART, axis=1))
     covariance[unknown, unknown] = np.inf
     return np.asarray(covariance)
+
+
+def white_covariance(information: Array, precision: Array) -> Array:
+    """The covariance for white residuals of variance 1, shape (unknowns, unknowns).
+
+    Arguments and infinite variances are those of `sandwich`.
+    """
+    inverse, unknown = _inverse(information + precision)
+    inverse[unknown, unknown] = np.inf
+    return inverse
+
+
+def _inverse(hessian: Array) -> tuple[Array, NDArray[np.int_]]:
+    """Inverse of a Hessian where it is known, and the unknowns that have another part."""
+    scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
+    values, vectors = np.linalg.eigh(hessian / np.outer(scale, scale))
+    known = values > EIGENVALUE_ROUNDING * values[-1]
+    inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(scale, scale)
+    return inverse, np.flatnonzero(np.any(np.abs(vectors[:, ~known]) > LEAST_PART, axis=1))
 
 
 def autocovariance(residual: Array) -> Array:

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.estimation.covariance import sandwich
+from plant_emulator.estimation.covariance import sandwich, white_covariance
 from plant_emulator.estimation.simulated_problem import (
     DIFFERENCE_NORM,
-    FollowedColumns,
+    SecantSlopes,
     SimulatedProblem,
     column_lengths,
 )
@@ -52,6 +52,7 @@ def estimate(
     progress: Callable[[float], None] | None = None,
     follow: Estimate | None = None,
     difference: float = DIFFERENCE_NORM,
+    rough: bool = False,
 ) -> Estimate:
     """Fit the unknowns from their starts.
 
@@ -66,14 +67,17 @@ def estimate(
         simulated but follow by secants: far cheaper, and good for a first look only
     difference : norm of the change of the residual vector that slopes are taken over; a wide one
         passes over local minima of a rough cost, and serves a search only
+    rough : whether the values are a start only, as with `follow` in any case: all slopes follow
+        steps that they predicted well, and the covariance is that of white residuals
     """
     unknowns = tuple(unknowns)
-    followed = None if follow is None else FollowedColumns(unknowns, follow)
-    problem = SimulatedProblem(unknowns, residuals, progress, followed, difference)
+    rough = rough or follow is not None
+    secants = SecantSlopes(unknowns, follow, rough=rough)
+    problem = SimulatedProblem(unknowns, residuals, progress, secants, difference)
     start, lower, upper = _start(unknowns)
     free = any(u.std is None for u in unknowns)
     if free and not any(slopes.any() for slopes in problem.jacobian(start)):
-        return _estimate(problem, start, False, "no unknown changes the residual")
+        return _estimate(problem, start, False, "no unknown changes the residual", rough=rough)
     most, bounds = iterations or MAX_ITERATIONS, (lower, upper)
     found = _minimise(problem, start, bounds, max(settled, settled_far), most)
     rows = problem.residual(found.x)
@@ -81,7 +85,7 @@ def estimate(
     near = sum(float(np.sum(r**2)) for r in rows) <= SUSPECT_MEAN_SQUARE * samples
     if near and settled < settled_far and found.nfev < most:
         found = _minimise(problem, found.x, bounds, settled, most - found.nfev)
-    return _estimate(problem, found.x, bool(found.status > 0), str(found.message))
+    return _estimate(problem, found.x, bool(found.status > 0), str(found.message), rough=rough)
 
 
 def _start(unknowns: Sequence[Unknown]) -> tuple[Array, Array, Array]:
@@ -106,9 +110,9 @@ def _minimise(
     # Threads that wait for each other in a decomposition of ten columns take most of the time.
     with threadpool_limits(1):
         return least_squares(
-            problem.rows,
+            problem.turned_rows,
             start,
-            problem.slopes,
+            problem.turned_slopes,
             bounds=bounds,
             x_scale="jac",
             ftol=settled,
@@ -131,7 +135,10 @@ def linearise_at(
         follow from a first differencing
     difference : see `estimate`
     """
-    problem = SimulatedProblem(tuple(unknowns), residuals, None, difference=difference)
+    unknowns = tuple(unknowns)
+    problem = SimulatedProblem(
+        unknowns, residuals, None, SecantSlopes(unknowns), difference=difference
+    )
     z = np.array([u.scaled(u.start) for u in unknowns])
     if near is None:
         problem.learn_steps(z)
@@ -140,8 +147,11 @@ def linearise_at(
     return _estimate(problem, z, True, "not fitted")
 
 
-def _estimate(problem: SimulatedProblem, z: Array, converged: bool, message: str) -> Estimate:
-    residuals, jacobians = problem.residual(z), problem.wide_jacobian(z)
+def _estimate(
+    problem: SimulatedProblem, z: Array, converged: bool, message: str, *, rough: bool = False
+) -> Estimate:
+    residuals = problem.residual(z)
+    jacobians = problem.jacobian(z) if rough else problem.wide_jacobian(z)
     information = sum(np.einsum("cni,cnj->ij", j, j) for j in jacobians)
     precision = np.diag([u.scaled_std**-2.0 for u in problem.unknowns])
     return Estimate(
@@ -149,7 +159,11 @@ def _estimate(problem: SimulatedProblem, z: Array, converged: bool, message: str
         z=z,
         residuals=tuple(residuals),
         jacobians=tuple(jacobians),
-        covariance=sandwich(residuals, jacobians, information, precision),
+        covariance=(
+            white_covariance(information, precision)
+            if rough
+            else sandwich(residuals, jacobians, information, precision)
+        ),
         information=information,
         cost=sum(float(np.sum(r**2)) for r in residuals),
         penalty=float(np.sum(problem.rows(z)[-len(z) :] ** 2)),

@@ -1,7 +1,8 @@
 """Residuals of simulated runs and their slopes, as functions of the unknowns of a fit (pure).
 
 The Jacobian is made of forward differences so small that the simulation keeps its sequence of
-steps; a state costs a simulation of its own run only.
+steps; a state costs a simulation of its own run only. In a rough fit nothing is differenced after a
+step that the slopes predicted well: they follow the step by secants.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ import numpy as np
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
 
     from plant_emulator.estimation.unknowns import Estimate, Residual, Unknown
     from plant_emulator.signals.log import Array
@@ -28,20 +31,23 @@ SMALLEST_DIFFERENCE, LARGEST_DIFFERENCE = 1e-6, 1e-3
 WIDEST_DIFFERENCE = 1e-2
 # Step of the first differences, before any slope is known.
 FIRST_DIFFERENCE = 1e-5
+# Share of the change of the residual vector that the slopes may miss in a step that they follow by
+# secants.
+MISSED_SHARE = 0.2
 
 
 @dataclass
 class SimulatedProblem:
     """Residuals and Jacobians of all runs at z, each simulated once.
 
-    follow : columns that are not differenced; None: every column is
+    secants : slopes of the last point, and which of them are not differenced
     difference : norm of the change of the residual vector that slopes are taken over
     """
 
     unknowns: tuple[Unknown, ...]
     residuals: Sequence[Residual]
     progress: Callable[[float], None] | None
-    follow: FollowedColumns | None = None
+    secants: SecantSlopes
     difference: float = DIFFERENCE_NORM
     simulations: int = 0
     known: tuple[bytes, list[Array]] = (b"", [])
@@ -84,13 +90,12 @@ class SimulatedProblem:
     def _jacobian(self, z: Array) -> list[Array]:
         base = self.residual(z)
         self.based = z.tobytes(), base
-        jacobians = [np.zeros((*r.shape, len(z))) for r in base]
+        differenced = self.secants.differenced(z, base, self.difference)
+        jacobians = self.secants.copies(base)
         steps = self._steps()
-        for j in range(len(z)):
-            if self.follow is None or not self.follow.has[j]:
-                self._difference(z, j, steps[j], jacobians)
-        if self.follow is not None:
-            self.follow.fill(z, base, jacobians)
+        for j in np.flatnonzero(differenced):
+            self._difference(z, int(j), steps[j], jacobians)
+        self.secants.move(z, base, jacobians, ~differenced)
         self.lengths = column_lengths(jacobians)
         return jacobians
 
@@ -116,8 +121,6 @@ class SimulatedProblem:
     def wide_jacobian(self, z: Array) -> list[Array]:
         """Jacobian of every run at z, with the columns of weak unknowns over wider differences."""
         jacobians = [j.copy() for j in self.jacobian(z)]
-        if self.follow is not None:
-            return jacobians
         narrow, wide = self._steps(), self._steps(WIDEST_DIFFERENCE)
         for j in np.flatnonzero(wide > narrow):
             self._difference(z, int(j), wide[j], jacobians)
@@ -127,11 +130,25 @@ class SimulatedProblem:
         """All residuals and the priors as one vector."""
         return np.concatenate([*(r.ravel() for r in self.residual(z)), self._prior(z)])
 
-    def slopes(self, z: Array) -> Array:
-        """Jacobian of `rows`, shape (rows, unknowns)."""
-        p = len(z)
+    def turned_rows(self, z: Array) -> Array:
+        """`rows`, turned so that all lies along the first axis, shape (1 + unknowns,)."""
+        turned = np.zeros(1 + len(z))
+        turned[0] = np.linalg.norm(self.rows(z))
+        return turned
+
+    def turned_slopes(self, z: Array) -> Array:
+        """Jacobian of `rows`, turned with them, shape (1 + unknowns, unknowns).
+
+        It is triangular: a rotation changes no product of rows and slopes, of which alone a step
+        of least squares is made, and all that it leaves of the samples is this factor.
+        """
         weight = np.diag([1.0 / u.scaled_std for u in self.unknowns])
-        return np.concatenate([*(j.reshape(-1, p) for j in self.jacobian(z)), weight])
+        parts = [np.column_stack([self._prior(z), weight])]
+        for residual, jacobian in zip(self.residual(z), self.jacobian(z), strict=True):
+            both = np.concatenate([residual[..., None], jacobian], axis=-1)
+            parts += list(np.linalg.qr(both, mode="r"))
+        factor = np.asarray(np.linalg.qr(np.concatenate(parts), mode="r"))
+        return np.asarray(factor[:, 1:] * np.where(factor[:, :1] < 0.0, -1.0, 1.0))
 
     def _prior(self, z: Array) -> Array:
         return np.array(
@@ -142,34 +159,68 @@ class SimulatedProblem:
         )
 
 
-class FollowedColumns:
-    """Columns of the Jacobian that are not differenced: they begin as those of another estimate and
-    follow the residual by secants (Broyden, Math. Comp. 19 (1965) 577).
+class SecantSlopes:
+    """Slopes that follow the residual by secants (Broyden, Math. Comp. 19 (1965) 577).
+
+    followed : columns that are never differenced, shape (unknowns,); they begin as those of another
+        estimate
+    rough : whether the other columns follow too after a step that all predicted well
     """
 
-    def __init__(self, unknowns: Sequence[Unknown], other: Estimate) -> None:
-        column = {(u.name, u.run): j for j, u in enumerate(other.unknowns)}
-        self.has = np.array([(u.name, u.run) in column for u in unknowns])
+    def __init__(
+        self, unknowns: Sequence[Unknown], other: Estimate | None = None, *, rough: bool = False
+    ) -> None:
+        column = {} if other is None else {(u.name, u.run): j for j, u in enumerate(other.unknowns)}
+        self.followed = np.array([(u.name, u.run) in column for u in unknowns])
+        self.rough = rough
         wanted = [column[u.name, u.run] for u in unknowns if (u.name, u.run) in column]
-        self._slopes = [j[..., wanted] for j in other.jacobians]
+        self._begun = [] if other is None else [j[..., wanted] for j in other.jacobians]
         self._last: tuple[Array, Sequence[Array], Sequence[Array]] | None = None
 
-    def fill(self, z: Array, residuals: Sequence[Array], jacobians: Sequence[Array]) -> None:
-        """Put the columns into Jacobians at z that have all others."""
+    def differenced(self, z: Array, residuals: Sequence[Array], least: float) -> NDArray[np.bool_]:
+        """Columns to difference at z, shape (unknowns,).
+
+        least : norm of what the slopes may have missed in any case
+        """
+        if self._last is not None and self.rough:
+            before, old, slopes = self._last
+            changes = [now - then for now, then in zip(residuals, old, strict=True)]
+            missed = [c - j @ (z - before) for c, j in zip(changes, slopes, strict=True)]
+            if _norm(missed) <= max(least, MISSED_SHARE * _norm(changes)):
+                return np.zeros_like(self.followed)
+        return ~self.followed
+
+    def copies(self, residuals: Sequence[Array]) -> list[Array]:
+        """Slopes as they were at the last point; 0 in columns that were never differenced."""
         if self._last is not None:
-            before, old, others = self._last
+            return [j.copy() for j in self._last[2]]
+        found = [np.zeros((*r.shape, len(self.followed))) for r in residuals]
+        for jacobian, begun in zip(found, self._begun, strict=False):
+            jacobian[..., self.followed] = begun
+        return found
+
+    def move(
+        self,
+        z: Array,
+        residuals: Sequence[Array],
+        jacobians: Sequence[Array],
+        kept: NDArray[np.bool_],
+    ) -> None:
+        """Let the kept columns follow the step to z, beside the others, which are those at z."""
+        if self._last is not None and kept.any():
+            before, old, slopes = self._last
             step = z - before
-            weight = sum(np.einsum("cnj,cnj->j", j, j) for j in self._slopes) * step[self.has]
-            length = float(weight @ step[self.has])
-            if length > 0.0:
-                for k, jacobian in enumerate(jacobians):
-                    between = 0.5 * (others[k] + jacobian)[..., ~self.has]
-                    missed = residuals[k] - old[k] - between @ step[~self.has]
-                    missed -= self._slopes[k] @ step[self.has]
-                    self._slopes[k] += missed[..., None] * (weight / length)
-        for slopes, jacobian in zip(self._slopes, jacobians, strict=True):
-            jacobian[..., self.has] = slopes
+            weight = column_lengths([j[..., kept] for j in jacobians]) ** 2 * step[kept]
+            length = float(weight @ step[kept])
+            for k, jacobian in enumerate(jacobians) if length > 0.0 else ():
+                between = 0.5 * (slopes[k] + jacobian)
+                missed = residuals[k] - old[k] - between @ step
+                jacobian[..., kept] += missed[..., None] * (weight / length)
         self._last = z.copy(), list(residuals), list(jacobians)
+
+
+def _norm(residuals: Sequence[Array]) -> float:
+    return float(np.sqrt(sum(np.vdot(r, r) for r in residuals)))
 
 
 def _values(unknowns: Sequence[Unknown], z: Array, run: int) -> dict[str, float]:

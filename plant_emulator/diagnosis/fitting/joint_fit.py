@@ -101,7 +101,8 @@ def fit(
     """Fit parameters, states and these effects to these runs, from these start values.
 
     iterations : at most so many; None: as many as `estimate` allows
-    near : an estimate of the same runs; slopes of its unknowns follow by secants, see `estimate`
+    near : an estimate of the same runs; slopes of its unknowns follow by secants, see `estimate`.
+        The fit has no standard errors then
     shrinkage : see `joint_unknowns`
     difference : norm of the change that slopes are taken over
     """
@@ -156,10 +157,10 @@ def approach(
     starts : all with the same effects
     iterations : of each fit along the measured outputs at most so many
     """
-    best: FitValues = min(
-        (lead(model, one, runs, iterations=FIRST_ITERATIONS) for one in starts),
-        key=lambda one: one.cost,
-    )
+    best = starts[0]
+    if len(starts) > 1:
+        first = [lead(model, one, runs, iterations=FIRST_ITERATIONS) for one in starts]
+        best = min(first, key=lambda one: one.cost)
     for interval in CORRECTION_INTERVALS:
         best = lead(model, best, runs, interval, iterations)
     return best
@@ -190,6 +191,7 @@ def lead(
         settled=LED_COST_TOLERANCE,
         iterations=iterations,
         difference=LED_DIFFERENCE,
+        rough=True,
     )
     return to_result(start.effects, found, len(runs))
 

@@ -62,7 +62,7 @@ def _values(trial: Trial, start: Start) -> FitValues:
 
 
 def _plausible(model: Model, trial: Trial, start: Start) -> Start:
-    """The nominal parameters with the plausible size of the last effect, and states that suit them.
+    """The nominal parameters with the plausible size of the last effect, in the start's states.
 
     The size is on the start's side of neutral.
     """
@@ -74,5 +74,4 @@ def _plausible(model: Model, trial: Trial, start: Start) -> Start:
     ]
     size = -1.0 if sum(sides) < 0.0 else 1.0
     values = {**start.values, **model.nominal(trial.runs), **values_at_size(candidate, size)}
-    states = tuple(model.initial_states(k, trial.effects, values) for k in trial.runs)
-    return replace(start, values=values, states=states)
+    return replace(start, values=values)

@@ -258,7 +258,7 @@ class Search:
         for name in best.effects:
             rest = tuple(e for e in best.effects if e != name)
             start = Start(values=best.values, states=best.states)
-            trial = Trial(rest, self.runner.runs, (start,))
+            trial = Trial(rest, self.runner.runs, (start,), SETTINGS.leader_iterations)
             (found,) = self.runner.map(confirm, [trial])
             self._keep(found)
             self.reduced_costs[name] = self.sets[frozenset(rest)].cost

@@ -13,6 +13,7 @@ from plant_emulator.estimation.covariance import (
     structure,
 )
 from plant_emulator.estimation.least_squares import estimate, linearise_at
+from plant_emulator.estimation.simulated_problem import SecantSlopes, SimulatedProblem
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.signals.log import Array
 
@@ -93,6 +94,46 @@ def test_columns_that_follow_are_not_simulated_and_lead_to_the_same_optimum() ->
     first = estimate([*start, tilt], [tilted], follow=near, iterations=1)
     assert np.array_equal(first.jacobians[0][..., :2], near.jacobians[0])
     assert first.simulations == 2  # where it starts, and the tilt
+
+
+def test_rough_fit_differences_anew_only_after_a_step_that_it_did_not_predict() -> None:
+    """A line keeps its slopes: 3 simulations for them and the start, 1 a trial. The square root of
+    Misra1a's start bends them, so that they are differenced again: 2 simulations each time."""
+    line = [number("a", 5.0), number("b", -7.0)]
+    x = np.linspace(-1.0, 1.0, 100)
+    y = 2.0 + 3.0 * x + np.cos(40.0 * x)
+    rough = estimate(line, [lambda v: (y - v["a"] - v["b"] * x)[None]], rough=True, iterations=3)
+    assert rough.simulations <= 3 + 2
+    assert rough.parameters() == pytest.approx({"a": 2.0, "b": 3.0}, abs=0.05)
+    bent = estimate(MISRA, [lambda v: 100.0 * misra(v)], rough=True)
+    assert bent.cost == pytest.approx(1e4 * 1.2455138894e-01, rel=1e-3)
+    assert bent.simulations > 3 + 2 * 2
+
+
+def test_covariance_of_a_rough_fit_is_that_of_white_residuals_of_variance_1() -> None:
+    """By hand: the mean of 25 samples of variance 1, whatever the residuals are."""
+    y = 10.0 * np.random.default_rng(1).standard_normal(25)
+    found = estimate([number("a", 0.0)], [lambda v: (y - v["a"])[None]], rough=True)
+    assert found.standard_errors == pytest.approx([0.2])
+
+
+def test_turned_rows_and_slopes_keep_all_products() -> None:
+    """The products are those of the residuals, the slopes by hand, and the priors."""
+    x = np.linspace(-1.0, 1.0, 9)
+    unknowns = (number("a", 2.0), number("b", 1.0, prior=0.5, std=0.25))
+
+    def residual(v: Mapping[str, float]) -> Array:
+        return np.stack([v["a"] * x, v["b"] * x**2 - 1.0])
+
+    problem = SimulatedProblem(unknowns, [residual], None, SecantSlopes(unknowns))
+    z = np.array([2.0, 1.0])
+    rows, slopes = problem.turned_rows(z), problem.turned_slopes(z)
+    zero = np.zeros(9)
+    by_hand = np.block([[x[:, None], zero[:, None]], [zero[:, None], (x**2)[:, None]]])
+    assert rows @ rows == pytest.approx(float(np.sum(residual({"a": 2.0, "b": 1.0}) ** 2)) + 4.0)
+    assert slopes.T @ slopes == pytest.approx(by_hand.T @ by_hand + np.diag([0.0, 16.0]), abs=1e-4)
+    gradient = by_hand.T @ residual({"a": 2.0, "b": 1.0}).ravel() + [0.0, 2.0 * 4.0]
+    assert slopes.T @ rows == pytest.approx(gradient, abs=1e-4)
 
 
 @pytest.mark.parametrize("start", [(500.0, 1e-4), (250.0, 5e-4)])  # NIST's two starts
