@@ -142,6 +142,12 @@ class Model(Protocol):
         None: the run has no measured input, or its noise does not count
         """
 
+    def turns(self, run: int, effects: Sequence[str], values: Mapping[str, float]) -> Array | None:
+        """Give the angle of the machine at the samples of a run [turns], shape (n,).
+
+        None: no part of the machine turns, or it cannot be simulated there
+        """
+
     def nominal(self, runs: Sequence[int]) -> Mapping[str, float]:
         """Nominal parameters by name: the given ones, or an estimate from these runs."""
 

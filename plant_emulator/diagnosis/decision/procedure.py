@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.decision import run_consistency
+from plant_emulator.diagnosis.decision.ripple import find_ripples
 from plant_emulator.diagnosis.decision.verdict import decide
 from plant_emulator.diagnosis.fitting.evidence import EVIDENCE_THRESHOLD, NOISE_MEAN_SQUARE, excess
 from plant_emulator.diagnosis.fitting.fit_steps import refit, start
@@ -93,7 +94,7 @@ class Procedure:
         if self.disturbances is not None:
             (null,) = runner.map(refit, [Task(base=null, runs=runner.runs)])
         search = Search(declared=self.runner, runner=runner, null=null, noise=self.disturbances)
-        return search.explain(), search.runner
+        return _explained(search), search.runner
 
     @property
     def _beside_lines(self) -> TaskRunner:
@@ -138,7 +139,7 @@ class Procedure:
             random_evidence=best.evidence,
             noise=self.lines,
         )
-        explained = search.explain()
+        explained = _explained(search)
         last = self._fit_random_effects(explained.final, [best.effect])
         return (replace(explained, random_effects=tuple(last)), search.runner) if last else None
 
@@ -177,6 +178,13 @@ class Procedure:
         fits = list(self._cleared.map(run_consistency.fit_alone, tasks))
         reason = run_consistency.inconsistency(self.runner.model, runs, fits)
         return replace(decision, kind="unknown", effects=(), reason=reason) if reason else decision
+
+
+def _explained(search: Search) -> Explanation:
+    """What a search finds, and the ripples that its final fit leaves."""
+    explained, runner = search.explain(), search.runner
+    (ripples,) = runner.map(find_ripples, [Task(base=explained.final, runs=runner.runs)])
+    return replace(explained, ripples=ripples)
 
 
 def _is_random(found: FitResult) -> bool:

@@ -5,7 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.evidence import LJUNG_BOX_LIMIT, adequate, significant
+from plant_emulator.diagnosis.fitting.evidence import (
+    LJUNG_BOX_LIMIT,
+    UNEXPLAINED_SHARE,
+    adequate,
+    significant,
+)
 from plant_emulator.estimation.noise.channel_noise import MOST_PREDICTABLE
 
 if TYPE_CHECKING:
@@ -103,6 +108,9 @@ def _reason_against(explained: Explanation) -> str:
     for channel, noise in explained.noise.items():
         if noise.colour.predictable > MOST_PREDICTABLE:
             return f"what is left of {channel} follows its own past as no noise of a sensor does"
+    for channel, ripple in explained.ripples.items():
+        if ripple.significant and ripple.squares > UNEXPLAINED_SHARE * explained.gained:
+            return f"what is left of {channel} repeats {ripple.order:.3g} times a turn of the drum"
     if _is_structured(explained):
         return "what is left is as small as the noise, but not as random"
     if final.insignificant and not (len(final.effects) == 1 and significant(final, null)):
@@ -132,5 +140,4 @@ def _is_structured(explained: Explanation) -> bool:
     """
     null, final = explained.null, explained.final
     small = adequate(final, null) if final.effects else null.mean_square <= NULL_MEAN_SQUARE
-    gained = null.cost - final.cost + sum(one.evidence for one in explained.random_effects)
-    return small and final.ljung_box_excess > max(LJUNG_BOX_LIMIT, gained)
+    return small and final.ljung_box_excess > max(LJUNG_BOX_LIMIT, explained.gained)

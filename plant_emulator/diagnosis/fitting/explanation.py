@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.answer import SearchStep
     from plant_emulator.diagnosis.fit_result import FitResult, VarianceComponent
     from plant_emulator.estimation.noise.channel_noise import ChannelNoise
+    from plant_emulator.estimation.order_spectrum import Ripple
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +49,7 @@ class Explanation:
     trace : the search in its order
     noise : of every channel as the logs show it; empty where it is as declared
     log_odds : of the final set against its best rival, in the mean square that it leaves [nats]
+    ripples : strongest order of each channel that turns, in what the final fit leaves
     """
 
     null: FitResult
@@ -60,6 +62,13 @@ class Explanation:
     reduced_costs: dict[str, float] = field(default_factory=dict)
     trace: tuple[SearchStep, ...] = ()
     noise: Mapping[str, ChannelNoise] = field(default_factory=dict)
+    ripples: Mapping[str, Ripple] = field(default_factory=dict)
+
+    @property
+    def gained(self) -> float:
+        """Fall of the cost that the accepted effects explain [chi squared]."""
+        random = sum(one.evidence for one in self.random_effects)
+        return self.null.cost - self.final.cost + random
 
     @property
     def named(self) -> tuple[str, ...]:

@@ -191,6 +191,14 @@ class BenchModel:
         values = {**self.fixed_values(run, where.effects), **where.values, **state}
         return noise_directions(self._recordings[run], *split_gap_position(values))
 
+    def turns(self, run: int, effects: Sequence[str], values: Mapping[str, float]) -> Array | None:
+        """See `Model`: the angle of the gear's output, which the motor's speed tells."""
+        with suppress(UnsettledError):
+            log = self.simulated(run, {**self.fixed_values(run, effects), **values})
+            speed = log["motor_speed"] / (self._values["gear_ratio"] * 2.0 * np.pi)
+            return np.append(0.0, np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(log.time)))
+        return None
+
     def nominal(self, runs: Sequence[int]) -> dict[str, float]:  # noqa: ARG002 - `Model`'s signature
         """See `Model`: the values of the parameter set."""
         return {u.name: u.prior for u in self.parameters}

@@ -95,6 +95,10 @@ class Line:
         """See `Model`: nothing is fed."""
         return None
 
+    def turns(self, run: int, effects: Sequence[str], values: Mapping[str, float]) -> Array | None:
+        """See `Model`: a line does not turn."""
+        return None
+
     def nominal(self, runs: Sequence[int]) -> dict[str, float]:
         """See `Model`."""
         return {u.name: u.prior for u in self.parameters}

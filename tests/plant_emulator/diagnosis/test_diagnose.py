@@ -40,6 +40,14 @@ class Unplanned(Line):
         return {}
 
 
+class Turning(Line):
+    """Turns twenty times, faster and faster."""
+
+    def turns(self, run: int, effects: Sequence[str], values: Mapping[str, float]) -> Array | None:
+        """See `Model`."""
+        return 5.0 * (TIME + 1.0) ** 2
+
+
 def diagnosed(model: Line) -> Findings:
     return Diagnose(InProcess(), Given(model), EACH_IN_TURN, settings={}).diagnose()
 
@@ -52,6 +60,29 @@ def test_run_that_alone_shows_the_effect_is_not_predicted_and_named() -> None:
     assert found.answer.verdict.effects == ("kink",)
     assert found.answer.logs.held_out == ("run 1", "run 2")
     assert found.details.notes == ("run 0: shows no shrinkage; the other runs do not show kink",)
+
+
+def test_wave_of_the_turns_is_no_noise_though_it_is_far_below_it() -> None:
+    """A wave of 0.4 times the noise holds 2000 * 0.4^2 / 2 = 160 squares in each run."""
+    turns = 5.0 * (TIME + 1.0) ** 2
+    runs = [
+        noisy(2.0 + 3.0 * TIME + 0.4 * np.sin(2.0 * np.pi * 7.0 * turns + seed), seed)
+        for seed in (1, 2, 3)
+    ]
+    assert diagnosed(Line(runs, ["kink"])).answer.verdict.kind == "parameter"
+    verdict = diagnosed(Turning(runs, ["kink"])).answer.verdict
+    assert verdict.kind == "unknown"
+    assert "what is left of y repeats 7 times a turn" in verdict.statement
+
+
+def test_wave_of_the_turns_beside_a_far_larger_effect_does_not_deny_it() -> None:
+    """Another form of the same cause leaves some of it: 0.4^2 of the wave, 16 of the kink."""
+    turns = 5.0 * (TIME + 1.0) ** 2
+    runs = [
+        noisy(16.0 * np.abs(TIME) + 0.4 * np.sin(2.0 * np.pi * 7.0 * turns + seed), seed)
+        for seed in (1, 2, 3)
+    ]
+    assert diagnosed(Turning(runs, ["kink"])).answer.verdict.effects == ("kink",)
 
 
 def test_effect_that_every_run_shows_is_predicted_in_all() -> None:

@@ -112,6 +112,9 @@ class Slope:
     ) -> NoiseDirections | None:
         return None
 
+    def turns(self, run: int, effects: Sequence[str], values: Any) -> None:
+        """See `Model`."""
+
     def nominal(self, runs: Sequence[int]) -> dict[str, float]:
         return {u.name: u.prior for u in self.parameters}
 

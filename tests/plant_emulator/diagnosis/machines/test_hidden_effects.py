@@ -9,6 +9,7 @@ from plant_emulator import effects
 from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.diagnosis.machines.bench_candidates import LOG_WHEEL_TORQUE
 from plant_emulator.model.parameters import ParameterSet
+from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import Recording
 from plant_emulator.recordings.wheel_torque import TAKEN
 from plant_emulator.signals.log import TRUCK, WHEEL_TORQUE, Log
@@ -93,3 +94,18 @@ def test_a_truck_of_unknown_torque_predicts_no_other_run(
     pair = [runs["free"], runs["unknown"]]
     assert plan_recordings(pair, 2)[1].folds == (((0,), (1,)),)
     assert plan_recordings(2 * [runs["unknown"]], 2)[1].folds == (((1,), (0,)), ((0,), (1,)))
+
+
+def test_turns_of_a_run_are_those_that_the_drum_makes(
+    runs: dict[str, Recording], nominal: ParameterSet
+) -> None:
+    """By hand: the integral of the drum's speed in the log; the gear may lead by its backlash."""
+    model = BenchModel([runs["free"], runs["truck"]], nominal, {})
+    log = runs["free"].log
+    turns = model.turns(0, (), {GAP_POSITION: 0.0})
+    assert turns is not None
+    assert turns.shape == log.time.shape
+    made = np.mean(log["drum_speed"]) * np.ptp(log.time) / (2.0 * np.pi)
+    assert made > 10.0
+    assert turns[-1] - turns[0] == pytest.approx(made, abs=0.1)
+    assert model.turns(0, (), {GAP_POSITION: 0.0, "drum_inertia": np.nan}) is None
