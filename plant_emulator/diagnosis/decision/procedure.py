@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.decision import run_consistency
-from plant_emulator.diagnosis.decision.ripple import find_ripples
 from plant_emulator.diagnosis.decision.verdict import decide
 from plant_emulator.diagnosis.fitting.evidence import EVIDENCE_THRESHOLD, NOISE_MEAN_SQUARE, excess
 from plant_emulator.diagnosis.fitting.fit_steps import refit, start
 from plant_emulator.diagnosis.fitting.input_noise_model import whiten_inputs
 from plant_emulator.diagnosis.fitting.random_effects import WeightedRecipe, fit_random_effect
+from plant_emulator.diagnosis.fitting.regularity import find_regularities
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, find_disturbances
 from plant_emulator.diagnosis.search.search import Search
@@ -181,10 +181,10 @@ class Procedure:
 
 
 def _explained(search: Search) -> Explanation:
-    """What a search finds, and the ripples that its final fit leaves."""
+    """What a search finds, and the regularities of what its final fit leaves."""
     explained, runner = search.explain(), search.runner
-    (ripples,) = runner.map(find_ripples, [Task(base=explained.final, runs=runner.runs)])
-    return replace(explained, ripples=ripples)
+    (found,) = runner.map(find_regularities, [Task(base=explained.final, runs=runner.runs)])
+    return replace(explained, regularities=found)
 
 
 def _is_random(found: FitResult) -> bool:

@@ -108,9 +108,9 @@ def _reason_against(explained: Explanation) -> str:
     for channel, noise in explained.noise.items():
         if noise.colour.predictable > MOST_PREDICTABLE:
             return f"what is left of {channel} follows its own past as no noise of a sensor does"
-    for channel, ripple in explained.ripples.items():
-        if ripple.significant and ripple.squares > UNEXPLAINED_SHARE * explained.gained:
-            return f"what is left of {channel} repeats {ripple.order:.3g} times a turn of the drum"
+    for one in explained.regularities:
+        if one.significant and one.squares > UNEXPLAINED_SHARE * explained.gained:
+            return f"what is left of {one.channel} {one.what}"
     if _is_structured(explained):
         return "what is left is as small as the noise, but not as random"
     if final.insignificant and not (len(final.effects) == 1 and significant(final, null)):

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 from plant_emulator.diagnosis.fitting.evidence import CLASS_MARGIN, evidence_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.answer import SearchStep
     from plant_emulator.diagnosis.fit_result import FitResult, VarianceComponent
+    from plant_emulator.diagnosis.fitting.regularity import Regularity
     from plant_emulator.estimation.noise.channel_noise import ChannelNoise
-    from plant_emulator.estimation.order_spectrum import Ripple
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +49,7 @@ class Explanation:
     trace : the search in its order
     noise : of every channel as the logs show it; empty where it is as declared
     log_odds : of the final set against its best rival, in the mean square that it leaves [nats]
-    ripples : strongest order of each channel that turns, in what the final fit leaves
+    regularities : of what the final fit leaves
     """
 
     null: FitResult
@@ -62,7 +62,7 @@ class Explanation:
     reduced_costs: dict[str, float] = field(default_factory=dict)
     trace: tuple[SearchStep, ...] = ()
     noise: Mapping[str, ChannelNoise] = field(default_factory=dict)
-    ripples: Mapping[str, Ripple] = field(default_factory=dict)
+    regularities: Sequence[Regularity] = ()
 
     @property
     def gained(self) -> float:

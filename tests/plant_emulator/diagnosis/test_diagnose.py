@@ -48,6 +48,17 @@ class Turning(Line):
         return 5.0 * (TIME + 1.0) ** 2
 
 
+class Wavy(Unplanned):
+    """A line with a known wave."""
+
+    KNOWN = 60.0 * np.sin(40.0 * TIME)
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+        without = super().residual(run, effects)
+        return lambda v: without(v) - self.KNOWN
+
+
 def diagnosed(model: Line) -> Findings:
     return Diagnose(InProcess(), Given(model), EACH_IN_TURN, settings={}).diagnose()
 
@@ -73,6 +84,15 @@ def test_wave_of_the_turns_is_no_noise_though_it_is_far_below_it() -> None:
     verdict = diagnosed(Turning(runs, ["kink"])).answer.verdict
     assert verdict.kind == "unknown"
     assert "what is left of y repeats 7 times a turn" in verdict.statement
+
+
+def test_hysteresis_of_a_sensor_is_no_noise() -> None:
+    """Half width 1: the sensor shows 1 less while the quantity rises, and 1 more while it falls."""
+    late = -np.sign(np.cos(40.0 * TIME))
+    runs = [noisy(2.0 + Wavy.KNOWN + late, seed) for seed in (1, 2, 3)]
+    verdict = diagnosed(Wavy(runs, ["kink"])).answer.verdict
+    assert verdict.kind == "unknown"
+    assert "what is left of y follows the channel's own value with a hyst" in verdict.statement
 
 
 def test_wave_of_the_turns_beside_a_far_larger_effect_does_not_deny_it() -> None:
