@@ -80,6 +80,18 @@ class MeasuredRun:
     hides: frozenset[str] = frozenset()
 
 
+@dataclass(frozen=True, kw_only=True)
+class Course:
+    """The simulated course of a run.
+
+    channels : simulated values of the run's channels [units], shape (channels, n)
+    turns : angle of the machine at the samples [turns], shape (n,); None: no part of it turns
+    """
+
+    channels: Array
+    turns: Array | None
+
+
 class Model(Protocol):
     """A machine that can be simulated, with its measured runs."""
 
@@ -142,11 +154,10 @@ class Model(Protocol):
         None: the run has no measured input, or its noise does not count
         """
 
-    def turns(self, run: int, effects: Sequence[str], values: Mapping[str, float]) -> Array | None:
-        """Give the angle of the machine at the samples of a run [turns], shape (n,).
-
-        None: no part of the machine turns, or it cannot be simulated there
-        """
+    def course(
+        self, run: int, effects: Sequence[str], values: Mapping[str, float]
+    ) -> Course | None:
+        """Simulate a run at these values; None: it cannot be simulated there."""
 
     def nominal(self, runs: Sequence[int]) -> Mapping[str, float]:
         """Nominal parameters by name: the given ones, or an estimate from these runs."""

@@ -5,7 +5,8 @@
 A sensor with friction or magnetic hysteresis shows y for x (M. Brokate, J. Sprekels, Hysteresis and
 Phase Transitions (1996), chapter 2). Its error y - x wanders slowly and looks like noise with a
 long memory, but noise does not follow the quantity. The gain of the error is that of a regression
-in the noise that the residual itself shows: whatever a memory explains is no hysteresis.
+in the noise that the residual itself shows, beside an offset, the quantity and its rate of change:
+what a memory, a gain or a lag explains is no hysteresis.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 HALF_WIDTHS = (1.0, 3.0, 10.0)
 # Memory of the noise [samples], which Akaike's criterion shortens, and its least deviation.
 MEMORY, AKAIKE, LEAST = 60, 2.0, 0.1
+# Share of an error beside the other columns below which rounding is left of it.
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -48,25 +51,31 @@ class ShownValues:
 
 def hysteresis_squares(runs: Sequence[ShownValues]) -> float:
     """Squares of the residuals that a hysteresis of the best half width holds [chi squared]."""
-    counted = [one.residual[one.use] for one in runs]
-    if not any(map(np.any, counted)):
+    runs = [one for one in runs if one.residual[one.use].any()]
+    if not runs:
         return 0.0
-    times = [one.time[one.use] for one in runs]
+    counted, times = [one.residual[one.use] for one in runs], [one.time[one.use] for one in runs]
     colour = fit_autoregression(counted, times, MEMORY, AKAIKE, LEAST)
     whiteners = [Whitener(ChannelNoise(colour=colour), one.use, one.time) for one in runs]
-    left = _whitened(whiteners, [one.residual for one in runs])
+
+    def white(rows: Sequence[Array]) -> Array:
+        return np.concatenate([w.innovations(r) for w, r in zip(whiteners, rows, strict=True)])
+
+    other = [
+        white([np.ones_like(one.time) for one in runs]),
+        white([one.quantity for one in runs]),
+        white([np.gradient(one.quantity, one.time) for one in runs]),
+    ]
+    known, _ = np.linalg.qr(np.stack(other, axis=-1))
+    left = white([one.residual for one in runs])
     found = 0.0
     for half_width in HALF_WIDTHS:
-        error = [play(one.quantity, half_width) - one.quantity for one in runs]
-        column = _whitened(whiteners, error)
+        error = white([play(one.quantity, half_width) - one.quantity for one in runs])
+        column = error - known @ (known.T @ error)
         length = float(column @ column)
-        if length > 0.0:
+        if length > ROUNDING * float(error @ error):
             found = max(found, float(column @ left) ** 2 / length)
     return found
-
-
-def _whitened(whiteners: Sequence[Whitener], rows: Sequence[Array]) -> Array:
-    return np.concatenate([w.innovations(row) for w, row in zip(whiteners, rows, strict=True)])
 
 
 def play(value: Array, half_width: float) -> Array:

@@ -8,7 +8,7 @@ count. The unknowns are parameters, shared by all runs, and states, each of one 
 
 by scipy's trust-region method; slopes: see `simulated_problem`.
 
-Standard errors come from the residuals themselves, see `covariance`.
+Standard errors come from the residuals themselves, see `covariance`; not those of a rough fit.
 """
 
 from __future__ import annotations

@@ -95,7 +95,8 @@ class SimulatedProblem:
         steps = self._steps()
         for j in np.flatnonzero(differenced):
             self._difference(z, int(j), steps[j], jacobians)
-        self.secants.move(z, base, jacobians, ~differenced)
+        if self.lengths is not None or self.secants.followed.any():
+            self.secants.move(z, base, jacobians, ~differenced)
         self.lengths = column_lengths(jacobians)
         return jacobians
 
@@ -162,6 +163,9 @@ class SimulatedProblem:
 class SecantSlopes:
     """Slopes that follow the residual by secants (Broyden, Math. Comp. 19 (1965) 577).
 
+    The residual of a run does not know the states of another run; its slopes follow without them
+    (Schubert, Math. Comp. 24 (1970) 27).
+
     followed : columns that are never differenced, shape (unknowns,); they begin as those of another
         estimate
     rough : whether the other columns follow too after a step that all predicted well
@@ -173,8 +177,9 @@ class SecantSlopes:
         column = {} if other is None else {(u.name, u.run): j for j, u in enumerate(other.unknowns)}
         self.followed = np.array([(u.name, u.run) in column for u in unknowns])
         self.rough = rough
+        self._run_of = [u.run for u in unknowns]
         wanted = [column[u.name, u.run] for u in unknowns if (u.name, u.run) in column]
-        self._begun = [] if other is None else [j[..., wanted] for j in other.jacobians]
+        self._begun = None if other is None else [j[..., wanted] for j in other.jacobians]
         self._last: tuple[Array, Sequence[Array], Sequence[Array]] | None = None
 
     def differenced(self, z: Array, residuals: Sequence[Array], least: float) -> NDArray[np.bool_]:
@@ -195,8 +200,9 @@ class SecantSlopes:
         if self._last is not None:
             return [j.copy() for j in self._last[2]]
         found = [np.zeros((*r.shape, len(self.followed))) for r in residuals]
-        for jacobian, begun in zip(found, self._begun, strict=False):
-            jacobian[..., self.followed] = begun
+        if self._begun is not None:
+            for jacobian, begun in zip(found, self._begun, strict=True):
+                jacobian[..., self.followed] = begun
         return found
 
     def move(
@@ -207,15 +213,17 @@ class SecantSlopes:
         kept: NDArray[np.bool_],
     ) -> None:
         """Let the kept columns follow the step to z, beside the others, which are those at z."""
-        if self._last is not None and kept.any():
+        if self._last is not None:
             before, old, slopes = self._last
             step = z - before
-            weight = column_lengths([j[..., kept] for j in jacobians]) ** 2 * step[kept]
-            length = float(weight @ step[kept])
-            for k, jacobian in enumerate(jacobians) if length > 0.0 else ():
-                between = 0.5 * (slopes[k] + jacobian)
-                missed = residuals[k] - old[k] - between @ step
-                jacobian[..., kept] += missed[..., None] * (weight / length)
+            squares = column_lengths(jacobians) ** 2
+            for k, jacobian in enumerate(jacobians):
+                own = kept & np.array([run in {None, k} for run in self._run_of])
+                weight = squares[own] * step[own]
+                length = float(weight @ step[own])
+                if length > 0.0:
+                    missed = residuals[k] - old[k] - 0.5 * (slopes[k] + jacobian) @ step
+                    jacobian[..., own] += missed[..., None] * (weight / length)
         self._last = z.copy(), list(residuals), list(jacobians)
 
 

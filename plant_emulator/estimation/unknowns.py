@@ -75,7 +75,8 @@ class Estimate:
 
     residuals, jacobians : one a run, shape (channels, samples) and (channels, samples, unknowns)
     cost : sum of squares of the whitened residuals, without the priors
-    covariance : of z, with the residuals' autocorrelation and the priors
+    covariance : of z, with the residuals' autocorrelation and the priors; of a rough fit that of
+        white residuals of variance 1
     information : J' J of z, from the data alone
     """
 

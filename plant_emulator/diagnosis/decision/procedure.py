@@ -84,7 +84,8 @@ class Procedure:
             found = self._test_random_effects(explained.final, explained.null) or found
         explained, runner = found
         decision = decide(model, explained)
-        if decision.kind == "unknown":
+        # Runs that agree together, but for a regularity, need no test.
+        if decide(model, replace(explained, regularities=())).kind == "unknown":
             decision = self._check_consistency(explained, decision)
         return explained, decision, runner
 
@@ -94,7 +95,9 @@ class Procedure:
         if self.disturbances is not None:
             (null,) = runner.map(refit, [Task(base=null, runs=runner.runs)])
         search = Search(declared=self.runner, runner=runner, null=null, noise=self.disturbances)
-        return _explained(search), search.runner
+        explained, runner = search.explain(), search.runner
+        (found,) = runner.map(find_regularities, [Task(base=explained.final, runs=runner.runs)])
+        return replace(explained, regularities=found), runner
 
     @property
     def _beside_lines(self) -> TaskRunner:
@@ -139,7 +142,7 @@ class Procedure:
             random_evidence=best.evidence,
             noise=self.lines,
         )
-        explained = _explained(search)
+        explained = search.explain()
         last = self._fit_random_effects(explained.final, [best.effect])
         return (replace(explained, random_effects=tuple(last)), search.runner) if last else None
 
@@ -178,13 +181,6 @@ class Procedure:
         fits = list(self._cleared.map(run_consistency.fit_alone, tasks))
         reason = run_consistency.inconsistency(self.runner.model, runs, fits)
         return replace(decision, kind="unknown", effects=(), reason=reason) if reason else decision
-
-
-def _explained(search: Search) -> Explanation:
-    """What a search finds, and the regularities of what its final fit leaves."""
-    explained, runner = search.explain(), search.runner
-    (found,) = runner.map(find_regularities, [Task(base=explained.final, runs=runner.runs)])
-    return replace(explained, regularities=found)
 
 
 def _is_random(found: FitResult) -> bool:

@@ -94,7 +94,7 @@ def decide(model: Model, explained: Explanation) -> Decision:
     if reason:
         moved = deviations(model, explained.final)
         return Decision(kind="unknown", effects=(), deviations=moved, reason=reason)
-    decision = _decide_by_fits(model, explained)
+    decision = _without_regularity(explained, _decide_by_fits(model, explained))
     if explained.random_effects and decision.kind != "unknown":
         return replace(decision, kind="effect", effects=explained.named)
     return decision
@@ -108,15 +108,24 @@ def _reason_against(explained: Explanation) -> str:
     for channel, noise in explained.noise.items():
         if noise.colour.predictable > MOST_PREDICTABLE:
             return f"what is left of {channel} follows its own past as no noise of a sensor does"
-    for one in explained.regularities:
-        if one.significant and one.squares > UNEXPLAINED_SHARE * explained.gained:
-            return f"what is left of {one.channel} {one.what}"
     if _is_structured(explained):
         return "what is left is as small as the noise, but not as random"
     if final.insignificant and not (len(final.effects) == 1 and significant(final, null)):
         name = final.insignificant[0]
         return f"it differs between the runs; {name} would do, but no size of it is certain"
     return ""
+
+
+def _without_regularity(explained: Explanation, decision: Decision) -> Decision:
+    """The decision; unknown where what is left is no noise, and no small part of the gap.
+
+    Another form of the law of an accepted effect leaves such a part.
+    """
+    for one in explained.regularities if decision.kind != "unknown" else ():
+        if one.significant and one.squares > UNEXPLAINED_SHARE * explained.gained:
+            reason = f"what is left of {one.channel} {one.what}"
+            return replace(decision, kind="unknown", effects=(), reason=reason)
+    return decision
 
 
 def _decide_by_fits(model: Model, explained: Explanation) -> Decision:

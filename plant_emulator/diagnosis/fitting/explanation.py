@@ -49,7 +49,7 @@ class Explanation:
     trace : the search in its order
     noise : of every channel as the logs show it; empty where it is as declared
     log_odds : of the final set against its best rival, in the mean square that it leaves [nats]
-    regularities : of what the final fit leaves
+    regularities : of what the final fit leaves; with random effects nobody looks for any
     """
 
     null: FitResult
@@ -66,7 +66,7 @@ class Explanation:
 
     @property
     def gained(self) -> float:
-        """Fall of the cost that the accepted effects explain [chi squared]."""
+        """Fall of the cost with the accepted effects, and evidence of the random ones [1]."""
         random = sum(one.evidence for one in self.random_effects)
         return self.null.cost - self.final.cost + random
 

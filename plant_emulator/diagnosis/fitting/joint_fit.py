@@ -102,7 +102,7 @@ def fit(
 
     iterations : at most so many; None: as many as `estimate` allows
     near : an estimate of the same runs; slopes of its unknowns follow by secants, see `estimate`.
-        The fit has no standard errors then
+        The standard errors are then those of white residuals of variance 1
     shrinkage : see `joint_unknowns`
     difference : norm of the change that slopes are taken over
     """

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.localisation.locate import locate
-from plant_emulator.diagnosis.machine import MeasuredRun
+from plant_emulator.diagnosis.machine import Course, MeasuredRun
 from plant_emulator.diagnosis.machines.bench_candidates import (
     SUBSYSTEM_OF,
     candidate,
@@ -191,12 +191,19 @@ class BenchModel:
         values = {**self.fixed_values(run, where.effects), **where.values, **state}
         return noise_directions(self._recordings[run], *split_gap_position(values))
 
-    def turns(self, run: int, effects: Sequence[str], values: Mapping[str, float]) -> Array | None:
-        """See `Model`: the angle of the gear's output, which the motor's speed tells."""
+    def course(
+        self, run: int, effects: Sequence[str], values: Mapping[str, float]
+    ) -> Course | None:
+        """See `Model`: the gear's output turns, as far as the shown motor speed takes it."""
+        everything = {**self.fixed_values(run, effects), **values}
         with suppress(UnsettledError):
-            log = self.simulated(run, {**self.fixed_values(run, effects), **values})
-            speed = log["motor_speed"] / (self._values["gear_ratio"] * 2.0 * np.pi)
-            return np.append(0.0, np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(log.time)))
+            log = self.simulated(run, everything)
+            speed = log["motor_speed"] / (everything["gear_ratio"] * 2.0 * np.pi)
+            steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(log.time)
+            return Course(
+                channels=np.stack([log[name] for name in self._recordings[run].channels]),
+                turns=np.append(0.0, np.cumsum(steps)),
+            )
         return None
 
     def nominal(self, runs: Sequence[int]) -> dict[str, float]:  # noqa: ARG002 - `Model`'s signature

@@ -264,6 +264,8 @@ class Search:
             self.reduced_costs[name] = self.sets[frozenset(rest)].cost
         found = self._settled()
         cheapest = min(self.reduced_costs, key=self.reduced_costs.__getitem__)
+        (least,) = self._fits(refit, [self.sets[frozenset(best.effects) - {cheapest}]])
+        self.reduced_costs[cheapest] = least.cost
         fall = self.reduced_costs[cheapest] - found.cost
         if found.effects != best.effects:
             return self._without_needless(found)
@@ -273,8 +275,7 @@ class Search:
         if closes and evidence_of(fall, found, self.null) >= EVIDENCE_THRESHOLD:
             return found
         self.sets = {k: one for k, one in self.sets.items() if len(k) < len(best.effects)}
-        (smaller,) = self._fits(refit, [self.sets[frozenset(best.effects) - {cheapest}]])
-        return self._without_needless(smaller)
+        return self._without_needless(least)
 
     def _log_odds(self, final: FitResult) -> float:
         """Log odds of a set against its best rival; see `summary.log_odds`."""

@@ -9,7 +9,7 @@ from plant_emulator.diagnosis.execution.pool import InProcess, Pool, TaskRunner
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.explanation import Explanation
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
-from plant_emulator.diagnosis.machine import Candidate, MeasuredRun
+from plant_emulator.diagnosis.machine import Candidate, Course, MeasuredRun
 from plant_emulator.diagnosis.search.search import Search
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.recordings.input_noise import NoiseDirections
@@ -95,9 +95,10 @@ class Line:
         """See `Model`: nothing is fed."""
         return None
 
-    def turns(self, run: int, effects: Sequence[str], values: Mapping[str, float]) -> Array | None:
+    def course(self, run: int, effects: Sequence[str], values: Mapping[str, float]) -> Course:
         """See `Model`: a line does not turn."""
-        return None
+        residual = self.residual(run, effects)(values)
+        return Course(channels=self.measured[run] - residual, turns=None)
 
     def nominal(self, runs: Sequence[int]) -> dict[str, float]:
         """See `Model`."""

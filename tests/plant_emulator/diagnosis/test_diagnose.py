@@ -11,6 +11,7 @@ from plant_emulator.diagnosis.diagnose import Diagnose, Findings
 from plant_emulator.diagnosis.execution.pool import InProcess
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.joint_fit import fit
+from plant_emulator.diagnosis.machine import Course
 from plant_emulator.diagnosis.prediction.gap import Fold, predict
 from plant_emulator.diagnosis.prediction.held_out import HeldOutRuns, Plan
 from plant_emulator.estimation import least_squares
@@ -43,9 +44,9 @@ class Unplanned(Line):
 class Turning(Line):
     """Turns twenty times, faster and faster."""
 
-    def turns(self, run: int, effects: Sequence[str], values: Mapping[str, float]) -> Array | None:
+    def course(self, run: int, effects: Sequence[str], values: Mapping[str, float]) -> Course:
         """See `Model`."""
-        return 5.0 * (TIME + 1.0) ** 2
+        return replace(super().course(run, effects, values), turns=5.0 * (TIME + 1.0) ** 2)
 
 
 class Wavy(Unplanned):

@@ -112,7 +112,7 @@ class Slope:
     ) -> NoiseDirections | None:
         return None
 
-    def turns(self, run: int, effects: Sequence[str], values: Any) -> None:
+    def course(self, run: int, effects: Sequence[str], values: Any) -> None:
         """See `Model`."""
 
     def nominal(self, runs: Sequence[int]) -> dict[str, float]:

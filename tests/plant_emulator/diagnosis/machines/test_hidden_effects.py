@@ -100,12 +100,15 @@ def test_turns_of_a_run_are_those_that_the_drum_makes(
     runs: dict[str, Recording], nominal: ParameterSet
 ) -> None:
     """By hand: the integral of the drum's speed in the log; the gear may lead by its backlash."""
-    model = BenchModel([runs["free"], runs["truck"]], nominal, {})
+    model = BenchModel([runs["free"]], nominal, {})
     log = runs["free"].log
-    turns = model.turns(0, (), {GAP_POSITION: 0.0})
+    course = model.course(0, (), {GAP_POSITION: 0.0})
+    assert course is not None
+    turns = course.turns
     assert turns is not None
     assert turns.shape == log.time.shape
+    assert course.channels.shape == model.runs[0].measured.shape
     made = np.mean(log["drum_speed"]) * np.ptp(log.time) / (2.0 * np.pi)
     assert made > 10.0
     assert turns[-1] - turns[0] == pytest.approx(made, abs=0.1)
-    assert model.turns(0, (), {GAP_POSITION: 0.0, "drum_inertia": np.nan}) is None
+    assert model.course(0, (), {GAP_POSITION: 0.0, "drum_inertia": np.nan}) is None
