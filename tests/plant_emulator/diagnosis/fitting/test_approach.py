@@ -5,7 +5,13 @@ from collections.abc import Callable
 import pytest
 
 from plant_emulator.diagnosis.fit_result import FitValues
-from plant_emulator.diagnosis.fitting.joint_fit import approach, fit, nearest
+from plant_emulator.diagnosis.fitting.joint_fit import (
+    FIRST_ITERATIONS,
+    approach,
+    fit,
+    lead,
+    nearest,
+)
 from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.model.stage import GAP_POSITION
@@ -46,7 +52,9 @@ def test_best_of_the_starts_is_led_on(model: BenchModel) -> None:
     start = nominal_start(model)
     values = {**start.values, "drum_inertia": 0.5 * start.values["drum_inertia"]}
     wrong = FitValues(effects=(), values=values, states=start.states)
-    right, other = (approach(model, [one], RUNS).values for one in (start, wrong))
+    first = [lead(model, one, RUNS, iterations=FIRST_ITERATIONS) for one in (start, wrong)]
+    assert first[0].cost < first[1].cost
+    right, other = (approach(model, [one], RUNS).values for one in first)
     assert right != other
     assert approach(model, [wrong, start], RUNS).values == right
 
