@@ -47,9 +47,9 @@ def test_another_estimator_ends_at_our_optimum(
 ) -> None:
     """lmfit's leastsq is MINPACK's Levenberg-Marquardt with its own differences.
 
-    To four digits, but for what the log says so little of that a tenth of its standard error is more
-    than that: leastsq itself ends 0.1 of it apart from the two starts, on both sides of ours. Its
-    sum of squares is not below ours by more than such a distance is worth, 0.1^2.
+    To four digits, but for what the log says so little of that a tenth of its standard error is
+    more than that: leastsq itself ends 0.1 of it apart from the two starts, on both sides of ours.
+    Its sum of squares is not below ours by more than such a distance is worth, 0.1^2.
     """
     import lmfit
 
