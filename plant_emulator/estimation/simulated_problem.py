@@ -95,6 +95,7 @@ class SimulatedProblem:
         steps = self._steps()
         for j in np.flatnonzero(differenced):
             self._difference(z, int(j), steps[j], jacobians)
+        # The first differences only tell the steps of the next ones: their slopes are not kept.
         if self.lengths is not None or self.secants.followed.any():
             self.secants.move(z, base, jacobians, ~differenced)
         self.lengths = column_lengths(jacobians)

@@ -195,15 +195,12 @@ class BenchModel:
         self, run: int, effects: Sequence[str], values: Mapping[str, float]
     ) -> Course | None:
         """See `Model`: the gear's output turns, as far as the shown motor speed takes it."""
-        everything = {**self.fixed_values(run, effects), **values}
+        every = {**self.fixed_values(run, effects), **values}
         with suppress(UnsettledError):
-            log = self.simulated(run, everything)
-            speed = log["motor_speed"] / (everything["gear_ratio"] * 2.0 * np.pi)
-            steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(log.time)
-            return Course(
-                channels=np.stack([log[name] for name in self._recordings[run].channels]),
-                turns=np.append(0.0, np.cumsum(steps)),
-            )
+            log = self.simulated(run, every)
+            speed = log["motor_speed"] / (every["gear_ratio"] * 2.0 * np.pi)
+            turns = np.append(0.0, np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(log.time)))
+            return Course(channels=np.stack([log[c] for c in self.runs[run].channels]), turns=turns)
         return None
 
     def nominal(self, runs: Sequence[int]) -> dict[str, float]:  # noqa: ARG002 - `Model`'s signature
