@@ -65,7 +65,8 @@ class MeasuredRun:
     noise : standard deviation of each channel's noise [units], shape (channels,)
     noise_ratio : deviation of each sample's noise over its channel's [1], shape (channels, n);
         (channels, 1) where all samples are alike
-    measured_input : whether an input of the simulation is a measurement with noise of its own
+    uncertain_inputs : whether an input of the simulation is a measurement with noise of its own, or
+        is not known in a hole of the log
     hides : effects that an unknown input of the run explains, or that need an input it lacks
     """
 
@@ -76,7 +77,7 @@ class MeasuredRun:
     measured: Array
     noise: Array
     noise_ratio: Array
-    measured_input: bool = False
+    uncertain_inputs: bool = False
     hides: frozenset[str] = frozenset()
 
 

@@ -1,19 +1,20 @@
 """Holes of a log, bridged so that the simulation goes on through them (pure).
 
 A hole gets regular rows. The rows do not count, but the simulation has to know there what the bench
-was asked to do. The reference is continued from both sides as straight lines. They meet at the
-corner that the hole hides. Where they do not meet within the hole, or the reference beside it is
-curved, the reference is straight.
+was asked to do. Each input is continued from both sides as straight lines. They meet at the corner
+that the hole hides. Where they do not meet within the hole, or the input beside it is curved or
+noisy, the input is straight, and the log tells how far it may be off (`INPUT_ERRORS`).
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
-from plant_emulator.signals.log import KNEE_TIME, KNEES
+from plant_emulator.signals.log import INPUT_ERRORS, KNEE_TIME, KNEES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -31,9 +32,13 @@ if TYPE_CHECKING:
 SHORTEST_HOLE, SHORTEST_WITH_KNEES = 1.75, 5.5
 # Intervals beside a hole that its lines are laid through.
 BESIDE = 10
-# Lines count that differ from the straight reference in the hole by so many times what they miss
+# Lines count that differ from the straight input in the hole by so many times what they miss
 # beside it. Beside a parabola that is 1.7 times in one lost row, and 4.2 times in five.
 STRAIGHT = 5.0
+# Rounding of an input over its range [1]: it tells of no bend.
+ROUNDING = 1e-6
+# Standard deviation of a uniform distribution over its width.
+UNIFORM = 12.0**-0.5
 
 
 def bridge_holes(log: Log, use: Use) -> tuple[Log, Use]:
@@ -49,12 +54,12 @@ def bridge_holes(log: Log, use: Use) -> tuple[Log, Use]:
     whole = np.concatenate([time, inserted])[order]
     logged = order < len(time)
     signals = {name: np.interp(whole, time, values) for name, values in log.signals.items()}
-    if "wheel_torque" not in log:
+    for name, error in ((name, error) for name, error in INPUT_ERRORS.items() if name in log):
+        signals[error] = np.zeros(len(whole))
         for k in holes:
             within = (whole > time[k]) & (whole < time[k + 1])
-            reference = log["speed_reference"]
-            signals["speed_reference"][within] = _continue_reference(
-                time, reference, int(k), whole[within]
+            signals[name][within], signals[error][within] = _continue_input(
+                time, log[name], int(k), whole[within]
             )
     for knee_time, _ in KNEES:
         if knee_time in log:  # a knee of 0 s is none: the reference is straight in the hole
@@ -72,23 +77,45 @@ def _regular(first: float, last: float, interval: float) -> Array:
     return np.linspace(first, last, count + 2)[1:-1]
 
 
-def _continue_reference(time: Array, reference: Array, hole: int, at: Array) -> Array:
-    """The reference in the hole behind a sample, at these times."""
+def _continue_input(time: Array, values: Array, hole: int, at: Array) -> tuple[Array, float]:
+    """An input in the hole behind a sample, at these times, and its standard deviation there.
+
+    Where the line from one side meets neither that of the other nor the sample there, the input may
+    have changed at any time in the hole.
+    """
+    straight = np.interp(at, time, values)
     before = slice(max(0, hole - BESIDE), hole + 1)
     after = slice(hole + 1, hole + 2 + BESIDE)
-    start, end = time[hole], time[hole + 1]
     if min(len(time[before]), len(time[after])) < 2:
-        return np.interp(at, time, reference)
-    first = np.polyfit(time[before] - start, reference[before], 1)
-    second = np.polyfit(time[after] - start, reference[after], 1)
-    turn = first[0] - second[0]
-    corner = (second[1] - first[1]) / turn if turn != 0.0 else -1.0
-    if not 0.0 < corner < end - start:
-        return np.interp(at, time, reference)
-    since, straight = at - start, np.interp(at, time, reference)
-    line = np.where(since < corner, np.polyval(first, since), np.polyval(second, since))
-    bend = max(
-        float(np.abs(np.polyval(own, time[side] - start) - reference[side]).max())
-        for own, side in ((first, before), (second, after))
-    )
-    return np.asarray(line if np.abs(line - straight).max() > STRAIGHT * bend else straight)
+        return straight, UNIFORM * abs(float(values[hole + 1] - values[hole]))
+    first = _Line.beside(time, values, before, hole + 1)
+    second = _Line.beside(time, values, after, hole)
+    bend = max(first.bend, second.bend)
+    meet = (second.line - first.line).roots()
+    for corner in meet[(time[hole] < meet) & (meet < time[hole + 1])]:
+        bent = np.where(at < corner, first.line(at), second.line(at))
+        if np.abs(bent - straight).max() > STRAIGHT * bend:
+            return bent, bend if bend > ROUNDING * np.ptp(values) else 0.0
+    return straight, UNIFORM * min(first.missed, second.missed)
+
+
+@dataclass(frozen=True)
+class _Line:
+    """The line through an input on one side of a hole.
+
+    bend : most that it misses there; missed : of the sample across the hole; 0: no more than a line
+        that is laid through the bend may miss so far away
+    """
+
+    line: Polynomial
+    bend: float
+    missed: float
+
+    @classmethod
+    def beside(cls, time: Array, values: Array, side: slice, across: int) -> _Line:
+        """The line on this side; across : the sample on the other one."""
+        line = Polynomial.fit(time[side], values[side], 1).convert()
+        bend = max(np.abs(line(time[side]) - values[side]).max(), ROUNDING * np.ptp(values))
+        missed = abs(line(time[across]) - values[across])
+        away = np.abs(time[side] - time[across]).max() / np.ptp(time[side])
+        return cls(line, float(bend), float(missed) if missed > away * bend else 0.0)

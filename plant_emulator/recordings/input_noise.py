@@ -20,6 +20,7 @@ whole run, and the covariance of an estimate takes them from the residual itself
 
 A wheel torque that nobody measured is estimated (`wheel_torque`). The error of the estimate is such
 an input noise, with a large standard deviation. What it could explain tells nothing of the machine.
+So is what is not known of an input in a hole of the log (`holes`).
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from scipy.sparse import block_diag, csr_array
 
 from plant_emulator.errors import UnsettledError
 from plant_emulator.recordings.wheel_torque import ERROR, ERROR_WINDOW
-from plant_emulator.signals.log import WHEEL_TORQUE
+from plant_emulator.signals.log import INPUT_ERRORS, WHEEL_TORQUE
 from plant_emulator.signals.noise import noise
 
 if TYPE_CHECKING:
@@ -83,7 +84,7 @@ class NoiseDirections:
 def noise_directions(
     recording: Recording, values: Mapping[str, float], gap_position: float
 ) -> NoiseDirections | None:
-    """Directions of the residual that the noise of the wheel torque disturbs; None: it has none.
+    """Directions of the residual that what is unknown of the inputs disturbs; None: there are none.
 
     values : of the model [SI]; gap_position : at the start of the run, -1 to 1
 
@@ -91,28 +92,24 @@ def noise_directions(
     Windows that are too far apart to meet in a stretch are simulated together. The response to one
     window must end within INPUT_MEMORY; a rest of it would add to the response to the next window.
     """
-    if not recording.inputs.truck:
+    if not recording.uncertain_inputs:
         return None
     try:
         base = recording.strict_residual(values, gap_position, DIRECTION_TOLERANCE)
     except UnsettledError:
         return None
-    length, step, deviation = _window(recording)
+    length = _window(recording)
     window = length * recording.inputs.interval
     stretch, memory = (length * round(span / window) for span in (STRETCH, INPUT_MEMORY))
     answers = [
-        deviation / step * _answer(recording.with_wheel_torque(torque), values, gap_position, base)
-        for torque in _disturbed_torques(recording, length, step, stretch + memory)
+        factor * _answer(disturbed, values, gap_position, base)
+        for disturbed, factor in (
+            *_disturbed_torques(recording, length, stretch + memory),
+            *_disturbed_holes(recording),
+        )
     ]
     if not answers:
         return None
-    if recording.estimated_torque:
-        answers += [
-            deviation
-            / step
-            * _answer(recording.with_wheel_torque(torque), values, gap_position, base)
-            for torque in _slowly_disturbed_torques(recording, step)
-        ]
     parts = [
         _strongest([answer[:, first : first + stretch] for answer in answers])
         for first in range(0, base.shape[1], stretch)
@@ -125,31 +122,10 @@ def noise_directions(
     )
 
 
-def _slowly_disturbed_torques(recording: Recording, step: float) -> list[Array]:
-    """Wheel torques that are off by a step for a second, one for each, and for the whole run.
-
-    A wrong friction makes such an error. Independent windows would hardly have one together, and
-    after a flight through the gap the response to it is not the sum of theirs.
-    """
-    run = recording.inputs
-    acts = np.logical_not(run.parked)
-    second = (run.time - run.time[0]) // TORQUE_ERROR_TIME
-    masks = [acts & (second == k) for k in np.unique(second)]
-    return [run.wheel_torque + step * mask for mask in (*masks, acts) if mask.any()]
-
-
-def _window(recording: Recording) -> tuple[int, float, float]:
-    """Samples of a window, change of its mean to simulate, and its standard deviation [N m].
-
-    An unknown torque may be off by far more than what the response is linear in.
-    """
-    measured = not recording.estimated_torque
-    span = NOISE_WINDOW if measured else ERROR_WINDOW
-    length = max(1, round(span / recording.inputs.interval))
-    if measured:
-        deviation = noise(recording.log[WHEEL_TORQUE]) / np.sqrt(length)
-        return length, deviation, deviation
-    return length, ERROR_STEP, ERROR
+def _window(recording: Recording) -> int:
+    """Samples of a window."""
+    span = ERROR_WINDOW if recording.estimated_torque else NOISE_WINDOW
+    return max(1, round(span / recording.inputs.interval))
 
 
 def _answer(
@@ -165,19 +141,66 @@ def _answer(
         return np.zeros_like(base)
 
 
-def _disturbed_torques(recording: Recording, length: int, step: float, every: int) -> list[Array]:
-    """Wheel torques in which one window of every so many samples is off by a step [N m].
+def _disturbed_torques(
+    recording: Recording, length: int, every: int
+) -> list[tuple[Recording, float]]:
+    """The recording with a wheel torque that is off, and the error's deviation over the change.
 
-    The first torque changes every first window, the next one every second window, and so on. Only
-    samples change at which the truck is not parked and that a counting sample follows.
+    In each, one window of every so many samples is off by a step: the first of them, the second
+    one, and so on. Only samples change at which the truck is not parked and that a counting sample
+    follows. An unknown torque may be off by far more than what the response is linear in, and for a
+    second or the whole run as well: a wrong friction makes such an error. Independent windows would
+    hardly have one together, and after a flight through the gap the response to it is not the sum
+    of theirs.
+
     length : of a window [samples]; every : distance of the changed windows [samples]
     """
     run = recording.inputs
+    if not run.truck:
+        return []
     places = np.arange(len(run.time))
     last = np.flatnonzero(recording.use.any(axis=0)).max(initial=-1)
-    acts = np.logical_not(run.parked) & (places <= last)
-    masks = [(places % every // length == k) & acts for k in range(every // length)]
-    return [run.wheel_torque + step * mask for mask in masks if mask.any()]
+    acts = np.logical_not(run.parked)
+    masks = [
+        (places % every // length == k) & acts & (places <= last) for k in range(every // length)
+    ]
+    step = deviation = noise(recording.log[WHEEL_TORQUE]) / np.sqrt(length)
+    if recording.estimated_torque:
+        step, deviation = ERROR_STEP, ERROR
+        second = (run.time - run.time[0]) // TORQUE_ERROR_TIME
+        masks += [acts & (second == k) for k in np.unique(second)]
+        masks.append(acts)
+    return [
+        (recording.with_wheel_torque(run.wheel_torque + step * mask), deviation / step)
+        for mask in masks
+        if mask.any()
+    ]
+
+
+def _disturbed_holes(recording: Recording) -> list[tuple[Recording, float]]:
+    """The recording with an input that is off by its standard deviation in holes, as above.
+
+    Holes that are too far apart to meet in a stretch are in one of them. An input is off both ways,
+    with half of the variance each, because a contact that comes early is no mirror of a late one.
+    """
+    found = []
+    for name, error in INPUT_ERRORS.items():
+        deviation = recording.log[error] if error in recording.log else np.zeros(1)
+        rows = np.flatnonzero(deviation)
+        holes = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1) if len(rows) else []
+        together: list[list[int]] = []
+        for hole in holes:
+            start = recording.inputs.time[hole[0]] - STRETCH - INPUT_MEMORY
+            free = (one for one in together if recording.inputs.time[one[-1]] < start)
+            joined = next(free, None)
+            if joined is None:
+                together.append(joined := [])
+            joined.extend(hole)
+        for one in together:
+            off = np.zeros(len(deviation))
+            off[one] = deviation[one]
+            found += [(recording.with_input_off(name, way * off), 0.5**0.5) for way in (1.0, -1.0)]
+    return found
 
 
 def _strongest(answers: Sequence[Array]) -> tuple[Array, Array]:

@@ -12,8 +12,10 @@ from numpy.lib.stride_tricks import sliding_window_view
 from plant_emulator.errors import IdentificationError, UnsettledError
 from plant_emulator.recordings.wheel_torque import is_estimated
 from plant_emulator.signals.log import (
+    INPUT_ERRORS,
     TIMING_ERROR,
     VOLTAGE,
+    WHEEL_TORQUE,
     Array,
     Log,
     compared_channels,
@@ -63,6 +65,12 @@ class Recording:
     def estimated_torque(self) -> bool:
         """Whether a truck's wheel torque is unknown, and its input an estimate."""
         return is_estimated(self.log)
+
+    @property
+    def uncertain_inputs(self) -> bool:
+        """Whether an input is a measurement with noise of its own, or not known in a hole."""
+        unknown = (e for e in INPUT_ERRORS.values() if e in self.log)
+        return self.inputs.truck or any(bool(self.log[error].any()) for error in unknown)
 
     @property
     def noise_ratio(self) -> Array:
@@ -183,6 +191,16 @@ class Recording:
     def with_wheel_torque(self, wheel_torque: Array) -> Recording:
         """The recording with another wheel torque as its input [N m], shape (n,)."""
         return replace(self, inputs=replace(self.inputs, wheel_torque=wheel_torque))
+
+    def with_input_off(self, name: str, off: Array) -> Recording:
+        """The recording with an input that is off by this [SI], shape (n,)."""
+        run = self.inputs
+        if name == WHEEL_TORQUE:
+            return self.with_wheel_torque(run.wheel_torque + off)
+        nodes = run.nodes
+        if nodes is not None:
+            nodes = (nodes[0], nodes[1] + np.interp(nodes[0], run.time, off))
+        return replace(self, inputs=replace(run, reference=run.reference + off, nodes=nodes))
 
 
 def voltage_errors(voltage: Array) -> Array:

@@ -30,6 +30,9 @@ KNEES = (
     ("reference_knee_2_time", "reference_knee_2"),
     ("reference_knee_3_time", "reference_knee_3"),
 )
+# Signals that act on the bench, and the standard deviation of what is not known of them in a hole
+# of the log [SI]: the same at all of its rows, and 0 elsewhere.
+INPUT_ERRORS = {"speed_reference": "speed_reference_error", WHEEL_TORQUE: "wheel_torque_error"}
 # Standard deviation of what is not known of the time that a row was taken at [s].
 TIMING_ERROR = "timing_error"
 # A channel that moves by less than this share of its largest value shows rounding only [1].

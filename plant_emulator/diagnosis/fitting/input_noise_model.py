@@ -31,7 +31,7 @@ def whiten_inputs(runner: TaskRunner) -> tuple[TaskRunner, FitResult | None]:
     The runner stays as it is where no input of the fitted runs is measured, or where the noise of
     the inputs does not count. The fit is None where none was needed to know that.
     """
-    if not any(runner.model.runs[run].measured_input for run in runner.runs):
+    if not any(runner.model.runs[run].uncertain_inputs for run in runner.runs):
         return runner, None
     (null,) = runner.map(start, [runner.runs])
     (found,) = runner.map(find_input_noise, [Task(base=null, runs=runner.runs)])
@@ -54,7 +54,7 @@ def find_input_noise(model: Model, task: Task) -> dict[int, NoiseDirections]:
             k, base, states.get(k) or model.initial_states(k, base.effects, base.values)
         )
         for k, run in enumerate(model.runs)
-        if run.measured_input
+        if run.uncertain_inputs
     }
     return {run: noise for run, noise in found.items() if noise is not None}
 

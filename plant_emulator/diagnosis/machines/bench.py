@@ -116,7 +116,7 @@ class BenchModel:
                 measured=np.stack([r.log[name] for name in r.channels]),
                 noise=r.noise,
                 noise_ratio=r.noise_ratio,
-                measured_input=r.inputs.truck,
+                uncertain_inputs=r.uncertain_inputs,
                 hides=own,
             )
             for r, own in zip(recordings, hides, strict=True)

@@ -63,6 +63,40 @@ def test_hole_in_a_straight_stretch_stays_straight() -> None:
     assert log["speed_reference"] == pytest.approx(reference(TIME))
 
 
+@pytest.mark.parametrize(("first", "last"), [(3.7, 4.2), (6.0, 6.5), (1.0, 1.5), (3.99, 4.01)])
+def test_hole_that_lines_bridge_hides_nothing(first: float, last: float) -> None:
+    log, _ = bridged(first, last)
+    assert not log["speed_reference_error"].any()
+
+
+def test_input_that_moved_in_a_hole_is_uncertain_by_a_uniform_time() -> None:
+    """It went from 0 to 6 at a time that nobody knows: 6 over the square root of 12."""
+    kept = (TIME <= 3.7) | (TIME >= 4.2)
+    torque = np.where(TIME < 4.0, 0.0, 6.0)
+    signals = {"speed_reference": reference(TIME)[kept], "wheel_torque": torque[kept]}
+    log, _ = bridge_holes(Log(TIME[kept], signals), {})
+    within = (log.time > 3.705) & (log.time < 4.195)
+    assert log["wheel_torque_error"][within] == pytest.approx(6.0 / 12.0**0.5)
+    assert not log["wheel_torque_error"][~within].any()
+
+
+def test_noise_of_an_input_is_no_move() -> None:
+    torque = 70.0 + np.random.default_rng(3).standard_normal(len(TIME))
+    kept = np.ones(len(TIME), bool)
+    kept[50::97] = False
+    signals = {"speed_reference": reference(TIME)[kept], "wheel_torque": torque[kept]}
+    log, _ = bridge_holes(Log(TIME[kept], signals), {})
+    assert np.all(np.abs(log["wheel_torque_error"]) < 1.5)
+
+
+def test_wheel_torque_gets_its_corner_back() -> None:
+    torque = np.minimum(0.0, -1000.0 * (TIME - 4.0))
+    kept = (TIME <= 3.7) | (TIME >= 4.2)
+    signals = {"speed_reference": reference(TIME)[kept], "wheel_torque": torque[kept]}
+    log, _ = bridge_holes(Log(TIME[kept], signals), {})
+    assert log["wheel_torque"] == pytest.approx(torque, abs=1e-6)
+
+
 def test_rows_that_are_there_stay_as_they_are() -> None:
     log, use = bridged(3.7, 4.2)
     whole = holed(3.7, 4.2)

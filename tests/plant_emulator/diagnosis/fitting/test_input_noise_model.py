@@ -25,7 +25,7 @@ class Fed(Line):
 
     def __init__(self, measured: Sequence[Array]) -> None:
         super().__init__(measured)
-        self.runs = [replace(run, measured_input=True) for run in self.runs]
+        self.runs = [replace(run, uncertain_inputs=True) for run in self.runs]
 
     def input_noise(
         self, run: int, where: FitResult, state: Mapping[str, float]
