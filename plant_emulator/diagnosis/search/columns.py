@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     States = Sequence[Mapping[str, float]]
 
 
+# Trials of a size that a limit begins to act at, and the share of it that is close enough.
+ONSET_TRIALS, CLOSE = 7, 0.7
 # Norm of a change that the noise hides [1]: a limit that is only touched says nothing of its size.
 HIDDEN_NORM = 1.0
 
@@ -49,12 +51,14 @@ class Score:
     gain : of log evidence
     values, states : of the effect, and of each run, where a fit may start
     theta : nuisance coefficients there
+    factor : largest coefficient of a column [1]
     """
 
     gain: float
     values: Mapping[str, float]
     states: tuple[Mapping[str, float], ...]
     theta: Array
+    factor: float
 
 
 def best_score(
@@ -70,6 +74,33 @@ def best_score(
             columns = list(_columns(fidelity, candidate, sign * size, states))
             if columns:
                 found.append(_score(fidelity, candidate, sign * size, columns, states))
+    return max(filter(None, found), key=lambda one: one.gain, default=None)
+
+
+def onset_score(
+    fidelity: Fidelity, candidate: Candidate, sizes: Sequence[float], states: States
+) -> Score | None:
+    """Score of an effect that shows nothing at the first size; None: nor at a larger one.
+
+    A limit does nothing up to some size, and soon far more than the data hold. Bisection finds the
+    size at whose column the regression finds that size itself.
+
+    sizes : ascending
+    """
+    found = []
+    for sign in signs(candidate.sizes):
+        (low, size), larger, high = sizes[:2], iter(sizes[2:]), 0.0
+        for _ in range(ONSET_TRIALS):
+            columns = list(_columns(fidelity, candidate, sign * size, states))
+            score = _score(fidelity, candidate, sign * size, columns, states) if columns else None
+            found.append(score)
+            if columns and (score is None or score.factor < 1.0):
+                high = size
+            else:
+                low = size
+            size = float(np.sqrt(low * high)) if high else next(larger, 0.0)
+            if size == 0.0 or (score is not None and CLOSE < score.factor < 1.0 / CLOSE):
+                break
     return max(filter(None, found), key=lambda one: one.gain, default=None)
 
 
@@ -116,7 +147,8 @@ def _score(
     beta[keep] = mean
     values, own = _estimate(candidate, size, columns, beta, states)
     theta = fidelity.data.theta(products, beta)
-    return Score(gain=value, values=values, states=own, theta=theta)
+    factor = float(beta.max())
+    return Score(gain=value, values=values, states=own, theta=theta, factor=factor)
 
 
 def _estimate(

@@ -18,6 +18,7 @@ from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.fitting.task import Task
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.search.promise import Start
 
@@ -55,6 +56,19 @@ def confirm(model: Model, trial: Trial) -> FitResult:
         for one in ([near, own] if several and near is not own else [near])
     ]
     return min(found, key=lambda one: one.cost)
+
+
+def without_effects(model: Model, pair: tuple[FitResult, Task]) -> FitResult:
+    """The fit without effects, anew from one with effects whose values leave less (a step).
+
+    Far from the data a fit may end in a local minimum. The freedom of any effect leads out of it.
+
+    pair : the fit without effects, and a task with the other fit
+    """
+    known, task = pair
+    start = FitValues(effects=(), values=task.base.values, states=task.base.states)
+    near = nearest(model, [start], task.runs, known.mean_square)
+    return known if near is None else fit(model, (), task.runs, near.values, near.states)
 
 
 def _values(trial: Trial, start: Start) -> FitValues:

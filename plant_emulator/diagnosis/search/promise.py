@@ -23,11 +23,14 @@ class Start:
 
 @dataclass(frozen=True, kw_only=True)
 class Promise:
-    """Gain of log evidence of one more effect, by each score: predicted, or reached by a fit."""
+    """Gain of log evidence of one more effect, by each score: predicted, or reached by a fit.
+
+    starts : of a fit, by score; none where the effect shows nothing
+    """
 
     effect: str
     gains: Mapping[str, float]
-    starts: tuple[Start, ...]
+    starts: Mapping[str, Start]
 
     @property
     def gain(self) -> float:
@@ -38,16 +41,23 @@ class Promise:
 def starts_of(promise: Promise, base: FitResult) -> tuple[Start, ...]:
     """Starts of an effect on top of a fit, and one with the parameters and states of that fit.
 
-    An estimate moves all unknowns at once, and may miss contact by that.
+    An estimate moves all unknowns at once, and may miss contact by that. One that gains far less
+    than another is no start: a limit at a size that it does not act at stays there.
     """
+    order = sorted(promise.starts, key=lambda score: -promise.gains[score])
+    told = [
+        promise.starts[score]
+        for score in order
+        if score == order[0] or promise.gains[score] > SETTINGS.rival_share * promise.gain
+    ]
     kept = [
         Start(
             values={**one.values, **base.values},
             states=tuple({**own, **fit} for own, fit in zip(one.states, base.states, strict=True)),
         )
-        for one in promise.starts[:1]
+        for one in told[:1]
     ]
-    return (*promise.starts, *kept)
+    return (*told, *kept)
 
 
 def leading(

@@ -17,7 +17,7 @@ from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.joint_fit import CORRECTION_INTERVALS, LED_DIFFERENCE
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.fitting.task import Task
-from plant_emulator.diagnosis.search.columns import best_score
+from plant_emulator.diagnosis.search.columns import best_score, onset_score
 from plant_emulator.diagnosis.search.promise import Promise, Start
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.simulation_columns import SimulationColumns
@@ -112,11 +112,11 @@ def regressions(
     ]
     found: dict[str, Promise] = {}
     for one in (one for some in runner.map(screen, asked) for one in some):
-        known = found.get(one.effect, Promise(effect=one.effect, gains={}, starts=()))
+        known = found.get(one.effect, Promise(effect=one.effect, gains={}, starts={}))
         found[one.effect] = Promise(
             effect=one.effect,
             gains={**known.gains, **one.gains},
-            starts=(*known.starts, *one.starts),
+            starts={**known.starts, **one.starts},
         )
     return sorted(found.values(), key=lambda p: -p.gain)
 
@@ -141,7 +141,7 @@ def screen(model: Model, asked: Screening) -> list[Promise]:
             Promise(
                 effect=name,
                 gains={asked.fidelity: 0.0 if score is None else score.gain},
-                starts=() if score is None else (_start(fidelity, score, base),),
+                starts={} if score is None else {asked.fidelity: _start(fidelity, score, base)},
             )
             for name, score in _scores(library, fidelity, sizes, asked.states).items()
         ]
@@ -215,17 +215,23 @@ def _scores(
     sizes: Sequence[float],
     states: Mapping[str, Sequence[Mapping[str, float]]],
 ) -> dict[str, Score | None]:
-    """Scores of all effects at the first size, and of the best effects at the other sizes."""
+    """Scores of all effects at the first size, and of the best effects at the other sizes.
+
+    An effect that shows nothing at the first size may be a limit; see `onset_score`.
+    """
     found = {
         name: best_score(fidelity, candidate, sizes[:1], states[name])
         for name, candidate in library.items()
     }
     if len(sizes) > 1:
-        order = sorted(found, key=lambda name: -_gain(found[name]))
         silent = [name for name, score in found.items() if score is None]
-        for name in dict.fromkeys((*order[: SETTINGS.tried_further], *silent)):
+        order = sorted(found.keys() - set(silent), key=lambda name: -_gain(found[name]))
+        for name in order[: SETTINGS.tried_further]:
             more = best_score(fidelity, library[name], sizes[1:], states[name])
             found[name] = max((found[name], more), key=_gain)
+        upward = [size for size in sizes if size >= sizes[0]]
+        for name in silent:
+            found[name] = onset_score(fidelity, library[name], upward, states[name])
     return found
 
 

@@ -1,9 +1,8 @@
 """Searches the set of effects of largest log evidence: expand the best set, then drop the needless.
 
 The log evidence of a set is half the fall of its penalised cost, less the gain that each of its
-effects needs. The best set is expanded by the effects of largest gain, predicted or by secants,
-until it leaves only noise or no gain is large enough. An effect beside an approximate law needs so
-much more gain as the error of this law may feign (`law_error`).
+effects needs. The best set is expanded by the effects of largest gain until it leaves only noise or
+no gain is large enough. Beside an approximate law, its error (`law_error`) must be gained as well.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from plant_emulator.diagnosis.fitting.evidence import (
 from plant_emulator.diagnosis.fitting.explanation import Explanation
 from plant_emulator.diagnosis.fitting.fit_steps import refit
 from plant_emulator.diagnosis.fitting.task import Task
-from plant_emulator.diagnosis.search.confirmation import Trial, confirm
+from plant_emulator.diagnosis.search.confirmation import Trial, confirm, without_effects
 from plant_emulator.diagnosis.search.law_error import LawErrors
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
 from plant_emulator.diagnosis.search.promise import Start, leading, starts_of
@@ -36,6 +35,7 @@ from plant_emulator.diagnosis.search.summary import (
     hypotheses,
     log_odds,
     not_told_apart,
+    regressions_tell,
     search_step,
     unconverged,
 )
@@ -164,7 +164,7 @@ class Search:
     def _expand(self, base: FitResult) -> None:
         """Fit the effects of largest gain on top of a set.
 
-        Regressions predict it; the leader of each is fitted until one leaves little, and then its
+        Regressions predict it; the leader of each is fitted until one leaves little, then its
         rivals. Where a set leaves more than the noise, or no leader is the cause, secants tell.
         """
         least = self._needed(base) if base.effects else SETTINGS.promising
@@ -174,9 +174,11 @@ class Search:
                 fits = self._confirm(base, [one], SETTINGS.leader_iterations)
                 best = min((best, *fits), key=lambda fit: fit.cost)
                 tried.append(one.effect)
-                if best is not base and self._little(best):
+                if best is not base and regressions_tell(best, self.null):
                     break
-            if self._little(best):
+            if not base.effects and best is not base and self._renew_null(best):
+                return
+            if regressions_tell(best, self.null):
                 most = SETTINGS.rivals_beside if base.effects else SETTINGS.rivals
                 self._confirm(base, leading(found, most, least, tried), SETTINGS.iterations)
                 return
@@ -189,20 +191,23 @@ class Search:
                 (known,) = self._confirm(base, [one], SETTINGS.leader_iterations)
             reached = max(reached, 0.5 * (base.cost - known.cost))
 
-    def _little(self, found: FitResult) -> bool:
-        """Whether a set leaves so little that regressions can choose its rivals."""
-        if len(found.effects) > 1:
-            return found.mean_square <= NOISE_MEAN_SQUARE
-        return found.mean_square <= SETTINGS.linear_mean_square or adequate(found, self.null)
+    def _renew_null(self, found: FitResult) -> bool:
+        """Fit without effects anew from a fit with some; give whether that leaves less."""
+        (null,) = self.runner.map(without_effects, [(self.null, self._task(found))])
+        if null.cost > self.null.cost - EVIDENCE_THRESHOLD:
+            return False
+        self.null = self.sets[frozenset()] = null
+        self.promises.pop(frozenset())
+        self.expanded.discard(frozenset())
+        self.trace.append(search_step(null, "fitted anew", null))
+        return True
 
-    def _confirm(
-        self, base: FitResult, promises: Sequence[Promise], iterations: int | None = None
-    ) -> list[FitResult]:
+    def _confirm(self, base: FitResult, new: Sequence[Promise], iterations: int) -> list[FitResult]:
         """Fit these effects on top of a set, each for at most so many iterations."""
         runs, own = self.runner.runs, base.effects
-        trials = [Trial((*own, p.effect), runs, starts_of(p, base), iterations) for p in promises]
+        trials = [Trial((*own, p.effect), runs, starts_of(p, base), iterations) for p in new]
         found = list(self.runner.map(confirm, trials))
-        for promise, one in zip(promises, found, strict=True):
+        for promise, one in zip(new, found, strict=True):
             self._keep(one)
             self.trace.append(search_step(self.null, "confirmed", one, promise.gains))
         return found
@@ -277,23 +282,19 @@ class Search:
         self.sets = {k: one for k, one in self.sets.items() if len(k) < len(best.effects)}
         return self._without_needless(least)
 
-    def _log_odds(self, final: FitResult) -> float:
-        """Log odds of a set against its best rival; see `summary.log_odds`."""
-        screened = self.promises.get(frozenset(final.effects), [])
-        values = {key: self._value(one) for key, one in self.sets.items()}
-        larger = {p.effect: self._needed(final) - p.gain for p in screened}
-        return log_odds(self.sets, values, final, larger)
-
     def _explanation(self, final: FitResult) -> Explanation:
         (shown,) = self.runner.map(visibilities, [self._task(self.null)])
+        values = {key: self._value(one) for key, one in self.sets.items()}
+        screened = self.promises.get(frozenset(final.effects), [])
+        larger = {p.effect: self._needed(final) - p.gain for p in screened}
         return Explanation(
             null=self.null,
             final=final,
             hypotheses=hypotheses(self.sets, shown),
             alternatives={name: alternatives(self.sets, final, name) for name in final.effects},
             unconverged=unconverged(final),
-            log_odds=self._log_odds(final),
-            reduced_costs=self.reduced_costs if len(final.effects) > 1 else {},
+            log_odds=log_odds(self.sets, values, final, larger),
+            reduced_costs=self.reduced_costs,
             trace=tuple(self.trace),
             noise=self.noise.channels if self.noise else {},
         )

@@ -64,7 +64,7 @@ def fitted_promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
     library = visible(runner.model, base, runner.runs)
     names, with_states = tuple(library), [n for n, c in library.items() if c.states]
     found = regressions(runner, base, with_states, (OBSERVER,))
-    states = {p.effect: p.starts[0].states for p in found if p.starts}
+    states = {p.effect: p.starts[OBSERVER].states for p in found if p.starts}
     for iterations in SETTINGS.secant_iterations:
         parts = [
             SecantFits(base, runner.runs, names[k::PARTS], states, iterations)
@@ -109,7 +109,7 @@ def _promise(model: Model, asked: SecantFits, name: str, near: Estimate) -> Prom
     )
     start = Start(values=found.values, states=found.states)
     gain = 0.5 * (base.cost - found.cost)
-    return Promise(effect=name, gains={SECANTS: gain}, starts=(start,))
+    return Promise(effect=name, gains={SECANTS: gain}, starts={SECANTS: start})
 
 
 def _sizes(candidate: Candidate) -> tuple[float, ...]:

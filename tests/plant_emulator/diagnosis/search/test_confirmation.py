@@ -8,8 +8,10 @@ import pytest
 
 from plant_emulator.diagnosis.execution.pool import TaskRunner
 from plant_emulator.diagnosis.fit_result import FitResult
+from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
+from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search import search
-from plant_emulator.diagnosis.search.confirmation import Trial, confirm
+from plant_emulator.diagnosis.search.confirmation import Trial, confirm, without_effects
 from plant_emulator.diagnosis.search.promise import Promise, Start
 from plant_emulator.diagnosis.search.screening import promises
 from tests.plant_emulator.diagnosis.line import TIME, Line, explained, noisy
@@ -35,6 +37,20 @@ def test_plausible_size_is_a_start_only_where_all_starts_are_far(size: float, as
     found = confirm(model, Trial(("wave",), (0,), (start,)))
     assert model.asked == asked
     assert found.values["wave_size"] == pytest.approx(4.0, abs=0.1)
+
+
+@pytest.mark.parametrize("size", [0.1, 4.0])
+def test_fit_without_effects_starts_anew_only_where_that_leaves_less(size: float) -> None:
+    """A wave of 4 is the cause, and its values leave 9 without it. One of 0.1 led there by luck."""
+    y = 2.0 + 3.0 * TIME + size * np.sin(20.0 * TIME)
+    model = Line([noisy(y)])
+    null = fit_null(model, (0,))
+    other = fit(model, ("wave",), (0,), {**null.values, "wave_size": size}, [{}])
+    known = replace(null, values={"a": 3.0, "b": 3.0}, sum_of_squares=2.0 * null.samples)
+    found = without_effects(model, (known, Task(base=other, runs=(0,))))
+    assert (found is known) == (size == 4.0)
+    assert found.effects == ()
+    assert size == 4.0 or found.cost == pytest.approx(null.cost)
 
 
 def test_leaders_of_each_regression_are_fitted_until_one_leaves_little(

@@ -41,6 +41,25 @@ def test_planted_effect_is_named_with_its_size() -> None:
     assert found.classes() == [["wave"]]
 
 
+def test_fit_without_effects_that_ended_far_off_is_fitted_anew(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It ends at a = 4 for 2, which a wave is tried for. With a = 2 nothing is left."""
+    model = Line([noisy(2.0 + 3.0 * TIME)])
+    right = fit_null(model, (0,))
+    values = {**right.values, "a": 4.0}
+    squares = float(np.sum(model.residual(0, ())(values) ** 2))
+    wrong = replace(right, values=values, cost=squares, sum_of_squares=squares)
+    start = Start(values={**values, "wave_size": 1.0}, states=({},))
+    wave = Promise(effect="wave", gains={"relations": 100.0}, starts={"relations": start})
+    monkeypatch.setattr(search, "promises", lambda _, base: [wave] if base is wrong else [])
+    there = runner(model)
+    found = Search(declared=there, runner=there, null=wrong).explain()
+    assert [step.action for step in found.trace].count("fitted anew") == 1
+    assert found.null.cost == pytest.approx(right.cost)
+    assert found.final.effects == ()
+
+
 def test_both_of_two_effects_are_named() -> None:
     y = 2.0 + 3.0 * TIME + 0.8 * np.sin(20.0 * TIME) - 3.0 * TIME**3
     found = explained(Line([noisy(y)]))
@@ -146,26 +165,31 @@ def test_size_as_large_as_it_may_be_is_no_certain_one() -> None:
 class Capped(Line):
     """The line with a wave that shows next to nothing, and that the wrong way, up to some size."""
 
+    slope = 20.0
+
     def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
         """See `Model`."""
         plain = super().residual(run, effects)
 
         def residual(v: Mapping[str, float]) -> Array:
             size = v.get("wave_size", 0.0)
-            return plain({**v, "wave_size": 20.0 * max(0.0, size - 0.45) - 1e-4 * size})
+            return plain({**v, "wave_size": self.slope * max(0.0, size - 0.45) - 1e-4 * size})
 
         return residual
 
 
-def test_limit_that_small_sizes_do_not_reach_is_found() -> None:
-    """By hand: 20 (0.51 - 0.45) = 1.2 of the wave; the next size that is tried makes 3 of it."""
+@pytest.mark.parametrize(("slope", "at"), [(20.0, 0.51), (2000.0, 0.4506)])
+def test_limit_that_small_sizes_do_not_reach_is_found(slope: float, at: float) -> None:
+    """By hand: 20 (0.51 - 0.45) = 1.2 of the wave. The size 1.0 makes 11 of it, or 1100."""
     model = Capped([noisy(2.0 + 3.0 * TIME + 1.2 * np.sin(20.0 * TIME))], ["wave", "cube"])
+    model.slope = slope
     (size,) = model.candidates["wave"].sizes
     sizes = (replace(size, lower=0.0),)
     model.candidates["wave"] = replace(model.candidates["wave"], sizes=sizes)
     found = explained(model)
     assert found.final.effects == ("wave",)
-    assert found.final.values["wave_size"] == pytest.approx(0.51, abs=0.01)
+    assert found.final.values["wave_size"] == pytest.approx(at, abs=0.2 / slope)
+    assert found.final.mean_square < NOISE_MEAN_SQUARE
 
 
 class Partly(Line):
@@ -230,7 +254,7 @@ def test_effect_follows_a_leader_that_does_not_keep_what_it_promised(
         Promise(
             effect=name,
             gains={SECANTS: gain},
-            starts=(Start(values={"a": 0.0, "b": 0.0, f"{name}_size": 1.0}, states=({},)),),
+            starts={SECANTS: Start(values={"a": 0.0, "b": 0.0, f"{name}_size": 1.0}, states=({},))},
         )
         for name, gain in sorted((("kink", of_the_kink), ("wave", 1000.0)), key=lambda one: -one[1])
     ]

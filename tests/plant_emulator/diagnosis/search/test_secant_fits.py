@@ -23,7 +23,7 @@ def test_gain_is_that_of_the_whole_fit_where_all_is_linear() -> None:
     found = promised(Line([noisy(2.0 + 3.0 * TIME - 3.0 * np.sin(20.0 * TIME))]))
     assert found["wave"].gain == pytest.approx(3.0**2 * 2000 / 4, rel=0.06)
     assert found["cube"].gain < 10.0
-    (start,) = found["wave"].starts
+    (start,) = found["wave"].starts.values()
     assert start.values["wave_size"] == pytest.approx(-3.0, abs=0.1)
 
 
@@ -49,5 +49,5 @@ def test_parameters_that_bent_without_the_cause_unbend() -> None:
     whole = fit(model, ("cube",), (0,), {"a": 10.0, "b": -0.5, "cube_size": -5.0}, [{}])
     found = promised(model)
     assert found["cube"].gain == pytest.approx(0.5 * (base.cost - whole.cost), rel=0.02)
-    (start,) = found["cube"].starts
+    (start,) = found["cube"].starts.values()
     assert start.values["b"] == pytest.approx(-0.5, abs=0.05)
