@@ -69,9 +69,10 @@ part of a file in time [s].
     "--save", type=OutputFile(), help="Write the parameter set with the accepted effects."
 )
 @click.option(
-    "--draft",
-    is_flag=True,
-    help="Draft a missing law whatever the verdict; it is drafted where the cause is unknown.",
+    "--draft/--no-draft",
+    default=None,
+    help="Draft a missing law whatever the verdict, or never; without this, where the cause is "
+    "unknown.",
 )
 @click.option(
     "--drafts",
@@ -101,7 +102,7 @@ def command(
     workers: int,
     scheduler: str | None,
     save: str | None,
-    draft: bool,
+    draft: bool | None,
     draft_folder: str,
     report: str | None,
     next_program: str | None,
@@ -133,7 +134,7 @@ def command(
             workers=workers,
             scheduler=scheduler,
             progress=tell,
-            draft="always" if draft else "unknown",
+            draft="unknown" if draft is None else "always" if draft else "never",
             draft_folder=draft_folder,
             settings={"command": f"plant-emulator {shlex.join(sys.argv[1:])}"},
         )

@@ -37,8 +37,9 @@ BESIDE = 10
 STRAIGHT = 5.0
 # Rounding of an input over its range [1]: it tells of no bend.
 ROUNDING = 1e-6
-# Standard deviation of a uniform distribution over its width.
-UNIFORM = 12.0**-0.5
+# Mean error of a straight input that kept its course to the end of the hole, or left it at once,
+# over what that course misses.
+HALF = 0.5
 
 
 def bridge_holes(log: Log, use: Use) -> tuple[Log, Use]:
@@ -87,7 +88,7 @@ def _continue_input(time: Array, values: Array, hole: int, at: Array) -> tuple[A
     before = slice(max(0, hole - BESIDE), hole + 1)
     after = slice(hole + 1, hole + 2 + BESIDE)
     if min(len(time[before]), len(time[after])) < 2:
-        return straight, UNIFORM * abs(float(values[hole + 1] - values[hole]))
+        return straight, HALF * abs(float(values[hole + 1] - values[hole]))
     first = _Line.beside(time, values, before, hole + 1)
     second = _Line.beside(time, values, after, hole)
     bend = max(first.bend, second.bend)
@@ -96,7 +97,7 @@ def _continue_input(time: Array, values: Array, hole: int, at: Array) -> tuple[A
         bent = np.where(at < corner, first.line(at), second.line(at))
         if np.abs(bent - straight).max() > STRAIGHT * bend:
             return bent, bend if bend > ROUNDING * np.ptp(values) else 0.0
-    return straight, UNIFORM * min(first.missed, second.missed)
+    return straight, HALF * min(first.missed, second.missed)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ sine column.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from typing import TYPE_CHECKING
 
@@ -26,8 +26,9 @@ if TYPE_CHECKING:
     States = Sequence[Mapping[str, float]]
 
 
-# Trials of a size that a limit begins to act at, and the share of it that is close enough.
-ONSET_TRIALS, CLOSE = 7, 0.7
+# Trials of a size that a regression finds, the share of it that is close enough, and the most that
+# a size changes by where it is known from one side only.
+TRIALS, CLOSE, STEP = 5, 0.7, 10.0
 # Norm of a change that the noise hides [1]: a limit that is only touched says nothing of its size.
 HIDDEN_NORM = 1.0
 
@@ -46,62 +47,82 @@ class Column:
 
 @dataclass(frozen=True, kw_only=True)
 class Score:
-    """The gain of an effect in one linear regression, at its best size.
+    """The gain of an effect in one linear regression, by its columns at a size.
 
-    gain : of log evidence
+    gain : of log evidence; size : of the columns [plausible sizes]
+    factor : size that the regression finds, over that of the columns [1]
     values, states : of the effect, and of each run, where a fit may start
     theta : nuisance coefficients there
-    factor : largest coefficient of a column [1]
     """
 
     gain: float
+    size: float
+    factor: float
     values: Mapping[str, float]
     states: tuple[Mapping[str, float], ...]
     theta: Array
-    factor: float
 
 
-def best_score(
-    fidelity: Fidelity, candidate: Candidate, sizes: Sequence[float], states: States
-) -> Score | None:
-    """Score of an effect at the size that gains most; None: it shows nothing here.
+def score_at(fidelity: Fidelity, candidate: Candidate, size: float, states: States) -> Score | None:
+    """Score of an effect by its columns at a size, of the better sign; None: it shows nothing.
 
     states : of the effect in each run, but for an angle
     """
-    found = []
-    for sign in signs(candidate.sizes):
-        for size in sizes:
-            columns = list(_columns(fidelity, candidate, sign * size, states))
-            if columns:
-                found.append(_score(fidelity, candidate, sign * size, columns, states))
-    return max(filter(None, found), key=lambda one: one.gain, default=None)
+    signed = (_score(fidelity, candidate, way * size, states) for way in signs(candidate.sizes))
+    return max(filter(None, (one for _, one in signed)), key=lambda one: one.gain, default=None)
 
 
-def onset_score(
-    fidelity: Fidelity, candidate: Candidate, sizes: Sequence[float], states: States
+def refined_score(
+    fidelity: Fidelity,
+    candidate: Candidate,
+    known: Score | None,
+    sizes: tuple[float, float],
+    states: States,
 ) -> Score | None:
-    """Score of an effect that shows nothing at the first size; None: nor at a larger one.
+    """Score of an effect by its columns at the size that the regression on them finds.
 
-    A limit does nothing up to some size, and soon far more than the data hold. Bisection finds the
-    size at whose column the regression finds that size itself.
+    A law that bends shows there. A limit does nothing up to some size, and soon far more than the
+    data hold.
 
-    sizes : ascending
+    known : score at the first size; None: the effect shows nothing there
+    sizes : the first and the largest
     """
-    found = []
-    for sign in signs(candidate.sizes):
-        (low, size), larger, high = sizes[:2], iter(sizes[2:]), 0.0
-        for _ in range(ONSET_TRIALS):
-            columns = list(_columns(fidelity, candidate, sign * size, states))
-            score = _score(fidelity, candidate, sign * size, columns, states) if columns else None
-            found.append(score)
-            if columns and (score is None or score.factor < 1.0):
-                high = size
-            else:
-                low = size
-            size = float(np.sqrt(low * high)) if high else next(larger, 0.0)
-            if size == 0.0 or (score is not None and CLOSE < score.factor < 1.0 / CLOSE):
-                break
-    return max(filter(None, found), key=lambda one: one.gain, default=None)
+    ways = signs(candidate.sizes) if known is None else (float(np.sign(known.size)),)
+    found = [one for way in ways for one in _bisect(fidelity, candidate, way, known, sizes, states)]
+    return max((known, *found), key=lambda one: one.gain if one else -np.inf)
+
+
+def _bisect(
+    fidelity: Fidelity,
+    candidate: Candidate,
+    way: float,
+    known: Score | None,
+    sizes: tuple[float, float],
+    states: States,
+) -> Iterator[Score]:
+    """Scores on the way to that size; way : sign of the sizes."""
+    first, largest = sizes
+    low, high = (0.0, first) if known is not None and known.factor < 1.0 else (first, 0.0)
+    score = known
+    for _ in range(TRIALS):
+        if (score is not None and CLOSE < score.factor < 1.0 / CLOSE) or low >= largest:
+            return
+        told = score.factor if score is not None else 0.0
+        if low and high:
+            size = float(np.sqrt(low * high))
+        elif high:
+            size = high * max(told, 1.0 / STEP)
+        else:
+            size = min(largest, low * min(told or STEP, STEP))
+        seen, score = _score(fidelity, candidate, way * size, states)
+        if score is not None:
+            # A size that is a little smaller may not act, and a fit would stay there.
+            own = values_at_size(candidate, way * size) if low and score.factor < 1.0 else {}
+            yield replace(score, values={**score.values, **own})
+        if seen and (score is None or score.factor < 1.0):
+            high = size
+        else:
+            low = size
 
 
 def _columns(
@@ -129,9 +150,15 @@ def _columns(
 
 
 def _score(
-    fidelity: Fidelity, candidate: Candidate, size: float, columns: Sequence[Column], states: States
-) -> Score | None:
-    """The gain with one-sided sizes kept on their side; None: all are on the other side."""
+    fidelity: Fidelity, candidate: Candidate, size: float, states: States
+) -> tuple[bool, Score | None]:
+    """Whether the columns show anything, and their gain with one-sided sizes kept on their side.
+
+    None: they show nothing, or all are on the other side
+    """
+    columns = list(_columns(fidelity, candidate, size, states))
+    if not columns:
+        return False, None
     products = fidelity.data.products(np.stack([c.change for c in columns]).T)
     two_sided = np.array([c.run is not None for c in columns])
     keep = np.arange(len(columns))
@@ -142,13 +169,17 @@ def _score(
             break
         keep = keep[~wrong]
     else:
-        return None
+        return True, None
     beta = np.zeros(len(columns))
     beta[keep] = mean
     values, own = _estimate(candidate, size, columns, beta, states)
+    at, neutral = values_at_size(candidate, size), candidate.neutral
+    factor = max(
+        abs(values[name] - neutral[name]) / abs(at[name] - neutral[name])
+        for name in {c.size for c in columns}
+    )
     theta = fidelity.data.theta(products, beta)
-    factor = float(beta.max())
-    return Score(gain=value, values=values, states=own, theta=theta, factor=factor)
+    return True, Score(gain=value, size=size, factor=factor, values=values, states=own, theta=theta)
 
 
 def _estimate(

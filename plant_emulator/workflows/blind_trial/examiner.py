@@ -1,7 +1,8 @@
 """Runs one diagnosis in its own process, which gets nothing but the logs.
 
 The logs are copied to an empty temporary folder, the working directory of the process. The process
-runs the command `plant-emulator diagnose`, which imports nothing of the trial.
+runs the command `plant-emulator diagnose`, which imports nothing of the trial. It drafts no missing
+law, because a trial does not judge drafts.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ class Examiner:
     def _run(self, logs: Sequence[str], folder: Path) -> tuple[int, str]:
         """Exit code and standard error of the command."""
         command = [sys.executable, "-m", "plant_emulator", "diagnose", *logs]
-        command += ["--workers", "1", "--json", "answer.json", "--save", "set.toml"]
+        command += ["--workers", "1", "--json", "answer.json", "--save", "set.toml", "--no-draft"]
         given = os.environ.get("PYTHONPATH", "")
         with self._lock:
             if self.stopped:
