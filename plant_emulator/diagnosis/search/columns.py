@@ -26,9 +26,8 @@ if TYPE_CHECKING:
     States = Sequence[Mapping[str, float]]
 
 
-# Trials of a size that a regression finds, the share of it that is close enough, and the most that
-# a size changes by where it is known from one side only.
-TRIALS, CLOSE, STEP = 5, 0.7, 10.0
+# Trials of a size that a limit begins to act at, and the share of it that is close enough.
+TRIALS, CLOSE = 6, 0.7
 # Norm of a change that the noise hides [1]: a limit that is only touched says nothing of its size.
 HIDDEN_NORM = 1.0
 
@@ -49,80 +48,70 @@ class Column:
 class Score:
     """The gain of an effect in one linear regression, by its columns at a size.
 
-    gain : of log evidence; size : of the columns [plausible sizes]
+    gain : of log evidence
     factor : size that the regression finds, over that of the columns [1]
     values, states : of the effect, and of each run, where a fit may start
     theta : nuisance coefficients there
     """
 
     gain: float
-    size: float
     factor: float
     values: Mapping[str, float]
     states: tuple[Mapping[str, float], ...]
     theta: Array
 
 
-def score_at(fidelity: Fidelity, candidate: Candidate, size: float, states: States) -> Score | None:
-    """Score of an effect by its columns at a size, of the better sign; None: it shows nothing.
+def best_score(
+    fidelity: Fidelity, candidate: Candidate, sizes: Sequence[float], states: States
+) -> Score | None:
+    """Score of an effect at the size that gains most; None: it shows nothing here.
 
     states : of the effect in each run, but for an angle
     """
-    signed = (_score(fidelity, candidate, way * size, states) for way in signs(candidate.sizes))
-    return max(filter(None, (one for _, one in signed)), key=lambda one: one.gain, default=None)
+    scores = (
+        _score(fidelity, candidate, way * size, states)[1]
+        for way in signs(candidate.sizes)
+        for size in sizes
+    )
+    return max(filter(None, scores), key=lambda one: one.gain, default=None)
 
 
-def refined_score(
-    fidelity: Fidelity,
-    candidate: Candidate,
-    known: Score | None,
-    sizes: tuple[float, float],
-    states: States,
+def onset_score(
+    fidelity: Fidelity, candidate: Candidate, silent: float, largest: float, states: States
 ) -> Score | None:
-    """Score of an effect by its columns at the size that the regression on them finds.
+    """Score of an effect that shows nothing at a small size; None: nor at the largest one.
 
-    A law that bends shows there. A limit does nothing up to some size, and soon far more than the
-    data hold.
-
-    known : score at the first size; None: the effect shows nothing there
-    sizes : the first and the largest
+    A limit does nothing up to some size, and soon far more than the data hold. Bisection finds the
+    size at whose columns the regression finds that size itself.
     """
-    ways = signs(candidate.sizes) if known is None else (float(np.sign(known.size)),)
-    found = [one for way in ways for one in _bisect(fidelity, candidate, way, known, sizes, states)]
-    return max((known, *found), key=lambda one: one.gain if one else -np.inf)
+    scores = (
+        score
+        for way in signs(candidate.sizes)
+        for score in _bisect(fidelity, candidate, way * silent, way * largest, states)
+    )
+    return max(scores, key=lambda one: one.gain, default=None)
 
 
 def _bisect(
-    fidelity: Fidelity,
-    candidate: Candidate,
-    way: float,
-    known: Score | None,
-    sizes: tuple[float, float],
-    states: States,
+    fidelity: Fidelity, candidate: Candidate, low: float, high: float, states: States
 ) -> Iterator[Score]:
-    """Scores on the way to that size; way : sign of the sizes."""
-    first, largest = sizes
-    low, high = (0.0, first) if known is not None and known.factor < 1.0 else (first, 0.0)
-    score = known
+    """Scores on the way to that size; low : shows nothing."""
+    size = high
     for _ in range(TRIALS):
-        if (score is not None and CLOSE < score.factor < 1.0 / CLOSE) or low >= largest:
-            return
-        told = score.factor if score is not None else 0.0
-        if low and high:
-            size = float(np.sqrt(low * high))
-        elif high:
-            size = high * max(told, 1.0 / STEP)
-        else:
-            size = min(largest, low * min(told or STEP, STEP))
-        seen, score = _score(fidelity, candidate, way * size, states)
+        seen, score = _score(fidelity, candidate, size, states)
         if score is not None:
             # A size that is a little smaller may not act, and a fit would stay there.
-            own = values_at_size(candidate, way * size) if low and score.factor < 1.0 else {}
+            own = values_at_size(candidate, size) if score.factor < 1.0 else {}
             yield replace(score, values={**score.values, **own})
+            if CLOSE < score.factor < 1.0 / CLOSE:
+                return
         if seen and (score is None or score.factor < 1.0):
             high = size
+        elif size == high:  # shows nothing, or is not large enough
+            return
         else:
             low = size
+        size = float(np.sign(high) * np.sqrt(low * high))
 
 
 def _columns(
@@ -179,7 +168,7 @@ def _score(
         for name in {c.size for c in columns}
     )
     theta = fidelity.data.theta(products, beta)
-    return True, Score(gain=value, size=size, factor=factor, values=values, states=own, theta=theta)
+    return True, Score(gain=value, factor=factor, values=values, states=own, theta=theta)
 
 
 def _estimate(

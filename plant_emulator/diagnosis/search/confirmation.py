@@ -27,12 +27,14 @@ if TYPE_CHECKING:
 class Trial:
     """A hypothesis to fit: its effects, the runs, and where the fit may begin.
 
+    further : starts for the case that all others are far from the data
     iterations : of each fit at most so many; None: until it converges
     """
 
     effects: tuple[str, ...]
     runs: tuple[int, ...]
     starts: tuple[Start, ...]
+    further: tuple[Start, ...] = ()
     iterations: int | None = None
 
 
@@ -48,9 +50,10 @@ def confirm(model: Model, trial: Trial) -> FitResult:
     far = NOISE_MEAN_SQUARE if several else SUSPECT_MEAN_SQUARE
     near = nearest(model, starts, trial.runs, far)
     if near is None:
-        starts += [_values(trial, _plausible(model, trial, one)) for one in trial.starts[:1]]
-        near = approach(model, starts, trial.runs, trial.iterations or APPROACH_ITERATIONS)
-    own = starts[len(trial.starts) - 1]
+        more = [*trial.further, *(_plausible(model, trial, one) for one in trial.starts[:1])]
+        every = [*starts, *(_values(trial, one) for one in more)]
+        near = approach(model, every, trial.runs, trial.iterations or APPROACH_ITERATIONS)
+    own = starts[-1]
     found = [
         fit(model, trial.effects, trial.runs, one.values, one.states, trial.iterations)
         for one in ([near, own] if several and near is not own else [near])

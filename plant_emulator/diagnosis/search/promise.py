@@ -38,26 +38,26 @@ class Promise:
         return max(self.gains.values(), default=0.0)
 
 
-def starts_of(promise: Promise, base: FitResult) -> tuple[Start, ...]:
-    """Starts of an effect on top of a fit, and one with the parameters and states of that fit.
+def starts_of(promise: Promise, base: FitResult) -> tuple[tuple[Start, ...], tuple[Start, ...]]:
+    """Starts of an effect on top of a fit, and further ones for the case that these are far off.
 
-    An estimate moves all unknowns at once, and may miss contact by that. One that gains far less
-    than another is no start: a limit at a size that it does not act at stays there.
+    An estimate moves all unknowns at once, and may miss contact by that: each is also a start with
+    the parameters and states of the fit, of those near the data the best one as the last. A score
+    that promises far less than another may tell a size at which a limit does not act, and near the
+    data a fit would stay there.
     """
     order = sorted(promise.starts, key=lambda score: -promise.gains[score])
-    told = [
-        promise.starts[score]
-        for score in order
-        if score == order[0] or promise.gains[score] > SETTINGS.rival_share * promise.gain
-    ]
+    least = SETTINGS.rival_share * promise.gain
+    leaders = max(1, sum(promise.gains[score] > least for score in order))
+    told = [promise.starts[score] for score in order]
     kept = [
         Start(
             values={**one.values, **base.values},
             states=tuple({**own, **fit} for own, fit in zip(one.states, base.states, strict=True)),
         )
-        for one in told[:1]
+        for one in told
     ]
-    return (*told, *kept)
+    return (*told[:leaders], *kept[:1]), (*told[leaders:], *kept[1:])
 
 
 def leading(

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def rich_columns(candidates: Mapping[str, Candidate], fidelity: Fidelity) -> Iterator[Array]:
     """Columns of all effects that a fit lacks, scaled to unit priors, shape (n, 1) each."""
-    size = SETTINGS.first_size
+    size = SETTINGS.sizes[0]
     for name, candidate in candidates.items():
         if candidate.stochastic or name in fidelity.where.effects:
             continue

@@ -17,7 +17,7 @@ from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.joint_fit import CORRECTION_INTERVALS, LED_DIFFERENCE
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.fitting.task import Task
-from plant_emulator.diagnosis.search.columns import refined_score, score_at
+from plant_emulator.diagnosis.search.columns import best_score, onset_score
 from plant_emulator.diagnosis.search.promise import Promise, Start
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.simulation_columns import SimulationColumns
@@ -132,6 +132,7 @@ def screen(model: Model, asked: Screening) -> list[Promise]:
     if asked.fidelity == NOMINAL_RELATIONS:
         base = _at_nominal(model, asked)
     last = bool(base.effects) and base.mean_square <= NOISE_MEAN_SQUARE
+    sizes = SETTINGS.sizes[:1] if last else SETTINGS.sizes
     with threadpool_limits(1):
         fidelity = _fidelity(model, replace(asked, base=base))
         if fidelity is None:
@@ -142,7 +143,7 @@ def screen(model: Model, asked: Screening) -> list[Promise]:
                 gains={asked.fidelity: 0.0 if score is None else score.gain},
                 starts={} if score is None else {asked.fidelity: _start(fidelity, score, base)},
             )
-            for name, score in _scores(library, fidelity, asked.states, refine=not last).items()
+            for name, score in _scores(library, fidelity, sizes, asked.states).items()
         ]
 
 
@@ -193,7 +194,7 @@ def _start_states(model: Model, candidate: Candidate, task: Task) -> dict[str, f
     if where.effects or all(u.step is None for u in candidate.states):
         return plain
     (run,), (fit,) = task.runs, where.states
-    values = {**where.values, **fit, **values_at_size(candidate, SETTINGS.first_size)}
+    values = {**where.values, **fit, **values_at_size(candidate, SETTINGS.sizes[0])}
     residual = model.rough().residual(run, (candidate.name,))
     return scan_states(residual, values, candidate.states, plain)
 
@@ -211,27 +212,25 @@ def scan_states(
 def _scores(
     library: Mapping[str, Candidate],
     fidelity: Fidelity,
+    sizes: Sequence[float],
     states: Mapping[str, Sequence[Mapping[str, float]]],
-    *,
-    refine: bool,
 ) -> dict[str, Score | None]:
-    """Scores of all effects at the first size.
+    """Scores of all effects at the first size, and of the best effects at the other sizes.
 
-    refine : whether those of the best effects, and of those that show nothing, are refined
+    An effect that shows nothing at the first size may be a limit; see `onset_score`.
     """
-    first = SETTINGS.first_size
-    found = {name: score_at(fidelity, one, first, states[name]) for name, one in library.items()}
-    if refine:
+    found = {
+        name: best_score(fidelity, candidate, sizes[:1], states[name])
+        for name, candidate in library.items()
+    }
+    if len(sizes) > 1:
         silent = [name for name, score in found.items() if score is None]
         order = sorted(found.keys() - set(silent), key=lambda name: -_gain(found[name]))
-        for name in (*order[: SETTINGS.tried_further], *silent):
-            found[name] = refined_score(
-                fidelity,
-                library[name],
-                found[name],
-                (first, SETTINGS.largest_size),
-                states[name],
-            )
+        for name in order[: SETTINGS.tried_further]:
+            more = best_score(fidelity, library[name], sizes[1:], states[name])
+            found[name] = max((found[name], more), key=_gain)
+        for name in silent:
+            found[name] = onset_score(fidelity, library[name], sizes[0], max(sizes), states[name])
     return found
 
 

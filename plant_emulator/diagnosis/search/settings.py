@@ -9,17 +9,17 @@ from dataclasses import dataclass
 class Settings:
     """Sizes are in plausible sizes of an effect, gains in natural logarithms of probability."""
 
-    # Size that the columns of all effects are taken at: a column is local and nearly linear.
-    first_size: float = 0.3
+    # A column is local and nearly linear, and a law that bends shows at one of these sizes. All
+    # effects are tried at the first size, and the best at the others too.
+    sizes: tuple[float, ...] = (0.3, 0.1, 1.0, 3.0)
     # Sizes that a fit by secants begins at: most laws bend less at the first, and a limit does not
     # act there.
     secant_sizes: tuple[float, ...] = (0.3, 1.0)
     # Iterations of fits by secants: of all effects, and of the best `tried_further`.
     secant_iterations: tuple[int, ...] = (2, 5)
-    # Largest size that a column is taken at, and prior standard deviation of a size in the rich
-    # model that noise is estimated beside.
+    # Prior standard deviation of a size in the rich model that noise is estimated beside.
     largest_size: float = 3.0
-    # So many effects of each score are refined; the true one was among three.
+    # So many effects of each score are tried at the other sizes; the true one was among three.
     tried_further: int = 6
     # Mean square up to which a linear model around a fit is as good as a fit with the cause: noise
     # is estimated beside it, and regressions choose the rivals of the first effect.
