@@ -169,7 +169,8 @@ class Undetectable:
 class SearchStep:
     """A step of the search for effects.
 
-    action : what was done with the set of effects: confirmed, converged, or noise estimated there
+    action : what was done with the set of effects: confirmed, converged, fitted anew, or noise
+        estimated there
     promised : gain that the linear regressions promised for the last effect, by regression
     gain : of log evidence over the fit without effects
     mean_square : of the whitened residual that the fit leaves

@@ -80,8 +80,8 @@ class Search:
         around the best set. Where that shows another noise, the queue starts again.
         """
         self.sets = {frozenset(): self.null}
-        near = self.null.mean_square <= SETTINGS.linear_mean_square
-        self._estimate_noise(self.null if near else self._queue(1))
+        far = self.null.mean_square > SETTINGS.linear_mean_square
+        self._estimate_noise(self._queue(1) if far else self.null)
         best = self._queue(SETTINGS.most_effects)
         if best.effects and not leaves_most(best, self.null) and self._estimate_noise(best):
             best = self._queue(SETTINGS.most_effects)
@@ -157,8 +157,7 @@ class Search:
 
     def _needed(self, found: FitResult) -> float:
         """Least gain of log evidence that one more effect needs on top of a fit."""
-        first = not found.effects and not self.random_evidence
-        needed = SETTINGS.needed if first else SETTINGS.needed_again
+        needed = SETTINGS.needed_again if found.effects or self.random_evidence else SETTINGS.needed
         return needed + SETTINGS.law_error**2 * 0.5 * self.random_evidence
 
     def _expand(self, base: FitResult) -> None:
@@ -192,9 +191,10 @@ class Search:
             reached = max(reached, 0.5 * (base.cost - known.cost))
 
     def _renew_null(self, found: FitResult) -> bool:
-        """Fit without effects anew from a fit with some; give whether that leaves less."""
+        """Fit without effects anew from one with some; give whether the two are rivals now."""
         (null,) = self.runner.map(without_effects, [(self.null, self._task(found))])
-        if null.cost > self.null.cost - EVIDENCE_THRESHOLD:
+        least = max(EVIDENCE_THRESHOLD, SETTINGS.rival_share * (self.null.cost - found.cost))
+        if self.null.cost - null.cost < least:
             return False
         self.null = self.sets[frozenset()] = null
         self.promises.pop(frozenset())
@@ -271,7 +271,7 @@ class Search:
         cheapest = min(self.reduced_costs, key=self.reduced_costs.__getitem__)
         (least,) = self._fits(refit, [self.sets[frozenset(best.effects) - {cheapest}]])
         self.reduced_costs[cheapest] = least.cost
-        fall = self.reduced_costs[cheapest] - found.cost
+        fall = least.cost - found.cost
         if found.effects != best.effects:
             return self._without_needless(found)
         closes = found.mean_square <= NOISE_MEAN_SQUARE or leaves_little(
