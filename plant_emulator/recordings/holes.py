@@ -35,6 +35,8 @@ BESIDE = 10
 # Lines count that differ from the straight input in the hole by so many times what they miss
 # beside it. Beside a parabola that is 1.7 times in one lost row, and 4.2 times in five.
 STRAIGHT = 5.0
+# What a line misses of the sample across, over what it would miss of a parabola: more is no curve.
+CURVED = 1.5
 # Rounding of an input over its range [1]: it tells of no bend.
 ROUNDING = 1e-6
 # Mean error of a straight input that kept its course to the end of the hole, or left it at once,
@@ -55,7 +57,9 @@ def bridge_holes(log: Log, use: Use) -> tuple[Log, Use]:
     whole = np.concatenate([time, inserted])[order]
     logged = order < len(time)
     signals = {name: np.interp(whole, time, values) for name, values in log.signals.items()}
-    for name, error in ((name, error) for name, error in INPUT_ERRORS.items() if name in log):
+    for name, error in INPUT_ERRORS.items():
+        if name not in log:
+            continue
         signals[error] = np.zeros(len(whole))
         for k in holes:
             within = (whole > time[k]) & (whole < time[k + 1])
@@ -82,7 +86,7 @@ def _continue_input(time: Array, values: Array, hole: int, at: Array) -> tuple[A
     """An input in the hole behind a sample, at these times, and its standard deviation there.
 
     Where the line from one side meets neither that of the other nor the sample there, the input may
-    have changed at any time in the hole.
+    have changed at any time in the hole. What changes and changes back in it stays hidden.
     """
     straight = np.interp(at, time, values)
     before = slice(max(0, hole - BESIDE), hole + 1)
@@ -95,28 +99,38 @@ def _continue_input(time: Array, values: Array, hole: int, at: Array) -> tuple[A
     meet = (second.line - first.line).roots()
     for corner in meet[(time[hole] < meet) & (meet < time[hole + 1])]:
         bent = np.where(at < corner, first.line(at), second.line(at))
-        if np.abs(bent - straight).max() > STRAIGHT * bend:
-            return bent, bend if bend > ROUNDING * np.ptp(values) else 0.0
-    return straight, HALF * min(first.missed, second.missed)
+        away = float(np.abs(bent - straight).max())
+        if away > STRAIGHT * bend:
+            # A rounded corner lies between the two.
+            return bent, HALF * away if bend > ROUNDING * np.ptp(values) else 0.0
+    return straight, min(first.error, second.error)
 
 
 @dataclass(frozen=True)
 class _Line:
     """The line through an input on one side of a hole.
 
-    bend : most that it misses there; missed : of the sample across the hole; 0: no more than a line
-        that is laid through the bend may miss so far away
+    bend : most that it misses there
+    error : standard deviation of a straight input in the hole, as far as this side tells
     """
 
     line: Polynomial
     bend: float
-    missed: float
+    error: float
 
     @classmethod
     def beside(cls, time: Array, values: Array, side: slice, across: int) -> _Line:
-        """The line on this side; across : the sample on the other one."""
+        """The line on this side; across : the sample on the other one.
+
+        A parabola misses 6 (1/2 + w)^2 - 1/2 bends of the sample across, and its chord 3/4 w^2
+        bends of the parabola, with w the hole over the length of the side.
+        """
         line = Polynomial.fit(time[side], values[side], 1).convert()
         bend = max(np.abs(line(time[side]) - values[side]).max(), ROUNDING * np.ptp(values))
-        missed = abs(line(time[across]) - values[across])
-        away = np.abs(time[side] - time[across]).max() / np.ptp(time[side])
-        return cls(line, float(bend), float(missed) if missed > away * bend else 0.0)
+        missed = HALF * abs(line(time[across]) - values[across])
+        wide = np.abs(time[side] - time[across]).min() / np.ptp(time[side])
+        curved = HALF * CURVED * (6.0 * (0.5 + wide) ** 2 - 0.5) * bend
+        error = missed if missed > curved else min(missed, 0.75 * wide**2 * bend)
+        if bend <= ROUNDING * np.ptp(values) and missed <= curved:
+            error = 0.0
+        return cls(line, float(bend), float(error))

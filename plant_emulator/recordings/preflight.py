@@ -134,7 +134,7 @@ def _holes(measured: Log, interval: float) -> list[str]:
         return []
     first = measured.time[holes[0]]
     note = f"{measured.source}: {len(holes)} holes, the first at {first:.3f} s; "
-    return [note + "the reference is continued across them, and no sample counts there"]
+    return [note + "the inputs are continued across them, and no sample counts there"]
 
 
 def _starts_at_rest(measured: Log) -> None:

@@ -197,10 +197,13 @@ class Recording:
         run = self.inputs
         if name == WHEEL_TORQUE:
             return self.with_wheel_torque(run.wheel_torque + off)
-        nodes = run.nodes
+        nodes, slope = run.nodes, run.slope
         if nodes is not None:
             nodes = (nodes[0], nodes[1] + np.interp(nodes[0], run.time, off))
-        return replace(self, inputs=replace(run, reference=run.reference + off, nodes=nodes))
+        if slope.any():  # no staircase
+            slope = slope + np.append(np.diff(off) / np.diff(run.time), 0.0)
+        inputs = replace(run, reference=run.reference + off, slope=slope, nodes=nodes)
+        return replace(self, inputs=inputs)
 
 
 def voltage_errors(voltage: Array) -> Array:

@@ -79,29 +79,32 @@ def best_score(
 def onset_score(
     fidelity: Fidelity, candidate: Candidate, silent: float, largest: float, states: States
 ) -> Score | None:
-    """Score of an effect that shows nothing at a small size; None: nor at the largest one.
+    """Score of an effect that has none at a small size; None: nor at larger ones.
 
-    A limit does nothing up to some size, and soon far more than the data hold. Bisection finds the
-    size at whose columns the regression finds that size itself.
+    A limit does nothing up to some size, and soon far more than the data hold. Bisection leads to
+    the size at whose columns the regression finds that size itself.
     """
     scores = (
         score
         for way in signs(candidate.sizes)
         for score in _bisect(fidelity, candidate, way * silent, way * largest, states)
     )
-    return max(scores, key=lambda one: one.gain, default=None)
+    return max(scores, key=lambda one: (one.factor > CLOSE, one.gain), default=None)
 
 
 def _bisect(
     fidelity: Fidelity, candidate: Candidate, low: float, high: float, states: States
 ) -> Iterator[Score]:
-    """Scores on the way to that size; low : shows nothing."""
+    """Scores on the way to that size; low : has none."""
     size = high
     for _ in range(TRIALS):
         seen, score = _score(fidelity, candidate, size, states)
         if score is not None:
             # A size that is a little smaller may not act, and a fit would stay there.
-            own = values_at_size(candidate, size) if score.factor < 1.0 else {}
+            at, neutral = values_at_size(candidate, size), candidate.neutral
+            own = {
+                n: at[n] for n in neutral if score.factor < 1.0 and score.values[n] != neutral[n]
+            }
             yield replace(score, values={**score.values, **own})
             if CLOSE < score.factor < 1.0 / CLOSE:
                 return
@@ -116,14 +119,20 @@ def _bisect(
 
 def _columns(
     fidelity: Fidelity, candidate: Candidate, size: float, states: States
-) -> Iterator[Column]:
-    """Columns of the size parameters that change the data visibly at this size."""
+) -> Iterator[Column | None]:
+    """Columns of the size parameters that change the data visibly at this size.
+
+    None: the model cannot be simulated at it
+    """
     angle = next((u.name for u in candidate.states if u.angle), None)
     single = len(candidate.sizes) == 1
     for u in candidate.sizes:
         values = values_at_size(candidate, size, None if single else u.name)
         change = fidelity.column(candidate.name, values, states)
-        if change is None or np.linalg.norm(change) < HIDDEN_NORM:
+        if change is None:
+            yield None
+            continue
+        if np.linalg.norm(change) < HIDDEN_NORM:
             continue
         turned = None
         if angle is not None:
@@ -143,11 +152,12 @@ def _score(
 ) -> tuple[bool, Score | None]:
     """Whether the columns show anything, and their gain with one-sided sizes kept on their side.
 
-    None: they show nothing, or all are on the other side
+    None: they show nothing, cannot be simulated, or are all on the other side
     """
-    columns = list(_columns(fidelity, candidate, size, states))
+    every = list(_columns(fidelity, candidate, size, states))
+    columns = [one for one in every if one is not None]
     if not columns:
-        return False, None
+        return bool(every), None
     products = fidelity.data.products(np.stack([c.change for c in columns]).T)
     two_sided = np.array([c.run is not None for c in columns])
     keep = np.arange(len(columns))

@@ -69,7 +69,13 @@ def without_effects(model: Model, pair: tuple[FitResult, Task]) -> FitResult:
     pair : the fit without effects, and a task with the other fit
     """
     known, task = pair
-    start = FitValues(effects=(), values=task.base.values, states=task.base.states)
+    # A size that stays among the values would keep the effect in the simulation.
+    values = {name: task.base.values[name] for name in known.values}
+    states = tuple(
+        {name: own[name] for name in plain}
+        for plain, own in zip(known.states, task.base.states, strict=True)
+    )
+    start = FitValues(effects=(), values=values, states=states)
     near = nearest(model, [start], task.runs, known.mean_square)
     return known if near is None else fit(model, (), task.runs, near.values, near.states)
 

@@ -217,7 +217,7 @@ def _scores(
 ) -> dict[str, Score | None]:
     """Scores of all effects at the first size, and of the best effects at the other sizes.
 
-    An effect that shows nothing at the first size may be a limit; see `onset_score`.
+    An effect that has none there may be a limit; see `onset_score`.
     """
     found = {
         name: best_score(fidelity, candidate, sizes[:1], states[name])
@@ -225,7 +225,8 @@ def _scores(
     }
     if len(sizes) > 1:
         silent = [name for name, score in found.items() if score is None]
-        order = sorted(found.keys() - set(silent), key=lambda name: -_gain(found[name]))
+        visible = [name for name, score in found.items() if score is not None]
+        order = sorted(visible, key=lambda name: -_gain(found[name]))
         for name in order[: SETTINGS.tried_further]:
             more = best_score(fidelity, library[name], sizes[1:], states[name])
             found[name] = max((found[name], more), key=_gain)

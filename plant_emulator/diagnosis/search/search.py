@@ -176,6 +176,7 @@ class Search:
                 if best is not base and regressions_tell(best, self.null):
                     break
             if not base.effects and best is not base and self._renew_null(best):
+                self._expand(self.null)
                 return
             if regressions_tell(best, self.null):
                 most = SETTINGS.rivals_beside if base.effects else SETTINGS.rivals
@@ -196,10 +197,9 @@ class Search:
         least = max(EVIDENCE_THRESHOLD, SETTINGS.rival_share * (self.null.cost - found.cost))
         if self.null.cost - null.cost < least:
             return False
+        self.trace.append(search_step(self.null, "fitted anew", null))
         self.null = self.sets[frozenset()] = null
         self.promises.pop(frozenset())
-        self.expanded.discard(frozenset())
-        self.trace.append(search_step(null, "fitted anew", null))
         return True
 
     def _confirm(self, base: FitResult, new: Sequence[Promise], iterations: int) -> list[FitResult]:

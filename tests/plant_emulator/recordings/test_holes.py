@@ -49,6 +49,7 @@ def test_lost_rows_of_a_curve_lie_on_the_chord(rows: int) -> None:
     assert log.time == pytest.approx(TIME)
     chord = 20.0 * 9.0 * (0.01 * (rows + 1)) ** 2 / 8.0
     assert log["speed_reference"] == pytest.approx(20.0 * np.sin(3.0 * TIME), abs=1.05 * chord)
+    assert log["speed_reference_error"].max() < 1.5 * chord
 
 
 def test_jittered_log_that_lost_no_row_stays() -> None:
@@ -78,6 +79,15 @@ def test_input_that_moved_in_a_hole_is_uncertain_by_half_of_that() -> None:
     within = (log.time > 3.705) & (log.time < 4.195)
     assert log["wheel_torque_error"][within] == pytest.approx(3.0)
     assert not log["wheel_torque_error"][~within].any()
+
+
+def test_rounded_corner_is_as_uncertain_as_it_cuts_its_lines() -> None:
+    """20 sin(3 t) turns at 0.524 s. A hole of 0.5 s hides how much: the chord is off by 5.2."""
+    kept = (TIME <= 0.28) | (TIME >= 0.78)
+    curve = 20.0 * np.sin(3.0 * TIME)
+    log, _ = bridge_holes(Log(TIME[kept], {"speed_reference": curve[kept]}), {})
+    off = np.abs(log["speed_reference"] - curve).max()
+    assert 0.5 * off < log["speed_reference_error"].max() < 3.0 * off
 
 
 def test_noise_of_an_input_is_no_move() -> None:

@@ -1,6 +1,6 @@
 """Fits of a hypothesis from its starts, and the order in which hypotheses are fitted."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +14,7 @@ from plant_emulator.diagnosis.search import search
 from plant_emulator.diagnosis.search.confirmation import Trial, confirm, without_effects
 from plant_emulator.diagnosis.search.promise import Promise, Start
 from plant_emulator.diagnosis.search.screening import promises
+from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import TIME, Line, explained, noisy
 
 WAVE = noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME))
@@ -39,11 +40,23 @@ def test_plausible_size_is_a_start_only_where_all_starts_are_far(size: float, as
     assert found.values["wave_size"] == pytest.approx(4.0, abs=0.1)
 
 
+class Simulating(Line):
+    """A line that simulates every effect whose size is among the values, as the bench does."""
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+
+        def residual(v: Mapping[str, float]) -> Array:
+            names = [name for name in self.candidates if f"{name}_size" in v]
+            return super(Simulating, self).residual(run, names)(v)
+
+        return residual
+
+
 @pytest.mark.parametrize("size", [0.1, 4.0])
 def test_fit_without_effects_starts_anew_only_where_that_leaves_less(size: float) -> None:
     """A wave of 4 is the cause, and its values leave 9 without it. One of 0.1 led there by luck."""
-    y = 2.0 + 3.0 * TIME + size * np.sin(20.0 * TIME)
-    model = Line([noisy(y)])
+    model = Simulating([noisy(2.0 + 3.0 * TIME + size * np.sin(20.0 * TIME))])
     null = fit_null(model, (0,))
     other = fit(model, ("wave",), (0,), {**null.values, "wave_size": size}, [{}])
     known = replace(null, values={"a": 3.0, "b": 3.0}, sum_of_squares=2.0 * null.samples)

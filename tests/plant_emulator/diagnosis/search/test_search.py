@@ -9,12 +9,14 @@ import pytest
 from plant_emulator.diagnosis.answer import Undetectable
 from plant_emulator.diagnosis.decision.subsystem import faulty_subsystem
 from plant_emulator.diagnosis.decision.verdict import decide
+from plant_emulator.diagnosis.execution.pool import TaskRunner
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, adequate, excess
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
 from plant_emulator.diagnosis.report.ranking import undetectable
 from plant_emulator.diagnosis.search import search
 from plant_emulator.diagnosis.search.promise import Promise, Start
+from plant_emulator.diagnosis.search.screening import promises
 from plant_emulator.diagnosis.search.search import Search
 from plant_emulator.diagnosis.search.secant_fits import SECANTS
 from plant_emulator.diagnosis.search.summary import not_told_apart
@@ -41,23 +43,29 @@ def test_planted_effect_is_named_with_its_size() -> None:
     assert found.classes() == [["wave"]]
 
 
+@pytest.mark.parametrize(("hidden", "named"), [(0.0, ()), (1.2, ("wave",))])
 def test_fit_without_effects_that_ended_far_off_is_fitted_anew(
-    monkeypatch: pytest.MonkeyPatch,
+    hidden: float, named: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It ends at a = 4 for 2, which a wave is tried for. With a = 2 nothing is left."""
-    model = Line([noisy(2.0 + 3.0 * TIME)])
+    """It ends at a = 4 for 2, which a cube is tried for; the wave is seen from a = 2 only."""
+    model = Line([noisy(2.0 + 3.0 * TIME + hidden * np.sin(20.0 * TIME))])
     right = fit_null(model, (0,))
     values = {**right.values, "a": 4.0}
     squares = float(np.sum(model.residual(0, ())(values) ** 2))
     wrong = replace(right, values=values, cost=squares, sum_of_squares=squares)
-    start = Start(values={**values, "wave_size": 1.0}, states=({},))
-    wave = Promise(effect="wave", gains={"relations": 100.0}, starts={"relations": start})
-    monkeypatch.setattr(search, "promises", lambda _, base: [wave] if base is wrong else [])
+
+    def promised(there: TaskRunner, base: FitResult) -> list[Promise]:
+        if base is not wrong:
+            return promises(there, base)
+        start = Start(values={**values, "cube_size": 1.0}, states=({},))
+        return [Promise(effect="cube", gains={"relations": 100.0}, starts={"relations": start})]
+
+    monkeypatch.setattr(search, "promises", promised)
     there = runner(model)
     found = Search(declared=there, runner=there, null=wrong).explain()
     assert [step.action for step in found.trace].count("fitted anew") == 1
     assert found.null.cost == pytest.approx(right.cost)
-    assert found.final.effects == ()
+    assert found.final.effects == named
 
 
 def test_both_of_two_effects_are_named() -> None:
