@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.signals.log import KNEE_TIME, TIMING_ERROR, WHEEL_TORQUE
+from plant_emulator.signals.log import KNEE_TIME, TIMING_ERROR
 from plant_emulator.signals.noise import deviation_without_outliers
 
 if TYPE_CHECKING:
@@ -49,10 +49,10 @@ def restamp(log: Log) -> tuple[Log, float]:
     """The log with its rows at the times that its reference shows, and the jitter's deviation [s].
 
     It then tells how uncertain these times are. A staircase (a log with a truck) tells nothing and
-    stays as it is; see `with_uncertain_stamps`. So does one with knees between its samples, which
-    bears the stamps of the PLC itself.
+    stays as it is. So does one with knees between its samples, which bears the stamps of the PLC
+    itself.
     """
-    if WHEEL_TORQUE in log or KNEE_TIME in log or len(log.time) < FEW_ROWS:
+    if "wheel_torque" in log or KNEE_TIME in log or len(log.time) < FEW_ROWS:
         return log, 0.0
     late, leverage = lateness(log.time, log["speed_reference"])
     told = leverage < 1.0
@@ -64,20 +64,6 @@ def restamp(log: Log) -> tuple[Log, float]:
         return log, 0.0
     signals = {**log.signals, TIMING_ERROR: deviation * np.sqrt(leverage)}
     return replace(log, time=log.time + late, signals=signals), deviation
-
-
-def with_uncertain_stamps(log: Log, deviation: float) -> Log:
-    """A log with a staircase whose rows are as far off their stamps as those of other logs.
-
-    One logger writes the logs of a bench. Another log tells the times of its rows itself, or that
-    they are right, and stays as it is.
-
-    deviation : of the time that a row was taken at, in the other logs [s]; 0: none
-    """
-    if deviation == 0.0 or WHEEL_TORQUE not in log or KNEE_TIME in log:
-        return log
-    uncertain = np.full(len(log.time), deviation)
-    return replace(log, signals={**log.signals, TIMING_ERROR: uncertain})
 
 
 def lateness(time: Array, reference: Array) -> tuple[Array, Array]:

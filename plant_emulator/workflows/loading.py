@@ -19,7 +19,7 @@ from plant_emulator.recordings.holes import bridge_holes
 from plant_emulator.recordings.preflight import NAMES, preflight
 from plant_emulator.recordings.recording import recording
 from plant_emulator.recordings.same_bench import check_same_bench
-from plant_emulator.recordings.stamps import restamp, with_uncertain_stamps
+from plant_emulator.recordings.stamps import restamp
 from plant_emulator.recordings.wheel_torque import mark_informative, with_estimated_torque
 from plant_emulator.signals.log import KNEE_TIME, VOLTAGE, Log
 from plant_emulator.simulation.simulate import values_of
@@ -76,14 +76,12 @@ def load_recordings(
     taken: list[Log] = []
     uses: list[Mapping[str, NDArray[np.bool_]]] = []
     notes: list[str] = []
-    most = 0.0
     for source in sources:
         log = source if isinstance(source, Log) else logs.read(source)
         check_unlabelled(log)
         check_signals(log, NEEDED)
         checked = preflight(log, parameters.value("gear_ratio"))
         log, jitter = restamp(log)
-        most = max(most, jitter)
         if jitter > 0.0:
             notes.append(
                 f"{log.source}: rows were taken {1e3 * jitter:.1f} ms (rms) off their stamps, as "
@@ -99,7 +97,6 @@ def load_recordings(
         taken.append(known)
         uses.append(use)
         notes += checked.notes
-    taken = [with_uncertain_stamps(log, most) for log in taken]
     check_distinct([(log.source, samples(log)) for log in taken])
     check_same_bench(taken, parameters.values())
     hold = cast("Hold | None", reference)

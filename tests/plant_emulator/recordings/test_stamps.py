@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from plant_emulator.recordings.recording import recording
-from plant_emulator.recordings.stamps import lateness, restamp, with_uncertain_stamps
-from plant_emulator.signals.log import KNEE_TIME, TIMING_ERROR, Log
+from plant_emulator.recordings.stamps import lateness, restamp
+from plant_emulator.signals.log import TIMING_ERROR, Log
 
 RATE = 75.0
 
@@ -91,15 +91,3 @@ def test_a_sine_is_no_jitter() -> None:
     _, leverage = lateness(given.time, given["speed_reference"])
     assert (leverage < 1.0).any()
     assert restamp(given)[1] == 0.0
-
-
-def test_staircase_is_as_uncertain_as_the_other_logs_of_its_bench() -> None:
-    """A log with knees has the stamps of the PLC, and one without a truck tells its own times."""
-    time = np.arange(0.0, 15.0, 0.01)
-    truck = log(time, time, wheel_torque=time)
-    found = with_uncertain_stamps(truck, 1e-3)
-    assert np.all(found[TIMING_ERROR] == 1e-3)
-    assert np.array_equal(found.time, time)
-    for one in (log(time, time), log(time, time, wheel_torque=time, **{KNEE_TIME: 0.0 * time})):
-        assert with_uncertain_stamps(one, 1e-3) is one
-    assert with_uncertain_stamps(truck, 0.0) is truck
