@@ -260,6 +260,16 @@ def shows_shrinkage(reference: Gap, explained: Gap) -> bool:
     return interval is None or interval[0] > 0.0
 
 
+def tells_share(reference: Gap, explained: Gap) -> bool:
+    """Whether the 95 % interval of the closed fraction is no wider than the gap.
+
+    Runs with much contact, or sizes that few runs show, are hard to predict from other runs. That
+    speaks neither for nor against an effect.
+    """
+    interval = closed_fraction_interval(reference, explained)
+    return interval is None or interval[1] - interval[0] <= 1.0
+
+
 def combined_gap(found: Gap) -> tuple[float, float, float]:
     """Root mean square over all channels, in the noise [1], and its 95 % interval."""
     squares, weights = found.resampled

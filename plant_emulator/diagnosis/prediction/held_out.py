@@ -13,6 +13,7 @@ from plant_emulator.diagnosis.prediction.gap import (
     measure_gap,
     predict,
     signature_norms,
+    tells_share,
 )
 from plant_emulator.diagnosis.prediction.trace import traces
 
@@ -34,6 +35,9 @@ MOST_PREDICTED = 3
 # Share of the best effect's evidence that an effect needs to be predicted. With less it is no
 # alternative, and its fits stop in local minima, so that its gain would tell of these.
 COMPARABLE_EVIDENCE = 0.5
+NO_SHARE = (
+    "no share is told: the other runs leave open how much of a held-out run the effects close"
+)
 # Stands for the parameter set as given among the hypotheses, which are named by their effects.
 NOMINAL = ("nominal",)
 # Of every fold the fitted runs, and the predicted runs.
@@ -60,7 +64,8 @@ class Gaps:
 
     runs : the predicted runs
     predictions, by_effects : predictions and gap of each hypothesis, by its effects or NOMINAL
-    predictable : whether any run can be predicted with the accepted effects
+    predictable : whether any run can be predicted with the accepted effects, well enough to tell
+        a share
     notes : on folds without a prediction and fits that did not converge
     fitted : gap that the fit to all runs leaves with the accepted effects on the same runs; None:
         it is what the predictions belong to
@@ -111,12 +116,18 @@ class HeldOutRuns:
         predictions = self.predictions(explained, followed, folds)
         runs = [self.runner.model.runs[run] for _, predicted in folds for run in predicted]
         lengths = block_lengths(predictions[()])
+        by_effects = {key: measure_gap(runs, one, lengths) for key, one in predictions.items()}
+        told = not followed or tells_share(by_effects[()], by_effects[followed])
         return Gaps(
             runs=runs,
             predictions=predictions,
-            by_effects={key: measure_gap(runs, one, lengths) for key, one in predictions.items()},
-            predictable=bool(usable),
-            notes=(*notes, *self.convergence_notes(folds, predictions)),
+            by_effects=by_effects,
+            predictable=bool(usable) and told,
+            notes=(
+                *notes,
+                *self.convergence_notes(folds, predictions),
+                *([] if told else [NO_SHARE]),
+            ),
             fitted=self._fitted_gap(explained, followed, folds, lengths),
         )
 

@@ -15,6 +15,7 @@ from plant_emulator.diagnosis.prediction.gap import (
     combined_gap,
     measure_gap,
     shows_shrinkage,
+    tells_share,
 )
 from plant_emulator.diagnosis.prediction.held_out import NOMINAL
 from plant_emulator.diagnosis.report.shrinkage import held_out_gap
@@ -53,6 +54,17 @@ def test_closed_fraction_by_hand() -> None:
     after = measure_gap(NAMES, [constant(1.5, 1.0)], [10])
     assert before.by_channel == pytest.approx([3.0, 2.0])
     assert closed_fraction(before, after) == pytest.approx(1 - 1.25 / 11)
+
+
+def test_predictions_that_go_astray_in_some_blocks_leave_the_share_open() -> None:
+    """By hand: two draws of halves that leave 0 or 63 of a gap of 8 close 1, -2.9 or -6.9 of it."""
+    run = [measured_run("a")]
+    before = measure_gap(run, [constant(3.0)], [50])
+    astray = measure_gap(run, [prediction(np.repeat([1.0, 8.0], 50))], [50])
+    assert not tells_share(before, astray)
+    assert not shows_shrinkage(before, astray)
+    assert tells_share(before, measure_gap(run, [constant(1.5)], [50]))
+    assert tells_share(before, before)
 
 
 def test_channel_at_the_noise_before_does_not_count() -> None:
