@@ -1,8 +1,9 @@
 """A model whose residuals are whitened for the noise of its measured inputs.
 
-An input that is measured brings its noise into the simulation. `recordings.input_noise` finds the
-directions of the residual that this noise disturbs. They are found once, at the fit without
-effects, and stay the same for every fit, because the costs of the fits are compared.
+An input that is measured brings its noise into the simulation, and so does one that a hole of the
+log hides. `recordings.input_noise` finds the directions of the residual that this noise disturbs.
+They are found once, at the fit without effects, and stay the same for every fit, because the costs
+of the fits are compared.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 def whiten_inputs(runner: TaskRunner) -> tuple[TaskRunner, FitResult | None]:
     """Give a runner whose model is whitened for input noise, and the fit without effects there.
 
-    The runner stays as it is where no input of the fitted runs is measured, or where the noise of
+    The runner stays as it is where no input of the fitted runs is uncertain, or where the noise of
     the inputs does not count. The fit is None where none was needed to know that.
     """
     if not any(runner.model.runs[run].uncertain_inputs for run in runner.runs):

@@ -95,7 +95,7 @@ def onset_score(
 def _bisect(
     fidelity: Fidelity, candidate: Candidate, low: float, high: float, states: States
 ) -> Iterator[Score]:
-    """Scores on the way to that size; low : has none."""
+    """Scores on the way to that size; low : a size without a score."""
     size = high
     for _ in range(TRIALS):
         seen, score = _score(fidelity, candidate, size, states)
