@@ -22,21 +22,14 @@ from plant_emulator.signals.noise import deviation_without_outliers
 if TYPE_CHECKING:
     from plant_emulator.signals.log import Array, Log
 
-# Windows of a local polynomial: first and last sample beside a row, and its degree. Long straight
-# ones tell best, and short or bent ones where the reference is.
-WINDOWS = (
-    (-20, 20, 1),
-    (-40, 0, 1),
-    (0, 40, 1),
-    (-8, 8, 1),
-    (-16, 0, 1),
-    (0, 16, 1),
-    (-10, 10, 2),
-    (-20, 0, 2),
-    (0, 20, 2),
-)
-# A window's departures over those of the best one, up to which it is as good.
-AS_GOOD = 1.3
+# Half widths of windows [samples] by the degree of their local polynomial: long straight ones tell
+# best, short ones where the reference has corners, and bent ones where it is a wave.
+HALF_WIDTHS = {1: (20, 8), 4: (30, 20, 14, 9)}
+# Departures of a window over the log's jitter up to which the polynomial follows the reference: so
+# many standard deviations of such a variance.
+LARGEST_CHANCE = 2.0
+# Times that the jitter is taken from the chosen windows; the last time changes it little.
+PASSES = 3
 # A slope that tells a row's time [rad/s^2], and the least jitter worth correcting [s].
 TELLING_SLOPE, LEAST_JITTER = 10.0, 2e-4
 # Rows that tell nothing of a jitter.
@@ -69,38 +62,49 @@ def restamp(log: Log) -> tuple[Log, float]:
 def lateness(time: Array, reference: Array) -> tuple[Array, Array]:
     """Timing error of every row [s], and its leverage in the fit [1], shape (n,) each.
 
-    By least squares over windows around, before or behind a row: the first of those that fit best.
+    By least squares over windows around, before or behind a row: of those that depart from the
+    reference no more than the jitter does, the one of least leverage.
     The leverage is the diagonal of the hat matrix (D. Hoaglin, R. Welsch, American Statistician 32
     (1978) 17). The jitter of the window's rows moves the fit: the timing error is uncertain by that
     share of the jitter's variance. It is 1 where the reference tells nothing.
     """
     n, interval = len(time), float(np.median(np.diff(time)))
-    spreads = np.full((len(WINDOWS), n), np.inf)
-    moves = np.zeros((len(WINDOWS), n))
-    leverages = np.ones(len(WINDOWS))
-    for k, (first, last, degree) in enumerate(WINDOWS):
+    windows = [
+        (first, first + 2 * half, degree)
+        for degree, halves in HALF_WIDTHS.items()
+        for half in halves
+        for first in (-half, -2 * half, 0)
+    ]
+    spreads = np.full((len(windows), n), np.inf)
+    rates, departures = np.zeros((2, len(windows), n))
+    leverages, freedoms = np.ones((2, len(windows), 1))
+    for k, (first, last, degree) in enumerate(windows):
+        freedoms[k] = last - first - degree
         if last - first >= n:
             continue
-        offsets = np.arange(first, last + 1)
-        basis = np.stack([offsets**power for power in range(degree + 1)], axis=1).astype(float)
+        offsets = interval * np.arange(first, last + 1)
+        basis = np.stack([offsets**power for power in range(degree + 1)], axis=1)
         inverse = np.linalg.pinv(basis)
         leverages[k] = basis[-first] @ inverse[:, -first]
         rows = np.arange(-first, n - last)
-        found = reference[rows[:, None] + offsets] @ inverse.T
-        left = reference[rows[:, None] + offsets] - found @ basis.T
-        rate = found[:, 1:2] + sum(
-            power * found[:, power : power + 1] * offsets ** (power - 1)
-            for power in range(2, degree + 1)
-        )
-        steep = np.min(np.abs(rate), axis=1) > TELLING_SLOPE * interval
-        moved = interval * left / np.where(rate == 0.0, np.inf, rate)
-        regular = steep & (np.max(np.abs(moved), axis=1) < LARGEST_DEPARTURE * interval)
-        freedom = len(offsets) - degree - 1
-        spread = np.sqrt(np.sum(moved**2, axis=1) / freedom)
+        values = reference[rows[:, None] + np.arange(first, last + 1)]
+        found = values @ inverse.T
+        left = values - found @ basis.T
+        powers = np.arange(1, degree + 1)
+        slope = (found[:, 1:] * powers) @ (offsets ** (powers[:, None] - 1))
+        moved = left / np.hypot(slope, TELLING_SLOPE)
+        regular = np.max(np.abs(moved), axis=1) < LARGEST_DEPARTURE * interval
+        spread = np.sqrt(np.sum(moved**2, axis=1) / freedoms[k])
         spreads[k, rows[regular]] = spread[regular]
-        moves[k, rows] = moved[:, -first]
-    best = spreads.min(axis=0)
-    chosen = np.argmax(spreads <= AS_GOOD * best + 1e-9, axis=0)
-    told = np.isfinite(best)
-    late = np.where(told, moves[chosen, np.arange(n)], 0.0)
-    return late, np.where(told, leverages[chosen], 1.0)
+        rates[k, rows], departures[k, rows] = slope[:, -first], left[:, -first]
+    best, places = spreads.min(axis=0), np.arange(n)
+    chosen = np.argmin(spreads, axis=0)
+    for _ in range(PASSES):
+        told = np.isfinite(best) & (np.abs(rates[chosen, places]) > TELLING_SLOPE)
+        jitter = np.median(spreads[chosen, places][told]) if told.any() else 0.0
+        largest = jitter * np.sqrt(1.0 + LARGEST_CHANCE * np.sqrt(2.0 / freedoms))
+        chosen = np.where(spreads <= np.maximum(largest, best), leverages, np.inf).argmin(axis=0)
+    rate = rates[chosen, places]
+    told = np.isfinite(best) & (np.abs(rate) > TELLING_SLOPE)
+    late = departures[chosen, places] / np.where(told, rate, np.inf)
+    return late, np.where(told, leverages[chosen, 0], 1.0)

@@ -85,6 +85,29 @@ def test_a_staircase_tells_nothing() -> None:
     assert restamp(given) == (given, 0.0)
 
 
+def test_rows_off_their_stamps_on_a_wave_of_one_hertz() -> None:
+    """A parabola of 20 samples departs from it by up to 2 ms, and moves rows that were in time."""
+    time = np.arange(0.0, 15.0, 0.01)
+    late = np.random.default_rng(2).uniform(-1.5e-3, 1.5e-3, len(time))
+    asked = 200.0 + 30.0 * np.sin(2.0 * np.pi * (time + late))
+    found, jitter = restamp(Log(time, {"speed_reference": asked, "motor_speed": time}))
+    slope = np.abs(60.0 * np.pi * np.cos(2.0 * np.pi * time))
+    error = (found.time - time - late)[slope > 20.0]
+    assert jitter == pytest.approx(1.5e-3 / np.sqrt(3.0), rel=0.1)
+    assert np.sqrt(np.mean(error**2)) < 0.45 * 1.5e-3 / np.sqrt(3.0)
+    assert np.mean((error / found[TIMING_ERROR][slope > 20.0]) ** 2) < 2.0
+
+
+def test_the_reference_at_the_times_found_is_straight_where_it_was() -> None:
+    """Rows that hop between lines make slopes that nobody asked for: 0.01 rad/s in 10 ms is 1."""
+    time = np.arange(0.0, 15.0, 0.01)
+    off = np.random.default_rng(1).uniform(-2e-3, 2e-3, len(time))
+    found, _ = restamp(log(time, time + off))
+    middle = (time > 1.6) & (time < 4.4)
+    slopes = np.diff(found["speed_reference"][middle]) / np.diff(found.time[middle])
+    assert np.max(np.abs(slopes - RATE)) < 2.0
+
+
 def test_a_sine_is_no_jitter() -> None:
     time = np.arange(0.0, 15.0, 0.01)
     given = Log(time, {"speed_reference": 200.0 + 50.0 * np.sin(2.0 * time)})
