@@ -116,6 +116,16 @@ def test_single_spikes_are_left_out_and_counted() -> None:
     assert not whitener.white(value)[places].any()
 
 
+def test_spikes_that_strike_neighbours_are_outliers_beside_single_ones() -> None:
+    value, use = white(5000, 9), np.ones(5000, bool)
+    value[[700, 701]] += [30.0, -25.0]
+    value[[2500, 2501]] += [22.0, 28.0]
+    assert not outlying(value, use).any()
+    places = [100, 900, 3000]
+    value[places] += 20.0
+    assert set(np.flatnonzero(outlying(value, use))) == {*places, 700, 701, 2500, 2501}
+
+
 def test_a_burst_of_several_samples_is_no_outlier() -> None:
     value = white(2000, 10)
     value[500:510] += 20.0 * np.sin(np.pi * np.arange(1, 11) / 11)
