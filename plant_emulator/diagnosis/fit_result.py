@@ -37,7 +37,7 @@ class FitResult(FitValues):
     converged : whether the fit ended before its iterations did
     ljung_box_excess : Ljung-Box statistic of the residuals beyond its expected value, summed over
         the channels; see `covariance.structure`
-    occam_penalty : part of the cost that charges the choice of the states
+    occam_penalty : part of the cost that charges the choice of sizes, shapes and states
     insignificant : effects with states of their own and no size that differs from neutral for
         certain; such an effect can follow anything that differs from run to run
     """

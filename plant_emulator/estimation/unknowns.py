@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -120,6 +120,28 @@ class Estimate:
         known = np.isfinite(white)
         larger = np.where(known, self.standard_errors, 1.0) / np.where(known, white, 1.0)
         return data_errors(self.information) * np.maximum(1.0, larger)
+
+    def occam_penalty(self, priors: Sequence[Unknown | None]) -> float:
+        """Cost of the freedom to choose some unknowns [chi squared].
+
+        A phase and a frequency fit any noise a little, and so does a size far below the plausible
+        one. The penalty of unknowns with a prior is
+
+            -log det(P C)
+
+        P : precision of the prior; C : covariance after the fit
+        With the penalty the cost falls as twice the logarithm of the probability with these
+        unknowns integrated out (Laplace's approximation; Occam factor of D. MacKay, Neural
+        Computation 4 (1992) 415).
+
+        priors : of the unknowns, in their order; None: not charged
+        """
+        own = [j for j, u in enumerate(priors) if u is not None and u.std is not None]
+        if not own:
+            return 0.0
+        deviations = np.array([u.scaled_std for u in priors if u is not None and u.std is not None])
+        narrowed = self.covariance[np.ix_(own, own)] / np.outer(deviations, deviations)
+        return max(0.0, -float(np.linalg.slogdet(narrowed).logabsdet))
 
     @property
     def correlation(self) -> Array:

@@ -6,8 +6,8 @@ The fit minimises the penalised sum of squares of the whitened residuals r of al
 
 z are the unknowns on the scale of the estimation. The nuisance parameters are the parameters of
 the machine that may differ from their nominal values. Every effect adds its sizes and its shapes;
-every run adds its initial states. The Occam penalty charges the choice of the states
-(D. MacKay, Neural Computation 4 (1992) 415); see `occam_penalty`.
+every run adds its initial states. The Occam penalty charges the choice of sizes, shapes and states
+(D. MacKay, Neural Computation 4 (1992) 415); see `Estimate.occam_penalty`.
 
 The functions take a model and plain data, so that other processes can run them.
 """
@@ -119,8 +119,13 @@ def fit(
         follow=near,
         difference=difference,
     )
-    reached = to_result(effects, found, len(runs))
     candidates = {name: model.candidates[name] for name in effects}
+    chosen = [
+        one
+        for c in candidates.values()
+        for one in (*(_shrunk(u, c.neutral[u.name]) for u in c.sizes), *c.shapes)
+    ]
+    reached = to_result(effects, found, len(runs), chosen)
     return replace(
         reached,
         insignificant=tuple(n for n, c in candidates.items() if not _significant(c, reached)),
@@ -230,10 +235,19 @@ def linearise(
     return linearise_at(unknowns, residuals, difference=difference)
 
 
-def to_result(effects: Sequence[str], found: Estimate, runs: int) -> FitResult:
-    """Turn an estimate with these effects into plain data; runs : number of fitted runs."""
+def to_result(
+    effects: Sequence[str], found: Estimate, runs: int, chosen: Sequence[Unknown] = ()
+) -> FitResult:
+    """Turn an estimate with these effects into plain data.
+
+    runs : number of fitted runs
+    chosen : sizes and shapes of the effects, with the priors that the Occam penalty charges
+    """
     errors = zip(found.unknowns, found.z, found.standard_errors, strict=True)
-    penalty = sum(occam_penalty(found, k) for k in range(runs))
+    charged = {u.name: u for u in chosen}
+    groups = [[charged.get(u.name) if u.run is None else None for u in found.unknowns]]
+    groups += [[u if u.run == k else None for u in found.unknowns] for k in range(runs)]
+    penalty = sum(found.occam_penalty(group) for group in groups)
     return FitResult(
         effects=tuple(effects),
         values=found.parameters(),
@@ -249,26 +263,6 @@ def to_result(effects: Sequence[str], found: Estimate, runs: int) -> FitResult:
         ljung_box_excess=sum(structure(channel) for run in found.residuals for channel in run),
         occam_penalty=penalty,
     )
-
-
-def occam_penalty(found: Estimate, run: int) -> float:
-    """Cost of the freedom to choose the states of a run [chi squared].
-
-    A phase and a frequency fit any noise a little. The penalty of the states with a prior is
-
-        -log det(P C)
-
-    P : precision of the prior; C : covariance after the fit
-    With the penalty the cost falls as twice the logarithm of the probability with the states
-    integrated out (Laplace's approximation; Occam factor of D. MacKay, Neural Computation 4
-    (1992) 415).
-    """
-    own = [j for j, u in enumerate(found.unknowns) if u.run == run and u.std is not None]
-    if not own:
-        return 0.0
-    deviations = np.array([found.unknowns[j].scaled_std for j in own])
-    narrowed = found.covariance[np.ix_(own, own)] / np.outer(deviations, deviations)
-    return max(0.0, -float(np.linalg.slogdet(narrowed).logabsdet))
 
 
 def effective_fraction(found: Estimate) -> float:

@@ -94,6 +94,53 @@ def test_looks_make_the_cost_the_probability_of_the_data() -> None:
     assert found.cost == pytest.approx(expected, abs=0.2)
 
 
+def test_a_size_is_charged_as_if_it_were_drawn() -> None:
+    """By hand, without parameters: y = s x^3 + noise, s ~ N(0, 2^2), of which the cost lacks only
+    the improbability of the size itself, (s / 2)^2.
+    """
+
+    class Cube(Line):
+        parameters = ()
+
+        def residual(self, run: int, effects: Sequence[str]) -> Callable[..., Array]:
+            return lambda v: (self.measured[run] - v["cube_size"] * TIME**3)[None, :]
+
+    model = Cube([noisy(0.3 * TIME**3)], ("cube",))
+    found = fit(model, ("cube",), [0], {"cube_size": 1.0}, [{}])
+    column = 2.0 * TIME**3
+    covariance = np.eye(len(TIME)) + np.outer(column, column)
+    y = model.measured[0]
+    expected = y @ np.linalg.solve(covariance, y) + np.linalg.slogdet(covariance).logabsdet
+    size = found.values["cube_size"]
+    assert found.cost + (size / 2.0) ** 2 == pytest.approx(expected, abs=0.3)
+
+
+def test_a_size_far_below_the_plausible_one_is_not_named() -> None:
+    """By hand: 0.017 of the plausible size at 5.5 standard errors gains 15 nats, and e^-6.5 of the
+    sizes that were as probable lie there.
+    """
+    column = TIME**3 - 0.6 * TIME
+    left = column - np.polynomial.polynomial.polyval(
+        TIME, np.polynomial.polynomial.polyfit(TIME, column, 1)
+    )
+    scale = 5.5 / 0.017 / float(np.linalg.norm(left))
+    noise = noisy(0.0 * TIME)
+    noise -= left * (left @ noise) / (left @ left)
+
+    class Steep(Line):
+        def residual(self, run: int, effects: Sequence[str]) -> Callable[..., Array]:
+            def residual(v: Mapping[str, float]) -> Array:
+                y = v["a"] + v["b"] * TIME
+                if effects:
+                    y = y + v["cube_size"] * scale * column
+                return (self.measured[run] - y)[None, :]
+
+            return residual
+
+    assert explained(Steep([noise + 0.017 * scale * left], ("cube",))).final.effects == ()
+    assert explained(Steep([noise + 0.05 * scale * left], ("cube",))).final.effects == ("cube",)
+
+
 def test_held_out_run_starts_in_the_valley_of_its_own_beat() -> None:
     y = noisy(wave(0.5, 3.37, 2.0))
     found = scan_unknowns(
