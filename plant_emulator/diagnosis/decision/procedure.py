@@ -28,7 +28,7 @@ from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, find_di
 from plant_emulator.diagnosis.search.search import Search
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from plant_emulator.diagnosis.decision.verdict import Decision
     from plant_emulator.diagnosis.execution.pool import TaskRunner
@@ -39,6 +39,18 @@ if TYPE_CHECKING:
 # Ljung-Box excess of a residual, as a share of its squares beyond the noise, up to which the gap
 # may be random. A dead time that varies at each scan had left 0.014.
 RANDOM_SHARE = 0.05
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Tested:
+    """The tested hypotheses, and the noise in which their costs count.
+
+    runner : whose model has that noise; estimated : the noise, where the search estimated it
+    """
+
+    explained: Explanation
+    runner: TaskRunner
+    estimated: LoggedNoise | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,91 +86,102 @@ class Procedure:
         model, runs = self.runner.model, self.runner.runs
         (null,) = [self.null] if self.null else self.runner.map(start, [runs])
         found = self._test_random_gap(null)
-        if found is None or decide(model, found[0]).kind == "unknown":
+        if found is None or decide(model, found.explained).kind == "unknown":
             plain = self._test_effects(null)
-            if found is None or decide(model, plain[0]).kind != "unknown":
+            if found is None or decide(model, plain.explained).kind != "unknown":
                 found = plain
-        explained = found[0]
+        explained = found.explained
         left = decide(model, explained).kind == "unknown" or _is_random(explained.final)
         if left and not explained.random_effects:
-            found = self._test_random_effects(explained.final, explained.null) or found
-        explained, runner = found
+            found = self._test_random_effects(explained.final, found) or found
+        explained, runner = found.explained, found.runner
         decision = decide(model, explained)
         # Runs that agree together, but for a regularity, need no test.
         if decide(model, replace(explained, regularities=())).kind == "unknown":
             decision = self._check_consistency(explained, decision)
         return explained, decision, runner
 
-    def _test_effects(self, null: FitResult) -> tuple[Explanation, TaskRunner]:
-        """Search the library; give also the runner in whose noise the costs count."""
+    def _test_effects(self, null: FitResult) -> _Tested:
+        """Search the library."""
         runner = self._cleared
         if self.disturbances is not None:
             (null,) = runner.map(refit, [Task(base=null, runs=runner.runs)])
         search = Search(declared=self.runner, runner=runner, null=null, noise=self.disturbances)
         explained, runner = search.explain(), search.runner
         (found,) = runner.map(find_regularities, [Task(base=explained.final, runs=runner.runs)])
-        return replace(explained, regularities=found), runner
-
-    @property
-    def _beside_lines(self) -> TaskRunner:
-        """A runner whose model has the lines of the mains in its noise."""
-        return _whitened(self.runner, self.lines)
+        return _Tested(
+            explained=replace(explained, regularities=found),
+            runner=runner,
+            estimated=None if search.noise is self.disturbances else search.noise,
+        )
 
     @property
     def _cleared(self) -> TaskRunner:
         """A runner whose model leaves the outliers out as well."""
         return _whitened(self.runner, self.disturbances)
 
-    def _test_random_gap(self, null: FitResult) -> tuple[Explanation, TaskRunner] | None:
+    def _test_random_gap(self, null: FitResult) -> _Tested | None:
         """Test the random effects first where the gap is large and random.
 
         None: the gap is small or not random
         """
-        return self._test_random_effects(null, null) if _is_random(null) else None
+        return self._test_random_effects(null) if _is_random(null) else None
 
     def _test_random_effects(
-        self, base: FitResult, null: FitResult
-    ) -> tuple[Explanation, TaskRunner] | None:
+        self, base: FitResult, beside: _Tested | None = None
+    ) -> _Tested | None:
         """Test all effects with the best random effect as part of the noise.
 
         base : fit whose residual shows the random effect
-        null : fit without effects
+        beside : hypotheses whose noise the random effect shows beside, where it was estimated
         None: no random effect explains the residual
         """
         runs, model = self.runner.runs, self.runner.model
-        found = self._fit_random_effects(base, model.candidates)
+        estimated = None if beside is None else beside.estimated
+        plain = _whitened(self.runner, estimated or self.lines)
+        found = self._fit_random_effects(plain, base, model.candidates)
+        if estimated is None:
+            found = self._show_beside_outliers(found, base)
         best = max(found, key=lambda one: one.evidence, default=None)
         if best is None:
             return None
         weights = dict(zip(runs, best.weights, strict=True))
         every = tuple(weights.get(k, np.ones(1)) for k in range(len(model.runs)))
-        plain = self._beside_lines
         runner = replace(plain, recipe=WeightedRecipe(plain.recipe, every))
+        null = base if beside is None else beside.explained.null
         (null,) = runner.map(refit, [Task(base=null, runs=runs)])
         search = Search(
             declared=runner,
             runner=runner,
             null=null,
             random_evidence=best.evidence,
-            noise=self.lines,
+            noise=estimated or self.lines,
         )
         explained = search.explain()
-        last = self._fit_random_effects(explained.final, [best.effect])
-        return (replace(explained, random_effects=tuple(last)), search.runner) if last else None
+        last = self._fit_random_effects(plain, explained.final, [best.effect])
+        if estimated is None:
+            last = self._show_beside_outliers(last, explained.final)
+        if not last:
+            return None
+        return _Tested(explained=replace(explained, random_effects=tuple(last)), runner=runner)
 
-    def _fit_random_effects(self, base: FitResult, names: Iterable[str]) -> list[VarianceComponent]:
-        """Fit the random effects among these on top of a fit; give those that count.
-
-        Outliers are as random as a random effect. It counts only where it shows beside them too.
-        """
+    def _fit_random_effects(
+        self, runner: TaskRunner, base: FitResult, names: Iterable[str]
+    ) -> list[VarianceComponent]:
+        """Fit the random effects among these on top of a fit; give those that count."""
         own = [name for name in names if self.runner.model.candidates[name].stochastic]
-        found = [
+        return [
             one
-            for one in self._fit_components(self._beside_lines, base, own)
+            for one in self._fit_components(runner, base, own)
             if one.consistent and one.evidence > EVIDENCE_THRESHOLD
         ]
+
+    def _show_beside_outliers(
+        self, found: Sequence[VarianceComponent], base: FitResult
+    ) -> list[VarianceComponent]:
+        """The components that show beside the outliers too, which are as random."""
         if self.disturbances is None:
-            return found
+            return list(found)
         beside = self._fit_components(self._cleared, base, [one.effect for one in found])
         return [
             one

@@ -172,6 +172,19 @@ def test_no_other_effect_is_sought_where_all_is_chance() -> None:
     assert all(isinstance(recipe, WeightedRecipe) for recipe in looked)
 
 
+def test_an_unrest_shows_beside_a_coloured_noise() -> None:
+    """In the declared noise the colour is structure, and no course of chance."""
+    from scipy.signal import lfilter
+
+    drawn = np.random.default_rng(8).standard_normal(len(TIME))
+    colour = lfilter([0.6 * 2.0], [1.0, -0.8], drawn)
+    model = Shaken([noisy(2.0 + 3.0 * TIME) + colour + shaken(4.0)])
+    assert not fit_random_effect(
+        model, Task(base=fit_null(model, [0]), runs=(0,), effect="shake")
+    ).consistent
+    assert Procedure(runner=runner(model)).run()[1].effects == ("shake",)
+
+
 def test_what_is_little_beside_a_great_unrest_may_be_its_law() -> None:
     """By hand: evidence of some n / 2 8^2 12 = 768e3, of which the wave's 125 are less than 0.001;
     alone it is found.
