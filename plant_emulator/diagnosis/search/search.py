@@ -27,7 +27,7 @@ from plant_emulator.diagnosis.search.confirmation import Trial, confirm, without
 from plant_emulator.diagnosis.search.law_error import LawErrors
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
 from plant_emulator.diagnosis.search.promise import Start, leading, starts_of
-from plant_emulator.diagnosis.search.screening import promises, visibilities
+from plant_emulator.diagnosis.search.screening import SIMULATION, promises, visibilities
 from plant_emulator.diagnosis.search.secant_fits import fitted_promises
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.summary import (
@@ -35,7 +35,6 @@ from plant_emulator.diagnosis.search.summary import (
     hypotheses,
     log_odds,
     not_told_apart,
-    regressions_tell,
     search_step,
     unconverged,
 )
@@ -173,12 +172,12 @@ class Search:
                 fits = self._confirm(base, [one], SETTINGS.leader_iterations)
                 best = min((best, *fits), key=lambda fit: fit.cost)
                 tried.append(one.effect)
-                if best is not base and regressions_tell(best, self.null):
+                if best is not base and best.mean_square <= NOISE_MEAN_SQUARE:
                     break
             if not base.effects and best is not base and self._renew_null(best):
                 self._expand(self.null)
                 return
-            if regressions_tell(best, self.null):
+            if best.mean_square <= NOISE_MEAN_SQUARE:
                 most = SETTINGS.rivals_beside if base.effects else SETTINGS.rivals
                 self._confirm(base, leading(found, most, least, tried), SETTINGS.iterations)
                 return
@@ -286,7 +285,8 @@ class Search:
         (shown,) = self.runner.map(visibilities, [self._task(self.null)])
         values = {key: self._value(one) for key, one in self.sets.items()}
         screened = self.promises.get(frozenset(final.effects), [])
-        larger = {p.effect: self._needed(final) - p.gain for p in screened}
+        needed = self._needed(final)
+        larger = {p.effect: needed - p.gains.get(SIMULATION, 0.0) for p in screened}
         return Explanation(
             null=self.null,
             final=final,

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 from plant_emulator.diagnosis.answer import SearchStep
 from plant_emulator.diagnosis.fitting.evidence import (
     CLASS_MARGIN,
-    NOISE_MEAN_SQUARE,
-    adequate,
     evidence_of,
 )
 from plant_emulator.diagnosis.fitting.explanation import Hypothesis
@@ -41,13 +39,6 @@ def not_told_apart(sets: Sets) -> list[FitResult]:
         near = SETTINGS.near * max(1.0, best.mean_square)
         kept += [one for one in same if one.cost < best.cost + near]
     return kept
-
-
-def regressions_tell(found: FitResult, null: FitResult) -> bool:
-    """Whether a set leaves so little that regressions can choose its rivals."""
-    if len(found.effects) > 1:
-        return found.mean_square <= NOISE_MEAN_SQUARE
-    return found.mean_square <= SETTINGS.linear_mean_square or adequate(found, null)
 
 
 def alternatives(sets: Sets, final: FitResult, name: str) -> dict[str, float]:
