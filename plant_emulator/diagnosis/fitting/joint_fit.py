@@ -42,9 +42,10 @@ FIRST_ITERATIONS, APPROACH_ITERATIONS = 3, 25
 LED_COST_TOLERANCE = 1e-3
 LED_DIFFERENCE = 10.0
 # Times between the corrections that lead a simulation along the measured outputs [s]: in the first
-# a speed that is off by some percent crosses a tenth of the backlash, in the second most of it.
-# Each is five times the one before: a longer jump ended in local minima.
-CORRECTION_INTERVALS = (0.2, 1.0, 5.0)
+# a speed that is off by some percent crosses a tenth of the backlash, in the third most of it. Each
+# is some 2.5 times the one before: jumps of five ended in local minima where the drum rocks to and
+# fro in the backlash.
+CORRECTION_INTERVALS = (0.2, 0.5, 1.2, 3.0, 8.0)
 # A size differs from neutral for certain from so many of its standard errors on.
 SIGNIFICANT_ERRORS = 3.0
 # Share of the largest size allowed from which on an effect stands for something else. An effect
