@@ -39,6 +39,7 @@ class Fold:
     """A cross-validation fold: runs to fit, and runs to predict.
 
     start : fit to start from, with the states of the fitted runs
+    states : of each predicted run, near those that suit it; none where they have to be looked for
     refitted : whether the runs are fitted; else the start's values are taken as they are
     as_fitted : whether the predicted run is a later part of the fitted one, and starts as that does
     """
@@ -46,6 +47,7 @@ class Fold:
     fitted: tuple[int, ...]
     predicted: tuple[int, ...]
     start: FitResult
+    states: tuple[Mapping[str, float], ...] = ()
     refitted: bool = True
     as_fitted: bool = False
 
@@ -65,7 +67,11 @@ def predict(model: Model, fold: Fold) -> Prediction:
     """Fit the fold's hypothesis to its fitted runs, and predict the others (a step)."""
     found = refit_fold(model, fold) if fold.refitted else fold.start
     known = found.states[0] if fold.as_fitted else None
-    predicted = [_predict_run(model, found, run, known) for run in fold.predicted]
+    near = fold.states or [None for _ in fold.predicted]
+    predicted = [
+        _predict_run(model, found, run, known, own)
+        for run, own in zip(fold.predicted, near, strict=True)
+    ]
     return Prediction(
         residuals=tuple(residual for residual, _ in predicted),
         converged=(found.converged or not fold.refitted) and all(ended for _, ended in predicted),
@@ -111,11 +117,16 @@ def _signature_norm(model: Model, fold: Fold, name: str) -> float:
 
 
 def _predict_run(
-    model: Model, found: FitResult, run: int, known: Mapping[str, float] | None
+    model: Model,
+    found: FitResult,
+    run: int,
+    known: Mapping[str, float] | None,
+    near: Mapping[str, float] | None,
 ) -> tuple[Array, bool]:
     """Residual of a run with all parameters kept, and whether the fit of its states converged.
 
     known : the run's states; None: they are fitted to it
+    near : states to fit from; None: they are looked for
     """
     effects = found.effects
     residual = model.residual(run, effects)
@@ -126,7 +137,7 @@ def _predict_run(
     own = (*model.states, *(u for name in effects for u in model.candidates[name].states))
     states, converged = known or {}, True
     if known is None and own:
-        start = model.initial_states(run, effects, found.values)
+        start = near or model.initial_states(run, effects, found.values)
         estimated = fit_from(start, own, residual_at)
         states, converged = estimated.states(0), estimated.converged
     return model.unwhitened_residual(run, effects)({**found.values, **states}), converged

@@ -228,11 +228,13 @@ class HeldOutRuns:
         refitted: bool,
     ) -> Fold:
         """A fold that starts from a fit to all runs of the plan."""
-        states = tuple(start.states[self.plan.fitted.index(run)] for run in fitted)
+        of_runs = dict(zip(self.plan.fitted, start.states, strict=True))
+        seen = all(run in of_runs for run in predicted)
         return Fold(
             fitted=fitted,
             predicted=predicted,
-            start=replace(start, states=states),
+            start=replace(start, states=tuple(of_runs[run] for run in fitted)),
+            states=tuple(of_runs[run] for run in predicted) if seen else (),
             refitted=refitted,
             as_fitted=self.plan.as_fitted,
         )

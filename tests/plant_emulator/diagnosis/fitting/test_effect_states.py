@@ -8,7 +8,7 @@ import pytest
 
 from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.machine import Candidate
-from plant_emulator.diagnosis.prediction.gap import Fold, refit_fold
+from plant_emulator.diagnosis.prediction.gap import Fold, predict, refit_fold
 from plant_emulator.estimation.robust_scan import scan_unknowns
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.signals.log import Array
@@ -150,6 +150,18 @@ def test_held_out_run_starts_in_the_valley_of_its_own_beat() -> None:
     )
     folded = np.sign(found["beat_rate"]) * np.array([found["beat_rate"], found["beat_phase"]])
     np.testing.assert_allclose(folded, [3.37, 2.0], atol=0.3)
+
+
+def test_states_that_a_fit_of_all_runs_found_are_not_looked_for_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    model = Beating([noisy(wave(2.0, rate, phase), k) for k, (rate, phase) in enumerate(RUNS)])
+    near = [{"beat_rate": rate + 0.01, "beat_phase": phase} for rate, phase in RUNS]
+    values = {"a": 0.0, "b": 0.0, "beat_size": 2.0}
+    start = fit(model, ("beat",), (0, 1), values, near[:2])
+    monkeypatch.delattr(Line, "initial_states")
+    found = predict(model, Fold(fitted=(0, 1), predicted=(2,), start=start, states=(near[2],)))
+    assert np.std(found.residuals[0]) == pytest.approx(1.0, abs=0.05)
 
 
 def test_prediction_has_no_more_of_an_effect_than_the_fitted_runs_show() -> None:
