@@ -72,6 +72,7 @@ class VarianceComponent:
     shape : constants that only shape the effect, by name
     evidence : twice the rise of the log-likelihood
     weights : 1 / sqrt(1 + a^2 v) of each run, shape (channels, samples)
+    unopposed : whether no run is much less likely with this size than without the effect
     homoscedastic : whether the weighted residual has the same variance at each level of v
     white : whether the weighted residual is nearly white
     """
@@ -83,10 +84,11 @@ class VarianceComponent:
     shape: Mapping[str, float]
     evidence: float
     weights: tuple[Array, ...]
+    unopposed: bool
     homoscedastic: bool
     white: bool
 
     @property
     def consistent(self) -> bool:
         """Whether the residual is what the random effect leaves."""
-        return self.homoscedastic and self.white
+        return self.unopposed and self.homoscedastic and self.white

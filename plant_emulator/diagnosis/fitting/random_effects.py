@@ -9,9 +9,9 @@ v : variance of the whitened channels over courses that are drawn at random, for
 a : size of the effect, a variance component estimated by maximum likelihood (S. R. Searle,
     G. Casella, C. E. McCulloch, Variance Components, 1992)
 
-Another cause leaves a large residual at other samples, or a residual that is not random. A random
-effect therefore counts only where the weighted residual has the same variance at every level of v,
-and is nearly white.
+Another cause leaves a large residual at other samples, in a part of the runs, or a residual that is
+not random. A random effect therefore counts only where the weighted residual has the same variance
+at every level of v, and is nearly white, and where no run speaks against it.
 """
 
 from __future__ import annotations
@@ -101,6 +101,10 @@ def _fit_component(model: Model, task: Task, shape: Mapping[str, float]) -> Vari
     squares = np.concatenate([r[c] for r, c in zip(residuals, counted, strict=True)]) ** 2
     added = np.concatenate([v[c] for v, c in zip(variances, counted, strict=True)])
     found, error, evidence = _maximise_likelihood(squares, added, size.upper)
+    of_runs = [
+        _loss(r[c] ** 2, v[c], 0.0) - _loss(r[c] ** 2, v[c], found)
+        for r, v, c in zip(residuals, variances, counted, strict=True)
+    ]
     weights = tuple(1.0 / np.sqrt(1.0 + found**2 * v) for v in variances)
     weighted = [r * w for r, w in zip(residuals, weights, strict=True)]
     return VarianceComponent(
@@ -111,6 +115,7 @@ def _fit_component(model: Model, task: Task, shape: Mapping[str, float]) -> Vari
         shape=shape,
         evidence=evidence,
         weights=weights,
+        unopposed=min(of_runs) > -EVIDENCE_THRESHOLD,
         homoscedastic=_is_homoscedastic(squares, found**2 * added),
         white=_is_white(weighted, evidence),
     )
@@ -153,8 +158,7 @@ def _maximise_likelihood(squares: Array, added: Array, upper: float) -> tuple[fl
     from scipy.optimize import minimize_scalar
 
     def loss(size: float) -> float:
-        total = 1.0 + size * size * added
-        return float(np.sum(np.log(total) + squares / total))
+        return _loss(squares, added, size)
 
     found = minimize_scalar(loss, bounds=(0.0, upper), method="bounded", options={"xatol": 1e-7})
     size = float(found.x)
@@ -162,6 +166,12 @@ def _maximise_likelihood(squares: Array, added: Array, upper: float) -> tuple[fl
     bend = (loss(size + step) - 2.0 * loss(size) + loss(size - step)) / step**2
     error = (2.0 / bend) ** 0.5 if bend > 0.0 else float("inf")
     return size, error, max(0.0, loss(0.0) - loss(size))
+
+
+def _loss(squares: Array, added: Array, size: float) -> float:
+    """Minus twice the log-likelihood of a size, but for a constant."""
+    total = 1.0 + size * size * added
+    return float(np.sum(np.log(total) + squares / total))
 
 
 def _is_homoscedastic(squares: Array, added: Array) -> bool:

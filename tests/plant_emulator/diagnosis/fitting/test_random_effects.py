@@ -88,6 +88,20 @@ def test_gap_that_is_as_large_but_not_random_is_no_unrest() -> None:
     assert not one.consistent
 
 
+def test_unrest_of_one_run_only_is_no_unrest_of_the_machine() -> None:
+    """By hand: each still run loses the sum of log(1 + a^2 v) - a^2 v / (1 + a^2 v)."""
+    line = 2.0 + 3.0 * TIME
+    model = Shaken([noisy(line, 1), noisy(line, 2), noisy(line, 3) + shaken(0.8)])
+    runs = (0, 1, 2)
+    one = fit_random_effect(model, Task(base=fit_null(model, runs), runs=runs, effect="shake"))
+    assert one.evidence > 1000.0
+    assert not one.consistent
+    model = Shaken([noisy(line, k) + shaken(0.8, k + 10) for k in runs])
+    assert fit_random_effect(
+        model, Task(base=fit_null(model, runs), runs=runs, effect="shake")
+    ).consistent
+
+
 def test_gap_that_is_random_elsewhere_is_no_unrest() -> None:
     """The residual is as large at small slopes as at large ones, like that of a coarse signal."""
     drawn = np.random.default_rng(3).standard_normal(len(TIME))
