@@ -162,8 +162,8 @@ class Search:
     def _expand(self, base: FitResult) -> None:
         """Fit the effects of largest gain on top of a set.
 
-        Regressions predict it; the leader of each is fitted until one leaves little, then its
-        rivals. Where a set leaves more than the noise, or no leader is the cause, secants tell.
+        Regressions predict it; the leader of each is fitted until one leaves noise, then its
+        rivals. Where a set leaves more than the noise, or none of these is the cause, secants tell.
         """
         least = self._needed(base) if base.effects else SETTINGS.promising
         if not base.effects or base.mean_square <= NOISE_MEAN_SQUARE:
@@ -174,12 +174,13 @@ class Search:
                 tried.append(one.effect)
                 if best is not base and best.mean_square <= NOISE_MEAN_SQUARE:
                     break
-            if not base.effects and best is not base and self._renew_null(best):
+            near = not base.effects and best.mean_square <= SETTINGS.linear_mean_square
+            if near and best is not base and self._renew_null(best):
                 self._expand(self.null)
                 return
-            if best.mean_square <= NOISE_MEAN_SQUARE:
-                most = SETTINGS.rivals_beside if base.effects else SETTINGS.rivals
-                self._confirm(base, leading(found, most, least, tried), SETTINGS.iterations)
+            most = SETTINGS.rivals_beside if base.effects else SETTINGS.rivals
+            fits = self._confirm(base, leading(found, most, least, tried), SETTINGS.iterations)
+            if min((best, *fits), key=lambda fit: fit.cost).mean_square <= NOISE_MEAN_SQUARE:
                 return
         reached = 0.0
         for one in fitted_promises(self.runner, base)[: SETTINGS.most_followed]:
@@ -285,8 +286,7 @@ class Search:
         (shown,) = self.runner.map(visibilities, [self._task(self.null)])
         values = {key: self._value(one) for key, one in self.sets.items()}
         screened = self.promises.get(frozenset(final.effects), [])
-        needed = self._needed(final)
-        larger = {p.effect: needed - p.gains.get(SIMULATION, 0.0) for p in screened}
+        larger = {p.effect: self._needed(final) - p.gains.get(SIMULATION, 0.0) for p in screened}
         return Explanation(
             null=self.null,
             final=final,
