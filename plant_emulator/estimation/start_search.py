@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     Progress = Callable[[str, float], None]
 
 # A scan: name, factor either way, values. Coarse over what a first guess may be off, then fine.
+# The flux comes first: from some value on the voltage does not suffice for the speeds asked.
 SCANS: tuple[tuple[str, float, int], ...] = (
+    ("flux_constant_1", 1.25, 15),
     (GAP_POSITION, 1.0, 9),
     ("dead_time", 2.5, 27),
     ("backlash_half_gap", 2.2, 31),

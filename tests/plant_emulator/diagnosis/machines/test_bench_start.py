@@ -1,0 +1,30 @@
+"""Where the fit of a bench begins."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.machines.bench import BenchModel
+from plant_emulator.model.parameters import ParameterSet
+from plant_emulator.recordings.recording import recording
+from plant_emulator.signals.log import Log
+from plant_emulator.simulation.sensor_noise import add_noise
+from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
+
+
+def test_a_bench_whose_voltage_does_not_suffice_is_fitted(
+    bench_log: Callable[[str], Log], nominal: ParameterSet
+) -> None:
+    """With 412 (N m/A)(rad/s) the motor stays at 230 rad/s; with the 367 of the set it reaches 380.
+
+    No slope at the one leads to the other.
+    """
+    asked = replace(bench_log("bench_nominal/program1"), source="run")
+    values = values_of(nominal) | {"flux_constant_1": 412.0}
+    log = add_noise(simulate(inputs_of(asked), values, gap_position=0.3, step=1e-3), 2)
+    assert log["motor_speed"].max() < 0.65 * log["speed_reference"].max()
+    found = fit_null(BenchModel([recording(log)], nominal, {}), [0])
+    assert found.mean_square < 1.1
+    assert found.values["flux_constant_1"] == pytest.approx(412.0, rel=0.01)
