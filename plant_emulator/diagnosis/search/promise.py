@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.search.settings import SETTINGS
 
 if TYPE_CHECKING:
@@ -74,3 +75,19 @@ def leading(
         rest = [p for p in order if p.effect not in tried][:most]
         near |= {p.effect: p for p in rest if p.gains.get(score, 0.0) > needed}
     return list(near.values())
+
+
+def rivals(
+    found: Sequence[Promise], base: FitResult, least: float, tried: Sequence[str]
+) -> list[Promise]:
+    """Effects to fit beside those that were tried on top of a fit.
+
+    They are those that nearly lead. Without effects, where no more than noise is left, an effect is
+    faint: its gain may be several times the promised one, and a fit is cheap. All that promise
+    something are fitted there.
+    """
+    if base.effects:
+        return leading(found, SETTINGS.rivals_beside, least, tried)
+    if base.mean_square <= NOISE_MEAN_SQUARE:
+        return [p for p in found if p.gain > least and p.effect not in tried]
+    return leading(found, SETTINGS.rivals, least, tried)

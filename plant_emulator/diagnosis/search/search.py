@@ -26,7 +26,7 @@ from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.confirmation import Trial, confirm, without_effects
 from plant_emulator.diagnosis.search.law_error import LawErrors
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
-from plant_emulator.diagnosis.search.promise import Start, leading, starts_of
+from plant_emulator.diagnosis.search.promise import Start, leading, rivals, starts_of
 from plant_emulator.diagnosis.search.screening import SIMULATION, promises, visibilities
 from plant_emulator.diagnosis.search.secant_fits import fitted_promises
 from plant_emulator.diagnosis.search.settings import SETTINGS
@@ -178,8 +178,8 @@ class Search:
             if near and best is not base and self._renew_null(best):
                 self._expand(self.null)
                 return
-            most = SETTINGS.rivals_beside if base.effects else SETTINGS.rivals
-            fits = self._confirm(base, leading(found, most, least, tried), SETTINGS.iterations)
+            new = rivals(found, base, least, tried)
+            fits = self._confirm(base, new, SETTINGS.iterations)
             if min((best, *fits), key=lambda fit: fit.cost).mean_square <= NOISE_MEAN_SQUARE:
                 return
         reached = 0.0

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
-from plant_emulator.diagnosis.search.promise import Promise, Start, leading, starts_of
+from plant_emulator.diagnosis.search.promise import Promise, Start, leading, rivals, starts_of
 from tests.plant_emulator.diagnosis.line import TIME, Line, noisy
 
 
@@ -23,6 +23,24 @@ def test_leaders_of_each_score_gain_half_of_its_most() -> None:
     assert [p.effect for p in leading(found, 2, 5.0, ["a"])] == ["b", "d", "c"]
     assert [p.effect for p in leading(found, 2, 25.0, ["a"])] == ["c", "d"]
     assert [p.effect for p in leading(found, 1, 5.0)] == ["b", "a"]
+
+
+def test_all_that_promise_something_are_rivals_where_only_noise_is_left() -> None:
+    """A faint effect that was promised 8 gained 42, and the leader's 37 were none."""
+    found = [
+        promise("a", simulation=37.0),
+        promise("b", simulation=30.0),
+        promise("c", simulation=27.0),
+        promise("d", simulation=8.0),
+        promise("e", simulation=0.5),
+    ]
+    noise = fit_null(Line([noisy(2.0 + 3.0 * TIME)]), (0,))
+    names = {p.effect for p in rivals(found, noise, 5.0, ["a"])}
+    assert names == {"b", "c", "d"}
+    gap = replace(noise, sum_of_squares=2.0 * noise.samples)
+    assert {p.effect for p in rivals(found, gap, 5.0, ["a"])} == {"b", "c"}
+    beside = replace(noise, effects=("a",))
+    assert {p.effect for p in rivals(found, beside, 5.0, [])} == {"a"}
 
 
 def test_effect_also_starts_at_the_parameters_of_the_set() -> None:
