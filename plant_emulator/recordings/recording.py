@@ -22,7 +22,7 @@ from plant_emulator.signals.log import (
     without_voltage,
 )
 from plant_emulator.signals.mains import noise_beside_lines
-from plant_emulator.signals.noise import FLOOR, noise
+from plant_emulator.signals.noise import FLOOR, noise, value_step
 from plant_emulator.simulation.simulate import (
     TOLERANCE,
     Hold,
@@ -42,6 +42,10 @@ if TYPE_CHECKING:
 # What is known of the voltage's sensor beforehand: its offset [V] and the error of its gain, each
 # run's own. An isolating amplifier of 500 V and 0.2 % is off by 1 V; a divider by some 0.5 %.
 OFFSET, GAIN_ERROR = 1.0, 0.005
+# What is known of the converter of a coarse channel: each run's offset, and the error of its gain
+# at the largest value [steps]. Noise of half a step smooths the steps, and two roundings one after
+# the other leave some percent of them. Finer channels have noise enough.
+CONVERTER_ERROR = 0.1
 # Residual where the model cannot be simulated [noise]: a search turns back there, and goes on.
 IMPOSSIBLE = 100.0
 
@@ -52,6 +56,7 @@ class Recording:
 
     use : samples that count, shape (channels, samples)
     logged_values : values of the model that the log measures, such as a temperature, by name [SI]
+    converter_errors : of coarse channels, by name [SI]
     """
 
     log: Log
@@ -60,6 +65,7 @@ class Recording:
     noise: Array
     use: NDArray[np.bool_]
     logged_values: Mapping[str, float] = field(default_factory=dict)
+    converter_errors: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def estimated_torque(self) -> bool:
@@ -117,10 +123,10 @@ class Recording:
     ) -> Array:
         """Whitened residual: measured minus simulated over the noise, shape (channels, samples).
 
-        Noise, gain and offset of the voltage's sensor together have the covariance 1 + X X' with X
-        the errors over the noise. The residual of the voltage is multiplied by the inverse of the
-        square root of that covariance. The errors follow from the simulated voltage, because the
-        noise of the measured one would explain a part of itself.
+        Noise, gain and offset of the voltage's sensor, or of the converter of a coarse channel,
+        together have the covariance 1 + X X' with X the errors over the noise. The residual is
+        multiplied by the inverse of the square root of that covariance. The errors follow from the
+        simulated value, because the noise of the measured one would explain a part of itself.
 
         Where the model cannot be simulated at these values, every sample is IMPOSSIBLE.
         """
@@ -151,10 +157,16 @@ class Recording:
         difference = np.stack([self.log[name] - found[name] for name in self.channels])
         deviation = self.noise[:, None] * self.noise_ratio
         white = np.where(self.use, difference / deviation, 0.0)
-        if VOLTAGE in self.channels:
-            row = self.channels.index(VOLTAGE)
-            errors = voltage_errors(found[VOLTAGE]) / deviation[row][:, None]
-            white[row] = whiten_sensor_errors(white[row], errors * self.use[row][:, None])
+        for row, name in enumerate(self.channels):
+            if name == VOLTAGE:
+                errors = voltage_errors(found[name])
+            elif name in self.converter_errors:
+                error, largest = self.converter_errors[name], np.max(np.abs(self.log[name]))
+                errors = sensor_errors(found[name], error, error / largest)
+            else:
+                continue
+            errors = errors / deviation[row][:, None] * self.use[row][:, None]
+            white[row] = whiten_sensor_errors(white[row], errors)
         return white
 
     def with_noise_beside(self, values: Mapping[str, float]) -> Recording:
@@ -211,7 +223,15 @@ def voltage_errors(voltage: Array) -> Array:
 
     voltage : shape (n,) [V]
     """
-    return np.stack([np.full(len(voltage), OFFSET), GAIN_ERROR * voltage], axis=-1)
+    return sensor_errors(voltage, OFFSET, GAIN_ERROR)
+
+
+def sensor_errors(value: Array, offset: float, gain_error: float) -> Array:
+    """Standard deviations of a value that its sensor's offset and gain make [SI], shape (n, 2).
+
+    value : shape (n,) [SI]; offset [SI], gain_error [1] : standard deviations
+    """
+    return np.stack([np.full(len(value), offset), gain_error * value], axis=-1)
 
 
 def whiten_sensor_errors(residual: Array, errors: Array) -> Array:
@@ -259,4 +279,9 @@ def recording(
         raise IdentificationError(
             f"{log.source}: {still} does not move; a run that excites it is needed"
         )
-    return Recording(log, inputs, channels, np.array(levels), counted)
+    errors = {
+        name: CONVERTER_ERROR * step
+        for name, level in zip(channels, levels, strict=True)
+        if (step := value_step(log[name])) > level
+    }
+    return Recording(log, inputs, channels, np.array(levels), counted, converter_errors=errors)

@@ -24,6 +24,9 @@ CLIP = 3.0
 TRUNCATED_DEVIATION = 0.986578
 # Least noise as a share of the channel's range: a log without noise still has rounding.
 FLOOR = 2e-4
+# Distance of two values that is none, over the range; and the least share of the usual distance
+# that the shorter ones have where values are steps apart.
+DUST, EVEN = 1e-9, 0.99
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,3 +69,16 @@ def deviation_without_outliers(differences: Array) -> float:
             break
         deviation = renewed
     return deviation
+
+
+def value_step(channel: Array) -> float:
+    """Step that the values of a quantised channel are apart [its unit]; 0: it has none.
+
+    channel : shape (n,)
+    """
+    apart = np.diff(np.unique(channel))
+    apart = apart[apart > DUST * np.ptp(channel)]
+    if len(apart) == 0:
+        return 0.0
+    low, usual = np.quantile(apart, (0.1, 0.5))
+    return float(usual) if low > EVEN * usual else 0.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from plant_emulator.signals.log import Log
-from plant_emulator.signals.noise import FLOOR, noise
+from plant_emulator.signals.noise import FLOOR, noise, value_step
 
 TIME = np.arange(4000) * 0.01
 
@@ -58,3 +58,12 @@ def test_noise_of_a_channel_slower_than_its_log_is_that_of_its_fresh_samples() -
     held = (smooth + 0.25 * random.standard_normal(len(TIME)))[np.arange(len(TIME)) // 5 * 5]
     fresh = np.arange(len(TIME)) % 5 == 0
     assert noise(held, fresh) == pytest.approx(0.25, rel=0.08)
+
+
+@pytest.mark.parametrize("step", [0.02175, 0.5])
+def test_values_of_a_quantised_channel_are_a_step_apart(step: float) -> None:
+    random = np.random.default_rng(4)
+    value = 3.0 + 2.0 * np.sin(np.linspace(0.0, 9.0, 4000)) + random.normal(0.0, 0.01, 4000)
+    assert value_step(np.round(value / step) * step) == pytest.approx(step)
+    assert value_step(value) == 0.0
+    assert value_step(np.full(4000, 3.0)) == 0.0
