@@ -80,7 +80,8 @@ class StartSearch:
                 self._scan(name, np.geomspace(1.0 / factor, factor, count))
 
     def _scan(self, name: str, factors: Array) -> None:
-        candidates = [{**self.values, name: self.values[name] * f} for f in factors]
+        # Where a log does not show the parameter, it stays as it is.
+        candidates = [self.values, *({**self.values, name: self.values[name] * f} for f in factors)]
         losses = [self.total(candidate) for candidate in candidates]
         self.values = candidates[int(np.argmin(losses))]
 

@@ -42,10 +42,12 @@ if TYPE_CHECKING:
 # What is known of the voltage's sensor beforehand: its offset [V] and the error of its gain, each
 # run's own. An isolating amplifier of 500 V and 0.2 % is off by 1 V; a divider by some 0.5 %.
 OFFSET, GAIN_ERROR = 1.0, 0.005
-# What is known of the converter of a coarse channel: each run's offset, and the error of its gain
-# at the largest value [steps]. Noise of half a step smooths the steps, and two roundings one after
+# What is known of the quantiser of a coarse channel: each run's offset, and the error of its gain
+# at the largest values [steps]. Noise of half a step smooths the steps, and two roundings one after
 # the other leave some percent of them. Finer channels have noise enough.
-CONVERTER_ERROR = 0.1
+QUANTISER_ERROR = 0.1
+# Quantile of a channel's values that counts as the largest: spikes are larger.
+LARGEST = 0.99
 # Residual where the model cannot be simulated [noise]: a search turns back there, and goes on.
 IMPOSSIBLE = 100.0
 
@@ -56,7 +58,7 @@ class Recording:
 
     use : samples that count, shape (channels, samples)
     logged_values : values of the model that the log measures, such as a temperature, by name [SI]
-    converter_errors : of coarse channels, by name [SI]
+    quantiser_errors : offset [SI] and error of the gain [1] of coarse channels, by name
     """
 
     log: Log
@@ -65,7 +67,7 @@ class Recording:
     noise: Array
     use: NDArray[np.bool_]
     logged_values: Mapping[str, float] = field(default_factory=dict)
-    converter_errors: Mapping[str, float] = field(default_factory=dict)
+    quantiser_errors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def estimated_torque(self) -> bool:
@@ -123,7 +125,7 @@ class Recording:
     ) -> Array:
         """Whitened residual: measured minus simulated over the noise, shape (channels, samples).
 
-        Noise, gain and offset of the voltage's sensor, or of the converter of a coarse channel,
+        Noise, gain and offset of the voltage's sensor, or of the quantiser of a coarse channel,
         together have the covariance 1 + X X' with X the errors over the noise. The residual is
         multiplied by the inverse of the square root of that covariance. The errors follow from the
         simulated value, because the noise of the measured one would explain a part of itself.
@@ -160,9 +162,8 @@ class Recording:
         for row, name in enumerate(self.channels):
             if name == VOLTAGE:
                 errors = voltage_errors(found[name])
-            elif name in self.converter_errors:
-                error, largest = self.converter_errors[name], np.max(np.abs(self.log[name]))
-                errors = sensor_errors(found[name], error, error / largest)
+            elif name in self.quantiser_errors:
+                errors = sensor_errors(found[name], *self.quantiser_errors[name])
             else:
                 continue
             errors = errors / deviation[row][:, None] * self.use[row][:, None]
@@ -279,9 +280,10 @@ def recording(
         raise IdentificationError(
             f"{log.source}: {still} does not move; a run that excites it is needed"
         )
-    errors = {
-        name: CONVERTER_ERROR * step
-        for name, level in zip(channels, levels, strict=True)
-        if (step := value_step(log[name])) > level
-    }
-    return Recording(log, inputs, channels, np.array(levels), counted, converter_errors=errors)
+    errors = {}
+    for name, level, own in zip(channels, levels, counted, strict=True):
+        error = QUANTISER_ERROR * value_step(log[name][own])
+        if error > QUANTISER_ERROR * level:
+            largest = float(np.quantile(np.abs(log[name][own]), LARGEST))
+            errors[name] = error, error / max(largest, error)
+    return Recording(log, inputs, channels, np.array(levels), counted, quantiser_errors=errors)

@@ -93,6 +93,8 @@ def lateness(time: Array, reference: Array) -> tuple[Array, Array]:
         powers = np.arange(1, degree + 1)
         slope = (found[:, 1:] * powers) @ (offsets ** (powers[:, None] - 1))
         moved = left / np.hypot(slope, TELLING_SLOPE)
+        # The row itself by its slope, so that neighbours cannot change places.
+        moved[:, -first] = left[:, -first] / np.maximum(np.abs(slope[:, -first]), TELLING_SLOPE)
         regular = np.max(np.abs(moved), axis=1) < LARGEST_DEPARTURE * interval
         spread = np.sqrt(np.sum(moved**2, axis=1) / freedoms[k])
         spreads[k, rows[regular]] = spread[regular]

@@ -26,7 +26,7 @@ TRUNCATED_DEVIATION = 0.986578
 FLOOR = 2e-4
 # Distance of two values that is none, over the range; and the least share of the usual distance
 # that the shorter ones have where values are steps apart.
-DUST, EVEN = 1e-9, 0.99
+DUST, EVEN = 1e-9, 0.9
 
 
 @dataclass(frozen=True, kw_only=True)

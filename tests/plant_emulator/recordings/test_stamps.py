@@ -108,6 +108,15 @@ def test_the_reference_at_the_times_found_is_straight_where_it_was() -> None:
     assert np.max(np.abs(slopes - RATE)) < 2.0
 
 
+def test_rows_of_a_coarse_reference_on_a_slow_ramp_keep_their_order() -> None:
+    """A step of 0.12 rad/s is a whole interval of 10 ms at 10.5 rad/s^2."""
+    time = np.arange(0.0, 60.0, 0.01)
+    asked = np.interp(time, [0.0, 2.0, 32.0, 50.0, 60.0], [0.0, 0.0, 315.0, 315.0, 262.5])
+    coarse = np.round(asked / 0.12) * 0.12
+    found, _ = restamp(Log(time, {"speed_reference": coarse, "motor_speed": time}))
+    assert np.all(np.diff(found.time) > 0.0)
+
+
 def test_a_sine_is_no_jitter() -> None:
     time = np.arange(0.0, 15.0, 0.01)
     given = Log(time, {"speed_reference": 200.0 + 50.0 * np.sin(2.0 * time)})

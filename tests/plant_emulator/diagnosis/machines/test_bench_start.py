@@ -28,3 +28,14 @@ def test_a_bench_whose_voltage_does_not_suffice_is_fitted(
     found = fit_null(BenchModel([recording(log)], nominal, {}), [0])
     assert found.mean_square < 1.1
     assert found.values["flux_constant_1"] == pytest.approx(412.0, rel=0.01)
+
+
+def test_a_flux_that_a_log_does_not_show_stays(
+    bench_log: Callable[[str], Log], nominal: ParameterSet
+) -> None:
+    """Below 190 rad/s the field is not weakened."""
+    asked = bench_log("bench_nominal/program1")
+    slow = Log(asked.time, {"speed_reference": 0.3 * asked["speed_reference"]}, "run")
+    log = add_noise(simulate(inputs_of(slow), values_of(nominal), gap_position=0.3, step=1e-3), 2)
+    values, _ = BenchModel([recording(log)], nominal, {}).start_values([0])
+    assert values["flux_constant_1"] == nominal.value("flux_constant_1")

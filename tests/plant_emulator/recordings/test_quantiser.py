@@ -1,4 +1,4 @@
-"""What the converter of a coarse channel may be off by is noise."""
+"""What the quantiser of a coarse channel may be off by is noise."""
 
 from collections.abc import Callable
 
@@ -39,5 +39,21 @@ def test_a_gain_that_is_off_by_a_part_of_a_step_tells_nothing_of_a_coarse_channe
     row = fine.channels.index("drum_speed")
     expected = np.sum((2e-4 * log["drum_speed"]) ** 2) / fine.noise[row] ** 2
     assert squares_of_gain(fine, 2e-4) == pytest.approx(expected, rel=0.05)
-    # A radius that is off by a percent is far more than what a converter may be off by.
+    # A radius that is off by a percent is far more than what a quantiser may be off by.
     assert squares_of_gain(coarse, 0.01) > 500.0
+
+
+def test_spikes_and_samples_that_do_not_count_do_not_hide_the_steps(
+    bench_log: Callable[[str], Log],
+) -> None:
+    log = bench_log("bench_nominal/program3")
+    plain = measured(log, 0.0218)
+    value, use = plain.log["drum_speed"].copy(), np.ones(len(log.time), bool)
+    value[1000:1100] = np.linspace(value[1000], value[1100], 100)
+    use[1000:1100] = False
+    value[[500, 2000, 3000]] += 60.0
+    holed = Log(log.time, {**plain.log.signals, "drum_speed": value}, "run.csv")
+    found = recording(holed, use={"drum_speed": use})
+    offset, gain = found.quantiser_errors["drum_speed"]
+    assert offset == pytest.approx(0.00218)
+    assert gain == pytest.approx(0.00218 / np.quantile(np.abs(log["drum_speed"]), 0.99), rel=0.02)
