@@ -134,13 +134,19 @@ class Estimate:
         unknowns integrated out (Laplace's approximation; Occam factor of D. MacKay, Neural
         Computation 4 (1992) 415).
 
-        priors : of the unknowns, in their order; None: not charged
+        priors : of the unknowns, in their order; None: not charged. A prior that the fit did not
+            have narrows the covariance first; an unknown that the data do not show costs nothing
         """
-        own = [j for j, u in enumerate(priors) if u is not None and u.std is not None]
-        if not own:
+        shown = np.isfinite(self.standard_errors)
+        pairs = [(j, u) for j, u in enumerate(priors) if u is not None and u.std and shown[j]]
+        if not pairs:
             return 0.0
-        deviations = np.array([u.scaled_std for u in priors if u is not None and u.std is not None])
-        narrowed = self.covariance[np.ix_(own, own)] / np.outer(deviations, deviations)
+        own = [j for j, _ in pairs]
+        deviations = np.array([u.scaled_std for _, u in pairs])
+        covariance = self.covariance[np.ix_(own, own)] / np.outer(deviations, deviations)
+        new = np.diag([float(self.unknowns[j].std is None) for j in own])
+        # (C^-1 + P)^-1 = (1 + C P)^-1 C
+        narrowed = np.linalg.solve(np.eye(len(own)) + covariance @ new, covariance)
         return max(0.0, -float(np.linalg.slogdet(narrowed).logabsdet))
 
     @property

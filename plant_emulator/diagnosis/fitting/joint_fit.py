@@ -76,6 +76,12 @@ def _shrunk(size: Unknown, neutral: float) -> Unknown:
     return replace(size, prior=neutral, std=SHRINKAGE * abs(size.start - neutral))
 
 
+def _chosen(model: Model, effects: Sequence[str]) -> list[Unknown]:
+    """Sizes and shapes of effects, with the priors that the Occam penalty charges."""
+    own = [model.candidates[name] for name in effects]
+    return [u for c in own for u in (*(_shrunk(u, c.neutral[u.name]) for u in c.sizes), *c.shapes)]
+
+
 def with_starts(
     unknowns: Sequence[Unknown], values: Mapping[str, float], states: Sequence[Mapping[str, float]]
 ) -> list[Unknown]:
@@ -121,12 +127,7 @@ def fit(
         difference=difference,
     )
     candidates = {name: model.candidates[name] for name in effects}
-    chosen = [
-        one
-        for c in candidates.values()
-        for one in (*(_shrunk(u, c.neutral[u.name]) for u in c.sizes), *c.shapes)
-    ]
-    reached = to_result(effects, found, len(runs), chosen)
+    reached = to_result(effects, found, len(runs), _chosen(model, effects))
     return replace(
         reached,
         insignificant=tuple(n for n, c in candidates.items() if not _significant(c, reached)),
@@ -199,7 +200,7 @@ def lead(
         difference=LED_DIFFERENCE,
         rough=True,
     )
-    return to_result(start.effects, found, len(runs))
+    return to_result(start.effects, found, len(runs), _chosen(model, start.effects))
 
 
 def _significant(candidate: Candidate, found: FitResult) -> bool:

@@ -76,7 +76,7 @@ def fit_random_effect(model: Model, task: Task) -> VarianceComponent:
     if not found.white:
         return found
     others = [_fit_component(model, task, usual | shape) for shape in _other_shapes(candidate)]
-    return max([found, *others], key=lambda one: one.evidence)
+    return max([found, *others], key=lambda one: (one.consistent, one.evidence))
 
 
 def _other_shapes(candidate: Candidate) -> list[dict[str, float]]:

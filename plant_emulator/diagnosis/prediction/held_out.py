@@ -198,7 +198,9 @@ class HeldOutRuns:
                 if key == NOMINAL:
                     start = replace(found, values=self.runner.model.nominal(fitted))
                 keys.append(key)
-                tasks.append(self._fold(start, fitted, predicted, refitted=key != NOMINAL))
+                fold = self._fold(start, fitted, predicted, refitted=key != NOMINAL)
+                # States that suit the fitted parameters do not suit others.
+                tasks.append(replace(fold, states=()) if key == NOMINAL else fold)
         predictions: dict[tuple[str, ...], list[Prediction]] = {}
         for key, prediction in zip(keys, self.runner.map(predict, tasks), strict=True):
             predictions.setdefault(key, []).append(prediction)

@@ -174,8 +174,8 @@ class Search:
                 tried.append(one.effect)
                 if best is not base and best.mean_square <= NOISE_MEAN_SQUARE:
                     break
-            near = not base.effects and best.mean_square <= SETTINGS.linear_mean_square
-            if near and best is not base and self._renew_null(best):
+            tells = not base.effects and best is not base and not leaves_most(best, self.null)
+            if tells and self._renew_null(best):
                 self._expand(self.null)
                 return
             new = rivals(found, base, least, tried)

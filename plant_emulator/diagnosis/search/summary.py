@@ -63,8 +63,8 @@ def log_odds(
     known any more.
 
     values : negative log evidence of each set
-    larger : by how much it rises with one more effect, as predicted; of an effect that was screened
-        beside the set
+    larger : by how much it rises with one more effect, as the simulation's slopes predict, which
+        are right beside a set that leaves noise; of an effect that was screened beside it
     """
     key, null = frozenset(final.effects), sets[frozenset()]
     rivals = [price for name, price in larger.items() if key | {name} not in sets]

@@ -115,6 +115,20 @@ def test_a_size_is_charged_as_if_it_were_drawn() -> None:
     assert found.cost + (size / 2.0) ** 2 == pytest.approx(expected, abs=0.3)
 
 
+def test_a_size_that_the_data_do_not_show_costs_nothing() -> None:
+    """Neither does it pay for the sizes that the data show."""
+
+    class Idle(Line):
+        def residual(self, run: int, effects: Sequence[str]) -> Callable[..., Array]:
+            return super().residual(run, [name for name in effects if name != "wave"])
+
+    model = Idle([noisy(2.0 + 3.0 * TIME + 0.3 * TIME**3)], ("cube", "wave"))
+    alone = fit(model, ("cube",), [0], {}, [{}])
+    both = fit(model, ("cube", "wave"), [0], {}, [{}])
+    assert alone.occam_penalty > 3.0
+    assert both.occam_penalty == pytest.approx(alone.occam_penalty, abs=0.01)
+
+
 def test_a_size_far_below_the_plausible_one_is_not_named() -> None:
     """By hand: 0.017 of the plausible size at 5.5 standard errors gains 15 nats, and e^-6.5 of the
     sizes that were as probable lie there.
