@@ -282,8 +282,8 @@ def recording(
         )
     errors = {}
     for name, level, own in zip(channels, levels, counted, strict=True):
-        error = QUANTISER_ERROR * value_step(log[name][own])
-        if error > QUANTISER_ERROR * level:
-            largest = float(np.quantile(np.abs(log[name][own]), LARGEST))
-            errors[name] = error, error / max(largest, error)
+        values = log[name][own]
+        if (step := value_step(values)) > level:
+            largest = max(step, float(np.quantile(np.abs(values), LARGEST)))
+            errors[name] = QUANTISER_ERROR * step, QUANTISER_ERROR * step / largest
     return Recording(log, inputs, channels, np.array(levels), counted, quantiser_errors=errors)
