@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from plant_emulator.estimation.unknowns import Lengths
     from plant_emulator.signals.log import Array
 
 
@@ -17,11 +18,13 @@ class FitValues:
 
     values : parameters, sizes and shapes by name
     states : the initial states of each run by name, one mapping a run
+    lengths : of the slopes near there, see `Estimate.lengths`; empty where they are not known
     """
 
     effects: tuple[str, ...]
     values: Mapping[str, float]
     states: tuple[Mapping[str, float], ...]
+    lengths: Lengths = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,6 +13,7 @@ Standard errors come from the residuals themselves, see `covariance`; not those 
 
 from __future__ import annotations
 
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +23,6 @@ from plant_emulator.estimation.simulated_problem import (
     DIFFERENCE_NORM,
     SecantSlopes,
     SimulatedProblem,
-    column_lengths,
 )
 from plant_emulator.estimation.unknowns import Estimate, Unknown
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from scipy.optimize import OptimizeResult
 
-    from plant_emulator.estimation.unknowns import Residual
+    from plant_emulator.estimation.unknowns import Lengths, Residual
     from plant_emulator.signals.log import Array
 
 MAX_ITERATIONS = 60
@@ -51,6 +51,7 @@ def estimate(
     iterations: int | None = None,
     progress: Callable[[float], None] | None = None,
     follow: Estimate | None = None,
+    lengths: Lengths = MappingProxyType({}),
     difference: float = DIFFERENCE_NORM,
     rough: bool = False,
 ) -> Estimate:
@@ -65,6 +66,7 @@ def estimate(
     progress : called with the sum of squares after every simulation of all runs
     follow : an estimate nearby, of the same runs; the columns of its unknowns are then not
         simulated but follow by secants: far cheaper, and good for a first look only
+    lengths : of slopes nearby, see `Estimate.lengths`, where they are known
     difference : norm of the change of the residual vector that slopes are taken over; a wide one
         passes over local minima of a rough cost, and serves a search only
     rough : whether the values are a start only, as with `follow` in any case: all slopes follow
@@ -73,7 +75,9 @@ def estimate(
     unknowns = tuple(unknowns)
     rough = rough or follow is not None
     secants = SecantSlopes(unknowns, follow, rough=rough)
-    problem = SimulatedProblem(unknowns, residuals, progress, secants, difference)
+    problem = SimulatedProblem(
+        unknowns, residuals, progress, secants, _lengths_of(unknowns, lengths), difference
+    )
     start, lower, upper = _start(unknowns)
     free = any(u.std is None for u in unknowns)
     if free and not any(slopes.any() for slopes in problem.jacobian(start)):
@@ -86,6 +90,11 @@ def estimate(
     if near and settled < settled_far and found.nfev < most:
         found = _minimise(problem, found.x, bounds, settled, most - found.nfev)
     return _estimate(problem, found.x, bool(found.status > 0), str(found.message), rough=rough)
+
+
+def _lengths_of(unknowns: Sequence[Unknown], known: Lengths) -> Array:
+    """Lengths of the slopes of these unknowns; NaN where they are not known."""
+    return np.array([known.get((u.name, u.run), np.nan) for u in unknowns])
 
 
 def _start(unknowns: Sequence[Unknown]) -> tuple[Array, Array, Array]:
@@ -126,24 +135,26 @@ def linearise_at(
     unknowns: Sequence[Unknown],
     residuals: Sequence[Residual],
     *,
-    near: Estimate | None = None,
+    lengths: Lengths = MappingProxyType({}),
     difference: float = DIFFERENCE_NORM,
 ) -> Estimate:
     """Linearise the residuals at the starts of the unknowns, and return it as an estimate there.
 
-    near : a linearisation nearby, whose slopes set the steps of the differences. Without it they
-        follow from a first differencing
+    lengths : of slopes nearby, which tell the steps of the differences. Where they are not known,
+        the steps follow from a first differencing
     difference : see `estimate`
     """
     unknowns = tuple(unknowns)
     problem = SimulatedProblem(
-        unknowns, residuals, None, SecantSlopes(unknowns), difference=difference
+        unknowns,
+        residuals,
+        None,
+        SecantSlopes(unknowns),
+        _lengths_of(unknowns, lengths),
+        difference,
     )
     z = np.array([u.scaled(u.start) for u in unknowns])
-    if near is None:
-        problem.learn_steps(z)
-    else:
-        problem.lengths = column_lengths(near.jacobians)
+    problem.learn_steps(z)
     return _estimate(problem, z, True, "not fitted")
 
 

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.estimation.unknowns import column_lengths
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
@@ -41,6 +43,8 @@ class SimulatedProblem:
     """Residuals and Jacobians of all runs at z, each simulated once.
 
     secants : slopes of the last point, and which of them are not differenced
+    lengths : of the slopes, which tell the steps of the next ones, shape (unknowns,); NaN where
+        they are not known yet
     difference : norm of the change of the residual vector that slopes are taken over
     """
 
@@ -48,12 +52,12 @@ class SimulatedProblem:
     residuals: Sequence[Residual]
     progress: Callable[[float], None] | None
     secants: SecantSlopes
+    lengths: Array
     difference: float = DIFFERENCE_NORM
     simulations: int = 0
     known: tuple[bytes, list[Array]] = (b"", [])
     based: tuple[bytes, list[Array]] = (b"", [])
     slopes_known: tuple[bytes, list[Array]] = (b"", [])
-    lengths: Array | None = None
 
     def residual(self, z: Array) -> list[Array]:
         """Residual of every run at z, shape (channels, samples) each."""
@@ -81,11 +85,15 @@ class SimulatedProblem:
         return self.slopes_known[1]
 
     def learn_steps(self, z: Array) -> None:
-        """Take the steps of the differences at z from first slopes.
+        """Take the steps of the differences at z from first slopes where they are not known yet.
 
         Over FIRST_DIFFERENCE the slope of a weak parameter is lost in the jitter of the simulation.
         """
-        self._jacobian(z)
+        first = [np.zeros((*r.shape, len(z))) for r in self.residual(z)]
+        unknown = np.isnan(self.lengths)
+        for j in np.flatnonzero(unknown):
+            self._difference(z, int(j), FIRST_DIFFERENCE, first)
+        self.lengths = np.where(unknown, column_lengths(first), self.lengths)
 
     def _jacobian(self, z: Array) -> list[Array]:
         base = self.residual(z)
@@ -95,20 +103,18 @@ class SimulatedProblem:
         steps = self._steps()
         for j in np.flatnonzero(differenced):
             self._difference(z, int(j), steps[j], jacobians)
-        # The first differences only tell the steps of the next ones: their slopes are not kept.
-        if self.lengths is not None or self.secants.followed.any():
+        # Where no step was known, the slopes only tell the next steps, and are not followed.
+        if np.isfinite(self.lengths).any() or self.secants.followed.any():
             self.secants.move(z, base, jacobians, ~differenced)
         self.lengths = column_lengths(jacobians)
         return jacobians
 
     def _steps(self, most: float = LARGEST_DIFFERENCE) -> Array:
         """Steps of z that change the residual vector by a norm, within their bounds."""
-        if self.lengths is None:
-            return np.full(len(self.unknowns), FIRST_DIFFERENCE)
         steps = np.clip(
             self.difference / self.lengths, SMALLEST_DIFFERENCE, most * max(1.0, self.difference)
         )
-        return np.asarray(steps)
+        return np.where(np.isnan(self.lengths), FIRST_DIFFERENCE, steps)
 
     def _difference(self, z: Array, j: int, step: float, jacobians: Sequence[Array]) -> None:
         """Fill in the column of one unknown."""
@@ -234,9 +240,3 @@ def _norm(residuals: Sequence[Array]) -> float:
 
 def _values(unknowns: Sequence[Unknown], z: Array, run: int) -> dict[str, float]:
     return {u.name: u.value(float(z[j])) for j, u in enumerate(unknowns) if u.run in {None, run}}
-
-
-def column_lengths(jacobians: Sequence[Array]) -> Array:
-    """Norm of the column of each unknown, shape (unknowns,)."""
-    squares = np.sum([np.einsum("cnj,cnj->j", j, j) for j in jacobians], axis=0)
-    return np.asarray(np.sqrt(np.maximum(squares, 1e-300)))

@@ -12,6 +12,8 @@ from plant_emulator.signals.log import Array
 
 # From the values by name to one run's whitened residual, shape (channels, samples).
 Residual = Callable[[Mapping[str, float]], Array]
+# Norms of the slopes of unknowns, by name and run.
+Lengths = Mapping[tuple[str, int | None], float]
 # Values that the start of a state is looked for among.
 STATE_STARTS = 9
 
@@ -105,6 +107,12 @@ class Estimate:
         return [(u, float(z)) for u, z in zip(self.unknowns, self.z, strict=True)]
 
     @property
+    def lengths(self) -> Lengths:
+        """Norm of the slopes of each unknown over all runs, by its name and run."""
+        norms = column_lengths(self.jacobians)
+        return {(u.name, u.run): float(n) for u, n in zip(self.unknowns, norms, strict=True)}
+
+    @property
     def standard_errors(self) -> Array:
         """Standard errors of z, shape (unknowns,)."""
         return np.sqrt(np.diag(self.covariance))
@@ -163,3 +171,9 @@ class Estimate:
         """Condition number of the Jacobian on the scale of the estimation [1]."""
         singular = np.sqrt(np.clip(np.linalg.eigvalsh(self.information), 0.0, None))
         return float(singular[-1] / singular[0]) if singular[0] > 0.0 else float("inf")
+
+
+def column_lengths(jacobians: Sequence[Array]) -> Array:
+    """Norm of the column of each unknown, shape (unknowns,)."""
+    squares = np.sum([np.einsum("cnj,cnj->j", j, j) for j in jacobians], axis=0)
+    return np.asarray(np.sqrt(np.maximum(squares, 1e-300)))

@@ -36,7 +36,7 @@ from plant_emulator.simulation.simulate import inputs_of, simulate
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from plant_emulator.estimation.unknowns import Estimate, Residual, Unknown
+    from plant_emulator.estimation.unknowns import Estimate, Lengths, Residual, Unknown
     from plant_emulator.identification.identify import Identification
     from plant_emulator.signals.log import Array
     from plant_emulator.simulation.simulate import RunInputs
@@ -157,13 +157,13 @@ def _linearisations(
     time, reference = program.reference()
     sensors = found.parameter_set.sensors
     run = inputs_of(Log(time, {"speed_reference": reference}, program.name), sensors=sensors)
-    near: Estimate | None = None
+    lengths: Lengths = {}
     for position in PLANNED_GAP_POSITIONS:
         unknowns = _unknowns(found, position)
         with suppress(UnsettledError):
             residual = _planned_residual(run, {**values, **_starts(unknowns)}, noise, found.noise)
-            near = near or linearise_at(unknowns, [residual])
-            yield linearise_at(unknowns, [residual], near=near)
+            lengths = lengths or linearise_at(unknowns, [residual]).lengths
+            yield linearise_at(unknowns, [residual], lengths=lengths)
 
 
 def _unknowns(found: Identification, position: float) -> list[Unknown]:

@@ -15,6 +15,7 @@ The functions take a model and plain data, so that other processes can run them.
 from __future__ import annotations
 
 from dataclasses import replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.machine import Candidate, Model
-    from plant_emulator.estimation.unknowns import Estimate, Unknown
+    from plant_emulator.estimation.unknowns import Estimate, Lengths, Unknown
 
 # Relative fall of the cost that ends a fit near the noise: some tenths in units of chi squared.
 COST_TOLERANCE = 1e-5
@@ -103,6 +104,7 @@ def fit(
     near: Estimate | None = None,
     *,
     shrinkage: bool = False,
+    lengths: Lengths = MappingProxyType({}),
     difference: float = DIFFERENCE_NORM,
 ) -> FitResult:
     """Fit parameters, states and these effects to these runs, from these start values.
@@ -111,7 +113,7 @@ def fit(
     near : an estimate of the same runs; slopes of its unknowns follow by secants, see `estimate`.
         The standard errors are then those of white residuals of variance 1
     shrinkage : see `joint_unknowns`
-    difference : norm of the change that slopes are taken over
+    lengths, difference : of the slopes, see `estimate`
     """
     unknowns = with_starts(
         joint_unknowns(model, effects, runs, shrinkage=shrinkage), values, states
@@ -124,6 +126,7 @@ def fit(
         settled_far=COARSE_COST_TOLERANCE,
         iterations=iterations,
         follow=near,
+        lengths=lengths,
         difference=difference,
     )
     candidates = {name: model.candidates[name] for name in effects}
@@ -197,6 +200,7 @@ def lead(
         [observer.residual(k, start.effects) for k in runs],
         settled=LED_COST_TOLERANCE,
         iterations=iterations,
+        lengths=start.lengths,
         difference=LED_DIFFERENCE,
         rough=True,
     )
@@ -225,7 +229,7 @@ def fit_from(
     iterations: int | None = None,
 ) -> FitResult:
     """Fit these effects from the values and states of another fit."""
-    return fit(model, effects, runs, start.values, start.states, iterations)
+    return fit(model, effects, runs, start.values, start.states, iterations, lengths=start.lengths)
 
 
 def linearise(
@@ -234,7 +238,7 @@ def linearise(
     """Compute residuals, Jacobians and covariance at the values of a fit, without fitting."""
     unknowns = with_starts(joint_unknowns(model, found.effects, runs), found.values, found.states)
     residuals = [model.residual(k, found.effects) for k in runs]
-    return linearise_at(unknowns, residuals, difference=difference)
+    return linearise_at(unknowns, residuals, lengths=found.lengths, difference=difference)
 
 
 def to_result(
@@ -254,6 +258,7 @@ def to_result(
         effects=tuple(effects),
         values=found.parameters(),
         states=tuple(found.states(k) for k in range(runs)),
+        lengths=found.lengths,
         cost=found.cost + found.penalty + penalty,
         sum_of_squares=found.cost,
         samples=found.samples,
@@ -280,4 +285,4 @@ def fit_null(model: Model, runs: Sequence[int]) -> FitResult:
     values, states = model.start_values(runs)
     start = FitValues(effects=(), values=values, states=tuple(states))
     near = nearest(model, [start], runs) or approach(model, [start], runs)
-    return fit(model, (), runs, near.values, near.states)
+    return fit(model, (), runs, near.values, near.states, lengths=near.lengths)

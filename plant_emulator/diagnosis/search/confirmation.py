@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fit_result import FitValues
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fitting.task import Task
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.search.promise import Start
+    from plant_emulator.estimation.unknowns import Lengths
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,7 @@ class Trial:
     """A hypothesis to fit: its effects, the runs, and where the fit may begin.
 
     further : starts for the case that all others are far from the data
+    lengths : of slopes nearby, see `Estimate.lengths`
     iterations : of each fit at most so many; None: until it converges
     """
 
@@ -35,6 +37,7 @@ class Trial:
     runs: tuple[int, ...]
     starts: tuple[Start, ...]
     further: tuple[Start, ...] = ()
+    lengths: Lengths = field(default_factory=dict)
     iterations: int | None = None
 
 
@@ -55,7 +58,15 @@ def confirm(model: Model, trial: Trial) -> FitResult:
         near = approach(model, every, trial.runs, trial.iterations or APPROACH_ITERATIONS)
     own = starts[-1]
     found = [
-        fit(model, trial.effects, trial.runs, one.values, one.states, trial.iterations)
+        fit(
+            model,
+            trial.effects,
+            trial.runs,
+            one.values,
+            one.states,
+            trial.iterations,
+            lengths=one.lengths,
+        )
         for one in ([near, own] if several and near is not own else [near])
     ]
     return min(found, key=lambda one: one.cost)
@@ -77,11 +88,15 @@ def without_effects(model: Model, pair: tuple[FitResult, Task]) -> FitResult:
     )
     start = FitValues(effects=(), values=values, states=states)
     near = nearest(model, [start], task.runs, known.mean_square)
-    return known if near is None else fit(model, (), task.runs, near.values, near.states)
+    if near is None:
+        return known
+    return fit(model, (), task.runs, near.values, near.states, lengths=known.lengths)
 
 
 def _values(trial: Trial, start: Start) -> FitValues:
-    return FitValues(effects=trial.effects, values=start.values, states=start.states)
+    return FitValues(
+        effects=trial.effects, values=start.values, states=start.states, lengths=trial.lengths
+    )
 
 
 def _plausible(model: Model, trial: Trial, start: Start) -> Start:

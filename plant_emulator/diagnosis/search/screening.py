@@ -217,20 +217,19 @@ def _scores(
 ) -> dict[str, Score | None]:
     """Scores of all effects at the first size, and of the best effects at the other sizes.
 
-    An effect that has none there may be a limit; see `onset_score`.
+    An effect that shows nothing there may be a limit; see `onset_score`.
     """
-    found = {
+    first = {
         name: best_score(fidelity, candidate, sizes[:1], states[name])
         for name, candidate in library.items()
     }
+    found = {name: score for name, (_, score) in first.items()}
     if len(sizes) > 1:
-        silent = [name for name, score in found.items() if score is None]
-        visible = [name for name, score in found.items() if score is not None]
-        order = sorted(visible, key=lambda name: -_gain(found[name]))
-        for name in order[: SETTINGS.tried_further]:
-            more = best_score(fidelity, library[name], sizes[1:], states[name])
+        order = sorted(found, key=lambda name: -_gain(found[name]))
+        for name in [n for n in order if found[n] is not None][: SETTINGS.tried_further]:
+            _, more = best_score(fidelity, library[name], sizes[1:], states[name])
             found[name] = max((found[name], more), key=_gain)
-        for name in silent:
+        for name in [n for n, (seen, _) in first.items() if not seen]:
             found[name] = onset_score(fidelity, library[name], sizes[0], max(sizes), states[name])
     return found
 

@@ -204,8 +204,8 @@ class Search:
 
     def _confirm(self, base: FitResult, new: Sequence[Promise], iterations: int) -> list[FitResult]:
         """Fit these effects on top of a set, each for at most so many iterations."""
-        runs, own = self.runner.runs, base.effects
-        trials = [Trial((*own, p.effect), runs, *starts_of(p, base), iterations) for p in new]
+        runs, own, near = self.runner.runs, base.effects, base.lengths
+        trials = [Trial((*own, p.effect), runs, *starts_of(p, base), near, iterations) for p in new]
         found = list(self.runner.map(confirm, trials))
         for promise, one in zip(new, found, strict=True):
             self._keep(one)
@@ -262,8 +262,10 @@ class Search:
             return best
         for name in best.effects:
             rest = tuple(e for e in best.effects if e != name)
-            start = Start(values=best.values, states=best.states)
-            trial = Trial(rest, self.runner.runs, (start,), (), SETTINGS.leader_iterations)
+            start = (Start(values=best.values, states=best.states),)
+            trial = Trial(
+                rest, self.runner.runs, start, (), best.lengths, SETTINGS.leader_iterations
+            )
             (found,) = self.runner.map(confirm, [trial])
             self._keep(found)
             self.reduced_costs[name] = self.sets[frozenset(rest)].cost

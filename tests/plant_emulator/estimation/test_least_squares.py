@@ -142,7 +142,9 @@ def test_turned_rows_and_slopes_keep_all_products() -> None:
     def residual(v: Mapping[str, float]) -> Array:
         return np.stack([v["a"] * x, v["b"] * x**2 - 1.0])
 
-    problem = SimulatedProblem(unknowns, [residual], None, SecantSlopes(unknowns))
+    problem = SimulatedProblem(
+        unknowns, [residual], None, SecantSlopes(unknowns), np.full(2, np.nan)
+    )
     z = np.array([2.0, 1.0])
     rows, slopes = problem.turned_rows(z), problem.turned_slopes(z)
     zero = np.zeros(9)
