@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Self
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,6 +25,15 @@ class FitValues:
     values: Mapping[str, float]
     states: tuple[Mapping[str, float], ...]
     lengths: Lengths = field(default_factory=dict)
+
+    def moved_to(self, other: FitValues) -> Self:
+        """This fit with its own parameters and states as another fit of the same runs has them."""
+        states = tuple(
+            {name: moved[name] for name in own}
+            for own, moved in zip(self.states, other.states, strict=True)
+        )
+        values = {name: other.values[name] for name in self.values}
+        return replace(self, values=values, states=states)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -160,16 +160,20 @@ def approach(
     """Values and states near the data, from which a fit of these effects may begin.
 
     Far from the data a free simulation has one local minimum for every way in which contact may
-    come and go. The fit is led along the measured outputs first, from the start that a few such
-    iterations find best, and then left to run freely for longer and longer times (homotopy from
-    prediction errors to simulation errors).
+    come and go. The fit is led along the measured outputs first, from the first start that a few
+    such iterations bring near the data, or else from the best one, and then left to run freely for
+    longer and longer times (homotopy from prediction errors to simulation errors).
 
-    starts : all with the same effects
+    starts : all with the same effects, the most promising ones first
     iterations : of each fit along the measured outputs at most so many
     """
     best = starts[0]
     if len(starts) > 1:
-        first = [lead(model, one, runs, iterations=FIRST_ITERATIONS) for one in starts]
+        first: list[FitResult] = []
+        for one in starts:
+            first.append(lead(model, one, runs, iterations=FIRST_ITERATIONS))
+            if first[-1].mean_square <= SUSPECT_MEAN_SQUARE:
+                break
         best = min(first, key=lambda one: one.cost)
     for interval in CORRECTION_INTERVALS:
         best = lead(model, best, runs, interval, iterations)

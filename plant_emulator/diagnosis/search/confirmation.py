@@ -81,13 +81,7 @@ def without_effects(model: Model, pair: tuple[FitResult, Task]) -> FitResult:
     """
     known, task = pair
     # A size that stays among the values would keep the effect in the simulation.
-    values = {name: task.base.values[name] for name in known.values}
-    states = tuple(
-        {name: own[name] for name in plain}
-        for plain, own in zip(known.states, task.base.states, strict=True)
-    )
-    start = FitValues(effects=(), values=values, states=states)
-    near = nearest(model, [start], task.runs, known.mean_square)
+    near = nearest(model, [known.moved_to(task.base)], task.runs, known.mean_square)
     if near is None:
         return known
     return fit(model, (), task.runs, near.values, near.states, lengths=known.lengths)

@@ -18,7 +18,7 @@ from plant_emulator.diagnosis.fitting.joint_fit import CORRECTION_INTERVALS, LED
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.columns import best_score, onset_score
-from plant_emulator.diagnosis.search.promise import Promise, Start
+from plant_emulator.diagnosis.search.promise import Promise, Start, leading
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.simulation_columns import SimulationColumns
 from plant_emulator.estimation.robust_scan import scan_unknowns
@@ -102,7 +102,7 @@ def regressions(
 ) -> list[Promise]:
     """Predicted gains of these effects on top of a fit, the largest first, by these regressions."""
     alone = [
-        Task(base=replace(base, states=(own,)), runs=(run,))
+        (Task(base=replace(base, states=(own,)), runs=(run,)), tuple(effects))
         for run, own in zip(runner.runs, base.states, strict=True)
     ]
     of_runs = list(runner.map(start_states, alone))
@@ -119,6 +119,22 @@ def regressions(
             starts={**known.starts, **one.starts},
         )
     return sorted(found.values(), key=lambda p: -p.gain)
+
+
+def rivals_of(
+    runner: TaskRunner, null: FitResult, leader: FitResult, supposed: Sequence[Promise]
+) -> list[Promise]:
+    """Those of the supposed rivals of a leader that promise much at its parameters as well.
+
+    Where a leader leaves noise, and the fit without its effect far more, that fit has bent its own
+    parameters. Elsewhere all stay.
+    """
+    if not supposed or not leader.mean_square <= NOISE_MEAN_SQUARE < null.mean_square:
+        return list(supposed)
+    own = leader.effects[-1]
+    names = (own, *(p.effect for p in supposed))
+    found = regressions(runner, null.moved_to(leader), names, (RELATIONS, SIMULATION))
+    return leading(found, len(supposed), SETTINGS.promising, (own,))
 
 
 def screen(model: Model, asked: Screening) -> list[Promise]:
@@ -179,13 +195,13 @@ def visible(model: Model, base: FitResult, runs: Sequence[int]) -> dict[str, Can
     return {name: one for name, one in _library(model, base).items() if name not in hidden}
 
 
-def start_states(model: Model, task: Task) -> dict[str, dict[str, float]]:
-    """States of each effect in the run of the task that its columns are taken at (a step).
+def start_states(model: Model, asked: tuple[Task, Sequence[str]]) -> dict[str, dict[str, float]]:
+    """States of these effects in the run of the task that their columns are taken at (a step).
 
     A state with many narrow basins, as a frequency, is scanned on top of a fit without effects.
     """
-    library = _library(model, task.base)
-    return {name: _start_states(model, one, task) for name, one in library.items()}
+    task, effects = asked
+    return {name: _start_states(model, model.candidates[name], task) for name in effects}
 
 
 def _start_states(model: Model, candidate: Candidate, task: Task) -> dict[str, float]:

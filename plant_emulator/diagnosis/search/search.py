@@ -27,7 +27,7 @@ from plant_emulator.diagnosis.search.confirmation import Trial, confirm, without
 from plant_emulator.diagnosis.search.law_error import LawErrors
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
 from plant_emulator.diagnosis.search.promise import Start, leading, rivals, starts_of
-from plant_emulator.diagnosis.search.screening import SIMULATION, promises, visibilities
+from plant_emulator.diagnosis.search.screening import SIMULATION, promises, rivals_of, visibilities
 from plant_emulator.diagnosis.search.secant_fits import fitted_promises
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.summary import (
@@ -178,7 +178,7 @@ class Search:
             if tells and self._renew_null(best):
                 self._expand(self.null)
                 return
-            new = rivals(found, base, least, tried)
+            new = rivals_of(self.runner, base, best, rivals(found, base, least, tried))
             fits = self._confirm(base, new, SETTINGS.iterations)
             if min((best, *fits), key=lambda fit: fit.cost).mean_square <= NOISE_MEAN_SQUARE:
                 return
@@ -235,11 +235,10 @@ class Search:
         """
         done: set[frozenset[str]] = set()
         while True:
-            order = sorted(self.sets.values(), key=self._value)
-            best = order[0]
+            best = min(self.sets.values(), key=self._value)
             near = [
                 one
-                for one in order
+                for one in self.sets.values()
                 if frozenset(one.effects) not in done
                 and len(one.effects) == max(1, len(best.effects))
                 and one.cost < best.cost + SETTINGS.near + (not one.converged) * excess(best)

@@ -73,6 +73,16 @@ def test_nothing_is_simulated_twice() -> None:
     assert len(set(asked)) == len(asked) == found.simulations
 
 
+def test_known_lengths_of_slopes_spare_the_first_differences() -> None:
+    """One for the point, two to learn the steps, two for the slopes, and two for wide ones."""
+    first = linearise_at(MISRA, [misra])
+    again = linearise_at(MISRA, [misra], lengths=first.lengths)
+    assert (first.simulations, again.simulations) == (7, 5)
+    assert np.array_equal(first.jacobians[0], again.jacobians[0])
+    one = {("b1", None): first.lengths["b1", None]}
+    assert linearise_at(MISRA, [misra], lengths=one).simulations == 6
+
+
 def test_columns_that_follow_are_not_simulated_and_lead_to_the_same_optimum() -> None:
     """Misra1a with a third unknown, from the estimate without it."""
     tilt = number("tilt", 0.0, scale=1e-3)

@@ -1,10 +1,12 @@
 """Fits from far off on logs of the independent bench."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
-from plant_emulator.diagnosis.fit_result import FitValues
+from plant_emulator.diagnosis.fit_result import FitResult, FitValues
+from plant_emulator.diagnosis.fitting import joint_fit
 from plant_emulator.diagnosis.fitting.joint_fit import (
     FIRST_ITERATIONS,
     approach,
@@ -57,6 +59,24 @@ def test_best_of_the_starts_is_led_on(model: BenchModel) -> None:
     right, other = (approach(model, [one], RUNS).values for one in first)
     assert right != other
     assert approach(model, [wrong, start], RUNS).values == right
+
+
+def test_first_start_that_comes_near_the_data_is_led_on(
+    model: BenchModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No iteration is spent on a start behind one that a few iterations bring to the noise."""
+    start, led = nominal_start(model), []
+    right = approach(model, [start], RUNS)
+    wrong = replace(start, values={**start.values, "drum_inertia": 150.0})
+
+    def listed(there: BenchModel, one: FitValues, *args: object, **more: object) -> FitResult:
+        led.append(one)
+        return lead(there, one, *args, **more)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(joint_fit, "lead", listed)
+    approach(model, [wrong, right, start], RUNS)
+    assert led[:2] == [wrong, right]
+    assert start not in led
 
 
 def test_start_near_the_noise_is_kept(model: BenchModel) -> None:

@@ -2,9 +2,12 @@
 
 from dataclasses import replace
 
-from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+import pytest
+
+from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
 from plant_emulator.diagnosis.search.promise import Promise, Start, leading, rivals, starts_of
-from tests.plant_emulator.diagnosis.line import TIME, Line, noisy
+from plant_emulator.diagnosis.search.screening import rivals_of
+from tests.plant_emulator.diagnosis.line import TIME, Line, noisy, runner
 
 
 def promise(effect: str, **gains: float) -> Promise:
@@ -23,6 +26,19 @@ def test_leaders_of_each_score_gain_half_of_its_most() -> None:
     assert [p.effect for p in leading(found, 2, 5.0, ["a"])] == ["b", "d", "c"]
     assert [p.effect for p in leading(found, 2, 25.0, ["a"])] == ["c", "d"]
     assert [p.effect for p in leading(found, 1, 5.0)] == ["b", "a"]
+
+
+def test_rivals_are_told_at_the_parameters_of_the_leader() -> None:
+    """Of three supposed rivals of a kink only one can do what the kink does, from its values."""
+    model = Line([noisy(2.0 + 3.0 * TIME + 5.0 * abs(TIME))])
+    null = fit_null(model, (0,))
+    leader = fit(model, ("kink",), (0,), {**null.values, "kink_size": 5.0}, [{}])
+    supposed = [promise(name) for name in ("wave", "near kink", "cube")]
+    told = rivals_of(runner(model), null, leader, supposed)
+    assert [p.effect for p in told] == ["near kink"]
+    start = told[0].starts["simulation"]
+    assert start.values["a"] == pytest.approx(2.0, abs=0.2)
+    assert start.values["near kink_size"] == pytest.approx(5.0, abs=0.3)
 
 
 def test_all_that_promise_something_are_rivals_where_only_noise_is_left() -> None:
