@@ -171,7 +171,8 @@ class SearchStep:
 
     action : what was done with the set of effects: confirmed, converged, fitted anew, or noise
         estimated there
-    promised : gain that the linear regressions promised for the last effect, by regression
+    promised : gain that the linear regressions promised for the last effect, by regression; of a
+        rival of a leader that leaves noise at the leader's parameters
     gain : of log evidence over the fit without effects
     mean_square : of the whitened residual that the fit leaves
     """

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Self
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from plant_emulator.estimation.unknowns import Lengths
     from plant_emulator.signals.log import Array
@@ -27,13 +27,30 @@ class FitValues:
     lengths: Lengths = field(default_factory=dict)
 
     def moved_to(self, other: FitValues) -> Self:
-        """This fit with its own parameters and states as another fit of the same runs has them."""
+        """This fit with its own parameters and states as another fit of the same runs has them.
+
+        Its cost and its errors stay those of its own place.
+        """
         states = tuple(
             {name: moved[name] for name in own}
             for own, moved in zip(self.states, other.states, strict=True)
         )
         values = {name: other.values[name] for name in self.values}
-        return replace(self, values=values, states=states)
+        return replace(self, values=values, states=states, lengths=other.lengths)
+
+    def of_runs(self, kept: Sequence[int]) -> Self:
+        """This fit with the states of some of its runs, which are numbered from 0."""
+        number: dict[int | None, int | None] = {None: None}
+        number |= {run: k for k, run in enumerate(kept)}
+        return replace(
+            self,
+            states=tuple(self.states[run] for run in kept),
+            lengths={
+                (name, number[run]): length
+                for (name, run), length in self.lengths.items()
+                if run in number
+            },
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -79,6 +79,9 @@ def estimate(
         unknowns, residuals, progress, secants, _lengths_of(unknowns, lengths), difference
     )
     start, lower, upper = _start(unknowns)
+    known = np.isfinite(problem.lengths)
+    if known.any() and not known.all():  # what follows secants must not begin in the jitter
+        problem.learn_steps(start)
     free = any(u.std is None for u in unknowns)
     if free and not any(slopes.any() for slopes in problem.jacobian(start)):
         return _estimate(problem, start, False, "no unknown changes the residual", rough=rough)

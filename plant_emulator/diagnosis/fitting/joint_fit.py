@@ -156,6 +156,7 @@ def approach(
     starts: Sequence[FitValues],
     runs: Sequence[int],
     iterations: int = APPROACH_ITERATIONS,
+    far: float = SUSPECT_MEAN_SQUARE,
 ) -> FitValues:
     """Values and states near the data, from which a fit of these effects may begin.
 
@@ -166,13 +167,15 @@ def approach(
 
     starts : all with the same effects, the most promising ones first
     iterations : of each fit along the measured outputs at most so many
+    far : mean square above which a start is far from the data
     """
     best = starts[0]
     if len(starts) > 1:
         first: list[FitResult] = []
         for one in starts:
-            first.append(lead(model, one, runs, iterations=FIRST_ITERATIONS))
-            if first[-1].mean_square <= SUSPECT_MEAN_SQUARE:
+            start = replace(one, lengths=first[-1].lengths if first else {})
+            first.append(lead(model, start, runs, iterations=FIRST_ITERATIONS))
+            if first[-1].mean_square <= far:
                 break
         best = min(first, key=lambda one: one.cost)
     for interval in CORRECTION_INTERVALS:

@@ -241,10 +241,9 @@ def _result(
 def _fold(
     plan: Plan, start: FitResult, fitted: tuple[int, ...], predicted: tuple[int, ...]
 ) -> Fold:
-    states = tuple(start.states[plan.fitted.index(run)] for run in fitted)
     return Fold(
         fitted=fitted,
         predicted=predicted,
-        start=replace(start, states=states),
+        start=start.of_runs([plan.fitted.index(run) for run in fitted]),
         as_fitted=plan.as_fitted,
     )

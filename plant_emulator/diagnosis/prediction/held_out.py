@@ -235,7 +235,7 @@ class HeldOutRuns:
         return Fold(
             fitted=fitted,
             predicted=predicted,
-            start=replace(start, states=tuple(of_runs[run] for run in fitted)),
+            start=start.of_runs([self.plan.fitted.index(run) for run in fitted]),
             states=tuple(of_runs[run] for run in predicted) if seen else (),
             refitted=refitted,
             as_fitted=self.plan.as_fitted,

@@ -63,21 +63,17 @@ class Score:
 
 def best_score(
     fidelity: Fidelity, candidate: Candidate, sizes: Sequence[float], states: States
-) -> tuple[bool, Score | None]:
-    """Whether an effect shows anything, and its score at the size that gains most.
+) -> Score | None:
+    """Score of an effect at the size that gains most; None: it shows nothing here.
 
     states : of the effect in each run, but for an angle
-    None: it shows nothing, cannot be simulated, or points to the other side of neutral
     """
-    seen, scores = zip(
-        *(
-            _score(fidelity, candidate, way * size, states)
-            for way in signs(candidate.sizes)
-            for size in sizes
-        ),
-        strict=True,
+    scores = (
+        _score(fidelity, candidate, way * size, states)[1]
+        for way in signs(candidate.sizes)
+        for size in sizes
     )
-    return any(seen), max(filter(None, scores), key=lambda one: one.gain, default=None)
+    return max(filter(None, scores), key=lambda one: one.gain, default=None)
 
 
 def onset_score(

@@ -55,7 +55,7 @@ def confirm(model: Model, trial: Trial) -> FitResult:
     if near is None:
         more = [*trial.further, *(_plausible(model, trial, one) for one in trial.starts[:1])]
         every = [*starts, *(_values(trial, one) for one in more)]
-        near = approach(model, every, trial.runs, trial.iterations or APPROACH_ITERATIONS)
+        near = approach(model, every, trial.runs, trial.iterations or APPROACH_ITERATIONS, far)
     own = starts[-1]
     found = [
         fit(

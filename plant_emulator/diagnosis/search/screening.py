@@ -102,8 +102,8 @@ def regressions(
 ) -> list[Promise]:
     """Predicted gains of these effects on top of a fit, the largest first, by these regressions."""
     alone = [
-        (Task(base=replace(base, states=(own,)), runs=(run,)), tuple(effects))
-        for run, own in zip(runner.runs, base.states, strict=True)
+        (Task(base=base.of_runs([k]), runs=(run,)), tuple(effects))
+        for k, run in enumerate(runner.runs)
     ]
     of_runs = list(runner.map(start_states, alone))
     states = {name: [own[name] for own in of_runs] for name in of_runs[0]}
@@ -121,19 +121,21 @@ def regressions(
     return sorted(found.values(), key=lambda p: -p.gain)
 
 
-def rivals_of(
+def rivals_at(
     runner: TaskRunner, null: FitResult, leader: FitResult, supposed: Sequence[Promise]
 ) -> list[Promise]:
     """Those of the supposed rivals of a leader that promise much at its parameters as well.
 
-    Where a leader leaves noise, and the fit without its effect far more, that fit has bent its own
-    parameters. Elsewhere all stay.
+    Where a leader leaves noise, and the fit without its effect more, that fit has bent its own
+    parameters. Elsewhere all stay, and where the regressions there do not even see the leader.
     """
     if not supposed or not leader.mean_square <= NOISE_MEAN_SQUARE < null.mean_square:
         return list(supposed)
     own = leader.effects[-1]
     names = (own, *(p.effect for p in supposed))
     found = regressions(runner, null.moved_to(leader), names, (RELATIONS, SIMULATION))
+    if not any(p.effect == own and p.gain > SETTINGS.promising for p in found):
+        return list(supposed)
     return leading(found, len(supposed), SETTINGS.promising, (own,))
 
 
@@ -233,19 +235,20 @@ def _scores(
 ) -> dict[str, Score | None]:
     """Scores of all effects at the first size, and of the best effects at the other sizes.
 
-    An effect that shows nothing there may be a limit; see `onset_score`.
+    An effect that has none there may be a limit; see `onset_score`.
     """
-    first = {
+    found = {
         name: best_score(fidelity, candidate, sizes[:1], states[name])
         for name, candidate in library.items()
     }
-    found = {name: score for name, (_, score) in first.items()}
     if len(sizes) > 1:
-        order = sorted(found, key=lambda name: -_gain(found[name]))
-        for name in [n for n in order if found[n] is not None][: SETTINGS.tried_further]:
-            _, more = best_score(fidelity, library[name], sizes[1:], states[name])
+        silent = [name for name, score in found.items() if score is None]
+        visible = [name for name, score in found.items() if score is not None]
+        order = sorted(visible, key=lambda name: -_gain(found[name]))
+        for name in order[: SETTINGS.tried_further]:
+            more = best_score(fidelity, library[name], sizes[1:], states[name])
             found[name] = max((found[name], more), key=_gain)
-        for name in [n for n, (seen, _) in first.items() if not seen]:
+        for name in silent:
             found[name] = onset_score(fidelity, library[name], sizes[0], max(sizes), states[name])
     return found
 

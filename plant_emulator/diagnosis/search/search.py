@@ -27,7 +27,7 @@ from plant_emulator.diagnosis.search.confirmation import Trial, confirm, without
 from plant_emulator.diagnosis.search.law_error import LawErrors
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
 from plant_emulator.diagnosis.search.promise import Start, leading, rivals, starts_of
-from plant_emulator.diagnosis.search.screening import SIMULATION, promises, rivals_of, visibilities
+from plant_emulator.diagnosis.search.screening import SIMULATION, promises, rivals_at, visibilities
 from plant_emulator.diagnosis.search.secant_fits import fitted_promises
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.summary import (
@@ -178,7 +178,7 @@ class Search:
             if tells and self._renew_null(best):
                 self._expand(self.null)
                 return
-            new = rivals_of(self.runner, base, best, rivals(found, base, least, tried))
+            new = rivals_at(self.runner, base, best, rivals(found, base, least, tried))
             fits = self._confirm(base, new, SETTINGS.iterations)
             if min((best, *fits), key=lambda fit: fit.cost).mean_square <= NOISE_MEAN_SQUARE:
                 return
@@ -204,8 +204,8 @@ class Search:
 
     def _confirm(self, base: FitResult, new: Sequence[Promise], iterations: int) -> list[FitResult]:
         """Fit these effects on top of a set, each for at most so many iterations."""
-        runs, own, near = self.runner.runs, base.effects, base.lengths
-        trials = [Trial((*own, p.effect), runs, *starts_of(p, base), near, iterations) for p in new]
+        runs, own, of = self.runner.runs, base.effects, base.lengths
+        trials = [Trial((*own, p.effect), runs, *starts_of(p, base), of, iterations) for p in new]
         found = list(self.runner.map(confirm, trials))
         for promise, one in zip(new, found, strict=True):
             self._keep(one)

@@ -83,6 +83,23 @@ def test_known_lengths_of_slopes_spare_the_first_differences() -> None:
     assert linearise_at(MISRA, [misra], lengths=one).simulations == 6
 
 
+def test_column_of_unknown_length_beside_known_ones_is_not_that_of_the_jitter() -> None:
+    """Over the first difference the limit s does nothing yet, and its slope would stay zero."""
+    x = np.linspace(-1.0, 1.0, 50)
+
+    def residual(v: Mapping[str, float]) -> Array:
+        acts = max(0.0, v["s"] - 0.005)
+        return np.stack(
+            [100.0 * (2.0 + 3.0 * x + 0.495 * x**2 - v["a"] - v["b"] * x - acts * x**2)]
+        )
+
+    unknowns = (number("a", 1.0), number("b", 1.0), number("s", 0.0))
+    known = {("a", None): 707.0, ("b", None): 416.0}
+    found = estimate(unknowns, [residual], lengths=known, difference=10.0, rough=True)
+    assert found.parameters()["s"] == pytest.approx(0.5, abs=1e-3)
+    assert found.cost < 1e-3
+
+
 def test_columns_that_follow_are_not_simulated_and_lead_to_the_same_optimum() -> None:
     """Misra1a with a third unknown, from the estimate without it."""
     tilt = number("tilt", 0.0, scale=1e-3)

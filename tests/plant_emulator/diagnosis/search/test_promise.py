@@ -1,12 +1,16 @@
 """What effects promise: the leaders of each score, and where their fits begin."""
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
 from plant_emulator.diagnosis.search.promise import Promise, Start, leading, rivals, starts_of
-from plant_emulator.diagnosis.search.screening import rivals_of
+from plant_emulator.diagnosis.search.screening import promises, rivals_at
+from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import TIME, Line, noisy, runner
 
 
@@ -28,13 +32,34 @@ def test_leaders_of_each_score_gain_half_of_its_most() -> None:
     assert [p.effect for p in leading(found, 1, 5.0)] == ["b", "a"]
 
 
-def test_rivals_are_told_at_the_parameters_of_the_leader() -> None:
-    """Of three supposed rivals of a kink only one can do what the kink does, from its values."""
-    model = Line([noisy(2.0 + 3.0 * TIME + 5.0 * abs(TIME))])
+class Bending(Line):
+    """A line on which a wave acts only where a is above 2.2."""
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+
+        def residual(v: Mapping[str, float]) -> Array:
+            size = max(0.0, v["a"] - 2.2) * v.get("wave_size", 0.0)
+            return super(Bending, self).residual(run, effects)({**v, "wave_size": size})
+
+        return residual
+
+
+def test_rivals_of_a_leader_that_leaves_noise_are_told_at_its_parameters() -> None:
+    """Without the kink a is bent from 2 to 4.5, where a wave acts; the kink's twin stays.
+
+    Beside a leader that leaves more than noise all stay.
+    """
+    y = noisy(2.0 + 3.0 * TIME + 5.0 * abs(TIME) + 0.5 * np.sin(20.0 * TIME))
+    model = Bending([y], ("kink", "near kink", "wave"))
     null = fit_null(model, (0,))
     leader = fit(model, ("kink",), (0,), {**null.values, "kink_size": 5.0}, [{}])
-    supposed = [promise(name) for name in ("wave", "near kink", "cube")]
-    told = rivals_of(runner(model), null, leader, supposed)
+    supposed = [p for p in promises(runner(model), null) if p.effect != "kink"]
+    assert all(p.gain > 50.0 for p in supposed)
+    assert leader.mean_square > NOISE_MEAN_SQUARE
+    assert rivals_at(runner(model), null, leader, supposed) == supposed
+    quiet = replace(leader, sum_of_squares=1.0 * leader.samples)
+    told = rivals_at(runner(model), null, quiet, supposed)
     assert [p.effect for p in told] == ["near kink"]
     start = told[0].starts["simulation"]
     assert start.values["a"] == pytest.approx(2.0, abs=0.2)
