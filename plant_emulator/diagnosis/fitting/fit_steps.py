@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fitting.joint_fit import fit_from, fit_null, lead
@@ -32,6 +31,6 @@ def refit(model: Model, task: Task) -> FitResult:
 def refit_along(model: Model, task: Task) -> FitResult:
     """The fit of `task.base` with its effects, led along the measured outputs (a step).
 
-    See `joint_fit.lead`. The slopes of a free simulation are longer than those of a led one.
+    See `joint_fit.lead`.
     """
-    return lead(model, replace(task.base, lengths={}), task.runs)
+    return lead(model, task.base, task.runs)

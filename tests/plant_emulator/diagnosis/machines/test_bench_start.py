@@ -14,20 +14,22 @@ from plant_emulator.simulation.sensor_noise import add_noise
 from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
 
 
+@pytest.mark.parametrize(("flux", "seed"), [(410.0, 2), (410.0, 3), (412.0, 2)])
 def test_a_bench_whose_voltage_does_not_suffice_is_fitted(
-    bench_log: Callable[[str], Log], nominal: ParameterSet
+    flux: float, seed: int, bench_log: Callable[[str], Log], nominal: ParameterSet
 ) -> None:
-    """With 412 (N m/A)(rad/s) the motor stays at 230 rad/s; with the 367 of the set it reaches 380.
+    """The motor is 50 rad/s short where 370 are asked for; with the flux of the set it is not.
 
     No slope at the one leads to the other.
     """
     asked = replace(bench_log("bench_nominal/program1"), source="run")
-    values = values_of(nominal) | {"flux_constant_1": 412.0}
-    log = add_noise(simulate(inputs_of(asked), values, gap_position=0.3, step=1e-3), 2)
-    assert log["motor_speed"].max() < 0.65 * log["speed_reference"].max()
+    values = values_of(nominal) | {"flux_constant_1": flux}
+    log = add_noise(simulate(inputs_of(asked), values, gap_position=0.3, step=1e-3), seed)
+    asked_speed, speed = log["speed_reference"], log["motor_speed"]
+    assert (speed - asked_speed)[asked_speed > 370.0].min() < -50.0
     found = fit_null(BenchModel([recording(log)], nominal, {}), [0])
     assert found.mean_square < 1.1
-    assert found.values["flux_constant_1"] == pytest.approx(412.0, rel=0.01)
+    assert found.values["flux_constant_1"] == pytest.approx(flux, rel=0.01)
 
 
 def test_a_flux_that_a_log_does_not_show_stays(
