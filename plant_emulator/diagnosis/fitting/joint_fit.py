@@ -200,8 +200,8 @@ def lead(
 ) -> FitResult:
     """Fit by a simulation that is led along the measured outputs; see `Model.observer`.
 
-    It takes its first slopes over small steps, and follows no secants from there: a bench near the
-    limit of its voltage ended at thirty times its noise.
+    Its first slopes are its own, and no secants follow them: with the steps of another fit, a bench
+    near the limit of its voltage ended at thirty times its noise.
     """
     unknowns = with_starts(joint_unknowns(model, start.effects, runs), start.values, start.states)
     observer = model.observer(interval).rough()

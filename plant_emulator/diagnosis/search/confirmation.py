@@ -14,13 +14,14 @@ from plant_emulator.diagnosis.fitting.joint_fit import (
     nearest,
 )
 from plant_emulator.diagnosis.fitting.signature import values_at_size
+from plant_emulator.diagnosis.search.promise import starts_of
 from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.task import Task
     from plant_emulator.diagnosis.machine import Model
-    from plant_emulator.diagnosis.search.promise import Start
+    from plant_emulator.diagnosis.search.promise import Promise, Start
     from plant_emulator.estimation.unknowns import Lengths
 
 
@@ -39,6 +40,15 @@ class Trial:
     further: tuple[Start, ...] = ()
     lengths: Lengths = field(default_factory=dict)
     iterations: int | None = None
+
+
+def trial_of(
+    promise: Promise, base: FitResult, runs: tuple[int, ...], iterations: int | None
+) -> Trial:
+    """The trial of one more effect on top of a fit."""
+    starts, further = starts_of(promise, base)
+    effects = (*base.effects, promise.effect)
+    return Trial(effects, runs, starts, further, base.lengths, iterations)
 
 
 def confirm(model: Model, trial: Trial) -> FitResult:

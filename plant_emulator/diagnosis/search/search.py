@@ -23,10 +23,10 @@ from plant_emulator.diagnosis.fitting.evidence import (
 from plant_emulator.diagnosis.fitting.explanation import Explanation
 from plant_emulator.diagnosis.fitting.fit_steps import refit
 from plant_emulator.diagnosis.fitting.task import Task
-from plant_emulator.diagnosis.search.confirmation import Trial, confirm, without_effects
+from plant_emulator.diagnosis.search.confirmation import Trial, confirm, trial_of, without_effects
 from plant_emulator.diagnosis.search.law_error import LawErrors
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
-from plant_emulator.diagnosis.search.promise import Start, leading, rivals, starts_of
+from plant_emulator.diagnosis.search.promise import Start, leading, rivals
 from plant_emulator.diagnosis.search.screening import SIMULATION, promises, rivals_at, visibilities
 from plant_emulator.diagnosis.search.secant_fits import fitted_promises
 from plant_emulator.diagnosis.search.settings import SETTINGS
@@ -204,8 +204,7 @@ class Search:
 
     def _confirm(self, base: FitResult, new: Sequence[Promise], iterations: int) -> list[FitResult]:
         """Fit these effects on top of a set, each for at most so many iterations."""
-        runs, own, of = self.runner.runs, base.effects, base.lengths
-        trials = [Trial((*own, p.effect), runs, *starts_of(p, base), of, iterations) for p in new]
+        trials = [trial_of(p, base, self.runner.runs, iterations) for p in new]
         found = list(self.runner.map(confirm, trials))
         for promise, one in zip(new, found, strict=True):
             self._keep(one)
