@@ -64,9 +64,12 @@ if TYPE_CHECKING:
 # less, because every sample of the one is a corner and every correction of the other is a jump. It
 # changes the residual by a hundredth of the noise.
 COARSE_TOLERANCE = 1e-4
-# Tolerance and largest step [s] of rough runs. They take half the time, and change the residual by
-# some hundredths of the noise, which is more than a derivative bears.
-ROUGH = (1e-5, 0.03)
+# Tolerance of rough runs. They take two thirds of the time, and change the residual by some
+# hundredths of the noise, which is more than a derivative bears.
+ROUGH_TOLERANCE = 1e-5
+# Largest step [s]: over some samples. It takes a third of the time off smooth runs, and changes the
+# residual by less than the tolerance does.
+LARGEST_STEP = 0.03
 
 
 class BenchModel:
@@ -166,11 +169,16 @@ class BenchModel:
         inputs = self._recordings[run].inputs
         along = None if self._along is None else self._along[run]
         own, gap = split_gap_position(values)
-        tolerance, step = ROUGH if self._roughly is self else (TOLERANCE, None)
+        tolerance = ROUGH_TOLERANCE if self._roughly is self else TOLERANCE
         if inputs.truck or along is not None:
             tolerance = COARSE_TOLERANCE
         return simulate(
-            inputs, own, gap_position=gap, tolerance=tolerance, largest_step=step, along=along
+            inputs,
+            own,
+            gap_position=gap,
+            tolerance=tolerance,
+            largest_step=LARGEST_STEP,
+            along=along,
         )
 
     def relations(
