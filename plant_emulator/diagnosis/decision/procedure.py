@@ -18,7 +18,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.decision import run_consistency
 from plant_emulator.diagnosis.decision.verdict import decide
-from plant_emulator.diagnosis.fitting.evidence import EVIDENCE_THRESHOLD, NOISE_MEAN_SQUARE, excess
+from plant_emulator.diagnosis.fitting.evidence import EVIDENCE_THRESHOLD, leaves_random
 from plant_emulator.diagnosis.fitting.fit_steps import refit, start
 from plant_emulator.diagnosis.fitting.input_noise_model import whiten_inputs
 from plant_emulator.diagnosis.fitting.random_effects import WeightedRecipe, fit_random_effect
@@ -35,10 +35,6 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult, VarianceComponent
     from plant_emulator.diagnosis.fitting.explanation import Explanation
     from plant_emulator.estimation.noise.logged_noise import LoggedNoise
-
-# Ljung-Box excess of a residual, as a share of its squares beyond the noise, up to which the gap
-# may be random. A dead time that varies at each scan had left 0.014.
-RANDOM_SHARE = 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,7 +87,7 @@ class Procedure:
             if found is None or decide(model, plain.explained).kind != "unknown":
                 found = plain
         explained = found.explained
-        left = decide(model, explained).kind == "unknown" or _is_random(explained.final)
+        left = decide(model, explained).kind == "unknown" or leaves_random(explained.final)
         if left and not explained.random_effects:
             found = self._test_random_effects(explained.final, found) or found
         explained, runner = found.explained, found.runner
@@ -125,7 +121,7 @@ class Procedure:
 
         None: the gap is small or not random
         """
-        return self._test_random_effects(null) if _is_random(null) else None
+        return self._test_random_effects(null) if leaves_random(null) else None
 
     def _test_random_effects(
         self, base: FitResult, beside: _Tested | None = None
@@ -204,12 +200,6 @@ class Procedure:
         fits = list(self._cleared.map(run_consistency.fit_alone, tasks))
         reason = run_consistency.inconsistency(self.runner.model, runs, fits)
         return replace(decision, kind="unknown", effects=(), reason=reason) if reason else decision
-
-
-def _is_random(found: FitResult) -> bool:
-    """Whether a fit leaves more than the noise, and that may be random."""
-    large = found.mean_square > NOISE_MEAN_SQUARE
-    return large and found.ljung_box_excess <= RANDOM_SHARE * excess(found)
 
 
 def _whitened(runner: TaskRunner, noise: LoggedNoise | None) -> TaskRunner:

@@ -29,6 +29,9 @@ UNEXPLAINED_SHARE = 0.2
 NOISE_MEAN_SQUARE = 1.05
 # Ljung-Box excess from which on a residual is not white noise [chi squared].
 LJUNG_BOX_LIMIT = 200.0
+# Ljung-Box excess of a residual, as a share of its squares beyond the noise, up to which the gap
+# may be random. A dead time that varies at each scan had left 0.014.
+RANDOM_SHARE = 0.05
 # Mean square from which on a fit leaves more than what the noise explains.
 MISFIT_MEAN_SQUARE = 1.5
 
@@ -71,3 +74,9 @@ def leaves_most(found: FitResult, null: FitResult) -> bool:
 def adequate(found: FitResult, null: FitResult) -> bool:
     """Whether a fit leaves so little of the gap without effects that its cause is known."""
     return leaves_little(found, excess(null))
+
+
+def leaves_random(found: FitResult) -> bool:
+    """Whether a fit leaves more than the noise, and that may be random."""
+    large = found.mean_square > NOISE_MEAN_SQUARE
+    return large and found.ljung_box_excess <= RANDOM_SHARE * excess(found)

@@ -49,9 +49,9 @@ LEAST_MEAN_SQUARE, MOST_MEAN_SQUARE = 0.5, 2.0
 # courses, 0.035 to 0.13 after coarse references.
 WHITE_SHARE = 0.01
 # The same share may be larger, up to 0.036, where it stays below this excess for each run. Random
-# courses leave an excess of 400 to 900 in three runs whatever their size, because scans and samples
-# beat; coarse references left 60 000.
-WHITE_SHARE_OF_BEAT, BEAT_EXCESS = 0.04, 350.0
+# courses leave an excess of 400 to 1600 in three runs whatever their size, because scans and
+# samples beat; coarse references left 60 000.
+WHITE_SHARE_OF_BEAT, BEAT_EXCESS = 0.04, 1000.0
 
 
 def fit_random_effect(model: Model, task: Task) -> VarianceComponent:

@@ -19,6 +19,7 @@ from plant_emulator.diagnosis.fitting.evidence import (
     excess,
     leaves_little,
     leaves_most,
+    leaves_random,
 )
 from plant_emulator.diagnosis.fitting.explanation import Explanation
 from plant_emulator.diagnosis.fitting.fit_steps import refit
@@ -141,12 +142,11 @@ class Search:
         return best
 
     def _is_last(self, found: FitResult) -> bool:
-        """Whether no effect is worth adding: the cause is foreign, or only noise is left."""
+        """Whether no effect is worth adding: the cause is foreign, or what is left is random."""
         foreign = excess(self.null) > SETTINGS.needed and leaves_most(found, self.null)
-        return foreign or (
-            found.mean_square <= NOISE_MEAN_SQUARE
-            and all(p.gain <= self._needed(found) for p in self._screen(found))
-        )
+        if found.mean_square > NOISE_MEAN_SQUARE:
+            return foreign or leaves_random(found)
+        return all(p.gain <= self._needed(found) for p in self._screen(found))
 
     def _screen(self, found: FitResult) -> list[Promise]:
         key = frozenset(found.effects)
@@ -162,31 +162,32 @@ class Search:
     def _expand(self, base: FitResult) -> None:
         """Fit the effects of largest gain on top of a set.
 
-        Regressions predict it; the leader of each is fitted until one leaves noise, then its
-        rivals. Where a set leaves more than the noise, or none of these is the cause, secants tell.
+        Regressions predict it. Their leaders are fitted until one leaves noise, then its rivals.
+        Where there is no effect yet, and none of these is the cause, fits by secants tell.
         """
         least = self._needed(base) if base.effects else SETTINGS.promising
-        if not base.effects or base.mean_square <= NOISE_MEAN_SQUARE:
-            found, tried, best = self._screen(base), [], base
-            for one in leading(found, 1, least):
-                fits = self._confirm(base, [one], SETTINGS.leader_iterations)
-                best = min((best, *fits), key=lambda fit: fit.cost)
-                tried.append(one.effect)
-                if best is not base and best.mean_square <= NOISE_MEAN_SQUARE:
-                    break
-            tells = not base.effects and best is not base and not leaves_most(best, self.null)
-            if tells and self._renew_null(best):
-                self._expand(self.null)
-                return
-            new = rivals_at(self.runner, base, best, rivals(found, base, least, tried))
-            fits = self._confirm(base, new, SETTINGS.iterations)
-            if min((best, *fits), key=lambda fit: fit.cost).mean_square <= NOISE_MEAN_SQUARE:
-                return
+        found, tried, best = self._screen(base), [], base
+        for one in leading(found, 1, least):
+            fits = self._confirm(base, [one], SETTINGS.leader_iterations)
+            best = min((best, *fits), key=lambda fit: fit.cost)
+            tried.append(one.effect)
+            if best is not base and best.mean_square <= NOISE_MEAN_SQUARE:
+                break
+        if base.effects and best.mean_square > NOISE_MEAN_SQUARE:
+            return
+        tells = not base.effects and best is not base and not leaves_most(best, self.null)
+        if tells and self._renew_null(best):
+            self._expand(self.null)
+            return
+        new = rivals_at(self.runner, base, best, rivals(found, base, least, tried))
+        best = min((best, *self._confirm(base, new, SETTINGS.iterations)), key=lambda fit: fit.cost)
+        if base.effects or best.mean_square <= NOISE_MEAN_SQUARE:
+            return
         reached = 0.0
         for one in fitted_promises(self.runner, base)[: SETTINGS.most_followed]:
             if one.gain <= max(least, SETTINGS.rival_share * reached):
                 break
-            known = self.sets.get(frozenset((*base.effects, one.effect)), base)
+            known = self.sets.get(frozenset([one.effect]), base)
             if one.gain > 0.5 * (base.cost - known.cost):
                 (known,) = self._confirm(base, [one], SETTINGS.leader_iterations)
             reached = max(reached, 0.5 * (base.cost - known.cost))

@@ -1,6 +1,6 @@
-"""Fits each effect on top of a fit, while the slopes of all else follow by secants.
+"""Fits each effect alone, while the slopes of all else follow by secants.
 
-Where more than noise is left and no leader of a regression explains it, the regressions mislead:
+Where the first effect is sought and no leader of a regression explains the gap, these mislead:
 without a cause, a fit has bent the parameters, and the slopes there hardly know the cause. Some
 iterations of a fit unbend them. The simulation is led along the measured outputs, so that contact
 comes in time meanwhile. The fits are cheap, because only the slopes of the effect itself are
@@ -41,7 +41,7 @@ PARTS = 2
 
 @dataclass(frozen=True)
 class SecantFits:
-    """Effects to fit on top of a fit.
+    """Effects to fit, each alone, from a fit without effects.
 
     states : of the runs, by effect, where a regression told those that the effect adds
     iterations : at most so many
@@ -55,7 +55,7 @@ class SecantFits:
 
 
 def fitted_promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
-    """Gains of effects on top of a fit, each fitted by secants, the largest first.
+    """Gains of effects over the fit without any, each fitted by secants, the largest first.
 
     All effects are fitted for some iterations, and the best for more.
     """
@@ -95,7 +95,7 @@ def _promise(model: Model, asked: SecantFits, name: str, near: Estimate) -> Prom
         (
             fit(
                 model,
-                (*base.effects, name),
+                (name,),
                 asked.runs,
                 {**base.values, **values_at_size(candidate, size)},
                 states,

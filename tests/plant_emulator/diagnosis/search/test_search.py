@@ -275,6 +275,14 @@ def test_effect_follows_a_leader_that_does_not_keep_what_it_promised(
     assert ["kink"] not in steps[len(confirmed) :]
 
 
+def test_set_that_leaves_what_is_random_is_not_expanded() -> None:
+    """Where a part of the log is far noisier, chance promises more than a second effect needs."""
+    random = 20.0 * np.random.default_rng(8).standard_normal(len(TIME)) * (np.abs(TIME) > 0.8)
+    found = explained(Line([noisy(10.0 * CUBE + random)], NAMES))
+    assert found.final.effects == ("cube",)
+    assert all(len(one.effects) == 1 for one in found.trace)
+
+
 @pytest.mark.parametrize("measured", [6.0 * RIPPLE, CUBE + 10.0 * KINK + 6.0 * RIPPLE])
 def test_ripple_that_no_effect_explains_is_unknown(measured: Array) -> None:
     """Its mean square is 18, alone and beside two effects; the noise has 1."""
