@@ -150,7 +150,7 @@ class Procedure:
             declared=runner,
             runner=runner,
             null=null,
-            random_evidence=best.evidence,
+            beside_random=True,
             noise=estimated or self.lines,
         )
         explained = search.explain()

@@ -57,13 +57,13 @@ class Search:
 
     declared : in the noise that the sensors declare
     runner : beside the outliers; null : fit without effects there
-    random_evidence : of a random effect that is part of that noise [chi squared]
+    beside_random : whether a random effect is part of that noise
     """
 
     declared: TaskRunner
     runner: TaskRunner
     null: FitResult
-    random_evidence: float = 0.0
+    beside_random: bool = False
     noise: LoggedNoise | None = None
     noise_at: tuple[object, ...] = ()
     sets: dict[frozenset[str], FitResult] = field(default_factory=dict)
@@ -96,7 +96,7 @@ class Search:
 
         The weights of a random effect fit the noise as it was declared.
         """
-        if self.noise_at == where.key or self.random_evidence:
+        if self.noise_at == where.key or self.beside_random:
             return False
         self.noise_at = where.key
         (noise,) = self.declared.map(estimate_noise, [self._task(where)])
@@ -155,9 +155,8 @@ class Search:
         return self.promises[key]
 
     def _needed(self, found: FitResult) -> float:
-        """Least gain of log evidence that one more effect needs on top of a fit."""
-        needed = SETTINGS.needed_again if found.effects or self.random_evidence else SETTINGS.needed
-        return needed + SETTINGS.law_error**2 * 0.5 * self.random_evidence
+        """Least gain that one more effect needs on top of a fit; none follows a random course."""
+        return SETTINGS.needed_again if found.effects or self.beside_random else SETTINGS.needed
 
     def _expand(self, base: FitResult) -> None:
         """Fit the effects of largest gain on top of a set.

@@ -199,14 +199,12 @@ def test_an_unrest_shows_beside_a_coloured_noise() -> None:
     assert Procedure(runner=runner(model)).run()[1].effects == ("shake",)
 
 
-def test_what_is_little_beside_a_great_unrest_may_be_its_law() -> None:
-    """By hand: evidence of some n / 2 8^2 12 = 768e3, of which the wave's 125 are less than 0.001;
-    alone it is found.
-    """
+def test_wave_beside_a_great_unrest_is_an_effect_too() -> None:
+    """By hand: the half that does not shake tells n/2 0.5^2 / 2 = 125 of the wave [chi squared]."""
     y = noisy(2.0 + 3.0 * TIME + 0.5 * np.sin(20.0 * TIME)) + shaken(8.0)
-    model = Shaken([y])
-    procedure = Procedure(runner=runner(model))
-    assert procedure.run()[1].effects == ("shake",)
+    found, decision, _ = Procedure(runner=runner(Shaken([y]))).run()
+    assert decision.effects == ("shake", "wave")
+    assert found.final.values["wave_size"] == pytest.approx(0.5, abs=0.15)
 
 
 def test_unrest_alone_is_an_effect() -> None:
