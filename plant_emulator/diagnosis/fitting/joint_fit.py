@@ -204,7 +204,7 @@ def lead(
     near the limit of its voltage ended at thirty times its noise.
     """
     unknowns = with_starts(joint_unknowns(model, start.effects, runs), start.values, start.states)
-    observer = model.observer(interval).rough()
+    observer = model.observer(interval)
     found = estimate(
         unknowns,
         [observer.residual(k, start.effects) for k in runs],

@@ -2,7 +2,8 @@
 
 The log evidence of a set is half the fall of its penalised cost, less the gain that each of its
 effects needs. The best set is expanded by the effects of largest gain until it leaves only noise or
-no gain is large enough. Beside an approximate law, its error (`law_error`) must be gained as well.
+what is random, none gains enough, or the cause is foreign. Beside an approximate law, its error
+(`law_error`) must be gained as well.
 """
 
 from __future__ import annotations
@@ -155,7 +156,7 @@ class Search:
         return self.promises[key]
 
     def _needed(self, found: FitResult) -> float:
-        """Least gain that one more effect needs on top of a fit; none follows a random course."""
+        """Least gain of log evidence that one more effect needs on top of a fit."""
         return SETTINGS.needed_again if found.effects or self.beside_random else SETTINGS.needed
 
     def _expand(self, base: FitResult) -> None:

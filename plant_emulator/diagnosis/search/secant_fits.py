@@ -1,6 +1,6 @@
 """Fits each effect alone, while the slopes of all else follow by secants.
 
-Where the first effect is sought and no leader of a regression explains the gap, these mislead:
+Where the first effect is sought and none of their leaders explains the gap, regressions mislead:
 without a cause, a fit has bent the parameters, and the slopes there hardly know the cause. Some
 iterations of a fit unbend them. The simulation is led along the measured outputs, so that contact
 comes in time meanwhile. The fits are cheap, because only the slopes of the effect itself are
@@ -78,7 +78,7 @@ def fitted_promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
 
 def fit_by_secants(model: Model, asked: SecantFits) -> list[Promise]:
     """Gain of each of these effects after some iterations of its fit (a step)."""
-    model = model.observer(CORRECTION_INTERVALS[0]).rough()
+    model = model.observer(CORRECTION_INTERVALS[0])
     near = linearise(model, asked.base, asked.runs, LED_DIFFERENCE)
     return [_promise(model, asked, name, near) for name in asked.effects]
 
