@@ -146,7 +146,7 @@ class Search:
         """Whether no effect is worth adding: the cause is foreign, or what is left is random."""
         foreign = excess(self.null) > SETTINGS.needed and leaves_most(found, self.null)
         if found.mean_square > NOISE_MEAN_SQUARE:
-            return foreign or leaves_random(found)
+            return foreign or (leaves_random(found) and not self.beside_random)
         return all(p.gain <= self._needed(found) for p in self._screen(found))
 
     def _screen(self, found: FitResult) -> list[Promise]:
