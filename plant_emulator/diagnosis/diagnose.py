@@ -15,6 +15,7 @@ from plant_emulator.diagnosis.answer import Answer, Logs
 from plant_emulator.diagnosis.calibration.confidence import Standing, confidence
 from plant_emulator.diagnosis.decision import subsystem
 from plant_emulator.diagnosis.decision.procedure import Procedure
+from plant_emulator.diagnosis.decision.verdict import decide
 from plant_emulator.diagnosis.design.next_experiment import Advice
 from plant_emulator.diagnosis.execution.pool import TaskRunner, build_model
 from plant_emulator.diagnosis.execution.progress import ReportingPool
@@ -113,12 +114,20 @@ class _Tests:
         return {"parameter": gaps.nominal, "effect": gaps.null}.get(self.decision.kind)
 
     def confirm(self, gaps: Gaps) -> _Tests:
-        """The tests; with an unknown cause where the held-out runs do not confirm the effects."""
+        """The tests; with an unknown cause where the held-out runs do not confirm the effects.
+
+        A random effect that leaves only noise without them is the cause alone.
+        """
         reference = self.reference(gaps)
         if not self.effects or reference is None:
             return self
         if shows_shrinkage(reference, gaps.by_effects[self.effects]):
             return self
+        explained, null = self.explained, self.explained.null
+        if explained.random_effects and null.mean_square <= NOISE_MEAN_SQUARE:
+            alone = replace(explained, final=null, alternatives={}, reduced_costs={})
+            decision = decide(build_model(self.runner.recipe), alone)
+            return replace(self, explained=alone, decision=decision)
         reason = f"the held-out runs do not confirm {' and '.join(self.effects)}"
         return replace(
             self, decision=replace(self.decision, kind="unknown", effects=(), reason=reason)

@@ -103,11 +103,10 @@ class Procedure:
         if self.disturbances is not None:
             (null,) = runner.map(refit, [Task(base=null, runs=runner.runs)])
         search = Search(declared=self.runner, runner=runner, null=null, noise=self.disturbances)
-        explained, runner = search.explain(), search.runner
-        (found,) = runner.map(find_regularities, [Task(base=explained.final, runs=runner.runs)])
+        explained = search.explain()
         return _Tested(
-            explained=replace(explained, regularities=found),
-            runner=runner,
+            explained=_with_regularities(explained, search.runner),
+            runner=search.runner,
             estimated=None if search.noise is self.disturbances else search.noise,
         )
 
@@ -159,7 +158,8 @@ class Procedure:
             last = self._show_beside_outliers(last, explained.final)
         if not last:
             return None
-        return _Tested(explained=replace(explained, random_effects=tuple(last)), runner=runner)
+        explained = replace(explained, random_effects=tuple(last))
+        return _Tested(explained=_with_regularities(explained, runner), runner=runner)
 
     def _fit_random_effects(
         self, runner: TaskRunner, base: FitResult, names: Iterable[str]
@@ -200,6 +200,15 @@ class Procedure:
         fits = list(self._cleared.map(run_consistency.fit_alone, tasks))
         reason = run_consistency.inconsistency(self.runner.model, runs, fits)
         return replace(decision, kind="unknown", effects=(), reason=reason) if reason else decision
+
+
+def _with_regularities(explained: Explanation, runner: TaskRunner) -> Explanation:
+    """The explanation with the regularities of what it leaves in the noise of the runner.
+
+    A random effect explains none: its course is chance.
+    """
+    (found,) = runner.map(find_regularities, [Task(base=explained.final, runs=runner.runs)])
+    return replace(explained, regularities=found)
 
 
 def _whitened(runner: TaskRunner, noise: LoggedNoise | None) -> TaskRunner:

@@ -49,7 +49,7 @@ class Explanation:
     trace : the search in its order
     noise : of every channel as the logs show it; empty where it is as declared
     log_odds : of the final set against its best rival, in the mean square that it leaves [nats]
-    regularities : of what the final fit leaves; with random effects nobody looks for any
+    regularities : of what the final fit leaves, beside the random effects
     """
 
     null: FitResult

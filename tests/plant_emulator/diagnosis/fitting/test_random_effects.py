@@ -11,6 +11,7 @@ from plant_emulator.diagnosis.execution.pool import InProcess
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
 from plant_emulator.diagnosis.fitting.random_effects import WeightedRecipe, fit_random_effect
 from plant_emulator.diagnosis.fitting.task import Task
+from plant_emulator.diagnosis.machine import Course
 from plant_emulator.diagnosis.search.screening import screen
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import (
@@ -205,6 +206,22 @@ def test_wave_beside_a_great_unrest_is_an_effect_too() -> None:
     found, decision, _ = Procedure(runner=runner(Shaken([y]))).run()
     assert decision.effects == ("shake", "wave")
     assert found.final.values["wave_size"] == pytest.approx(0.5, abs=0.15)
+
+
+def test_wave_of_the_turns_beside_an_unrest_is_no_part_of_it() -> None:
+    """By hand: a wave of 0.5 holds n/2 0.5^2 = 125 squares of each run's half that is still."""
+    turns = 5.0 * (TIME + 1.0) ** 2
+
+    class Turning(Shaken):
+        def course(self, run: int, effects: Sequence[str], values: Mapping[str, float]) -> Course:
+            return replace(super().course(run, effects, values), turns=turns)
+
+    still = [noisy(2.0 + 3.0 * TIME, seed) + shaken(0.12, seed) for seed in (11, 12, 13)]
+    waved = [y + 0.5 * np.sin(2.0 * np.pi * 7.0 * turns) for y in still]
+    assert Procedure(runner=runner(Turning(still))).run()[1].effects == ("shake",)
+    decision = Procedure(runner=runner(Turning(waved))).run()[1]
+    assert (decision.kind, decision.effects) == ("unknown", ())
+    assert "repeats 7 times a turn" in decision.reason
 
 
 def test_unrest_alone_is_an_effect() -> None:
