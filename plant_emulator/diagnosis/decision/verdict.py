@@ -133,7 +133,7 @@ def _decide_by_fits(model: Model, explained: Explanation) -> Decision:
     null, final = explained.null, explained.final
     if final.effects and adequate(final, null):
         moved = deviations(model, final)
-        return Decision(kind="effect", effects=final.effects, deviations=moved, reason="")
+        return Decision(kind="effect", effects=explained.named, deviations=moved, reason="")
     moved = deviations(model, null)
     if not final.effects and null.mean_square <= NULL_MEAN_SQUARE:
         kind: Kind = "parameter" if any(one.significant for one in moved) else "none"

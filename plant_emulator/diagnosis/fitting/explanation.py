@@ -46,6 +46,8 @@ class Explanation:
     random_effects : accepted random effects, beside the effects of `final`
     reduced_costs : for each of several accepted effects, the least cost of a fit without it; empty
         where the final fit is no cause
+    corrections : effects of the final fit that only correct the law of another one; they are not
+        named
     trace : the search in its order
     noise : of every channel as the logs show it; empty where it is as declared
     log_odds : of the final set against its best rival, in the mean square that it leaves [nats]
@@ -60,6 +62,7 @@ class Explanation:
     log_odds: float
     random_effects: tuple[VarianceComponent, ...] = ()
     reduced_costs: dict[str, float] = field(default_factory=dict)
+    corrections: frozenset[str] = frozenset()
     trace: tuple[SearchStep, ...] = ()
     noise: Mapping[str, ChannelNoise] = field(default_factory=dict)
     regularities: Sequence[Regularity] = ()
@@ -73,7 +76,12 @@ class Explanation:
     @property
     def named(self) -> tuple[str, ...]:
         """Names of all accepted effects, the random ones first."""
-        return (*(one.effect for one in self.random_effects), *self.final.effects)
+        return (*(one.effect for one in self.random_effects), *self._followed)
+
+    @property
+    def _followed(self) -> tuple[str, ...]:
+        """The accepted effects of the final fit."""
+        return tuple(e for e in self.final.effects if e not in self.corrections)
 
     def evidence(self, hypothesis: Hypothesis) -> float:
         """Evidence of an effect [1]: beside the other accepted effects, or alone."""
@@ -91,7 +99,7 @@ class Explanation:
     def classes(self) -> list[list[str]]:
         """Classes of effects that these logs cannot tell apart, each led by an accepted effect."""
         found = [[one.effect] for one in self.random_effects]
-        for name in self.final.effects:
+        for name in self._followed:
             costs = sorted(self.alternatives.get(name, {}).items(), key=lambda pair: pair[1])
             near = [
                 other

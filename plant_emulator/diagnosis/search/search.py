@@ -34,6 +34,7 @@ from plant_emulator.diagnosis.search.secant_fits import fitted_promises
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.summary import (
     alternatives,
+    corrections,
     hypotheses,
     log_odds,
     not_told_apart,
@@ -254,7 +255,8 @@ class Search:
 
         Where a set leaves something correlated, an effect that follows a little of it is needless:
         its evidence among what is left is that of chance. An effect is the cause of what the others
-        leave only if it leaves little of that. No part of a set is the cause where the set is none.
+        leave only if it leaves little of that, or no more of the gap than approximate laws do. No
+        part of a set is the cause where the set is none.
         """
         self.reduced_costs = {}
         if len(best.effects) < 2 or not adequate(best, self.null):
@@ -275,8 +277,10 @@ class Search:
         fall = least.cost - found.cost
         if found.effects != best.effects:
             return self._without_needless(found)
-        closes = found.mean_square <= NOISE_MEAN_SQUARE or leaves_little(
-            found, excess(found) + fall
+        closes = (
+            found.mean_square <= NOISE_MEAN_SQUARE
+            or leaves_little(found, excess(found) + fall)
+            or excess(found) <= SETTINGS.law_error**2 * excess(self.null)
         )
         if closes and evidence_of(fall, found, self.null) >= EVIDENCE_THRESHOLD:
             return found
@@ -288,6 +292,11 @@ class Search:
         values = {key: self._value(one) for key, one in self.sets.items()}
         screened = self.promises.get(frozenset(final.effects), [])
         larger = {p.effect: self._needed(final) - p.gains.get(SIMULATION, 0.0) for p in screened}
+        library = self.runner.model.candidates
+        mending = corrections(library, self.null, final, self.reduced_costs)
+        if mending:
+            named = replace(final, effects=tuple(e for e in final.effects if e not in mending))
+            self.trace.append(search_step(self.null, "others only correct a law", named))
         return Explanation(
             null=self.null,
             final=final,
@@ -296,6 +305,7 @@ class Search:
             unconverged=unconverged(final),
             log_odds=log_odds(self.sets, values, final, larger),
             reduced_costs=self.reduced_costs,
+            corrections=mending,
             trace=tuple(self.trace),
             noise=self.noise.channels if self.noise else {},
         )

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.machine import Candidate
     from plant_emulator.diagnosis.search.screening import Visibility
 
     Sets = Mapping[frozenset[str], FitResult]
@@ -49,6 +50,29 @@ def alternatives(sets: Sets, final: FitResult, name: str) -> dict[str, float]:
         for key, one in sets.items()
         if len(key) == len(final.effects) and key >= others
     }
+
+
+def corrections(
+    library: Mapping[str, Candidate],
+    null: FitResult,
+    final: FitResult,
+    reduced_costs: Mapping[str, float],
+) -> frozenset[str]:
+    """Effects of a set that only correct the law of another one that changes the same quantity.
+
+    An approximate law leaves up to the square of its relative error of what it closes, and not only
+    at the samples where it closes most: a ramp that lands softly is wrong at its ends.
+
+    reduced_costs : of the set without each effect
+    """
+    share = SETTINGS.law_error**2
+    laws = [library[name] for name in final.effects if not library[name].exact_form]
+    return frozenset(
+        name
+        for name, cost in reduced_costs.items()
+        if cost - final.cost < share * (null.cost - cost)
+        and any(law.name != name and law.quantities & library[name].quantities for law in laws)
+    )
 
 
 def log_odds(

@@ -1,8 +1,11 @@
 """The gain that the error of an approximate law can feign, against hand calculations."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from plant_emulator.diagnosis.decision.verdict import decide
 from plant_emulator.diagnosis.search.law_error import feigned_gain
 from tests.plant_emulator.diagnosis.line import SHAPES, TIME, Line, explained, noisy
 
@@ -36,3 +39,29 @@ def test_an_effect_where_the_law_does_not_act_needs_no_more(
     measured = 30.0 * SHAPES["late"](TIME) + 1.5 * SHAPES["wave"](TIME)
     model = Line([noisy(measured)], ["late", "wave"])
     assert set(explained(model).final.effects) == named
+
+
+@pytest.mark.parametrize(
+    ("exact", "share", "named"),
+    [(False, True, ("late",)), (False, False, ("late", "wave")), (True, True, ("late", "wave"))],
+)
+def test_an_effect_of_the_same_quantity_may_only_correct_the_law(
+    monkeypatch: pytest.MonkeyPatch, exact: bool, share: bool, named: tuple[str, ...]
+) -> None:
+    """By hand: 1125 squares of the wave are less than a hundredth of the 450000 of the other."""
+    monkeypatch.setitem(SHAPES, "late", lambda x: (x > 0.0) * np.sin(31.0 * x))
+    monkeypatch.setitem(SHAPES, "wave", lambda x: (x < 0.0) * np.sin(20.0 * x))
+    measured = 30.0 * SHAPES["late"](TIME) + 1.5 * SHAPES["wave"](TIME)
+    model = Line([noisy(measured)], ["late", "wave"])
+    late, wave = model.candidates["late"], model.candidates["wave"]
+    own = frozenset(["load"] if share else ["supply"])
+    model.candidates = {
+        "late": replace(late, exact_form=exact, quantities=frozenset(["load", "speed"])),
+        "wave": replace(wave, quantities=own),
+    }
+    found = explained(model)
+    assert found.final.effects == ("late", "wave")
+    assert found.named == named
+    assert decide(model, found).effects == named
+    assert found.classes() == [[name] for name in named]
+    assert (found.trace[-1].action == "others only correct a law") == (named == ("late",))
