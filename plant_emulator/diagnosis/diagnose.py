@@ -64,6 +64,11 @@ THRESHOLDS = {
     "mean square over the noise up to which a fit leaves noise": f"{NOISE_MEAN_SQUARE:g}",
 }
 
+CORRECTS = (
+    "the fit has it, but it is not named; it closes no more than another law of an effect that"
+    " changes the same quantity may leave"
+)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Findings:
@@ -71,7 +76,7 @@ class Findings:
 
     details : what a report shows beside the answer
     final : fit whose values can be saved
-    fixed : for each accepted effect the values that were not fitted, by name in the effect
+    fixed : for each effect of that fit the values that were not fitted, by name in the effect
     """
 
     answer: Answer
@@ -92,6 +97,17 @@ class _Tests:
     def effects(self) -> tuple[str, ...]:
         """The accepted effects that a simulation can follow."""
         return self.explained.final.effects if self.decision.effects else ()
+
+    @property
+    def fitted(self) -> tuple[str, ...]:
+        """The effects of the final fit, with the random ones; the accepted ones come first."""
+        return tuple(dict.fromkeys((*self.decision.effects, *self.effects)))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A note on each effect of the final fit that is not named."""
+        unnamed = [name for name in self.fitted if name not in self.decision.effects]
+        return tuple(f"{name}: {CORRECTS}" for name in unnamed)
 
     @property
     def final(self) -> FitResult:
@@ -184,11 +200,11 @@ class Diagnose:
                 traces=gaps.traces(tests.effects),
                 waterfall=waterfall(gaps.by_effects, tests.effects),
                 settings={**self.settings, **THRESHOLDS},
-                notes=(*self.notes, *gaps.notes),
+                notes=(*self.notes, *gaps.notes, *tests.notes),
                 spectra=self._spectra(tests),
             ),
             final=tests.final,
-            fixed={name: self._fixed_values(name) for name in tests.decision.effects},
+            fixed={name: self._fixed_values(name) for name in tests.fitted},
         )
 
     def _test(self) -> _Tests:

@@ -122,21 +122,27 @@ def regressions(
 
 
 def rivals_at(
-    runner: TaskRunner, null: FitResult, leader: FitResult, supposed: Sequence[Promise]
+    runner: TaskRunner,
+    base: FitResult,
+    leader: FitResult,
+    supposed: Sequence[Promise],
+    least: float,
 ) -> list[Promise]:
     """Those of the supposed rivals of a leader that promise much at its parameters as well.
 
     Where a leader leaves noise, and the fit without its effect more, that fit has bent its own
     parameters. Elsewhere all stay, and where the regressions there do not even see the leader.
+
+    base : fit that the rivals are to join; least : gain that one must promise
     """
-    if not supposed or not leader.mean_square <= NOISE_MEAN_SQUARE < null.mean_square:
+    if not supposed or not leader.mean_square <= NOISE_MEAN_SQUARE < base.mean_square:
         return list(supposed)
     own = leader.effects[-1]
     names = (own, *(p.effect for p in supposed))
-    found = regressions(runner, null.moved_to(leader), names, (RELATIONS, SIMULATION))
-    if not any(p.effect == own and p.gain > SETTINGS.promising for p in found):
+    found = regressions(runner, base.moved_to(leader), names, (RELATIONS, SIMULATION))
+    if not any(p.effect == own and p.gain > least for p in found):
         return list(supposed)
-    return leading(found, len(supposed), SETTINGS.promising, (own,))
+    return leading(found, len(supposed), least, (own,))
 
 
 def screen(model: Model, asked: Screening) -> list[Promise]:

@@ -180,7 +180,7 @@ class Search:
         if tells and self._renew_null(best):
             self._expand(self.null)
             return
-        new = rivals_at(self.runner, base, best, rivals(found, base, least, tried))
+        new = rivals_at(self.runner, base, best, rivals(found, base, least, tried), least)
         best = min((best, *self._confirm(base, new, SETTINGS.iterations)), key=lambda fit: fit.cost)
         if base.effects or best.mean_square <= NOISE_MEAN_SQUARE:
             return

@@ -17,7 +17,7 @@ from plant_emulator.diagnosis.prediction.held_out import HeldOutRuns, Plan
 from plant_emulator.estimation import least_squares
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.fitting.test_random_effects import Shaken, shaken
-from tests.plant_emulator.diagnosis.line import TIME, Given, Line, noisy, runner
+from tests.plant_emulator.diagnosis.line import SHAPES, TIME, Given, Line, noisy, runner
 
 EACH_IN_TURN = Plan(fitted=(0, 1, 2), folds=(((1, 2), (0,)), ((0, 2), (1,)), ((0, 1), (2,))))
 
@@ -153,6 +153,25 @@ def test_effect_that_the_held_out_runs_refute_is_dropped_beside_a_random_one() -
     assert found.answer.trace[-1].effects == ("wave",)
     assert found.answer.verdict.effects == ("shake",)
     assert found.fixed.keys() == {"shake"}
+
+
+def test_effect_that_only_corrects_a_law_is_fitted_noted_and_not_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """By hand: 3 * 1125 squares of the wave are less than a hundredth of 3 * 450000."""
+    monkeypatch.setitem(SHAPES, "late", lambda x: (x > 0.0) * np.sin(31.0 * x))
+    monkeypatch.setitem(SHAPES, "wave", lambda x: (x < 0.0) * np.sin(20.0 * x))
+    gap = 30.0 * SHAPES["late"](TIME) + 1.5 * SHAPES["wave"](TIME)
+    model = Unplanned([noisy(gap, seed) for seed in (1, 2, 3)], ["late", "wave"])
+    model.candidates = {
+        name: replace(one, quantities=frozenset(["load"])) for name, one in model.candidates.items()
+    }
+    found = diagnosed(model)
+    assert found.answer.verdict.effects == ("late",)
+    assert [one.effect for one in found.answer.ranking if one.accepted] == ["late"]
+    assert found.fixed.keys() == {"late", "wave"}
+    assert [note.partition(":")[0] for note in found.details.notes] == ["wave"]
+    assert found.answer.gap.closed_fraction == pytest.approx(1.0, abs=0.01)
 
 
 class EachOwnEffect(Line):

@@ -57,9 +57,9 @@ def test_rivals_of_a_leader_that_leaves_noise_are_told_at_its_parameters() -> No
     supposed = [p for p in promises(runner(model), null) if p.effect != "kink"]
     assert all(p.gain > 50.0 for p in supposed)
     assert leader.mean_square > NOISE_MEAN_SQUARE
-    assert rivals_at(runner(model), null, leader, supposed) == supposed
+    assert rivals_at(runner(model), null, leader, supposed, 5.0) == supposed
     quiet = replace(leader, sum_of_squares=1.0 * leader.samples)
-    told = rivals_at(runner(model), null, quiet, supposed)
+    told = rivals_at(runner(model), null, quiet, supposed, 5.0)
     assert [p.effect for p in told] == ["near kink"]
     start = told[0].starts["simulation"]
     assert start.values["a"] == pytest.approx(2.0, abs=0.2)
