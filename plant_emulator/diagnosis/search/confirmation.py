@@ -5,23 +5,26 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from plant_emulator.diagnosis.fit_result import FitValues
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.joint_fit import (
     APPROACH_ITERATIONS,
     approach,
     fit,
+    linearise,
     nearest,
 )
 from plant_emulator.diagnosis.fitting.signature import values_at_size
-from plant_emulator.diagnosis.search.promise import starts_of
+from plant_emulator.diagnosis.search.promise import Start, starts_of
+from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.fitting.task import Task
     from plant_emulator.diagnosis.machine import Model
-    from plant_emulator.diagnosis.search.promise import Promise, Start
+    from plant_emulator.diagnosis.search.promise import Promise
     from plant_emulator.estimation.unknowns import Lengths
 
 
@@ -82,19 +85,63 @@ def confirm(model: Model, trial: Trial) -> FitResult:
     return min(found, key=lambda one: one.cost)
 
 
-def without_effects(model: Model, pair: tuple[FitResult, Task]) -> FitResult:
-    """The fit without effects, anew from one with effects whose values leave less (a step).
+@dataclass(frozen=True)
+class Reduction:
+    """A fit, and one of its effects to do without."""
+
+    base: FitResult
+    runs: tuple[int, ...]
+    effect: str
+
+
+def reduce(model: Model, asked: Reduction) -> FitResult:
+    """Fit a set again without one of its effects (a step).
+
+    One start has the values of the set as they are, another those that its slopes tell where the
+    effect is absent: an effect may have bent the parameters together with it.
+    """
+    base = asked.base
+    rest = tuple(name for name in base.effects if name != asked.effect)
+    # A size that is not neutral would keep the effect in the simulation of a start.
+    values = {**base.values, **model.candidates[asked.effect].neutral}
+    starts = (_absent(model, asked), Start(values=values, states=base.states))
+    iterations = SETTINGS.leader_iterations
+    return confirm(model, Trial(rest, asked.runs, starts, (), base.lengths, iterations))
+
+
+def _absent(model: Model, asked: Reduction) -> Start:
+    """The least sum of squares with the effect's sizes at neutral, by the slopes at the fit."""
+    neutral = model.candidates[asked.effect].neutral
+    near = linearise(model, asked.base, asked.runs)
+    own = np.array([u.name in neutral and u.run is None for u in near.unknowns])
+    change = np.array([u.scaled(neutral.get(u.name, u.start)) for u in near.unknowns]) - near.z
+    curvature = near.information + np.diag([u.scaled_std**-2.0 for u in near.unknowns])
+    pull = curvature[np.ix_(~own, own)] @ change[own]
+    moved = near.z + np.where(own, change, 0.0)
+    # A state that no sample shows has no curvature, and stays.
+    moved[~own] -= np.linalg.lstsq(curvature[np.ix_(~own, ~own)], pull)[0]
+    there = replace(near, z=moved)
+    states = tuple(there.states(k) for k in range(len(asked.runs)))
+    return Start(values=there.parameters(), states=states)
+
+
+def without_effects(model: Model, pair: tuple[FitResult, Reduction]) -> FitResult:
+    """The fit without effects, anew from one with an effect whose values leave less (a step).
 
     Far from the data a fit may end in a local minimum. The freedom of any effect leads out of it.
 
-    pair : the fit without effects, and a task with the other fit
+    pair : the fit without effects, and the reduction of the other fit to none
     """
-    known, task = pair
-    # A size that stays among the values would keep the effect in the simulation.
-    near = nearest(model, [known.moved_to(task.base)], task.runs, known.mean_square)
+    known, asked = pair
+    absent = _absent(model, asked)
+    starts = [
+        FitValues(effects=(), values=absent.values, states=absent.states, lengths=known.lengths),
+        known.moved_to(asked.base),
+    ]
+    near = nearest(model, starts, asked.runs, known.mean_square)
     if near is None:
         return known
-    return fit(model, (), task.runs, near.values, near.states, lengths=known.lengths)
+    return fit(model, (), asked.runs, near.values, near.states, lengths=known.lengths)
 
 
 def _values(trial: Trial, start: Start) -> FitValues:

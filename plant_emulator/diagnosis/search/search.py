@@ -25,10 +25,16 @@ from plant_emulator.diagnosis.fitting.evidence import (
 from plant_emulator.diagnosis.fitting.explanation import Explanation
 from plant_emulator.diagnosis.fitting.fit_steps import refit
 from plant_emulator.diagnosis.fitting.task import Task
-from plant_emulator.diagnosis.search.confirmation import Trial, confirm, trial_of, without_effects
+from plant_emulator.diagnosis.search.confirmation import (
+    Reduction,
+    confirm,
+    reduce,
+    trial_of,
+    without_effects,
+)
 from plant_emulator.diagnosis.search.law_error import LawErrors
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
-from plant_emulator.diagnosis.search.promise import Start, leading, rivals
+from plant_emulator.diagnosis.search.promise import leading, rivals
 from plant_emulator.diagnosis.search.screening import SIMULATION, promises, rivals_at, visibilities
 from plant_emulator.diagnosis.search.secant_fits import fitted_promises
 from plant_emulator.diagnosis.search.settings import SETTINGS
@@ -195,7 +201,8 @@ class Search:
 
     def _renew_null(self, found: FitResult) -> bool:
         """Fit without effects anew from one with some; give whether the two are rivals now."""
-        (null,) = self.runner.map(without_effects, [(self.null, self._task(found))])
+        asked = Reduction(found, self.runner.runs, found.effects[-1])
+        (null,) = self.runner.map(without_effects, [(self.null, asked)])
         least = max(EVIDENCE_THRESHOLD, SETTINGS.rival_share * (self.null.cost - found.cost))
         if self.null.cost - null.cost < least:
             return False
@@ -218,6 +225,7 @@ class Search:
         key = frozenset(found.effects)
         if key not in self.sets or found.cost < self.sets[key].cost:
             self.sets[key] = found
+            self.null = self.sets[frozenset()]
 
     def _value(self, found: FitResult) -> float:
         """Negative log evidence of a set, with the gain that each of its effects needs."""
@@ -253,30 +261,32 @@ class Search:
     def _without_needless(self, best: FitResult) -> FitResult:
         """Drop the effect that closes least until each one closes enough; return the set.
 
-        Where a set leaves something correlated, an effect that follows a little of it is needless:
-        its evidence among what is left is that of chance. An effect is the cause of what the others
-        leave only if it leaves little of that, or no more of the gap than approximate laws do. No
-        part of a set is the cause where the set is none.
+        Each set is compared with smaller ones that begin where it leads: it may have left a local
+        minimum of theirs. Where a set leaves something correlated, an effect that follows a little
+        of it is needless: its evidence among what is left is that of chance. An effect is the cause
+        of what the others leave only if it leaves little of that, or no more of the gap than
+        approximate laws do. No part of a set is the cause where the set is none.
         """
         self.reduced_costs = {}
-        if len(best.effects) < 2 or not adequate(best, self.null):
+        if not best.effects or not adequate(best, self.null):
             return best
-        for name in best.effects:
-            rest = tuple(e for e in best.effects if e != name)
-            start = (Start(values=best.values, states=best.states),)
-            trial = Trial(
-                rest, self.runner.runs, start, (), best.lengths, SETTINGS.leader_iterations
-            )
-            (found,) = self.runner.map(confirm, [trial])
+        for asked in (Reduction(best, self.runner.runs, name) for name in best.effects):
+            if len(best.effects) == 1:
+                (found,) = self.runner.map(without_effects, [(self.null, asked)])
+            else:
+                (found,) = self.runner.map(reduce, [asked])
             self._keep(found)
-            self.reduced_costs[name] = self.sets[frozenset(rest)].cost
+            self.reduced_costs[asked.effect] = self.sets[frozenset(found.effects)].cost
         found = self._settled()
+        if found.effects != best.effects:
+            return self._without_needless(found)
+        if len(found.effects) == 1:
+            self.reduced_costs = {}
+            return found
         cheapest = min(self.reduced_costs, key=self.reduced_costs.__getitem__)
         (least,) = self._fits(refit, [self.sets[frozenset(best.effects) - {cheapest}]])
         self.reduced_costs[cheapest] = least.cost
         fall = least.cost - found.cost
-        if found.effects != best.effects:
-            return self._without_needless(found)
         closes = (
             found.mean_square <= NOISE_MEAN_SQUARE
             or leaves_little(found, excess(found) + fall)

@@ -9,9 +9,15 @@ import pytest
 from plant_emulator.diagnosis.execution.pool import TaskRunner
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
-from plant_emulator.diagnosis.fitting.task import Task
-from plant_emulator.diagnosis.search import search
-from plant_emulator.diagnosis.search.confirmation import Trial, confirm, without_effects
+from plant_emulator.diagnosis.machine import Model
+from plant_emulator.diagnosis.search import confirmation, search
+from plant_emulator.diagnosis.search.confirmation import (
+    Reduction,
+    Trial,
+    confirm,
+    reduce,
+    without_effects,
+)
 from plant_emulator.diagnosis.search.promise import Promise, Start
 from plant_emulator.diagnosis.search.screening import promises
 from plant_emulator.signals.log import Array
@@ -40,6 +46,35 @@ def test_plausible_size_is_a_start_only_where_all_starts_are_far(size: float, as
     assert found.values["wave_size"] == pytest.approx(4.0, abs=0.1)
 
 
+def test_set_without_an_effect_starts_where_the_slopes_tell_it_to_be(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """On a line the slopes tell all: the start is the least squares of the other columns."""
+    y = WAVE + 5.0 * np.abs(TIME)
+    model = Line([y])
+    both = fit(
+        model, ("wave", "kink"), (0,), fit_null(model, (0,)).values | {"kink_size": 1.0}, [{}]
+    )
+    asked: list[Trial] = []
+
+    def listen(model: Model, trial: Trial) -> FitResult:
+        asked.append(trial)
+        return confirm(model, trial)
+
+    monkeypatch.setattr(confirmation, "confirm", listen)
+    found = reduce(model, Reduction(both, (0,), "kink"))
+    columns = np.column_stack([np.ones_like(TIME), TIME, np.sin(20.0 * TIME)])
+    prior = np.diag([0.1, 0.1, 0.0])  # a and b have standard deviations of 10
+    rows = np.concatenate([columns, prior])
+    expected, *_ = np.linalg.lstsq(rows, np.concatenate([y, np.zeros(3)]), rcond=None)
+    told, kept = asked[0].starts
+    assert [told.values[name] for name in ("a", "b", "wave_size")] == pytest.approx(expected)
+    assert kept.values["a"] == pytest.approx(2.0, abs=0.2)
+    assert told.values["kink_size"] == kept.values["kink_size"] == 0.0
+    assert found.effects == ("wave",)
+    assert found.values["a"] == pytest.approx(expected[0])
+
+
 class Simulating(Line):
     """A line that simulates every effect whose size is among the values, as the bench does."""
 
@@ -60,7 +95,7 @@ def test_fit_without_effects_starts_anew_only_where_that_leaves_less(size: float
     null = fit_null(model, (0,))
     other = fit(model, ("wave",), (0,), {**null.values, "wave_size": size}, [{}])
     known = replace(null, values={"a": 3.0, "b": 3.0}, sum_of_squares=2.0 * null.samples)
-    found = without_effects(model, (known, Task(base=other, runs=(0,))))
+    found = without_effects(model, (known, Reduction(other, (0,), "wave")))
     assert (found is known) == (size == 4.0)
     assert found.effects == ()
     assert size == 4.0 or found.cost == pytest.approx(null.cost)
