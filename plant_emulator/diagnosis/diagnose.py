@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from plant_emulator.diagnosis.answer import Answer, Logs
 from plant_emulator.diagnosis.calibration.confidence import Standing, confidence
 from plant_emulator.diagnosis.decision import subsystem
-from plant_emulator.diagnosis.decision.procedure import Procedure
+from plant_emulator.diagnosis.decision.procedure import Procedure, with_regularities
 from plant_emulator.diagnosis.decision.verdict import decide
 from plant_emulator.diagnosis.design.next_experiment import Advice
 from plant_emulator.diagnosis.execution.pool import TaskRunner, build_model
@@ -87,11 +87,15 @@ class Findings:
 
 @dataclass(frozen=True, kw_only=True)
 class _Tests:
-    """The tested hypotheses; runner : in whose noise their costs count."""
+    """The tested hypotheses.
+
+    runner : in whose noise their costs count; refuted : effects that the held-out runs refuted
+    """
 
     explained: Explanation
     decision: Decision
     runner: TaskRunner
+    refuted: tuple[str, ...] = ()
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -105,9 +109,12 @@ class _Tests:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """A note on each effect of the final fit that is not named."""
+        """A note on each effect that was fitted and is not named."""
         unnamed = [name for name in self.fitted if name not in self.decision.effects]
-        return tuple(f"{name}: {CORRECTS}" for name in unnamed)
+        return (
+            *(f"{name}: {CORRECTS}" for name in unnamed),
+            *(f"{name}: the held-out runs do not confirm it" for name in self.refuted),
+        )
 
     @property
     def final(self) -> FitResult:
@@ -141,9 +148,11 @@ class _Tests:
             return self
         explained, null = self.explained, self.explained.null
         if explained.random_effects and null.mean_square <= NOISE_MEAN_SQUARE:
-            alone = replace(explained, final=null, alternatives={}, reduced_costs={})
-            decision = decide(build_model(self.runner.recipe), alone)
-            return replace(self, explained=alone, decision=decision)
+            # What the odds of the random effect alone are, no search has told.
+            alone = replace(explained, final=null, alternatives={}, reduced_costs={}, log_odds=0.0)
+            alone = with_regularities(alone, self.runner)
+            decision = decide(self.runner.model, alone)
+            return replace(self, explained=alone, decision=decision, refuted=self.effects)
         reason = f"the held-out runs do not confirm {' and '.join(self.effects)}"
         return replace(
             self, decision=replace(self.decision, kind="unknown", effects=(), reason=reason)

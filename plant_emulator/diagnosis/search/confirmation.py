@@ -110,17 +110,33 @@ def reduce(model: Model, asked: Reduction) -> FitResult:
 
 
 def _absent(model: Model, asked: Reduction) -> Start:
-    """The least sum of squares with the effect's sizes at neutral, by the slopes at the fit."""
-    neutral = model.candidates[asked.effect].neutral
+    """The least sum of squares with the effect's sizes at neutral, by the slopes at the fit.
+
+    Shapes and states of the effect stay: they mean nothing where the effect is absent.
+    """
+    candidate = model.candidates[asked.effect]
     near = linearise(model, asked.base, asked.runs)
-    own = np.array([u.name in neutral and u.run is None for u in near.unknowns])
-    change = np.array([u.scaled(neutral.get(u.name, u.start)) for u in near.unknowns]) - near.z
-    curvature = near.information + np.diag([u.scaled_std**-2.0 for u in near.unknowns])
-    pull = curvature[np.ix_(~own, own)] @ change[own]
-    moved = near.z + np.where(own, change, 0.0)
+    own = {u.name for u in (*candidate.sizes, *candidate.shapes, *candidate.states)}
+    free = np.array([u.name not in own for u in near.unknowns])
+    sizes = candidate.neutral
+    change = np.array(
+        [
+            u.scaled(sizes[u.name]) - z if u.name in sizes else 0.0
+            for u, z in zip(near.unknowns, near.z, strict=True)
+        ]
+    )
+    precision = np.array([u.scaled_std**-2.0 for u in near.unknowns])
+    prior = np.array([0.0 if u.std is None else u.scaled(u.prior) for u in near.unknowns])
+    curvature = near.information + np.diag(precision)
+    slope = precision * (near.z - prior) + sum(
+        np.einsum("cnj,cn->j", j, r) for j, r in zip(near.jacobians, near.residuals, strict=True)
+    )
     # A state that no sample shows has no curvature, and stays.
-    moved[~own] -= np.linalg.lstsq(curvature[np.ix_(~own, ~own)], pull)[0]
-    there = replace(near, z=moved)
+    step, *_ = np.linalg.lstsq(curvature[np.ix_(free, free)], (slope + curvature @ change)[free])
+    change[free] -= step
+    lower = [u.scaled(u.lower) for u in near.unknowns]
+    upper = [u.scaled(u.upper) for u in near.unknowns]
+    there = replace(near, z=np.clip(near.z + change, lower, upper))
     states = tuple(there.states(k) for k in range(len(asked.runs)))
     return Start(values=there.parameters(), states=states)
 

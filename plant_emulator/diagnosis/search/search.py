@@ -206,10 +206,14 @@ class Search:
         least = max(EVIDENCE_THRESHOLD, SETTINGS.rival_share * (self.null.cost - found.cost))
         if self.null.cost - null.cost < least:
             return False
+        self._take_null(null)
+        return True
+
+    def _take_null(self, null: FitResult) -> None:
+        """Take a better fit without effects in the place of the known one."""
         self.trace.append(search_step(self.null, "fitted anew", null))
         self.null = self.sets[frozenset()] = null
-        self.promises.pop(frozenset())
-        return True
+        self.promises.pop(frozenset(), None)
 
     def _confirm(self, base: FitResult, new: Sequence[Promise], iterations: int) -> list[FitResult]:
         """Fit these effects on top of a set, each for at most so many iterations."""
@@ -225,7 +229,6 @@ class Search:
         key = frozenset(found.effects)
         if key not in self.sets or found.cost < self.sets[key].cost:
             self.sets[key] = found
-            self.null = self.sets[frozenset()]
 
     def _value(self, found: FitResult) -> float:
         """Negative log evidence of a set, with the gain that each of its effects needs."""
@@ -270,32 +273,41 @@ class Search:
         self.reduced_costs = {}
         if not best.effects or not adequate(best, self.null):
             return best
-        for asked in (Reduction(best, self.runner.runs, name) for name in best.effects):
-            if len(best.effects) == 1:
-                (found,) = self.runner.map(without_effects, [(self.null, asked)])
-            else:
-                (found,) = self.runner.map(reduce, [asked])
+        asked = [Reduction(best, self.runner.runs, name) for name in best.effects]
+        if len(asked) == 1:
+            return self._beside_renewed_null(best, asked[0])
+        for one, found in zip(asked, self.runner.map(reduce, asked), strict=True):
             self._keep(found)
-            self.reduced_costs[asked.effect] = self.sets[frozenset(found.effects)].cost
+            self.reduced_costs[one.effect] = self.sets[frozenset(found.effects)].cost
         found = self._settled()
         if found.effects != best.effects:
             return self._without_needless(found)
-        if len(found.effects) == 1:
-            self.reduced_costs = {}
-            return found
         cheapest = min(self.reduced_costs, key=self.reduced_costs.__getitem__)
         (least,) = self._fits(refit, [self.sets[frozenset(best.effects) - {cheapest}]])
         self.reduced_costs[cheapest] = least.cost
         fall = least.cost - found.cost
+        library = self.runner.model.candidates
+        approximate = any(not library[e].exact_form for e in least.effects)
         closes = (
             found.mean_square <= NOISE_MEAN_SQUARE
             or leaves_little(found, excess(found) + fall)
-            or excess(found) <= SETTINGS.law_error**2 * excess(self.null)
+            or (approximate and excess(found) <= SETTINGS.law_error**2 * excess(self.null))
         )
         if closes and evidence_of(fall, found, self.null) >= EVIDENCE_THRESHOLD:
             return found
         self.sets = {k: one for k, one in self.sets.items() if len(k) < len(best.effects)}
         return self._without_needless(least)
+
+    def _beside_renewed_null(self, best: FitResult, asked: Reduction) -> FitResult:
+        """The one effect; what the queue finds where a better fit without it takes its gain."""
+        (null,) = self.runner.map(without_effects, [(self.null, asked)])
+        if null.cost >= self.null.cost:
+            return best
+        self._take_null(null)
+        if min(self.sets.values(), key=self._value).effects == best.effects:
+            return best
+        self.expanded.discard(frozenset())
+        return self._without_needless(self._queue(SETTINGS.most_effects))
 
     def _explanation(self, final: FitResult) -> Explanation:
         (shown,) = self.runner.map(visibilities, [self._task(self.null)])
@@ -303,7 +315,7 @@ class Search:
         screened = self.promises.get(frozenset(final.effects), [])
         larger = {p.effect: self._needed(final) - p.gains.get(SIMULATION, 0.0) for p in screened}
         library = self.runner.model.candidates
-        mending = corrections(library, self.null, final, self.reduced_costs)
+        mending = corrections(library, final, self.reduced_costs)
         if mending:
             named = replace(final, effects=tuple(e for e in final.effects if e not in mending))
             self.trace.append(search_step(self.null, "others only correct a law", named))

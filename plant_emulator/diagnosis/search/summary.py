@@ -53,10 +53,7 @@ def alternatives(sets: Sets, final: FitResult, name: str) -> dict[str, float]:
 
 
 def corrections(
-    library: Mapping[str, Candidate],
-    null: FitResult,
-    final: FitResult,
-    reduced_costs: Mapping[str, float],
+    library: Mapping[str, Candidate], final: FitResult, reduced_costs: Mapping[str, float]
 ) -> frozenset[str]:
     """Effects of a set that only correct the law of another one that changes the same quantity.
 
@@ -66,12 +63,13 @@ def corrections(
     reduced_costs : of the set without each effect
     """
     share = SETTINGS.law_error**2
-    laws = [library[name] for name in final.effects if not library[name].exact_form]
+    closed = {name: cost - final.cost for name, cost in reduced_costs.items()}
+    laws = [library[name] for name in closed if not library[name].exact_form]
     return frozenset(
         name
-        for name, cost in reduced_costs.items()
-        if cost - final.cost < share * (null.cost - cost)
-        and any(law.name != name and law.quantities & library[name].quantities for law in laws)
+        for name in closed
+        for law in laws
+        if law.quantities & library[name].quantities and closed[name] < share * closed[law.name]
     )
 
 

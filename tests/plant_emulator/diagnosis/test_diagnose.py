@@ -153,6 +153,7 @@ def test_effect_that_the_held_out_runs_refute_is_dropped_beside_a_random_one() -
     assert found.answer.trace[-1].effects == ("wave",)
     assert found.answer.verdict.effects == ("shake",)
     assert found.fixed.keys() == {"shake"}
+    assert found.details.notes[-1] == "wave: the held-out runs do not confirm it"
 
 
 def test_effect_that_only_corrects_a_law_is_fitted_noted_and_not_named(

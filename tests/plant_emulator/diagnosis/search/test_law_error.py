@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.decision.verdict import decide
+from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.search.law_error import feigned_gain
+from plant_emulator.diagnosis.search.summary import corrections
 from tests.plant_emulator.diagnosis.line import SHAPES, TIME, Line, explained, noisy
 
 
@@ -39,6 +41,28 @@ def test_an_effect_where_the_law_does_not_act_needs_no_more(
     measured = 30.0 * SHAPES["late"](TIME) + 1.5 * SHAPES["wave"](TIME)
     model = Line([noisy(measured)], ["late", "wave"])
     assert set(explained(model).final.effects) == named
+
+
+@pytest.mark.parametrize(
+    ("costs", "found"),
+    [
+        ({"kink": 1_000_100.0, "wave": 10_000.0}, {"wave"}),
+        ({"kink": 1_000_100.0, "wave": 10_200.0}, set()),  # 10100 of 1000000
+        ({"kink": 160.0, "wave": 150.0}, set()),  # each nearly does without the other
+        # The large one is exact, and changes another quantity.
+        ({"cube": 1_000_100.0, "kink": 6_100.0, "wave": 5_100.0}, set()),
+    ],
+)
+def test_a_correction_closes_less_than_the_law_may_leave(
+    costs: dict[str, float], found: set[str]
+) -> None:
+    """By hand, of a set that costs 100: a law may leave a hundredth of what it closes."""
+    model = Line([noisy(TIME)], list(costs))
+    library = {n: replace(c, quantities=frozenset(["load"])) for n, c in model.candidates.items()}
+    if "cube" in library:
+        library["cube"] = replace(library["cube"], exact_form=True, quantities=frozenset(["speed"]))
+    final = replace(fit_null(model, [0]), effects=tuple(costs), cost=100.0)
+    assert corrections(library, final, costs) == found
 
 
 @pytest.mark.parametrize(

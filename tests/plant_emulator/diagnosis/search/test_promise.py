@@ -59,6 +59,7 @@ def test_rivals_of_a_leader_that_leaves_noise_are_told_at_its_parameters() -> No
     assert leader.mean_square > NOISE_MEAN_SQUARE
     assert rivals_at(runner(model), null, leader, supposed, 5.0) == supposed
     quiet = replace(leader, sum_of_squares=1.0 * leader.samples)
+    assert rivals_at(runner(model), null, quiet, supposed, 1e6) == supposed  # not even the leader
     told = rivals_at(runner(model), null, quiet, supposed, 5.0)
     assert [p.effect for p in told] == ["near kink"]
     start = told[0].starts["simulation"]

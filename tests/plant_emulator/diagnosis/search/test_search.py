@@ -465,14 +465,18 @@ def test_what_takes_but_a_part_of_the_rest_is_no_second_effect(
     assert set(explained(rippled(2.0, ripple)).final.effects) == named
 
 
-@pytest.mark.parametrize(("beside", "named"), [(0.75, {"kink", "wave"}), (0.95, {"kink"})])
+@pytest.mark.parametrize(
+    ("beside", "exact", "named"),
+    [(0.75, False, {"kink", "wave"}), (0.95, False, {"kink"}), (0.75, True, {"kink"})],
+)
 def test_what_an_approximate_law_may_leave_speaks_against_no_second_effect(
-    beside: float, named: set[str]
+    beside: float, exact: bool, named: set[str]
 ) -> None:
     """By hand: the kink closes 2000 20^2 / 12 = 66700, and may leave 667 of them. A ripple of 1.3
     takes 1690. One of no law takes 562 or 902, more than a fifth of both, less 100 for the noise.
     """
     model = rippled(20.0, 1.3 * np.sin(20.0 * TIME) + beside * np.sin(1500.0 * TIME))
+    model.candidates["kink"] = replace(model.candidates["kink"], exact_form=exact)
     found = KnownNoise(
         declared=runner(model), runner=runner(model), null=fit_null(model, [0])
     ).explain()
