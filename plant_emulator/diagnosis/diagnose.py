@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 from plant_emulator.diagnosis.answer import Answer, Logs
 from plant_emulator.diagnosis.calibration.confidence import Standing, confidence
 from plant_emulator.diagnosis.decision import subsystem
-from plant_emulator.diagnosis.decision.procedure import Procedure, with_regularities
-from plant_emulator.diagnosis.decision.verdict import decide
+from plant_emulator.diagnosis.decision.procedure import Procedure
 from plant_emulator.diagnosis.design.next_experiment import Advice
 from plant_emulator.diagnosis.execution.pool import TaskRunner, build_model
 from plant_emulator.diagnosis.execution.progress import ReportingPool
@@ -87,15 +86,11 @@ class Findings:
 
 @dataclass(frozen=True, kw_only=True)
 class _Tests:
-    """The tested hypotheses.
-
-    runner : in whose noise their costs count; refuted : effects that the held-out runs refuted
-    """
+    """The tested hypotheses; runner : in whose noise their costs count."""
 
     explained: Explanation
     decision: Decision
     runner: TaskRunner
-    refuted: tuple[str, ...] = ()
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -111,10 +106,7 @@ class _Tests:
     def notes(self) -> tuple[str, ...]:
         """A note on each effect that was fitted and is not named."""
         unnamed = [name for name in self.fitted if name not in self.decision.effects]
-        return (
-            *(f"{name}: {CORRECTS}" for name in unnamed),
-            *(f"{name}: the held-out runs do not confirm it" for name in self.refuted),
-        )
+        return tuple(f"{name}: {CORRECTS}" for name in unnamed)
 
     @property
     def final(self) -> FitResult:
@@ -137,22 +129,12 @@ class _Tests:
         return {"parameter": gaps.nominal, "effect": gaps.null}.get(self.decision.kind)
 
     def confirm(self, gaps: Gaps) -> _Tests:
-        """The tests; with an unknown cause where the held-out runs do not confirm the effects.
-
-        A random effect that leaves only noise without them is the cause alone.
-        """
+        """The tests; with an unknown cause where the held-out runs do not confirm the effects."""
         reference = self.reference(gaps)
         if not self.effects or reference is None:
             return self
         if shows_shrinkage(reference, gaps.by_effects[self.effects]):
             return self
-        explained, null = self.explained, self.explained.null
-        if explained.random_effects and null.mean_square <= NOISE_MEAN_SQUARE:
-            # What the odds of the random effect alone are, no search has told.
-            alone = replace(explained, final=null, alternatives={}, reduced_costs={}, log_odds=0.0)
-            alone = with_regularities(alone, self.runner)
-            decision = decide(self.runner.model, alone)
-            return replace(self, explained=alone, decision=decision, refuted=self.effects)
         reason = f"the held-out runs do not confirm {' and '.join(self.effects)}"
         return replace(
             self, decision=replace(self.decision, kind="unknown", effects=(), reason=reason)

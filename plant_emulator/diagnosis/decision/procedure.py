@@ -108,7 +108,7 @@ class Procedure:
         search = Search(declared=self.runner, runner=runner, null=null, noise=self.disturbances)
         explained = search.explain()
         return _Tested(
-            explained=with_regularities(explained, search.runner),
+            explained=_with_regularities(explained, search.runner),
             runner=search.runner,
             estimated=None if search.noise is self.disturbances else search.noise,
         )
@@ -162,7 +162,7 @@ class Procedure:
         if not last:
             return None
         explained = replace(explained, random_effects=tuple(last))
-        return _Tested(explained=with_regularities(explained, runner), runner=runner)
+        return _Tested(explained=_with_regularities(explained, runner), runner=runner)
 
     def _fit_random_effects(
         self, runner: TaskRunner, base: FitResult, names: Iterable[str]
@@ -205,7 +205,7 @@ class Procedure:
         return replace(decision, kind="unknown", effects=(), reason=reason) if reason else decision
 
 
-def with_regularities(explained: Explanation, runner: TaskRunner) -> Explanation:
+def _with_regularities(explained: Explanation, runner: TaskRunner) -> Explanation:
     """The explanation with the regularities of what it leaves in the noise of the runner.
 
     A random effect explains none: its course is chance.

@@ -112,6 +112,7 @@ def reduce(model: Model, asked: Reduction) -> FitResult:
 def _absent(model: Model, asked: Reduction) -> Start:
     """The least sum of squares with the effect's sizes at neutral, by the slopes at the fit.
 
+    The fit is the least of its own sum: its gradient is that of contact, which is not smooth.
     Shapes and states of the effect stay: they mean nothing where the effect is absent.
     """
     candidate = model.candidates[asked.effect]
@@ -126,13 +127,9 @@ def _absent(model: Model, asked: Reduction) -> Start:
         ]
     )
     precision = np.array([u.scaled_std**-2.0 for u in near.unknowns])
-    prior = np.array([0.0 if u.std is None else u.scaled(u.prior) for u in near.unknowns])
     curvature = near.information + np.diag(precision)
-    slope = precision * (near.z - prior) + sum(
-        np.einsum("cnj,cn->j", j, r) for j, r in zip(near.jacobians, near.residuals, strict=True)
-    )
     # A state that no sample shows has no curvature, and stays.
-    step, *_ = np.linalg.lstsq(curvature[np.ix_(free, free)], (slope + curvature @ change)[free])
+    step, *_ = np.linalg.lstsq(curvature[np.ix_(free, free)], (curvature @ change)[free])
     change[free] -= step
     lower = [u.scaled(u.lower) for u in near.unknowns]
     upper = [u.scaled(u.upper) for u in near.unknowns]

@@ -140,7 +140,7 @@ class Search:
         best = min(self.sets.values(), key=self._value)
         while len(best.effects) < most_effects:
             key = frozenset(best.effects)
-            if key in self.expanded or (best.effects and self._is_last(best)):
+            if key in self.expanded or self._is_last(best):
                 break
             self.expanded.add(key)
             self._expand(best)
@@ -150,7 +150,16 @@ class Search:
         return best
 
     def _is_last(self, found: FitResult) -> bool:
-        """Whether no effect is worth adding: the cause is foreign, or what is left is random."""
+        """Whether no effect is worth adding: the cause is foreign, or what is left is random.
+
+        The noise of a random effect is that of few courses of its law. A gain within it means
+        little.
+        """
+        if self.beside_random and found.mean_square <= NOISE_MEAN_SQUARE:
+            self._screen(found)  # for the odds against one more effect
+            return True
+        if not found.effects:
+            return False
         foreign = excess(self.null) > SETTINGS.needed and leaves_most(found, self.null)
         if found.mean_square > NOISE_MEAN_SQUARE:
             return foreign or (leaves_random(found) and not self.beside_random)

@@ -16,7 +16,6 @@ from plant_emulator.diagnosis.prediction.gap import Fold, predict
 from plant_emulator.diagnosis.prediction.held_out import HeldOutRuns, Plan
 from plant_emulator.estimation import least_squares
 from plant_emulator.signals.log import Array
-from tests.plant_emulator.diagnosis.fitting.test_random_effects import Shaken, shaken
 from tests.plant_emulator.diagnosis.line import SHAPES, TIME, Given, Line, noisy, runner
 
 EACH_IN_TURN = Plan(fitted=(0, 1, 2), folds=(((1, 2), (0,)), ((0, 2), (1,)), ((0, 1), (2,))))
@@ -134,26 +133,6 @@ def test_runs_that_do_not_agree_alone_are_not_told_apart() -> None:
     verdict = diagnosed(Unplanned(runs, ["kink"])).answer.verdict
     assert verdict.kind == "unknown"
     assert "each log alone" not in verdict.statement
-
-
-def test_effect_that_the_held_out_runs_refute_is_dropped_beside_a_random_one() -> None:
-    """A wave of 0.75 in one run makes the fit follow a third of it in all, where others have 0.05.
-
-    Beside the shake, what the wave leaves in all runs is no more than noise.
-    """
-
-    class Planless(Shaken, Unplanned):
-        pass
-
-    runs = [
-        noisy(2.0 + 3.0 * TIME + wave * np.sin(20.0 * TIME), seed) + shaken(3.0, seed)
-        for seed, wave in ((11, 0.75), (12, 0.05), (13, 0.05))
-    ]
-    found = diagnosed(Planless(runs))
-    assert found.answer.trace[-1].effects == ("wave",)
-    assert found.answer.verdict.effects == ("shake",)
-    assert found.fixed.keys() == {"shake"}
-    assert found.details.notes[-1] == "wave: the held-out runs do not confirm it"
 
 
 def test_effect_that_only_corrects_a_law_is_fitted_noted_and_not_named(

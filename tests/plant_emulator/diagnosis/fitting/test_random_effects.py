@@ -8,6 +8,7 @@ import pytest
 
 from plant_emulator.diagnosis.decision.procedure import Procedure
 from plant_emulator.diagnosis.execution.pool import InProcess
+from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
 from plant_emulator.diagnosis.fitting.random_effects import WeightedRecipe, fit_random_effect
 from plant_emulator.diagnosis.fitting.task import Task
@@ -171,7 +172,7 @@ def test_effect_beside_an_unrest_is_named_with_it() -> None:
 
 
 def test_no_other_effect_is_sought_where_all_is_chance() -> None:
-    """Every first look at one counts the unrest as noise already."""
+    """Every look at one counts the unrest as noise already."""
     looked = []
 
     class Watched(InProcess):
@@ -206,6 +207,20 @@ def test_wave_beside_a_great_unrest_is_an_effect_too() -> None:
     found, decision, _ = Procedure(runner=runner(Shaken([y]))).run()
     assert decision.effects == ("shake", "wave")
     assert found.final.values["wave_size"] == pytest.approx(0.5, abs=0.15)
+
+
+def test_no_effect_is_named_within_the_noise_of_a_random_one() -> None:
+    """By hand: a wave of 0.6 in one run and 0.1 in two holds 500 * 0.38 = 190 squares in the halves
+    that do not shake, 3 % of all 6000.
+    """
+    runs = [
+        noisy(2.0 + 3.0 * TIME + wave * np.sin(20.0 * TIME), seed) + shaken(3.0, seed)
+        for seed, wave in ((11, 0.6), (12, 0.1), (13, 0.1))
+    ]
+    explained, decision, _ = Procedure(runner=runner(Shaken(runs))).run()
+    assert explained.null.mean_square <= NOISE_MEAN_SQUARE
+    assert decision.effects == ("shake",)
+    assert explained.trace == ()
 
 
 def test_wave_of_the_turns_beside_an_unrest_is_no_part_of_it() -> None:
