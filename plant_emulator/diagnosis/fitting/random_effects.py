@@ -48,9 +48,8 @@ LEAST_MEAN_SQUARE, MOST_MEAN_SQUARE = 0.5, 2.0
 # Ljung-Box excess that may be left, as a share of the evidence: 0.0002 to 0.009 after random
 # courses, 0.035 to 0.13 after coarse references.
 WHITE_SHARE = 0.01
-# The same share may be larger where it stays below this excess for each run. Courses that the model
-# itself draws leave an excess of up to 570 a run on logs of programs 1 to 3, because scans and
-# samples beat; a machine that draws them otherwise has nearly twice that. Coarse references left
+# The same share may be larger where it stays below this excess for each run. Random courses leave
+# some hundreds a run whatever their size, because scans and samples beat; coarse references left
 # 20 000.
 WHITE_SHARE_OF_BEAT, BEAT_EXCESS = 0.04, 1000.0
 
