@@ -43,6 +43,11 @@ class Regression:
         seen = _forward(lower, nuisance.T @ y)
         return cls(y, nuisance, lower, seen, y - nuisance @ _backward(lower, seen))
 
+    @property
+    def mean(self) -> Array:
+        """Mean of the nuisance coefficients, shape (k,)."""
+        return _backward(self.lower, self.seen)
+
     def products(self, columns: Array) -> Products:
         """Compute what the data say of columns, shape (n, k)."""
         seen = _forward(self.lower, self.nuisance.T @ columns)

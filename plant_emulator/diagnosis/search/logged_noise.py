@@ -16,9 +16,11 @@ import numpy as np
 
 from plant_emulator.diagnosis.search.rich_model import rich_columns
 from plant_emulator.diagnosis.search.simulation_columns import SimulationColumns
+from plant_emulator.estimation.noise.channel_noise import LINE_PRIOR
 from plant_emulator.estimation.noise.disturbances import outlying
 from plant_emulator.estimation.noise.logged_noise import disturbances_of_runs, noise_of_runs
 from plant_emulator.estimation.regression import Regression
+from plant_emulator.signals.mains import line_columns
 from plant_emulator.signals.noise import NoiseSeries
 
 if TYPE_CHECKING:
@@ -48,28 +50,61 @@ def find_disturbances(model: Model, task: Task) -> tuple[LoggedNoise | None, Log
 
     None where there are none.
     """
-    series = []
-    for k, states in zip(task.runs, task.base.states, strict=True):
-        rows, run = (
-            model.residual(k, task.base.effects)({**task.base.values, **states}),
-            model.runs[k],
-        )
-        for name, row in zip(run.channels, rows, strict=True):
-            series.append((k, name, NoiseSeries(time=run.time, value=row, use=row != 0.0)))
+    residuals = [
+        model.residual(k, task.base.effects)({**task.base.values, **states})
+        for k, states in zip(task.runs, task.base.states, strict=True)
+    ]
+    series = _of_channels(model, task.runs, residuals, residuals)
     return disturbances_of_runs(series, marked=False), disturbances_of_runs(series)
 
 
-def _series(model: Model, simulation: SimulationColumns) -> Iterator[tuple[int, str, NoiseSeries]]:
-    """Run, channel and residual of the rich model, for every channel of every run."""
+def _series(model: Model, simulation: SimulationColumns) -> list[tuple[int, str, NoiseSeries]]:
+    """Run, channel and residual of the rich model, for every channel of every run.
+
+    Lines are fitted beside the columns, and left in the residual: a double of the mains that
+    sampling folds to a slow wave would lend itself to the columns, and leave their shape as colour.
+    """
+    residuals = simulation.found.residuals
     columns = [simulation.data.nuisance, *rich_columns(model.candidates, simulation)]
-    rest = Regression.of(simulation.data.y, np.concatenate(columns, axis=1)).left
+    known = disturbances_of_runs(
+        _of_channels(model, simulation.runs, residuals, residuals), marked=False
+    )
+    lines = [] if known is None else list(_line_columns(model, simulation, known))
+    regression = Regression.of(simulation.data.y, np.concatenate([*columns, *lines], axis=1))
+    rest = regression.left
+    if lines:
+        waves = np.concatenate(lines, axis=1)
+        rest = rest + waves @ regression.mean[-waves.shape[1] :]
+    ends = np.cumsum([r.size for r in residuals])[:-1]
+    parts = [p.reshape(r.shape) for p, r in zip(np.split(rest, ends), residuals, strict=True)]
+    return _of_channels(model, simulation.runs, parts, residuals)
+
+
+def _of_channels(
+    model: Model, runs: Sequence[int], values: Sequence[Array], residuals: Sequence[Array]
+) -> list[tuple[int, str, NoiseSeries]]:
+    """Run, channel and values, for every channel of every run; a residual of 0 does not count."""
+    return [
+        (k, name, NoiseSeries(time=model.runs[k].time, value=row, use=residual != 0.0))
+        for k, rows, others in zip(runs, values, residuals, strict=True)
+        for name, row, residual in zip(model.runs[k].channels, rows, others, strict=True)
+    ]
+
+
+def _line_columns(
+    model: Model, simulation: SimulationColumns, known: LoggedNoise
+) -> Iterator[Array]:
+    """Columns of the lines of each channel of each run, scaled to unit priors, shape (n, m)."""
     first = 0
-    for k, residual in zip(simulation.runs, simulation.found.residuals, strict=True):
-        run = model.runs[k]
-        part = rest[first : first + residual.size].reshape(residual.shape)
-        first += residual.size
-        for name, row, counted in zip(run.channels, part, residual != 0.0, strict=True):
-            yield k, name, NoiseSeries(time=run.time, value=row, use=counted)
+    for k in simulation.runs:
+        time = model.runs[k].time
+        for whitener in known.whiteners[k]:
+            if whitener.lines:
+                waves = LINE_PRIOR * line_columns(time, whitener.lines)
+                found = np.zeros((simulation.base.size, waves.shape[1]))
+                found[first : first + len(time)] = waves * whitener.use[:, None]
+                yield found
+            first += len(time)
 
 
 class _WhitenedModel:
