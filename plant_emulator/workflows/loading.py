@@ -19,6 +19,7 @@ from plant_emulator.recordings.holes import bridge_holes
 from plant_emulator.recordings.preflight import NAMES, preflight
 from plant_emulator.recordings.recording import recording
 from plant_emulator.recordings.same_bench import check_same_bench
+from plant_emulator.recordings.shared_noise import with_shared_noise
 from plant_emulator.recordings.stamps import restamp
 from plant_emulator.recordings.wheel_torque import mark_informative, with_estimated_torque
 from plant_emulator.signals.log import KNEE_TIME, VOLTAGE, Log
@@ -100,10 +101,10 @@ def load_recordings(
     check_distinct([(log.source, samples(log)) for log in taken])
     check_same_bench(taken, parameters.values())
     hold = cast("Hold | None", reference)
-    recordings = [
-        _weighed(recording(log, hold, use, parameters.sensors), parameters)
-        for log, use in zip(taken, uses, strict=True)
+    plain = [
+        recording(log, hold, use, parameters.sensors) for log, use in zip(taken, uses, strict=True)
     ]
+    recordings = [_weighed(one, parameters) for one in with_shared_noise(plain)]
     if common_channels:
         recordings, more = with_common_voltage(recordings)
         notes += more
