@@ -2,15 +2,19 @@
 
 Where the first effect is sought and none of their leaders explains the gap, regressions mislead:
 without a cause, a fit has bent the parameters, and the slopes there hardly know the cause. Some
-iterations of a fit unbend them. The simulation is led along the measured outputs, so that contact
-comes in time meanwhile. The fits are cheap, because only the slopes of the effect itself are
-simulated anew (see `least_squares.estimate`).
+iterations of a fit unbend them. A parameter that stands for the cause may be bent further than
+slopes reach, as a dead time that stands for a filter: a search along that parameter unbends it. The
+simulation is led along the measured outputs, so that contact comes in time meanwhile. The fits are
+cheap, because only the slopes of the effect itself are simulated anew (see
+`least_squares.estimate`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from plant_emulator.diagnosis.fitting.fit_steps import refit_along
 from plant_emulator.diagnosis.fitting.joint_fit import (
@@ -24,6 +28,7 @@ from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.promise import Promise, Start
 from plant_emulator.diagnosis.search.screening import OBSERVER, regressions, visible
 from plant_emulator.diagnosis.search.settings import SETTINGS
+from plant_emulator.estimation.unknowns import column_lengths
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -32,6 +37,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Candidate, Model
     from plant_emulator.estimation.unknowns import Estimate
+    from plant_emulator.signals.log import Array
 
 # Name of the score in the trace.
 SECANTS = "fit by secants"
@@ -84,32 +90,76 @@ def fit_by_secants(model: Model, asked: SecantFits) -> list[Promise]:
 
 
 def _promise(model: Model, asked: SecantFits, name: str, near: Estimate) -> Promise:
-    """The gain of an effect from the better of its sizes, and where that fit has come to."""
+    """The gain of an effect from the best of its starts, and where that fit has come to."""
     base, candidate = asked.base, model.candidates[name]
     own = [u.name for u in candidate.states]
     states = [
         {**fitted, **{state: told[state] for state in own if state in told}}
         for fitted, told in zip(base.states, asked.states.get(name, base.states), strict=True)
     ]
+    starts = [{**base.values, **values_at_size(candidate, size)} for size in _sizes(candidate)]
+    starts += [_unbent(model, name, asked.runs, near, one, states) for one in starts[1:]]
     found = min(
         (
             fit(
                 model,
                 (name,),
                 asked.runs,
-                {**base.values, **values_at_size(candidate, size)},
+                values,
                 states,
                 asked.iterations,
                 near,
                 difference=LED_DIFFERENCE,
             )
-            for size in _sizes(candidate)
+            for values in starts
         ),
         key=lambda one: one.cost,
     )
     start = Start(values=found.values, states=found.states)
     gain = 0.5 * (base.cost - found.cost)
     return Promise(effect=name, gains={SECANTS: gain}, starts={SECANTS: start})
+
+
+def _unbent(
+    model: Model,
+    name: str,
+    runs: Sequence[int],
+    near: Estimate,
+    values: Mapping[str, float],
+    states: Sequence[Mapping[str, float]],
+) -> dict[str, float]:
+    """The values beside an effect with the parameter that follows it most at its least squares.
+
+    near : slopes at the parameters without the effect; values, states : with the effect
+    """
+    from scipy.optimize import minimize_scalar
+
+    def rows(found: Mapping[str, float]) -> list[Array]:
+        pairs = zip(runs, states, strict=True)
+        return [model.residual(k, (name,))({**found, **own}) for k, own in pairs]
+
+    along = np.sum(
+        [
+            np.einsum("cnj,cn->j", slopes, now - then)
+            for slopes, now, then in zip(near.jacobians, rows(values), near.residuals, strict=True)
+        ],
+        axis=0,
+    )
+    lengths = column_lengths(near.jacobians)
+    shared = np.array([u.run is None for u in near.unknowns])
+    j = int(np.argmax(np.where(shared, np.abs(along) / lengths, -1.0)))
+    unknown = near.unknowns[j]
+
+    def moved(to: float) -> dict[str, float]:
+        return {**values, unknown.name: unknown.value(to)}
+
+    def squares(to: float) -> float:
+        return sum(float(np.sum(r**2)) for r in rows(moved(to)))
+
+    bounds = (unknown.scaled(unknown.lower), unknown.scaled(unknown.upper))
+    most = SETTINGS.unbending_iterations
+    found = minimize_scalar(squares, bounds=bounds, method="bounded", options={"maxiter": most})
+    return moved(float(found.x))
 
 
 def _sizes(candidate: Candidate) -> tuple[float, ...]:

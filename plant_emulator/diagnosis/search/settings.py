@@ -15,6 +15,9 @@ class Settings:
     # Sizes that a fit by secants begins at: most laws bend less at the first, and a limit does not
     # act there.
     secant_sizes: tuple[float, ...] = (0.3, 1.0)
+    # Iterations of the search along the one parameter that follows an effect most, within its
+    # bounds: they tell it to some percent, and a start needs no more.
+    unbending_iterations: int = 12
     # Iterations of fits by secants: of all effects, and of the best `tried_further`.
     secant_iterations: tuple[int, ...] = (2, 5)
     # Prior standard deviation of a size in the rich model that noise is estimated beside.
