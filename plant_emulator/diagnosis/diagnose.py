@@ -15,6 +15,7 @@ from plant_emulator.diagnosis.answer import Answer, Logs
 from plant_emulator.diagnosis.calibration.confidence import Standing, confidence
 from plant_emulator.diagnosis.decision import subsystem
 from plant_emulator.diagnosis.decision.procedure import Procedure
+from plant_emulator.diagnosis.decision.verdict import without_uncertain
 from plant_emulator.diagnosis.design.next_experiment import Advice
 from plant_emulator.diagnosis.execution.pool import TaskRunner, build_model
 from plant_emulator.diagnosis.execution.progress import ReportingPool
@@ -64,8 +65,8 @@ THRESHOLDS = {
 }
 
 CORRECTS = (
-    "the fit has it, but it is not named; it closes no more than another law of an effect that"
-    " changes the same quantity may leave"
+    "the fit has it, but it is not named; it closes no more than the law of another effect may"
+    " leave, or its size is smaller than the error of its own law"
 )
 
 
@@ -201,6 +202,9 @@ class Diagnose:
     def _test(self) -> _Tests:
         procedure = Procedure(runner=self.runner).with_input_noise().with_disturbances()
         explained, decision, runner = procedure.run()
+        explained, decision = without_uncertain(
+            self.model, explained, decision, self.model_form_errors
+        )
         return _Tests(explained=explained, decision=decision, runner=runner)
 
     def _spectra(self, tests: _Tests) -> tuple[Spectrum, ...]:

@@ -13,6 +13,7 @@ error of `model_form_errors`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import hypot
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -57,6 +58,15 @@ def reference_size(estimated: float, plausible: float) -> float:
     Another law may take nearly all of a size, so that the estimate alone would be too small.
     """
     return max(abs(estimated), plausible)
+
+
+def size_error(value: float, standard_error: float, plausible: float, form_error: float) -> float:
+    """Standard error of a size with the model-form error [its unit].
+
+    value, plausible : distances of the size and of the usual size from neutral [its unit]
+    standard_error : of the fit [its unit]; form_error : relative [1]
+    """
+    return hypot(standard_error, form_error * reference_size(value, plausible))
 
 
 def _relative_error(cases: Sequence[EstimatedSize]) -> float:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import inf
 from typing import TYPE_CHECKING
 
+from plant_emulator.diagnosis.calibration.model_form_error import size_error
 from plant_emulator.diagnosis.fitting.evidence import (
     LJUNG_BOX_LIMIT,
+    NOISE_MEAN_SQUARE,
     UNEXPLAINED_SHARE,
     adequate,
     significant,
@@ -14,10 +17,13 @@ from plant_emulator.diagnosis.fitting.evidence import (
 from plant_emulator.estimation.noise.channel_noise import MOST_PREDICTABLE
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from plant_emulator.diagnosis.answer import Kind
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.explanation import Explanation
-    from plant_emulator.diagnosis.machine import Model
+    from plant_emulator.diagnosis.machine import Candidate, Model
+    from plant_emulator.estimation.unknowns import Unknown
 
 # A parameter deviates from its nominal value from so many of its standard errors on.
 DEVIATION_ERRORS = 3.0
@@ -98,6 +104,65 @@ def decide(model: Model, explained: Explanation) -> Decision:
     if explained.random_effects and decision.kind != "unknown":
         return replace(decision, kind="effect", effects=explained.named)
     return decision
+
+
+def without_uncertain(
+    model: Model,
+    explained: Explanation,
+    decision: Decision,
+    model_form_errors: Mapping[str, float],
+) -> tuple[Explanation, Decision]:
+    """Name no effect that noise can do without, and none of whose sizes is told from neutral.
+
+    The standard error of a size holds the error of its law. Beside another effect such an effect
+    stays in the fit. Alone it is a rival of the fit without effects, which decides.
+
+    model_form_errors : relative, of the sizes by name; see `calibration.model_form_error`
+    """
+    final = explained.final
+    uncertain = frozenset(
+        name
+        for name in _uncertain(final, model.candidates, model_form_errors)
+        if _square_without(name, explained) <= NOISE_MEAN_SQUARE * final.samples
+    )
+    if not uncertain or not decision.effects:
+        return explained, decision
+    named = replace(explained, corrections=explained.corrections | uncertain)
+    if named.named:
+        return named, replace(decision, effects=named.named)
+    without = replace(explained, final=explained.null, corrections=frozenset(), log_odds=0.0)
+    return without, decide(model, without)
+
+
+def _square_without(name: str, explained: Explanation) -> float:
+    """Sum of squares of the fit without one of the accepted effects [chi squared]."""
+    if len(explained.final.effects) == 1:
+        return explained.null.sum_of_squares
+    rise = explained.reduced_costs.get(name, inf) - explained.final.cost
+    return explained.final.sum_of_squares + rise
+
+
+def _uncertain(
+    final: FitResult, candidates: Mapping[str, Candidate], model_form_errors: Mapping[str, float]
+) -> frozenset[str]:
+    """Effects of a fit none of whose sizes is told from neutral."""
+
+    def certain(candidate: Candidate, size: Unknown) -> bool:
+        neutral = candidate.neutral[size.name]
+        found, plausible = final.values[size.name] - neutral, abs(size.start - neutral)
+        error = size_error(
+            found,
+            final.standard_errors[size.name],
+            plausible,
+            model_form_errors.get(size.name, 0.0),
+        )
+        return abs(found) > error
+
+    return frozenset(
+        name
+        for name in final.effects
+        if not any(certain(candidates[name], size) for size in candidates[name].sizes)
+    )
 
 
 def _reason_against(explained: Explanation) -> str:

@@ -46,8 +46,8 @@ class Explanation:
     random_effects : accepted random effects, beside the effects of `final`
     reduced_costs : for each of several accepted effects, the least cost of a fit without it; empty
         where the final fit is no cause
-    corrections : effects of the final fit that only correct the law of another one; they are not
-        named
+    corrections : effects of the final fit that only correct the law of another one, or have no
+        certain size beside it; they are not named
     trace : the search in its order
     noise : of every channel as the logs show it; empty where it is as declared
     log_odds : of the final set against its best rival, in the mean square that it leaves [nats]

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import hypot
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.answer import Quantity, RankedEffect, Undetectable
-from plant_emulator.diagnosis.calibration.model_form_error import reference_size
+from plant_emulator.diagnosis.calibration.model_form_error import size_error
 from plant_emulator.diagnosis.fitting.evidence import DETECTABLE_NORM, EVIDENCE_THRESHOLD
 
 if TYPE_CHECKING:
@@ -83,11 +82,13 @@ def _sizes(
     shapes = () if candidate.stochastic else candidate.shapes
     for name in (u.name for u in (*candidate.sizes, *shapes)):
         value = fit.values[name]
-        form_error = model_form_errors.get(name, 0.0) * reference_size(value, usual.get(name, 0.0))
+        form_error = model_form_errors.get(name, 0.0)
         yield Quantity(
             name=name.removeprefix(f"{candidate.name}_"),
             value=value,
-            standard_error=hypot(fit.standard_errors[name], form_error),
+            standard_error=size_error(
+                value, fit.standard_errors[name], usual.get(name, 0.0), form_error
+            ),
             unit=candidate.units[name],
         )
 

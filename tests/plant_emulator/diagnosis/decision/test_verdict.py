@@ -1,10 +1,18 @@
 """The verdict on a machine so small that it can be checked by hand."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from plant_emulator.diagnosis.decision.verdict import Decision, decide, deviations
+from plant_emulator.diagnosis.decision.verdict import (
+    Decision,
+    decide,
+    deviations,
+    without_uncertain,
+)
+from plant_emulator.diagnosis.fitting.explanation import Explanation
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from tests.plant_emulator.diagnosis.line import TIME, Line, explained, linear, noisy
 
@@ -51,3 +59,67 @@ def test_shift_that_chance_may_explain_does_not_come_first() -> None:
         ("a", True),
         ("b", False),
     ]
+
+
+def with_sizes(
+    model: Line, sizes: Mapping[str, float], error: float, without: float = 30.0
+) -> Explanation:
+    """What the tests of a model found, if its final fit had these sizes.
+
+    without : rise of the cost without each effect
+    """
+    found = explained(model)
+    final = replace(
+        found.null,
+        effects=tuple(sizes),
+        values=found.null.values | {f"{name}_size": size for name, size in sizes.items()},
+        standard_errors=found.null.standard_errors | {f"{name}_size": error for name in sizes},
+    )
+    costs = dict.fromkeys(sizes, final.cost + without)
+    return replace(found, final=final, reduced_costs=costs, log_odds=30.0)
+
+
+@pytest.mark.parametrize(
+    ("error", "of_law", "named"),
+    [
+        (0.01, 0.0, ("cube", "wave")),
+        # By hand: a law that is off by half of a plausible size of 1 makes an error of 0.5.
+        (0.01, 0.5, ("wave",)),
+        (0.5, 0.0, ("wave",)),
+    ],
+)
+def test_effect_with_a_size_within_its_error_is_not_named(
+    error: float, of_law: float, named: tuple[str, ...]
+) -> None:
+    model = Line([noisy(LINE)], ["cube", "wave"])
+    found = with_sizes(model, {"cube": 0.4, "wave": -0.6}, error)
+    decision = Decision(kind="effect", effects=found.named, deviations=(), reason="")
+    errors = {"cube_size": of_law, "wave_size": of_law}
+    after, told = without_uncertain(model, found, decision, errors)
+    assert told.effects == after.named == named
+    assert after.final == found.final
+
+
+def test_effect_of_any_size_that_noise_cannot_do_without_is_named() -> None:
+    """By hand: 200 of 2000 samples' squares are more than the noise's uncertainty of 5 %."""
+    model = Line([noisy(LINE)], ["cube", "wave"])
+    found = with_sizes(model, {"cube": 0.4, "wave": -0.6}, 0.5, without=200.0)
+    decision = Decision(kind="effect", effects=found.named, deviations=(), reason="")
+    _, told = without_uncertain(model, found, decision, {})
+    assert told.effects == ("cube", "wave")
+    apart = Line([noisy(LINE + 2.0 * TIME**3)], ["cube"])
+    alone = with_sizes(apart, {"cube": 0.4}, 0.5)
+    assert alone.null.mean_square > 1.05
+    decision = Decision(kind="effect", effects=("cube",), deviations=(), reason="")
+    _, told = without_uncertain(apart, alone, decision, {})
+    assert told.effects == ("cube",)
+
+
+def test_effect_alone_with_a_size_within_its_error_is_no_cause() -> None:
+    model = Line([noisy(LINE)], ["cube"])
+    found = with_sizes(model, {"cube": 0.01}, 0.02)
+    decision = Decision(kind="effect", effects=("cube",), deviations=(), reason="")
+    after, told = without_uncertain(model, found, decision, {})
+    assert (told.kind, told.effects) == ("parameter", ())
+    assert after.final == found.null
+    assert after.log_odds == 0.0
