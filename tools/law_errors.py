@@ -28,12 +28,11 @@ from plant_emulator.diagnosis.execution.pool import InProcess, TaskRunner, build
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
 from plant_emulator.diagnosis.report.ranking import ranked_effect
 from plant_emulator.recordings.recording import recording
+from plant_emulator.recordings.shared_noise import with_shared_noise
 from plant_emulator.solver.kernel import kernel, use_own_effects
 from plant_emulator.workflows.workers import end_with_parent
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from plant_emulator.blind.case import Case
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
@@ -70,13 +69,15 @@ def sizes(seed: int, only: tuple[str, ...], number: int) -> list[dict[str, Any]]
     return [asdict(one) for one in pairs if one.estimated != 0.0]
 
 
-def _recordings(case: Case, nominal: ParameterSet) -> Iterator[Recording]:
+def _recordings(case: Case, nominal: ParameterSet) -> list[Recording]:
     """The logs of a case, as a diagnosis reads them."""
+    found = []
     with TemporaryDirectory() as folder:
         for run, log in enumerate(simulate_truth(case, nominal)):
             path = f"{folder}/{case.programs[run]}.csv.gz"
             logs.write(measure(case, log, run, nominal), path)
-            yield recording(logs.read(path))
+            found.append(recording(logs.read(path)))
+    return with_shared_noise(found)
 
 
 @click.command()

@@ -66,7 +66,7 @@ THRESHOLDS = {
 
 CORRECTS = (
     "the fit has it, but it is not named; it closes no more than the law of another effect may"
-    " leave, or its size is smaller than the error of its own law"
+    " leave, or its size is smaller than its own error"
 )
 
 

@@ -201,6 +201,19 @@ class Recording:
             use=self.use[kept],
         )
 
+    def with_noise(self, levels: Array) -> Recording:
+        """The recording with another noise of its channels [SI], shape (channels,).
+
+        A channel whose values are further apart than its noise is coarse.
+        """
+        errors = {}
+        for name, level, own in zip(self.channels, levels, self.use, strict=True):
+            values = self.log[name][own]
+            if (step := value_step(values)) > level:
+                largest = max(step, float(np.quantile(np.abs(values), LARGEST)))
+                errors[name] = QUANTISER_ERROR * step, QUANTISER_ERROR * step / largest
+        return replace(self, noise=levels, quantiser_errors=errors)
+
     def with_wheel_torque(self, wheel_torque: Array) -> Recording:
         """The recording with another wheel torque as its input [N m], shape (n,)."""
         return replace(self, inputs=replace(self.inputs, wheel_torque=wheel_torque))
@@ -236,16 +249,16 @@ def sensor_errors(value: Array, offset: float, gain_error: float) -> Array:
 
 
 def whiten_sensor_errors(residual: Array, errors: Array) -> Array:
-    """Whiten a residual for errors of its sensor beside white noise of variance 1; shape (n,).
+    """Whiten residuals for errors of their sensor beside white noise of variance 1.
 
     (1 + X X')^(-1/2) r, computed from the eigenvalues of X'X
 
-    residual : r, shape (n,); errors : X, shape (n, k)
+    residual : r, shape (n,) or, of several, (n, m); errors : X, shape (n, k)
     """
     squares, vectors = np.linalg.eigh(errors.T @ errors)
     squares = np.maximum(squares, 1e-12)
     lost = (1.0 - 1.0 / np.sqrt(1.0 + squares)) / squares
-    return np.asarray(residual - errors @ (vectors @ (lost * (vectors.T @ (errors.T @ residual)))))
+    return np.asarray(residual - errors @ ((vectors * lost) @ (vectors.T @ (errors.T @ residual))))
 
 
 def recording(
@@ -280,10 +293,5 @@ def recording(
         raise IdentificationError(
             f"{log.source}: {still} does not move; a run that excites it is needed"
         )
-    errors = {}
-    for name, level, own in zip(channels, levels, counted, strict=True):
-        values = log[name][own]
-        if (step := value_step(values)) > level:
-            largest = max(step, float(np.quantile(np.abs(values), LARGEST)))
-            errors[name] = QUANTISER_ERROR * step, QUANTISER_ERROR * step / largest
-    return Recording(log, inputs, channels, np.array(levels), counted, quantiser_errors=errors)
+    noise = np.array(levels)
+    return Recording(log, inputs, channels, noise, counted).with_noise(noise)

@@ -137,7 +137,7 @@ def identify(
     logs, hold_out, free = list_logs(logs), list_sources(hold_out), list_names(free)
     check_reference(reference)
     bench, own = parameter_set(parameters), effect_values(effects)
-    recordings, notes = load_recordings([*logs, *hold_out], bench, reference)
+    recordings, notes = load_recordings([*logs, *hold_out], bench, reference, fitted=len(logs))
     recordings = [with_logged_values(r, own) for r in recordings]
     estimation, prediction = recordings[: len(logs)], recordings[len(logs) :]
     simulate(estimation[0].inputs, values_of(bench, own))  # compiling is not part of the fit's time

@@ -65,6 +65,7 @@ def load_recordings(
     reference: str | None = None,
     *,
     common_channels: bool = False,
+    fitted: int | None = None,
 ) -> tuple[list[Recording], list[str]]:
     """Load the logs of one bench; return the recordings, and notes on what the user should know.
 
@@ -72,6 +73,7 @@ def load_recordings(
     reference : what holds between samples of the speed reference; None: as the log says
     common_channels : leave a voltage out that only some logs have. A pooled fit uses the voltages
         that there are. A held-out run can be predicted only in channels that the fitted runs have.
+    fitted : so many of the sources, the first ones, tell the noise of all; None: all of them do
     Raises LogError for a log that cannot be used.
     """
     taken: list[Log] = []
@@ -101,10 +103,11 @@ def load_recordings(
     check_distinct([(log.source, samples(log)) for log in taken])
     check_same_bench(taken, parameters.values())
     hold = cast("Hold | None", reference)
-    plain = [
-        recording(log, hold, use, parameters.sensors) for log, use in zip(taken, uses, strict=True)
+    weighed = [
+        _weighed(recording(log, hold, use, parameters.sensors), parameters)
+        for log, use in zip(taken, uses, strict=True)
     ]
-    recordings = [_weighed(one, parameters) for one in with_shared_noise(plain)]
+    recordings = with_shared_noise(weighed, fitted)
     if common_channels:
         recordings, more = with_common_voltage(recordings)
         notes += more

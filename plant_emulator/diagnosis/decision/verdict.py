@@ -14,6 +14,7 @@ from plant_emulator.diagnosis.fitting.evidence import (
     adequate,
     significant,
 )
+from plant_emulator.diagnosis.search.summary import search_step, unconverged
 from plant_emulator.estimation.noise.channel_noise import MOST_PREDICTABLE
 
 if TYPE_CHECKING:
@@ -114,29 +115,44 @@ def without_uncertain(
 ) -> tuple[Explanation, Decision]:
     """Name no effect that noise can do without, and none of whose sizes is told from neutral.
 
-    The standard error of a size holds the error of its law. Beside another effect such an effect
-    stays in the fit. Alone it is a rival of the fit without effects, which decides.
+    Beside others, such an effect may stand for an error of their laws, and the standard error of a
+    size holds that of its own law. It stays in the fit. Only the one that closes least falls: the
+    others may need each other. Alone, the fit without effects decides.
 
     model_form_errors : relative, of the sizes by name; see `calibration.model_form_error`
     """
-    final = explained.final
-    uncertain = frozenset(
-        name
-        for name in _uncertain(final, model.candidates, model_form_errors)
-        if _square_without(name, explained) <= NOISE_MEAN_SQUARE * final.samples
-    )
-    if not uncertain or not decision.effects:
+    final, null = explained.final, explained.null
+    if not decision.effects or not final.effects:
         return explained, decision
-    named = replace(explained, corrections=explained.corrections | uncertain)
-    if named.named:
+    alone = len(explained.named) == 1
+    uncertain = _uncertain(final, model.candidates, {} if alone else model_form_errors)
+    squares = {one: _square_without(one, explained) for one in uncertain - explained.corrections}
+    least = min(squares, key=squares.__getitem__, default="")
+    if not least or squares[least] > NOISE_MEAN_SQUARE * final.samples:
+        return explained, decision
+    if not alone:
+        corrections = explained.corrections | {least}
+        rest = replace(final, effects=tuple(e for e in final.effects if e not in corrections))
+        step = search_step(null, f"the size of {least} is uncertain", rest)
+        named = replace(explained, corrections=corrections, trace=(*explained.trace, step))
         return named, replace(decision, effects=named.named)
-    without = replace(explained, final=explained.null, corrections=frozenset(), log_odds=0.0)
+    step = search_step(null, f"the size of {least} is uncertain", null)
+    without = replace(
+        explained,
+        trace=(*explained.trace, step),
+        final=null,
+        corrections=frozenset(),
+        reduced_costs={},
+        alternatives={},
+        unconverged=unconverged(null),
+        log_odds=0.5 * (final.cost - null.cost),
+    )
     return without, decide(model, without)
 
 
 def _square_without(name: str, explained: Explanation) -> float:
     """Sum of squares of the fit without one of the accepted effects [chi squared]."""
-    if len(explained.final.effects) == 1:
+    if explained.final.effects == (name,):
         return explained.null.sum_of_squares
     rise = explained.reduced_costs.get(name, inf) - explained.final.cost
     return explained.final.sum_of_squares + rise

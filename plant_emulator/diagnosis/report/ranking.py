@@ -87,7 +87,10 @@ def _sizes(
             name=name.removeprefix(f"{candidate.name}_"),
             value=value,
             standard_error=size_error(
-                value, fit.standard_errors[name], usual.get(name, 0.0), form_error
+                value - candidate.neutral.get(name, 0.0),
+                fit.standard_errors[name],
+                usual.get(name, 0.0),
+                form_error,
             ),
             unit=candidate.units[name],
         )

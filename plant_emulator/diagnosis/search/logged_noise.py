@@ -20,11 +20,12 @@ from plant_emulator.estimation.noise.channel_noise import LINE_PRIOR
 from plant_emulator.estimation.noise.disturbances import outlying
 from plant_emulator.estimation.noise.logged_noise import disturbances_of_runs, noise_of_runs
 from plant_emulator.estimation.regression import Regression
+from plant_emulator.recordings.recording import whiten_sensor_errors
 from plant_emulator.signals.mains import line_columns
 from plant_emulator.signals.noise import NoiseSeries
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.execution.pool import Recipe
     from plant_emulator.diagnosis.fidelity import Fidelity
@@ -61,20 +62,17 @@ def find_disturbances(model: Model, task: Task) -> tuple[LoggedNoise | None, Log
 def _series(model: Model, simulation: SimulationColumns) -> list[tuple[int, str, NoiseSeries]]:
     """Run, channel and residual of the rich model, for every channel of every run.
 
-    Lines are fitted beside the columns, and left in the residual: a double of the mains that
+    The columns are fitted beside the lines, which stay in the residual: a double of the mains that
     sampling folds to a slow wave would lend itself to the columns, and leave their shape as colour.
     """
     residuals = simulation.found.residuals
+    series = _of_channels(model, simulation.runs, residuals, residuals)
+    known = disturbances_of_runs(series, marked=False)
     columns = [simulation.data.nuisance, *rich_columns(model.candidates, simulation)]
-    known = disturbances_of_runs(
-        _of_channels(model, simulation.runs, residuals, residuals), marked=False
-    )
-    lines = [] if known is None else list(_line_columns(model, simulation, known))
-    regression = Regression.of(simulation.data.y, np.concatenate([*columns, *lines], axis=1))
-    rest = regression.left
-    if lines:
-        waves = np.concatenate(lines, axis=1)
-        rest = rest + waves @ regression.mean[-waves.shape[1] :]
+    both = np.concatenate([simulation.data.y[:, None], *columns], axis=1)
+    beside = both if known is None else _beside_lines(both, model, simulation.runs, known)
+    found = Regression.of(beside[:, 0], beside[:, 1:]).mean
+    rest = both[:, 0] - both[:, 1:] @ found
     ends = np.cumsum([r.size for r in residuals])[:-1]
     parts = [p.reshape(r.shape) for p, r in zip(np.split(rest, ends), residuals, strict=True)]
     return _of_channels(model, simulation.runs, parts, residuals)
@@ -91,20 +89,20 @@ def _of_channels(
     ]
 
 
-def _line_columns(
-    model: Model, simulation: SimulationColumns, known: LoggedNoise
-) -> Iterator[Array]:
-    """Columns of the lines of each channel of each run, scaled to unit priors, shape (n, m)."""
-    first = 0
-    for k in simulation.runs:
+def _beside_lines(both: Array, model: Model, runs: Sequence[int], known: LoggedNoise) -> Array:
+    """Data and columns of all channels of all runs, whitened for the lines.
+
+    both : shape (n, k), as the result
+    """
+    found, first = both.copy(), 0
+    for k in runs:
         time = model.runs[k].time
         for whitener in known.whiteners[k]:
+            own = slice(first, first := first + len(time))
             if whitener.lines:
-                waves = LINE_PRIOR * line_columns(time, whitener.lines)
-                found = np.zeros((simulation.base.size, waves.shape[1]))
-                found[first : first + len(time)] = waves * whitener.use[:, None]
-                yield found
-            first += len(time)
+                waves = LINE_PRIOR * line_columns(time, whitener.lines) * whitener.use[:, None]
+                found[own] = whiten_sensor_errors(both[own], waves)
+    return found
 
 
 class _WhitenedModel:

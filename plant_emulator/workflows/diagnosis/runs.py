@@ -91,6 +91,7 @@ def bench_runs(
         parameters,
         reference,
         common_channels=True,
+        fitted=len(logs),
     )
     recordings, plan = plan_recordings(recordings, len(logs))
     settings = {

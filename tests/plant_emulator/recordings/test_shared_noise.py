@@ -51,3 +51,39 @@ def test_a_log_without_noise_tells_nothing_of_the_others(bench_log: BenchLog) ->
     loaded = [recording(one) for one in (exact, add_noise(exact, 1))]
     for one, before in zip(with_shared_noise(loaded), loaded, strict=True):
         assert one.noise == pytest.approx(before.noise)
+
+
+def test_held_out_logs_do_not_tell_the_noise_of_the_fitted_ones(bench_log: BenchLog) -> None:
+    quiet = add_noise(bench_log("bench_nominal/program3"), 1)
+    restless = np.random.default_rng(4).choice((-1.0, 1.0), len(quiet.time))
+    loud = changed(quiet, armature_current=quiet["armature_current"] + restless)
+    loaded = [recording(one) for one in (loud, quiet)]
+    row = loaded[0].channels.index("armature_current")
+    first, second = with_shared_noise(loaded, 1)
+    assert first.noise[row] == second.noise[row] == pytest.approx(loaded[0].noise[row])
+
+
+def test_a_slow_sensor_in_a_fast_log_tells_nothing_of_slow_logs(bench_log: BenchLog) -> None:
+    """Noise of a lag of 20 ms changes little within 1 ms, and shows as less."""
+    slow = add_noise(bench_log("bench_nominal/program3"), 1)
+    time = np.arange(slow.time[0], slow.time[-1], 0.001)
+    signals = {name: np.interp(time, slow.time, value) for name, value in slow.signals.items()}
+    fast = Log(time, signals, "fast.csv")
+    loaded = [recording(one) for one in (slow, fast)]
+    row = loaded[0].channels.index("shaft_torque")
+    assert loaded[1].noise[row] < 0.8 * loaded[0].noise[row]
+    for one, before in zip(with_shared_noise(loaded), loaded, strict=True):
+        assert one.noise == pytest.approx(before.noise)
+
+
+def test_a_short_log_that_is_quiet_by_chance_does_not_tell_the_noise_alone(
+    bench_log: BenchLog,
+) -> None:
+    """By hand: 300 samples tell a deviation within 6 %, 5000 within 1.5 %."""
+    long = add_noise(bench_log("bench_nominal/program3"), 1)
+    cut = slice(1000, 1300)
+    part = Log(long.time[cut], {n: v[cut] for n, v in long.signals.items()}, "short.csv")
+    loaded = [recording(one) for one in (long, part)]
+    chance = [loaded[0], loaded[1].with_noise(0.87 * loaded[0].noise)]
+    for one in with_shared_noise(chance):
+        assert one.noise == pytest.approx(loaded[0].noise, rel=0.01)

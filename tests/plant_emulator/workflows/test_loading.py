@@ -13,6 +13,7 @@ from plant_emulator import logs
 from plant_emulator.cli import main
 from plant_emulator.errors import DiagnosisError, LogError
 from plant_emulator.model.parameters import ParameterSet
+from plant_emulator.model.sensors import Sensor
 from plant_emulator.recordings.preflight import preflight
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
@@ -109,6 +110,21 @@ def test_single_log_that_moves_in_both_parts_is_taken(bench_log: BenchLog) -> No
     runs, plan = plan_recordings([recording(bench_log("bench_practice/practice_004/program2"))], 1)
     assert len(runs) == 2
     assert plan.as_fitted
+
+
+def test_logs_that_are_read_together_share_the_noise_of_their_sensors(
+    bench_log: BenchLog, nominal: ParameterSet
+) -> None:
+    quiet, loud = (add_noise(bench_log(f"bench_nominal/program{k}"), k) for k in (2, 3))
+    restless = np.random.default_rng(4).choice((-1.0, 1.0), len(loud.time))
+    moved = {**loud.signals, "armature_current": loud["armature_current"] + restless}
+    loud = replace(loud, signals=moved)
+    for one in load_recordings([quiet, loud], nominal)[0]:
+        found = one.noise[one.channels.index("armature_current")]
+        assert found == pytest.approx(SENSORS["armature_current"][0], rel=0.05)
+    sensors = {"armature_current": Sensor(noise=0.7)}
+    for one in load_recordings([quiet, loud], replace(nominal, sensors=sensors))[0]:
+        assert one.noise[one.channels.index("armature_current")] == pytest.approx(0.7, rel=1e-9)
 
 
 def test_noise_of_a_recording_is_that_beside_a_simulation(nominal: ParameterSet) -> None:

@@ -115,11 +115,32 @@ def test_effect_of_any_size_that_noise_cannot_do_without_is_named() -> None:
     assert told.effects == ("cube",)
 
 
+def test_of_two_effects_of_uncertain_sizes_the_one_that_closes_least_falls() -> None:
+    """They may stand for each other, and neither would be left."""
+    model = Line([noisy(LINE)], ["cube", "wave"])
+    found = with_sizes(model, {"cube": 0.4, "wave": -0.4}, 0.5)
+    costs = {"cube": found.final.cost + 20.0, "wave": found.final.cost + 10.0}
+    found = replace(found, reduced_costs=costs)
+    decision = Decision(kind="effect", effects=found.named, deviations=(), reason="")
+    after, told = without_uncertain(model, found, decision, {})
+    assert told.effects == after.named == ("cube",)
+
+
 def test_effect_alone_with_a_size_within_its_error_is_no_cause() -> None:
     model = Line([noisy(LINE)], ["cube"])
     found = with_sizes(model, {"cube": 0.01}, 0.02)
+    found = replace(found, final=replace(found.final, cost=found.null.cost - 50.0))
     decision = Decision(kind="effect", effects=("cube",), deviations=(), reason="")
     after, told = without_uncertain(model, found, decision, {})
     assert (told.kind, told.effects) == ("parameter", ())
     assert after.final == found.null
-    assert after.log_odds == 0.0
+    # By hand: half the cost by which its rival is better.
+    assert after.log_odds == -25.0
+
+
+def test_error_of_its_own_law_speaks_against_no_effect_alone() -> None:
+    model = Line([noisy(LINE)], ["cube"])
+    found = with_sizes(model, {"cube": 0.4}, 0.01)
+    decision = Decision(kind="effect", effects=("cube",), deviations=(), reason="")
+    _, told = without_uncertain(model, found, decision, {"cube_size": 0.5})
+    assert told.effects == ("cube",)

@@ -19,13 +19,15 @@ def test_hum_that_sampling_folds_to_a_slow_wave_leaves_white_noise(
     turns = 2.0 * np.pi * 50.08 * time
     hum = 3.0 * np.cos(turns + 0.4) + 2.0 * np.cos(2.0 * turns)
     monkeypatch.setitem(SHAPES, "bump", lambda x: np.exp(-((x / 0.1) ** 2)))
-    model = Line([noisy(1.0 + 2.0 * TIME + hum)], ["bump"])
+    quiet = 1.0 + 2.0 * TIME
+    model = Line([noisy(quiet), noisy(quiet + hum, 1)], ["bump"])
     model.runs = [replace(run, time=time) for run in model.runs]
-    found = estimate_noise(model, Task(base=fit_null(model, (0,)), runs=(0,)))
+    found = estimate_noise(model, Task(base=fit_null(model, (0, 1)), runs=(0, 1)))
+    assert [one.lines == () for (one,) in found.whiteners.values()] == [True, False]
     noise = found.channels["y"]
     assert noise.colour.order == 0
     assert noise.deviation == pytest.approx(1.0, abs=0.05)
     # The mirror image at 49.92 Hz has the same samples.
     assert abs(noise.lines[0] - 50.0) == pytest.approx(0.08, abs=0.005)
-    # By hand: half the squares of the amplitudes.
-    assert noise.disturbance == pytest.approx(0.5 * (3.0**2 + 2.0**2), rel=0.05)
+    # By hand: half the squares of the amplitudes, in one of two runs.
+    assert noise.disturbance == pytest.approx(0.25 * (3.0**2 + 2.0**2), rel=0.05)
