@@ -28,7 +28,7 @@ from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, find_di
 from plant_emulator.diagnosis.search.search import Search
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable
 
     from plant_emulator.diagnosis.decision.verdict import Decision
     from plant_emulator.diagnosis.execution.pool import TaskRunner
@@ -54,13 +54,11 @@ class Procedure:
     """One diagnosis up to its decision.
 
     null : fit without effects; None where it has not been made yet
-    lines : of the mains beside the declared noise; disturbances : lines and the outliers, which are
-        left out; None where there are none
+    disturbances : lines of the mains, and the outliers, which are left out; None: there are none
     """
 
     runner: TaskRunner
     null: FitResult | None = None
-    lines: LoggedNoise | None = None
     disturbances: LoggedNoise | None = None
 
     def with_input_noise(self) -> Procedure:
@@ -75,7 +73,7 @@ class Procedure:
         ((lines, found),) = self.runner.map(find_disturbances, [Task(base=null, runs=runs)])
         if lines is not None:
             (null,) = _whitened(self.runner, lines).map(refit, [Task(base=null, runs=runs)])
-        return replace(self, null=null, lines=lines, disturbances=found)
+        return replace(self, null=null, disturbances=found)
 
     def run(self) -> tuple[Explanation, Decision, TaskRunner]:
         """Test the hypotheses and decide; give also the runner in whose noise the costs count."""
@@ -136,10 +134,9 @@ class Procedure:
         """
         runs, model = self.runner.runs, self.runner.model
         estimated = None if beside is None else beside.estimated
-        plain = _whitened(self.runner, estimated or self.lines)
+        noise = estimated or self.disturbances
+        plain = _whitened(self.runner, noise)
         found = self._fit_random_effects(plain, base, model.candidates)
-        if estimated is None:
-            found = self._show_beside_outliers(found, base)
         best = max(found, key=lambda one: one.evidence, default=None)
         if best is None:
             return None
@@ -153,12 +150,10 @@ class Procedure:
             runner=runner,
             null=null,
             beside_random=True,
-            noise=estimated or self.lines,
+            noise=noise,
         )
         explained = search.explain()
         last = self._fit_random_effects(plain, explained.final, [best.effect])
-        if estimated is None:
-            last = self._show_beside_outliers(last, explained.final)
         if not last:
             return None
         explained = replace(explained, random_effects=tuple(last))
@@ -173,19 +168,6 @@ class Procedure:
             one
             for one in self._fit_components(runner, base, own)
             if one.consistent and one.evidence > EVIDENCE_THRESHOLD
-        ]
-
-    def _show_beside_outliers(
-        self, found: Sequence[VarianceComponent], base: FitResult
-    ) -> list[VarianceComponent]:
-        """The components that show beside the outliers too, which are as random."""
-        if self.disturbances is None:
-            return list(found)
-        beside = self._fit_components(self._cleared, base, [one.effect for one in found])
-        return [
-            one
-            for one, other in zip(found, beside, strict=True)
-            if other.evidence > EVIDENCE_THRESHOLD
         ]
 
     def _fit_components(

@@ -45,13 +45,10 @@ SHOWN_VARIANCE, LEVELS = 0.05, (0.0, 0.25, 0.5, 0.75, 1.0)
 # Mean square that may be left at a level. The bounds are wide: the courses are few, and the
 # machine's scans differ from the model's.
 LEAST_MEAN_SQUARE, MOST_MEAN_SQUARE = 0.5, 2.0
-# Ljung-Box excess that may be left, as a share of the evidence: 0.0002 to 0.009 after random
-# courses, 0.035 to 0.13 after coarse references.
-WHITE_SHARE = 0.01
-# The same share may be larger where it stays below this excess for each run. Random courses leave
-# some hundreds a run whatever their size, because scans and samples beat; coarse references left
-# 20 000.
-WHITE_SHARE_OF_BEAT, BEAT_EXCESS = 0.04, 1000.0
+# Ljung-Box excess that may be left in a run, and as a share of the evidence. Random courses leave
+# up to 410 a run whatever their size, because scans and samples beat, and coarse references that
+# pass as random left 640 and more.
+MOST_EXCESS, EXCESS_SHARE = 500.0, 0.04
 
 
 def fit_random_effect(model: Model, task: Task) -> VarianceComponent:
@@ -124,8 +121,7 @@ def _fit_component(model: Model, task: Task, shape: Mapping[str, float]) -> Vari
 def _is_white(residuals: Sequence[Array], evidence: float) -> bool:
     """Whether the weighted residuals have no more Ljung-Box excess than random courses leave."""
     excess = sum(structure(channel) for residual in residuals for channel in residual)
-    of_beat = min(WHITE_SHARE_OF_BEAT * evidence, BEAT_EXCESS * len(residuals))
-    return excess < max(WHITE_SHARE * evidence, of_beat)
+    return excess < min(EXCESS_SHARE * evidence, MOST_EXCESS * len(residuals))
 
 
 def _variances(model: Model, task: Task, shape: Mapping[str, float], size: float) -> list[Array]:
