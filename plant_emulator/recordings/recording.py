@@ -258,7 +258,8 @@ def whiten_sensor_errors(residual: Array, errors: Array) -> Array:
     squares, vectors = np.linalg.eigh(errors.T @ errors)
     squares = np.maximum(squares, 1e-12)
     lost = (1.0 - 1.0 / np.sqrt(1.0 + squares)) / squares
-    return np.asarray(residual - errors @ ((vectors * lost) @ (vectors.T @ (errors.T @ residual))))
+    shown = vectors.T @ (errors.T @ residual)
+    return np.asarray(residual - errors @ (vectors @ (lost * shown.T).T))
 
 
 def recording(

@@ -14,7 +14,6 @@ Soc. Suppl. 8 (1946) 27)
 
 from __future__ import annotations
 
-from itertools import groupby
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,6 +31,8 @@ if TYPE_CHECKING:
 DEVIATION_ERROR, ERRORS = 1.07, 3.0
 # Noise of so many times the least one is no rounding.
 ROUNDING = 2.0
+# Intervals between readings that differ by less than this ratio are alike.
+FASTER = 1.4
 
 
 def with_shared_noise(
@@ -40,13 +41,18 @@ def with_shared_noise(
     """The recordings, each with the noise that its sensors show in the quietest of them.
 
     A log that shows only the rounding of its values, as where a coarse channel stands still, keeps
-    that, and tells nothing of the others.
+    that, and tells nothing of the others. Nor does one whose wheel torque is an estimate, which
+    follows the noise of the sensors that it was made from.
 
     fitted : so many recordings, the first ones, tell the noise of all; None: all of them do
     """
     found = [one.noise.copy() for one in recordings]
     for places in _alike(recordings):
-        telling = [(k, c) for k, c in places if fitted is None or k < fitted]
+        telling = [
+            (k, c)
+            for k, c in places
+            if (fitted is None or k < fitted) and not recordings[k].estimated_torque
+        ]
         if telling:
             levels = np.array([recordings[k].noise[c] for k, c in telling])
             counts = np.array([np.count_nonzero(recordings[k].use[c]) for k, c in telling])
@@ -57,18 +63,27 @@ def with_shared_noise(
 
 
 def _alike(recordings: Sequence[Recording]) -> Iterator[list[tuple[int, int]]]:
-    """Recordings and rows of each channel that shows noise, of logs within an octave of sampling.
+    """Recordings and rows of each channel that shows noise, where its readings come alike fast.
 
-    A sensor that is sampled faster changes less from sample to sample, whatever its noise is.
+    A sensor that is read faster changes less from reading to reading, whatever its noise is.
     """
-    keyed = [
-        (name, round(float(np.log2(np.median(np.diff(one.log.time))))), k, c)
+    keyed = sorted(
+        (name, float(np.median(np.diff(one.log.time[one.use[c]]))), k, c)
         for k, one in enumerate(recordings)
         for c, name in enumerate(one.channels)
         if one.noise[c] > ROUNDING * FLOOR * np.ptp(one.log[name])
-    ]
-    for _, group in groupby(sorted(keyed), key=lambda one: one[:2]):
-        yield [(k, c) for _, _, k, c in group]
+    )
+    group: list[tuple[int, int]] = []
+    first: tuple[str, float] = ("", 0.0)
+    for name, interval, k, c in keyed:
+        if group and (name != first[0] or interval > FASTER * first[1]):
+            yield group
+            group = []
+        if not group:
+            first = name, interval
+        group.append((k, c))
+    if group:
+        yield group
 
 
 def _quietest(levels: Array, counts: Array) -> float:

@@ -145,7 +145,7 @@ def without_uncertain(
         reduced_costs={},
         alternatives={},
         unconverged=unconverged(null),
-        log_odds=0.5 * (final.cost - null.cost),
+        log_odds=-abs(explained.log_odds),
     )
     return without, decide(model, without)
 

@@ -129,13 +129,12 @@ def test_of_two_effects_of_uncertain_sizes_the_one_that_closes_least_falls() -> 
 def test_effect_alone_with_a_size_within_its_error_is_no_cause() -> None:
     model = Line([noisy(LINE)], ["cube"])
     found = with_sizes(model, {"cube": 0.01}, 0.02)
-    found = replace(found, final=replace(found.final, cost=found.null.cost - 50.0))
     decision = Decision(kind="effect", effects=("cube",), deviations=(), reason="")
     after, told = without_uncertain(model, found, decision, {})
     assert (told.kind, told.effects) == ("parameter", ())
     assert after.final == found.null
-    # By hand: half the cost by which its rival is better.
-    assert after.log_odds == -25.0
+    # Its rival is better by as much as it was better than the next one.
+    assert after.log_odds == -30.0
 
 
 def test_error_of_its_own_law_speaks_against_no_effect_alone() -> None:
