@@ -115,22 +115,21 @@ def without_uncertain(
 ) -> tuple[Explanation, Decision]:
     """Name no effect that noise can do without, and none of whose sizes is told from neutral.
 
-    Beside others, such an effect may stand for an error of their laws, and the standard error of a
-    size holds that of its own law. It stays in the fit. Only the one that closes least falls: the
-    others may need each other. Alone, the fit without effects decides.
+    Such an effect repairs a local minimum, or the laws of others. The error of a size holds that of
+    its own law. Beside others the effect stays in the fit, and only the one that closes least falls
+    (the others may need each other). Alone, the fit without effects decides.
 
     model_form_errors : relative, of the sizes by name; see `calibration.model_form_error`
     """
     final, null = explained.final, explained.null
     if not decision.effects or not final.effects:
         return explained, decision
-    alone = len(explained.named) == 1
-    uncertain = _uncertain(final, model.candidates, {} if alone else model_form_errors)
+    uncertain = _uncertain(final, model.candidates, model_form_errors)
     squares = {one: _square_without(one, explained) for one in uncertain - explained.corrections}
     least = min(squares, key=squares.__getitem__, default="")
     if not least or squares[least] > NOISE_MEAN_SQUARE * final.samples:
         return explained, decision
-    if not alone:
+    if len(explained.named) > 1:
         corrections = explained.corrections | {least}
         rest = replace(final, effects=tuple(e for e in final.effects if e not in corrections))
         step = search_step(null, f"the size of {least} is uncertain", rest)

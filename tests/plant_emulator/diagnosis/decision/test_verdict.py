@@ -126,20 +126,15 @@ def test_of_two_effects_of_uncertain_sizes_the_one_that_closes_least_falls() -> 
     assert told.effects == after.named == ("cube",)
 
 
-def test_effect_alone_with_a_size_within_its_error_is_no_cause() -> None:
+@pytest.mark.parametrize(("size", "error", "of_law"), [(0.01, 0.02, 0.0), (0.4, 0.01, 0.5)])
+def test_effect_alone_with_a_size_within_its_error_is_no_cause(
+    size: float, error: float, of_law: float
+) -> None:
     model = Line([noisy(LINE)], ["cube"])
-    found = with_sizes(model, {"cube": 0.01}, 0.02)
+    found = with_sizes(model, {"cube": size}, error)
     decision = Decision(kind="effect", effects=("cube",), deviations=(), reason="")
-    after, told = without_uncertain(model, found, decision, {})
+    after, told = without_uncertain(model, found, decision, {"cube_size": of_law})
     assert (told.kind, told.effects) == ("parameter", ())
     assert after.final == found.null
     # Its rival is better by as much as it was better than the next one.
     assert after.log_odds == -30.0
-
-
-def test_error_of_its_own_law_speaks_against_no_effect_alone() -> None:
-    model = Line([noisy(LINE)], ["cube"])
-    found = with_sizes(model, {"cube": 0.4}, 0.01)
-    decision = Decision(kind="effect", effects=("cube",), deviations=(), reason="")
-    _, told = without_uncertain(model, found, decision, {"cube_size": 0.5})
-    assert told.effects == ("cube",)
