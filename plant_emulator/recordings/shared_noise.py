@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.signals.log import KNEE_TIME
 from plant_emulator.signals.noise import FLOOR
 
 if TYPE_CHECKING:
@@ -41,18 +42,14 @@ def with_shared_noise(
     """The recordings, each with the noise that its sensors show in the quietest of them.
 
     A log that shows only the rounding of its values, as where a coarse channel stands still, keeps
-    that, and tells nothing of the others. Nor does one whose wheel torque is an estimate, which
-    follows the noise of the sensors that it was made from.
+    that, and tells nothing of the others. A recording of a gateway keeps its own noise, which is
+    that beside a simulation.
 
     fitted : so many recordings, the first ones, tell the noise of all; None: all of them do
     """
     found = [one.noise.copy() for one in recordings]
     for places in _alike(recordings):
-        telling = [
-            (k, c)
-            for k, c in places
-            if (fitted is None or k < fitted) and not recordings[k].estimated_torque
-        ]
+        telling = [(k, c) for k, c in places if fitted is None or k < fitted]
         if telling:
             levels = np.array([recordings[k].noise[c] for k, c in telling])
             counts = np.array([np.count_nonzero(recordings[k].use[c]) for k, c in telling])
@@ -70,6 +67,7 @@ def _alike(recordings: Sequence[Recording]) -> Iterator[list[tuple[int, int]]]:
     keyed = sorted(
         (name, float(np.median(np.diff(one.log.time[one.use[c]]))), k, c)
         for k, one in enumerate(recordings)
+        if not one.estimated_torque and KNEE_TIME not in one.log
         for c, name in enumerate(one.channels)
         if one.noise[c] > ROUNDING * FLOOR * np.ptp(one.log[name])
     )
