@@ -1,6 +1,7 @@
 """One diagnosis, from a plan of runs to the findings.
 
-1. The procedure tests the hypotheses and decides (`decision.procedure`).
+1. The procedure tests the hypotheses and decides (`decision.procedure`). Effects whose size is
+   uncertain lose their names (`decision.verdict`).
 2. The held-out runs are predicted with every hypothesis that counts (`prediction.held_out`).
 3. The gap is located (`decision.subsystem`).
 4. The answer and the details of the report are put together (`report`).

@@ -249,17 +249,16 @@ def sensor_errors(value: Array, offset: float, gain_error: float) -> Array:
 
 
 def whiten_sensor_errors(residual: Array, errors: Array) -> Array:
-    """Whiten residuals for errors of their sensor beside white noise of variance 1.
+    """Whiten a residual for errors of its sensor beside white noise of variance 1; shape (n,).
 
     (1 + X X')^(-1/2) r, computed from the eigenvalues of X'X
 
-    residual : r, shape (n,) or, of several, (n, m); errors : X, shape (n, k)
+    residual : r, shape (n,); errors : X, shape (n, k)
     """
     squares, vectors = np.linalg.eigh(errors.T @ errors)
     squares = np.maximum(squares, 1e-12)
     lost = (1.0 - 1.0 / np.sqrt(1.0 + squares)) / squares
-    shown = vectors.T @ (errors.T @ residual)
-    return np.asarray(residual - errors @ (vectors @ (lost * shown.T).T))
+    return np.asarray(residual - errors @ (vectors @ (lost * (vectors.T @ (errors.T @ residual)))))
 
 
 def recording(

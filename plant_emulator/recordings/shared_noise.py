@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.recordings.preflight import NOISY
 from plant_emulator.signals.log import KNEE_TIME
-from plant_emulator.signals.noise import FLOOR
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 # Standard error of a deviation times the square root of the samples, and so many of these errors
 # that two logs of the same noise may be off, each to its side.
 DEVIATION_ERROR, ERRORS = 1.07, 3.0
-# Noise of so many times the least one is no rounding.
-ROUNDING = 2.0
 # Intervals between readings that differ by less than this ratio are alike.
 FASTER = 1.4
 
@@ -69,7 +67,7 @@ def _alike(recordings: Sequence[Recording]) -> Iterator[list[tuple[int, int]]]:
         for k, one in enumerate(recordings)
         if not one.estimated_torque and KNEE_TIME not in one.log
         for c, name in enumerate(one.channels)
-        if one.noise[c] > ROUNDING * FLOOR * np.ptp(one.log[name])
+        if one.noise[c] > NOISY * np.ptp(one.log[name])
     )
     group: list[tuple[int, int]] = []
     first: tuple[str, float] = ("", 0.0)

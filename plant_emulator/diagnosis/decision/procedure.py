@@ -163,18 +163,17 @@ class Procedure:
         self, runner: TaskRunner, base: FitResult, names: Iterable[str]
     ) -> list[VarianceComponent]:
         """Fit the random effects among these on top of a fit; give those that count."""
-        own = [name for name in names if self.runner.model.candidates[name].stochastic]
+        library = self.runner.model.candidates
+        tasks = [
+            Task(base=base, runs=runner.runs, effect=name)
+            for name in names
+            if library[name].stochastic
+        ]
         return [
             one
-            for one in self._fit_components(runner, base, own)
+            for one in runner.map(fit_random_effect, tasks)
             if one.consistent and one.evidence > EVIDENCE_THRESHOLD
         ]
-
-    def _fit_components(
-        self, runner: TaskRunner, base: FitResult, names: Iterable[str]
-    ) -> list[VarianceComponent]:
-        tasks = [Task(base=base, runs=runner.runs, effect=name) for name in names]
-        return list(runner.map(fit_random_effect, tasks))
 
     def _check_consistency(self, explained: Explanation, decision: Decision) -> Decision:
         """Make the decision unknown where each run agrees with the equations, but not together."""

@@ -16,12 +16,9 @@ import numpy as np
 
 from plant_emulator.diagnosis.search.rich_model import rich_columns
 from plant_emulator.diagnosis.search.simulation_columns import SimulationColumns
-from plant_emulator.estimation.noise.channel_noise import LINE_PRIOR
 from plant_emulator.estimation.noise.disturbances import outlying
 from plant_emulator.estimation.noise.logged_noise import disturbances_of_runs, noise_of_runs
 from plant_emulator.estimation.regression import Regression
-from plant_emulator.recordings.recording import whiten_sensor_errors
-from plant_emulator.signals.mains import line_columns
 from plant_emulator.signals.noise import NoiseSeries
 
 if TYPE_CHECKING:
@@ -96,12 +93,10 @@ def _beside_lines(both: Array, model: Model, runs: Sequence[int], known: LoggedN
     """
     found, first = both.copy(), 0
     for k in runs:
-        time = model.runs[k].time
         for whitener in known.whiteners[k]:
-            own = slice(first, first := first + len(time))
+            own = slice(first, first := first + len(model.runs[k].time))
             if whitener.lines:
-                waves = LINE_PRIOR * line_columns(time, whitener.lines) * whitener.use[:, None]
-                found[own] = whiten_sensor_errors(both[own], waves)
+                found[own] = np.stack([whitener.white(c) for c in both[own].T], axis=-1)
     return found
 
 
