@@ -18,14 +18,19 @@ from plant_emulator.diagnosis.fitting.joint_fit import (
 )
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.search.promise import Start, starts_of
+from plant_emulator.diagnosis.search.screening import scan_states
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE
+from plant_emulator.estimation.robust_scan import scan_unknowns
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.search.promise import Promise
     from plant_emulator.estimation.unknowns import Lengths
+    from plant_emulator.signals.log import Array
 
 
 @dataclass(frozen=True)
@@ -56,6 +61,56 @@ def trial_of(
 
 def confirm(model: Model, trial: Trial) -> FitResult:
     """Fit a hypothesis from its best start (a step).
+
+    Sizes of the last effect that have many narrow basins are scanned before, and states once more
+    where the fit leaves more than noise: they were scanned where the effect was missing.
+    """
+    starts = tuple(_with_sizes_scanned(model, trial, one) for one in trial.starts)
+    further = tuple(_with_sizes_scanned(model, trial, one) for one in trial.further)
+    found = fit_from_best_start(model, replace(trial, starts=starts, further=further))
+    own = model.candidates[trial.effects[-1]].states
+    if found.mean_square <= NOISE_MEAN_SQUARE or all(u.step is None for u in own):
+        return found
+    again = replace(trial, starts=(_with_states_scanned(model, trial, found),), further=())
+    return min(found, fit_from_best_start(model, again), key=lambda one: one.cost)
+
+
+def _with_states_scanned(model: Model, trial: Trial, found: FitResult) -> Start:
+    """A fit with those states of the last effect scanned that have many narrow basins."""
+    own, rough = model.candidates[trial.effects[-1]].states, model.rough()
+    states = tuple(
+        scan_states(rough.residual(k, trial.effects), {**found.values, **at}, own, at)
+        for k, at in zip(trial.runs, found.states, strict=True)
+    )
+    return Start(values=found.values, states=states)
+
+
+def _with_sizes_scanned(model: Model, trial: Trial, start: Start) -> Start:
+    """A start with those sizes of the last effect scanned that have many narrow basins.
+
+    The regressions tell little of such a size, because contact jumps with it. The scan goes up to
+    the largest size that they try.
+    """
+    candidate = model.candidates[trial.effects[-1]]
+    narrow = [u for u in candidate.sizes if u.step is not None]
+    if not narrow:
+        return start
+    largest = values_at_size(candidate, max(SETTINGS.sizes))
+    within = [replace(u, upper=min(u.upper, largest[u.name])) for u in narrow]
+    rough = model.rough()
+
+    def residual(sizes: Mapping[str, float]) -> Array:
+        values = {**start.values, **sizes}
+        pairs = zip(trial.runs, start.states, strict=True)
+        rows = [rough.residual(k, trial.effects)({**values, **own}) for k, own in pairs]
+        return np.concatenate([one.ravel() for one in rows])
+
+    present = {u.name: start.values[u.name] for u in within}
+    return replace(start, values={**start.values, **scan_unknowns(residual, present, within)})
+
+
+def fit_from_best_start(model: Model, trial: Trial) -> FitResult:
+    """Fit a hypothesis from its best start.
 
     Where all starts are far from the data, the linear estimate of a size says little, and the
     nominal parameters with the plausible size are one more start. A set of effects is also fitted
@@ -106,7 +161,7 @@ def reduce(model: Model, asked: Reduction) -> FitResult:
     values = {**base.values, **model.candidates[asked.effect].neutral}
     starts = (_absent(model, asked), Start(values=values, states=base.states))
     iterations = SETTINGS.leader_iterations
-    return confirm(model, Trial(rest, asked.runs, starts, (), base.lengths, iterations))
+    return fit_from_best_start(model, Trial(rest, asked.runs, starts, (), base.lengths, iterations))
 
 
 def _absent(model: Model, asked: Reduction) -> Start:

@@ -9,19 +9,20 @@ import pytest
 from plant_emulator.diagnosis.execution.pool import TaskRunner
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
-from plant_emulator.diagnosis.machine import Model
+from plant_emulator.diagnosis.machine import Candidate, Model
 from plant_emulator.diagnosis.search import confirmation, search
 from plant_emulator.diagnosis.search.confirmation import (
     Reduction,
     Trial,
     confirm,
+    fit_from_best_start,
     reduce,
     without_effects,
 )
 from plant_emulator.diagnosis.search.promise import Promise, Start
 from plant_emulator.diagnosis.search.screening import promises
 from plant_emulator.signals.log import Array
-from tests.plant_emulator.diagnosis.line import TIME, Line, explained, noisy
+from tests.plant_emulator.diagnosis.line import TIME, Line, effect, explained, linear, noisy
 
 WAVE = noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME))
 
@@ -46,6 +47,53 @@ def test_plausible_size_is_a_start_only_where_all_starts_are_far(size: float, as
     assert found.values["wave_size"] == pytest.approx(4.0, abs=0.1)
 
 
+def tone(*, narrow: str) -> Candidate:
+    """A wave of unknown amplitude; its frequency, in basins of 3, is a size or a state."""
+    amplitude = replace(linear("amplitude", 1.0), lower=0.1)
+    frequency = replace(linear("frequency", 20.0), lower=1.0, step=1.0)
+    return replace(
+        effect("tone"),
+        sizes=(amplitude, frequency) if narrow == "size" else (amplitude,),
+        states=() if narrow == "size" else (frequency,),
+        neutral={"amplitude": 0.0, "frequency": 1.0} if narrow == "size" else {"amplitude": 0.0},
+    )
+
+
+class Tone(Line):
+    """A line with a tone."""
+
+    def __init__(self, measured: Array, candidate: Candidate) -> None:
+        super().__init__([measured])
+        self.candidates = {"tone": candidate}
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+
+        def residual(v: Mapping[str, float]) -> Array:
+            y = v["a"] + v["b"] * TIME + v["amplitude"] * np.sin(v["frequency"] * TIME)
+            return (self.measured[run] - y)[None, :]
+
+        return residual
+
+
+@pytest.mark.parametrize("narrow", ["size", "state"])
+def test_frequency_far_from_its_start_is_found_by_a_scan(narrow: str) -> None:
+    """A descent from 20 ends at a side lobe, an amplitude of 0.6 in place of 4."""
+    model = Tone(noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(37.3 * TIME)), tone(narrow=narrow))
+    values = {"a": 2.0, "b": 3.0, "amplitude": 4.0}
+    given, state = {"frequency": 20.0}, {}
+    if narrow == "state":
+        given, state = state, given
+    start = Start(values={**values, **given}, states=(state,))
+    trial = Trial(("tone",), (0,), (start,))
+    descended = fit_from_best_start(model, trial)
+    found = confirm(model, trial)
+    assert abs(descended.values["amplitude"]) < 1.0
+    assert found.values["amplitude"] == pytest.approx(4.0, abs=0.15)
+    at = found.values if narrow == "size" else found.states[0]
+    assert at["frequency"] == pytest.approx(37.3, abs=0.1)
+
+
 def test_set_without_an_effect_starts_where_the_slopes_tell_it_to_be(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -59,9 +107,9 @@ def test_set_without_an_effect_starts_where_the_slopes_tell_it_to_be(
 
     def listen(model: Model, trial: Trial) -> FitResult:
         asked.append(trial)
-        return confirm(model, trial)
+        return fit_from_best_start(model, trial)
 
-    monkeypatch.setattr(confirmation, "confirm", listen)
+    monkeypatch.setattr(confirmation, "fit_from_best_start", listen)
     found = reduce(model, Reduction(both, (0,), "kink"))
     columns = np.column_stack([np.ones_like(TIME), TIME, np.sin(20.0 * TIME)])
     prior = np.diag([0.1, 0.1, 0.0])  # a and b have standard deviations of 10
