@@ -33,6 +33,8 @@ RANGES: dict[DirtKind, tuple[float, float]] = {
     "jitter": (5e-4, 2e-3),
     "lost": (5e-3, 3e-2),
 }
+# Deviation of coloured noise [noise].
+COLOUR = 2.0
 # Height of spikes [noise], mains [Hz] and how far off they are, longest hole [s].
 SPIKE, MAINS, MAINS_OFF, DIRT_HOLE = (15.0, 40.0), 50.0, 0.05, 0.5
 # Channels that hum and are held.
@@ -74,12 +76,57 @@ def take_rows(fine: Log, time: Array, half_width: float, seed: int) -> Log:
     return replace(fine, time=time, signals=signals)
 
 
+def over_noise(change: Array, time: Array, levels: Array, dirt: Dirt | None) -> Array:
+    """A change of the compared channels over their noise, whitened where dirt gives it a colour.
+
+    change : [SI], shape (channels, samples), as the result [1]; time : [s], shape (samples,)
+    levels : deviation of the noise without dirt [SI], shape (channels,)
+
+    Values that are held tell nothing new. Hum, spikes and lost or jittered rows hide little of a
+    change from whoever knows of them, and are left out.
+    """
+    if dirt is None:
+        return change / levels[:, None]
+    sensors = np.array([SENSORS[name][0] for name in COMPARED])
+    match dirt.kind:
+        case "colour":
+            pole = float(np.exp(-np.median(np.diff(time)) / dirt.size))
+            ratios = COLOUR * sensors / levels
+            rows = [_whiten_colour(row, pole, q) for row, q in zip(change, ratios, strict=True)]
+            return np.stack(rows) / levels[:, None]
+        case "coarse":
+            wider: Array = np.hypot(levels, dirt.size * sensors / np.sqrt(12.0))
+            return change / wider[:, None]
+        case "held":
+            again = np.arange(len(time)) % round(dirt.size) != 0
+            held = np.array([name in HELD_CHANNELS for name in COMPARED])
+            return np.where(held[:, None] & again, 0.0, change / levels[:, None])
+        case _:
+            return change / levels[:, None]
+
+
+def _whiten_colour(row: Array, pole: float, ratio: float) -> Array:
+    """Whiten white noise of deviation 1 plus a first-order process, shape (samples,), as the row.
+
+    Their sum is a process with the pole and one zero z: 1 + z^2 and z are in the proportion of its
+    covariances (G. E. P. Box, G. M. Jenkins, Time Series Analysis, chapter 3).
+
+    ratio : deviation of the first-order process
+    """
+    from scipy.signal import lfilter
+
+    both = (1.0 + pole**2 + ratio**2 * (1.0 - pole**2)) / pole
+    zero = 0.5 * (both - np.sqrt(both**2 - 4.0))
+    innovation = float(np.sqrt(pole / zero))
+    return np.asarray(lfilter([1.0, -pole], [1.0, -zero], row), float) / innovation
+
+
 def _replace_signals(log: Log, changes: dict[str, Array]) -> Log:
     return replace(log, signals={**log.signals, **changes})
 
 
 def _colour(log: Log, time_constant: float, random: np.random.Generator) -> Log:
-    """Add noise that is correlated over a time constant, twice as large as the sensor's own."""
+    """Add noise that is correlated over a time constant, larger than the sensor's own."""
     from scipy.signal import lfilter
 
     pole = float(np.exp(-np.median(np.diff(log.time)) / time_constant))
@@ -87,7 +134,7 @@ def _colour(log: Log, time_constant: float, random: np.random.Generator) -> Log:
     for name in COMPARED:
         draws = random.standard_normal(len(log.time))
         slow = lfilter([np.sqrt(1.0 - pole**2)], [1.0, -pole], draws)
-        found[name] = log[name] + 2.0 * SENSORS[name][0] * slow
+        found[name] = log[name] + COLOUR * SENSORS[name][0] * slow
     return _replace_signals(log, found)
 
 

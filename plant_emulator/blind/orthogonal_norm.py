@@ -1,9 +1,10 @@
 """The orthogonal norm of a hidden effect: its size in the logs after nuisance projection.
 
-The true law changes the noise-free logs at its hidden size. The whitened change is projected
-orthogonally to the tangents of the nuisance parameters and initial states at the truth, with their
-priors. A large norm is checked by a nonlinear fit of the nuisance parameters to the noise-free
-logs, because these can follow more of the change than their tangents show. The smaller norm counts.
+The true law changes the noise-free logs at its hidden size. The change, whitened for the noise of
+the case and its dirt, is projected orthogonally to the tangents of the nuisance parameters and
+initial states at the truth, with their priors. A large norm is checked by a nonlinear fit of the
+nuisance parameters to the noise-free logs, because these can follow more of the change than their
+tangents show. The smaller norm counts.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.blind.dirt import over_noise
 from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
 from plant_emulator.errors import UnsettledError
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
@@ -115,14 +117,14 @@ def _simulation(
     case: Case, run: int, log: Log, parameters: ParameterSet, hidden: Sequence[Hidden]
 ) -> Residual:
     """A run simulated from parameters and gap position, whitened, shape (channels, samples)."""
-    inputs = inputs_of(log)
-    levels = noise_levels(COMPARED)[:, None]
+    inputs, levels = inputs_of(log), noise_levels(COMPARED)
     effects = {h.law: h.in_run(run) for h in hidden}
     fixed = values_of(parameters.with_values(case.parameters), effects)
 
     def evaluate(found: Mapping[str, float]) -> Array:
         values, gap = split_gap_position({**fixed, **found})
         out = simulate(inputs, values, gap_position=gap)
-        return np.stack([out[name] for name in COMPARED]) / levels
+        signals = np.stack([out[name] for name in COMPARED])
+        return over_noise(signals, log.time, levels, case.dirt)
 
     return evaluate

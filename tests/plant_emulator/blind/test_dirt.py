@@ -9,7 +9,16 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from plant_emulator.blind.dirt import RANGES, Dirt, DirtKind, draw_dirt, soil, take_rows
+from plant_emulator.blind.dirt import (
+    HELD_CHANNELS,
+    RANGES,
+    Dirt,
+    DirtKind,
+    draw_dirt,
+    over_noise,
+    soil,
+    take_rows,
+)
 from plant_emulator.blind.sealing import seal, unseal
 from plant_emulator.signals.log import COMPARED, Log
 from plant_emulator.simulation.sensor_noise import SENSORS
@@ -42,6 +51,40 @@ def test_coloured_noise_has_its_time_constant(clean: Log) -> None:
     noise = change(clean, "colour", 0.03)
     assert np.std(noise) == pytest.approx(2.0, rel=0.15)
     assert np.corrcoef(noise[3:], noise[:-3])[0, 1] == pytest.approx(np.exp(-1.0), abs=0.1)
+
+
+def test_what_colour_adds_is_whitened() -> None:
+    """White noise of 1 beside colour of 2: variance 5, and 4 exp(-1/3) to the next sample."""
+    still = Log(TIME, dict.fromkeys((*COMPARED, "speed_reference"), np.zeros(len(TIME))))
+    levels = np.array([SENSORS[name][0] for name in COMPARED])
+    white = np.random.default_rng(0).standard_normal((len(COMPARED), len(TIME)))
+    soiled = soil(still, Dirt(kind="colour", size=0.03), 1)
+    rows = np.stack([soiled[name] for name in COMPARED]) + white * levels[:, None]
+    assert np.mean(rows[0] ** 2) / levels[0] ** 2 == pytest.approx(5.0, rel=0.2)
+    for row in over_noise(rows, TIME, levels, Dirt(kind="colour", size=0.03)):
+        assert np.mean(row**2) == pytest.approx(1.0, rel=0.08)
+        for lag in (1, 2, 5):
+            assert abs(np.corrcoef(row[lag:], row[:-lag])[0, 1]) < 0.06
+
+
+def test_change_counts_for_what_dirt_leaves_of_it() -> None:
+    levels = np.array([SENSORS[name][0] for name in COMPARED])
+    rows = np.repeat(levels[:, None], len(TIME), axis=1)
+
+    def square(kind: DirtKind, size: float, channel: int) -> float:
+        found = over_noise(rows, TIME, levels, Dirt(kind=kind, size=size))
+        return float(np.mean(found[channel] ** 2))
+
+    # By hand: a step of 3 adds 9 / 12 of variance; of values held for 4 samples one is new.
+    assert square("coarse", 3.0, 0) == pytest.approx(1.0 / 1.75)
+    held = [COMPARED.index(name) for name in HELD_CHANNELS]
+    for channel in range(len(COMPARED)):
+        expected = 0.25 if channel in held else 1.0
+        assert square("held", 4.0, channel) == pytest.approx(expected)
+    # A slow change counts for little beside the spectrum of noise at zero: 1 + 4 (1 + p) / (1 - p).
+    pole = np.exp(-1.0 / 3.0)
+    expected = 1.0 / (1.0 + 4.0 * (1.0 + pole) / (1.0 - pole))
+    assert square("colour", 0.03, 0) == pytest.approx(expected, rel=0.05)
 
 
 def test_hum_has_its_amplitude_where_it_is_expected(clean: Log) -> None:
