@@ -62,14 +62,19 @@ class Score:
 
 
 def best_score(
-    fidelity: Fidelity, candidate: Candidate, sizes: Sequence[float], states: States
+    fidelity: Fidelity,
+    candidate: Candidate,
+    sizes: Sequence[float],
+    states: States,
+    share: float = 1.0,
 ) -> Score | None:
     """Score of an effect at the size that gains most; None: it shows nothing here.
 
     states : of the effect in each run, but for an angle
+    share : of each size that the columns are taken at; scaled up, those of a small share are slopes
     """
     scores = (
-        _score(fidelity, candidate, way * size, states)[1]
+        _score(fidelity, candidate, way * size, states, share)[1]
         for way in signs(candidate.sizes)
         for size in sizes
     )
@@ -118,16 +123,16 @@ def _bisect(
 
 
 def _columns(
-    fidelity: Fidelity, candidate: Candidate, size: float, states: States
+    fidelity: Fidelity, candidate: Candidate, size: float, states: States, share: float
 ) -> Iterator[Column | None]:
-    """Columns of the size parameters that change the data visibly at this size.
+    """Columns of the size parameters that change the data visibly at this share of a size.
 
-    None: the model cannot be simulated at it
+    They are scaled up to the size. None: the model cannot be simulated at it
     """
     angle = next((u.name for u in candidate.states if u.angle), None)
     single = len(candidate.sizes) == 1
     for u in candidate.sizes:
-        values = values_at_size(candidate, size, None if single else u.name)
+        values = values_at_size(candidate, share * size, None if single else u.name)
         change = fidelity.column(candidate.name, values, states)
         if change is None:
             yield None
@@ -139,22 +144,22 @@ def _columns(
             aside = [{**s, angle: pi / 2} for s in states]
             turned = fidelity.column(candidate.name, values, aside)
         if turned is None or np.allclose(turned, change):
-            yield Column(size=u.name, run=None, change=change)
+            yield Column(size=u.name, run=None, change=change / share)
             continue
         for run in range(len(states)):
             own = fidelity.owners == run
-            yield Column(size=u.name, run=run, change=np.where(own, change, 0.0))
-            yield Column(size=u.name, run=run, change=np.where(own, turned, 0.0))
+            yield Column(size=u.name, run=run, change=np.where(own, change / share, 0.0))
+            yield Column(size=u.name, run=run, change=np.where(own, turned / share, 0.0))
 
 
 def _score(
-    fidelity: Fidelity, candidate: Candidate, size: float, states: States
+    fidelity: Fidelity, candidate: Candidate, size: float, states: States, share: float = 1.0
 ) -> tuple[bool, Score | None]:
     """Whether the columns show anything, and their gain with one-sided sizes kept on their side.
 
     None: they show nothing, cannot be simulated, or are all on the other side
     """
-    every = list(_columns(fidelity, candidate, size, states))
+    every = list(_columns(fidelity, candidate, size, states, share))
     columns = [one for one in every if one is not None]
     if not columns:
         return bool(every), None

@@ -91,9 +91,15 @@ class Screening:
 
 
 def promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
-    """Predicted gains of all effects on top of a fit, the largest first."""
-    far = not base.effects and base.mean_square > SETTINGS.linear_mean_square
-    fidelities = (NOMINAL_RELATIONS if far else RELATIONS, SIMULATION)
+    """Predicted gains of all effects on top of a fit, the largest first.
+
+    On top of effects that leave noise the simulation is right, and its slopes tell all there is.
+    """
+    fidelities: tuple[str, ...] = (RELATIONS, SIMULATION)
+    if _leaves_noise(base):
+        fidelities = (SIMULATION,)
+    elif not base.effects and base.mean_square > SETTINGS.linear_mean_square:
+        fidelities = (NOMINAL_RELATIONS, SIMULATION)
     return regressions(runner, base, tuple(visible(runner.model, base, runner.runs)), fidelities)
 
 
@@ -146,28 +152,24 @@ def rivals_at(
 
 
 def screen(model: Model, asked: Screening) -> list[Promise]:
-    """Predicted gains of effects by one regression (a step).
-
-    On top of a fit with effects that leaves noise, another effect is tried at one size only.
-    """
+    """Predicted gains of effects by one regression (a step)."""
     from threadpoolctl import threadpool_limits
 
     base, library = asked.base, {name: model.candidates[name] for name in asked.effects}
     if asked.fidelity == NOMINAL_RELATIONS:
         base = _at_nominal(model, asked)
-    last = bool(base.effects) and base.mean_square <= NOISE_MEAN_SQUARE
-    sizes = SETTINGS.sizes[:1] if last else SETTINGS.sizes
     with threadpool_limits(1):
         fidelity = _fidelity(model, replace(asked, base=base))
         if fidelity is None:
             return []
+        found = _scores(library, fidelity, asked)
         return [
             Promise(
                 effect=name,
                 gains={asked.fidelity: 0.0 if score is None else score.gain},
                 starts={} if score is None else {asked.fidelity: _start(fidelity, score, base)},
             )
-            for name, score in _scores(library, fidelity, sizes, asked.states).items()
+            for name, score in found.items()
         ]
 
 
@@ -233,29 +235,44 @@ def scan_states(
     return scan_unknowns(lambda own: residual({**values, **own}), start, states)
 
 
-def _scores(
-    library: Mapping[str, Candidate],
-    fidelity: Fidelity,
-    sizes: Sequence[float],
-    states: Mapping[str, Sequence[Mapping[str, float]]],
-) -> dict[str, Score | None]:
-    """Scores of all effects at the first size, and of the best effects at the other sizes.
+def _leaves_noise(base: FitResult) -> bool:
+    """Whether a fit with effects leaves nothing but noise."""
+    return bool(base.effects) and base.mean_square <= NOISE_MEAN_SQUARE
 
-    An effect that has none there may be a limit; see `onset_score`.
+
+def _scores(
+    library: Mapping[str, Candidate], fidelity: Fidelity, asked: Screening
+) -> dict[str, Score | None]:
+    """Scores of all effects at the first size, of the best at the others too.
+
+    Near the noise an effect is faint, and its slopes tell more than a size at which it bends. On
+    top of effects that leave noise, the first size is for those that have no slope. An effect that
+    shows nothing there may be a limit; see `onset_score`.
     """
-    found = {
-        name: best_score(fidelity, candidate, sizes[:1], states[name])
-        for name, candidate in library.items()
-    }
-    if len(sizes) > 1:
-        silent = [name for name, score in found.items() if score is None]
-        visible = [name for name, score in found.items() if score is not None]
-        order = sorted(visible, key=lambda name: -_gain(found[name]))
-        for name in order[: SETTINGS.tried_further]:
-            more = best_score(fidelity, library[name], sizes[1:], states[name])
-            found[name] = max((found[name], more), key=_gain)
-        for name in silent:
-            found[name] = onset_score(fidelity, library[name], sizes[0], max(sizes), states[name])
+    first, *others = SETTINGS.sizes
+    # Relations hold between samples: nothing adds up in them, and their columns hardly bend.
+    near = asked.base.mean_square <= SETTINGS.linear_mean_square
+    slopes = near and asked.fidelity == SIMULATION
+    found: dict[str, Score | None] = {}
+    for name, candidate in library.items():
+        states = asked.states[name]
+        if slopes:
+            share = SETTINGS.slope_share
+            found[name] = best_score(fidelity, candidate, (1.0,), states, share)
+        if found.get(name) is None or not _leaves_noise(asked.base):
+            at_first = best_score(fidelity, candidate, (first,), states)
+            found[name] = max((found.get(name), at_first), key=_gain)
+    if _leaves_noise(asked.base):
+        return found
+    silent = [name for name, score in found.items() if score is None]
+    visible = [name for name, score in found.items() if score is not None]
+    order = sorted(visible, key=lambda name: -_gain(found[name]))
+    for name in order[: SETTINGS.tried_further]:
+        more = best_score(fidelity, library[name], others, asked.states[name])
+        found[name] = max((found[name], more), key=_gain)
+    for name in silent:
+        states = asked.states[name]
+        found[name] = onset_score(fidelity, library[name], first, max(SETTINGS.sizes), states)
     return found
 
 

@@ -163,7 +163,7 @@ class Search:
         foreign = excess(self.null) > SETTINGS.needed and leaves_most(found, self.null)
         if found.mean_square > NOISE_MEAN_SQUARE:
             return foreign or (leaves_random(found) and not self.beside_random)
-        return all(p.gain <= self._needed(found) for p in self._screen(found))
+        return all(p.gain <= self._promising(found) for p in self._screen(found))
 
     def _screen(self, found: FitResult) -> list[Promise]:
         key = frozenset(found.effects)
@@ -175,13 +175,17 @@ class Search:
         """Least gain of log evidence that one more effect needs on top of a fit."""
         return SETTINGS.needed_again if found.effects or self.beside_random else SETTINGS.needed
 
+    def _promising(self, found: FitResult) -> float:
+        """Predicted gain from which on one more effect is fitted on top of a fit."""
+        return SETTINGS.promising_again if found.effects else SETTINGS.promising
+
     def _expand(self, base: FitResult) -> None:
         """Fit the effects of largest gain on top of a set.
 
         Regressions predict it. Their leaders are fitted until one leaves noise, then its rivals.
         Where there is no effect yet, and none of these is the cause, fits by secants tell.
         """
-        least = self._needed(base) if base.effects else SETTINGS.promising
+        least = self._promising(base)
         found, tried, best = self._screen(base), [], base
         for one in leading(found, 1, least):
             fits = self._confirm(base, [one], SETTINGS.leader_iterations)

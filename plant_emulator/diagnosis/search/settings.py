@@ -12,6 +12,9 @@ class Settings:
     # A column is local and nearly linear, and a law that bends shows at one of these sizes. All
     # effects are tried at the first size, and the best at the others too.
     sizes: tuple[float, ...] = (0.3, 0.1, 1.0, 3.0)
+    # Share of a plausible size whose columns are slopes: a simulation adds up, so that columns may
+    # bend from a tenth of a plausible size on (a contact comes or stays away).
+    slope_share: float = 0.01
     # Sizes that a fit by secants begins at: most laws bend less at the first, and a limit does not
     # act there.
     secant_sizes: tuple[float, ...] = (0.3, 1.0)
@@ -32,8 +35,10 @@ class Settings:
     # Predicted gain from which on a first effect is fitted: parameters that bend together make the
     # gain of a weak effect several times the predicted one.
     promising: float = 5.0
-    # Gain that one more effect needs: by chance such gains came to 20.
+    # Gain that one more effect needs: by chance such gains came to 20. Half of it must be
+    # predicted: parameters that follow nearly all of an effect blur what its slopes tell.
     needed_again: float = 30.0
+    promising_again: float = 15.0
     # Most effects of a set: nobody has told more than three causes apart in one set of logs.
     most_effects: int = 3
     # Relative error of an approximate law: other laws of the same effect differed by up to this.
