@@ -132,19 +132,18 @@ class Procedure:
         beside : hypotheses whose noise the random effect shows beside, where it was estimated
         None: no random effect explains the residual
         """
-        runs, model = self.runner.runs, self.runner.model
         estimated = None if beside is None else beside.estimated
         noise = estimated or self.disturbances
         plain = _whitened(self.runner, noise)
-        found = self._fit_random_effects(plain, base, model.candidates)
-        best = max(found, key=lambda one: one.evidence, default=None)
-        if best is None:
-            return None
-        weights = dict(zip(runs, best.weights, strict=True))
-        every = tuple(weights.get(k, np.ones(1)) for k in range(len(model.runs)))
-        runner = replace(plain, recipe=WeightedRecipe(plain.recipe, every))
         null = base if beside is None else beside.explained.null
-        (null,) = runner.map(refit, [Task(base=null, runs=runs)])
+        runner, null, name = self._weighted(plain, base, null)
+        if not name:
+            return None
+        # Beside a random effect outliers stand out that its large residuals hid before.
+        ((_, hidden),) = runner.map(find_disturbances, [Task(base=null, runs=self.runner.runs)])
+        if hidden is not None:
+            plain = _whitened(plain, hidden)
+            runner, null, name = self._weighted(plain, base, null)
         search = Search(
             declared=runner,
             runner=runner,
@@ -153,11 +152,30 @@ class Procedure:
             noise=noise,
         )
         explained = search.explain()
-        last = self._fit_random_effects(plain, explained.final, [best.effect])
+        last = self._fit_random_effects(plain, explained.final, [name])
         if not last:
             return None
         explained = replace(explained, random_effects=tuple(last))
         return _Tested(explained=_with_regularities(explained, runner), runner=runner)
+
+    def _weighted(
+        self, plain: TaskRunner, base: FitResult, null: FitResult
+    ) -> tuple[TaskRunner, FitResult, str]:
+        """The runner with the best random effect as part of the noise, and a fit anew in it.
+
+        base : fit whose residual shows the random effect; null : the other fit
+        Give the effect's name as well; it is empty, and the others are as given, without one.
+        """
+        model = plain.model
+        found = self._fit_random_effects(plain, base, model.candidates)
+        best = max(found, key=lambda one: one.evidence, default=None)
+        if best is None:
+            return plain, null, ""
+        weights = dict(zip(plain.runs, best.weights, strict=True))
+        every = tuple(weights.get(k, np.ones(1)) for k in range(len(model.runs)))
+        runner = replace(plain, recipe=WeightedRecipe(plain.recipe, every))
+        (null,) = runner.map(refit, [Task(base=null, runs=runner.runs)])
+        return runner, null, best.effect
 
     def _fit_random_effects(
         self, runner: TaskRunner, base: FitResult, names: Iterable[str]

@@ -254,6 +254,16 @@ def test_spikes_of_a_transmission_are_no_unrest() -> None:
     assert procedure.with_disturbances().run()[1].kind != "effect"
 
 
+def test_spikes_that_an_unrest_hides_stand_out_beside_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The unrest rises from 1 to 193 over the line; six spikes of 160 are where it is 6 to 20."""
+    monkeypatch.setitem(globals(), "SLOPE", 0.12 + 12.0 * (TIME + 1.0))
+    y = noisy(2.0 + 3.0 * TIME) + shaken(8.0)
+    y[[60, 83, 109, 131, 158, 184]] += 160.0
+    explained, decision, _ = Procedure(runner=runner(Shaken([y]))).with_disturbances().run()
+    assert decision.effects == ("shake",)
+    assert explained.random_effects[0].size == pytest.approx(8.0, rel=0.05)
+
+
 def test_weighted_model_is_another_recipe() -> None:
     model = Shaken([noisy(2.0 + 3.0 * TIME)])
     halves = WeightedRecipe(Given(model), (np.full((1, len(TIME)), 0.5),))
