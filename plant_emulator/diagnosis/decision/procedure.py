@@ -144,6 +144,8 @@ class Procedure:
         if hidden is not None:
             plain = _whitened(plain, hidden)
             runner, null, name = self._weighted(plain, base, null)
+            if not name:
+                return None
         search = Search(
             declared=runner,
             runner=runner,
