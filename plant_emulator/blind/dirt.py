@@ -76,33 +76,35 @@ def take_rows(fine: Log, time: Array, half_width: float, seed: int) -> Log:
     return replace(fine, time=time, signals=signals)
 
 
-def over_noise(change: Array, time: Array, levels: Array, dirt: Dirt | None) -> Array:
-    """A change of the compared channels over their noise, whitened where dirt gives it a colour.
+def whiten(rows: Array, time: Array, levels: Array, dirt: Dirt | None) -> Array:
+    """The compared channels, or a change of them, over their noise; whitened for coloured noise.
 
-    change : [SI], shape (channels, samples), as the result [1]; time : [s], shape (samples,)
+    The map is linear.
+
+    rows : [SI], shape (channels, samples), as the result [1]; time : [s], shape (samples,)
     levels : deviation of the noise without dirt [SI], shape (channels,)
 
-    Values that are held tell nothing new. Hum, spikes and lost or jittered rows hide little of a
-    change from whoever knows of them, and are left out.
+    Values that are held tell nothing new. What hum, spikes and lost or jittered rows hide of a
+    change is not counted.
     """
     if dirt is None:
-        return change / levels[:, None]
+        return rows / levels[:, None]
     sensors = np.array([SENSORS[name][0] for name in COMPARED])
     match dirt.kind:
         case "colour":
             pole = float(np.exp(-np.median(np.diff(time)) / dirt.size))
             ratios = COLOUR * sensors / levels
-            rows = [_whiten_colour(row, pole, q) for row, q in zip(change, ratios, strict=True)]
-            return np.stack(rows) / levels[:, None]
+            white = [_whiten_colour(row, pole, q) for row, q in zip(rows, ratios, strict=True)]
+            return np.stack(white) / levels[:, None]
         case "coarse":
             wider: Array = np.hypot(levels, dirt.size * sensors / np.sqrt(12.0))
-            return change / wider[:, None]
+            return rows / wider[:, None]
         case "held":
             again = np.arange(len(time)) % round(dirt.size) != 0
             held = np.array([name in HELD_CHANNELS for name in COMPARED])
-            return np.where(held[:, None] & again, 0.0, change / levels[:, None])
-        case _:
-            return change / levels[:, None]
+            return np.where(held[:, None] & again, 0.0, rows / levels[:, None])
+        case "hum" | "spikes" | "jitter" | "lost":
+            return rows / levels[:, None]
 
 
 def _whiten_colour(row: Array, pole: float, ratio: float) -> Array:
@@ -116,7 +118,7 @@ def _whiten_colour(row: Array, pole: float, ratio: float) -> Array:
     from scipy.signal import lfilter
 
     both = (1.0 + pole**2 + ratio**2 * (1.0 - pole**2)) / pole
-    zero = 0.5 * (both - np.sqrt(both**2 - 4.0))
+    zero = 2.0 / (both + np.sqrt(both**2 - 4.0))
     innovation = float(np.sqrt(pole / zero))
     return np.asarray(lfilter([1.0, -pole], [1.0, -zero], row), float) / innovation
 

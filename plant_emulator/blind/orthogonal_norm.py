@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.blind.dirt import over_noise
+from plant_emulator.blind.dirt import whiten
 from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
 from plant_emulator.errors import UnsettledError
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
@@ -125,6 +125,6 @@ def _simulation(
         values, gap = split_gap_position({**fixed, **found})
         out = simulate(inputs, values, gap_position=gap)
         signals = np.stack([out[name] for name in COMPARED])
-        return over_noise(signals, log.time, levels, case.dirt)
+        return whiten(signals, log.time, levels, case.dirt)
 
     return evaluate

@@ -142,7 +142,8 @@ class Procedure:
         # Beside a random effect outliers stand out that its large residuals hid before.
         ((_, hidden),) = runner.map(find_disturbances, [Task(base=null, runs=self.runner.runs)])
         if hidden is not None:
-            plain = _whitened(plain, hidden)
+            noise = hidden if noise is None else noise.with_outliers_of(hidden)
+            plain = _whitened(self.runner, noise)
             runner, null, name = self._weighted(plain, base, null)
             if not name:
                 return None

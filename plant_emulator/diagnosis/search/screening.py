@@ -3,7 +3,8 @@
 A linear regression predicts it, in the relations and in the simulation's residual. What is local is
 clean in the first; what is slow and faint adds up in the second. A large gap bends the parameters
 of the fit without effects, and slopes there mislead. The relations are those at the nominal
-parameters then.
+parameters then. On top of effects that leave noise the simulation is right, and tells all that the
+relations tell.
 """
 
 from __future__ import annotations
@@ -91,10 +92,7 @@ class Screening:
 
 
 def promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
-    """Predicted gains of all effects on top of a fit, the largest first.
-
-    On top of effects that leave noise the simulation is right, and its slopes tell all there is.
-    """
+    """Predicted gains of all effects on top of a fit, the largest first."""
     fidelities: tuple[str, ...] = (RELATIONS, SIMULATION)
     if _leaves_noise(base):
         fidelities = (SIMULATION,)
@@ -243,25 +241,13 @@ def _leaves_noise(base: FitResult) -> bool:
 def _scores(
     library: Mapping[str, Candidate], fidelity: Fidelity, asked: Screening
 ) -> dict[str, Score | None]:
-    """Scores of all effects at the first size, of the best at the others too.
+    """Scores of all effects at the first size, and of the best effects at the other sizes.
 
-    Near the noise an effect is faint, and its slopes tell more than a size at which it bends. On
-    top of effects that leave noise, the first size is for those that have no slope. An effect that
-    shows nothing there may be a limit; see `onset_score`.
+    An effect that has none there may be a limit; see `onset_score`. On top of effects that leave
+    noise another one is faint: the first size is enough.
     """
     first, *others = SETTINGS.sizes
-    # Relations hold between samples: nothing adds up in them, and their columns hardly bend.
-    near = asked.base.mean_square <= SETTINGS.linear_mean_square
-    slopes = near and asked.fidelity == SIMULATION
-    found: dict[str, Score | None] = {}
-    for name, candidate in library.items():
-        states = asked.states[name]
-        if slopes:
-            share = SETTINGS.slope_share
-            found[name] = best_score(fidelity, candidate, (1.0,), states, share)
-        if found.get(name) is None or not _leaves_noise(asked.base):
-            at_first = best_score(fidelity, candidate, (first,), states)
-            found[name] = max((found.get(name), at_first), key=_gain)
+    found = {name: _first_score(fidelity, candidate, asked) for name, candidate in library.items()}
     if _leaves_noise(asked.base):
         return found
     silent = [name for name, score in found.items() if score is None]
@@ -274,6 +260,20 @@ def _scores(
         states = asked.states[name]
         found[name] = onset_score(fidelity, library[name], first, max(SETTINGS.sizes), states)
     return found
+
+
+def _first_score(fidelity: Fidelity, candidate: Candidate, asked: Screening) -> Score | None:
+    """Score of an effect at the first size, or that of its slopes near the noise.
+
+    Relations hold between samples: nothing adds up in them, and their columns hardly bend.
+    """
+    states = asked.states[candidate.name]
+    found = best_score(fidelity, candidate, SETTINGS.sizes[:1], states)
+    near = asked.base.mean_square <= SETTINGS.linear_mean_square
+    if asked.fidelity != SIMULATION or not near:
+        return found
+    slopes = best_score(fidelity, candidate, (1.0,), states, SETTINGS.slope_share)
+    return max((found, slopes), key=_gain)
 
 
 def _gain(score: Score | None) -> float:

@@ -10,10 +10,12 @@ class Settings:
     """Sizes are in plausible sizes of an effect, gains in natural logarithms of probability."""
 
     # A column is local and nearly linear, and a law that bends shows at one of these sizes. All
-    # effects are tried at the first size, and the best at the others too.
+    # effects are tried at the first size, and the best at the others too, but for those beside
+    # effects that leave noise: they are faint.
     sizes: tuple[float, ...] = (0.3, 0.1, 1.0, 3.0)
     # Share of a plausible size whose columns are slopes: a simulation adds up, so that columns may
-    # bend from a tenth of a plausible size on (a contact comes or stays away).
+    # bend from a tenth of a plausible size on (a contact comes or stays away). Rough and fine
+    # simulations still tell such a slope alike, within some hundredths.
     slope_share: float = 0.01
     # Sizes that a fit by secants begins at: most laws bend less at the first, and a limit does not
     # act there.

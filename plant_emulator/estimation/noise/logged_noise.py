@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -52,6 +52,21 @@ class LoggedNoise:
             and _same_lines(a.lines, b.lines)
             for a, b in ((one, other.channels[name]) for name, one in self.channels.items())
         )
+
+    def with_outliers_of(self, other: LoggedNoise) -> LoggedNoise:
+        """This noise, with the outliers of another noise of the same runs left out as well."""
+        channels = {
+            name: replace(one, outliers=one.outliers + other.channels[name].outliers)
+            for name, one in self.channels.items()
+        }
+        whiteners = {
+            run: tuple(
+                replace(one, use=one.use & more.use)
+                for one, more in zip(own, other.whiteners[run], strict=True)
+            )
+            for run, own in self.whiteners.items()
+        }
+        return LoggedNoise(channels=channels, whiteners=whiteners)
 
     def whitened(self, run: int, residual: Residual) -> Residual:
         """The residual function of a run, whitened for this noise."""

@@ -15,9 +15,9 @@ from plant_emulator.blind.dirt import (
     Dirt,
     DirtKind,
     draw_dirt,
-    over_noise,
     soil,
     take_rows,
+    whiten,
 )
 from plant_emulator.blind.sealing import seal, unseal
 from plant_emulator.signals.log import COMPARED, Log
@@ -61,7 +61,7 @@ def test_what_colour_adds_is_whitened() -> None:
     soiled = soil(still, Dirt(kind="colour", size=0.03), 1)
     rows = np.stack([soiled[name] for name in COMPARED]) + white * levels[:, None]
     assert np.mean(rows[0] ** 2) / levels[0] ** 2 == pytest.approx(5.0, rel=0.2)
-    for row in over_noise(rows, TIME, levels, Dirt(kind="colour", size=0.03)):
+    for row in whiten(rows, TIME, levels, Dirt(kind="colour", size=0.03)):
         assert np.mean(row**2) == pytest.approx(1.0, rel=0.08)
         for lag in (1, 2, 5):
             assert abs(np.corrcoef(row[lag:], row[:-lag])[0, 1]) < 0.06
@@ -72,7 +72,7 @@ def test_change_counts_for_what_dirt_leaves_of_it() -> None:
     rows = np.repeat(levels[:, None], len(TIME), axis=1)
 
     def square(kind: DirtKind, size: float, channel: int) -> float:
-        found = over_noise(rows, TIME, levels, Dirt(kind=kind, size=size))
+        found = whiten(rows, TIME, levels, Dirt(kind=kind, size=size))
         return float(np.mean(found[channel] ** 2))
 
     # By hand: a step of 3 adds 9 / 12 of variance; of values held for 4 samples one is new.

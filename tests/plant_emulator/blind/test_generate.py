@@ -76,12 +76,23 @@ def test_log_has_the_columns_of_the_bench_and_no_voltage(nominal: ParameterSet) 
     assert set(log.signals) == {"speed_reference", *COMPARED, "shell_temperature"}
 
 
-def test_offset_of_a_sensor_has_the_norm_of_its_samples(nominal: ParameterSet) -> None:
+@pytest.mark.parametrize(
+    ("dirt", "added", "samples"),
+    [
+        (None, 0.0, 1851),
+        (Dirt(kind="coarse", size=3.0), 3.0 * 0.25 / np.sqrt(12), 1851),
+        (Dirt(kind="held", size=4.0), 0.0, 463),
+    ],
+)
+def test_offset_of_a_sensor_has_the_norm_of_its_samples(
+    dirt: Dirt | None, added: float, samples: int, nominal: ParameterSet
+) -> None:
     """No parameter moves the torque alone, so nearly offset / noise x sqrt(samples) is left."""
     case = case_with(hidden("torque_sensor_offset", "torque_sensor", offset=0.5))
+    case = replace(case, dirt=dirt)
     found = norms(case, simulate_truth(case, nominal), nominal)
-    level = np.hypot(0.25, 100 / 4096 / np.sqrt(12))
-    whole = 0.5 / level * np.sqrt(1851)
+    level = np.sqrt(0.25**2 + (100 / 4096) ** 2 / 12 + added**2)
+    whole = 0.5 / level * np.sqrt(samples)
     assert 0.5 * whole < found["torque_sensor_offset"] < whole
 
 

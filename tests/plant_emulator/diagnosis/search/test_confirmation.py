@@ -21,6 +21,7 @@ from plant_emulator.diagnosis.search.confirmation import (
 )
 from plant_emulator.diagnosis.search.promise import Promise, Start
 from plant_emulator.diagnosis.search.screening import promises
+from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import TIME, Line, effect, explained, linear, noisy
 
@@ -47,15 +48,14 @@ def test_plausible_size_is_a_start_only_where_all_starts_are_far(size: float, as
     assert found.values["wave_size"] == pytest.approx(4.0, abs=0.1)
 
 
-def tone(*, narrow: str) -> Candidate:
+def tone(frequency: Unknown, *, narrow: str) -> Candidate:
     """A wave of unknown amplitude; its frequency, in basins of 3, is a size or a state."""
     amplitude = replace(linear("amplitude", 1.0), lower=0.1)
-    frequency = replace(linear("frequency", 20.0), lower=1.0, step=1.0)
     return replace(
         effect("tone"),
         sizes=(amplitude, frequency) if narrow == "size" else (amplitude,),
         states=() if narrow == "size" else (frequency,),
-        neutral={"amplitude": 0.0, "frequency": 1.0} if narrow == "size" else {"amplitude": 0.0},
+        neutral={"amplitude": 0.0, "frequency": 0.0} if narrow == "size" else {"amplitude": 0.0},
     )
 
 
@@ -76,12 +76,15 @@ class Tone(Line):
         return residual
 
 
-@pytest.mark.parametrize("narrow", ["size", "state"])
-def test_frequency_far_from_its_start_is_found_by_a_scan(narrow: str) -> None:
+@pytest.mark.parametrize(("narrow", "side"), [("size", 1.0), ("size", -1.0), ("state", 1.0)])
+def test_frequency_far_from_its_start_is_found_by_a_scan(narrow: str, side: float) -> None:
     """A descent from 20 ends at a side lobe, an amplitude of 0.6 in place of 4."""
-    model = Tone(noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(37.3 * TIME)), tone(narrow=narrow))
+    lower, upper = sorted((side, 50.0 * side))
+    frequency = replace(linear("frequency", 20.0 * side), lower=lower, upper=upper, step=1.0)
+    measured = noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(side * 37.3 * TIME))
+    model = Tone(measured, tone(frequency, narrow=narrow))
     values = {"a": 2.0, "b": 3.0, "amplitude": 4.0}
-    given, state = {"frequency": 20.0}, {}
+    given, state = {"frequency": frequency.start}, {}
     if narrow == "state":
         given, state = state, given
     start = Start(values={**values, **given}, states=(state,))
@@ -91,7 +94,7 @@ def test_frequency_far_from_its_start_is_found_by_a_scan(narrow: str) -> None:
     assert abs(descended.values["amplitude"]) < 1.0
     assert found.values["amplitude"] == pytest.approx(4.0, abs=0.15)
     at = found.values if narrow == "size" else found.states[0]
-    assert at["frequency"] == pytest.approx(37.3, abs=0.1)
+    assert at["frequency"] == pytest.approx(side * 37.3, abs=0.1)
 
 
 def test_set_without_an_effect_starts_where_the_slopes_tell_it_to_be(

@@ -74,6 +74,35 @@ def test_slopes_predict_the_gain_of_an_effect_whose_columns_bend() -> None:
     assert found.starts["simulation"].values["wave_size"] == pytest.approx(1.2, abs=0.15)
 
 
+def test_relations_are_not_asked_beside_effects_that_leave_noise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[tuple[str, ...]] = []
+    monkeypatch.setattr(Line, "relations", lambda _, where, *__: asked.append(where.effects))
+    model = Line([noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME))])
+    null = fit_null(model, (0,))
+    wave = fit(model, ("wave",), (0,), {**null.values, "wave_size": 4.0}, [{}])
+    assert wave.mean_square <= NOISE_MEAN_SQUARE
+    promises(runner(model), null)
+    promises(runner(model), wave)
+    assert asked == [()]
+
+
+def test_second_effect_is_fitted_where_half_of_its_gain_is_promised(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """By hand: the kink gains 2000 1.2^2 / 24 = 120, and needs 30."""
+
+    def of_20(there: TaskRunner, base: FitResult) -> list[Promise]:
+        most = 20.0 if base.effects else np.inf
+        found = promises(there, base)
+        return [replace(p, gains={k: min(v, most) for k, v in p.gains.items()}) for p in found]
+
+    monkeypatch.setattr(search, "promises", of_20)
+    y = noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME) + 1.2 * np.abs(TIME))
+    assert explained(Line([y], ["wave", "kink"])).final.effects == ("wave", "kink")
+
+
 @pytest.mark.parametrize(("hidden", "named"), [(0.0, ()), (1.2, ("wave",))])
 def test_fit_without_effects_that_ended_far_off_is_fitted_anew(
     hidden: float, named: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
