@@ -74,6 +74,28 @@ def test_slopes_predict_the_gain_of_an_effect_whose_columns_bend() -> None:
     assert found.starts["simulation"].values["wave_size"] == pytest.approx(1.2, abs=0.15)
 
 
+@pytest.mark.parametrize("left", [0.0, 2.0])
+def test_leader_is_led_again_only_where_it_leaves_more_than_noise(left: float) -> None:
+    """By hand: of squares of 800 a cosine of 2 leaves 2, beside the noise of 1."""
+    y = noisy(2.0 + 3.0 * TIME + 40.0 * np.sin(20.0 * TIME) + left * np.cos(37.0 * TIME))
+    found = explained(Line([y], ["wave", "cube"]))
+    led = [step.effects for step in found.trace if step.action == "led again"]
+    assert led == ([("wave",)] if left else [])
+
+
+def test_rival_of_a_second_effect_is_fitted_where_little_of_the_gap_is_left() -> None:
+    """A cosine of 2 is left beside both, and they differ by a thousandth only.
+
+    Beside a random effect the noise stays as it is, and the cosine does not pass for it.
+    """
+    y = 2.0 + 3.0 * TIME + 40.0 * np.sin(20.0 * TIME) + 30.0 * np.abs(TIME)
+    model = Line([noisy(y + 2.0 * np.cos(37.0 * TIME))], ["wave", "kink", "near kink"])
+    there, null = runner(model), fit_null(model, (0,))
+    found = Search(declared=there, runner=there, null=null, beside_random=True).explain()
+    assert found.final.mean_square > NOISE_MEAN_SQUARE
+    assert sorted(map(sorted, found.classes())) == [["kink", "near kink"], ["wave"]]
+
+
 def test_relations_are_not_asked_beside_effects_that_leave_noise(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
