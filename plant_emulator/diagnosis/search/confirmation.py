@@ -18,18 +18,15 @@ from plant_emulator.diagnosis.fitting.joint_fit import (
 )
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.search.promise import Start, starts_of
+from plant_emulator.diagnosis.search.scans import scan_sizes, scan_states
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE
-from plant_emulator.estimation.robust_scan import cauchy_loss, scan_unknowns
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.machine import Candidate, Model
+    from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.search.promise import Promise
-    from plant_emulator.estimation.unknowns import Lengths, Residual, Unknown
-    from plant_emulator.signals.log import Array
+    from plant_emulator.estimation.unknowns import Lengths
 
 
 @dataclass(frozen=True)
@@ -64,72 +61,17 @@ def confirm(model: Model, trial: Trial) -> FitResult:
     Of the last effect, sizes with many narrow basins are scanned at its starts, and such states
     once more where the fit leaves more than noise: until then the effect was missing.
     """
-    starts = tuple(_with_sizes_scanned(model, trial, one) for one in trial.starts)
-    further = tuple(_with_sizes_scanned(model, trial, one) for one in trial.further)
+    starts = tuple(scan_sizes(model, trial.effects, trial.runs, one) for one in trial.starts)
+    further = tuple(scan_sizes(model, trial.effects, trial.runs, one) for one in trial.further)
     found = fit_from_best_start(model, replace(trial, starts=starts, further=further))
     own = model.candidates[trial.effects[-1]].states
     if found.mean_square <= NOISE_MEAN_SQUARE or all(u.step is None for u in own):
         return found
-    start = _with_states_scanned(model, trial, found)
+    start = scan_states(model, found, trial.runs)
     if start.states == found.states:
         return found
     again = replace(trial, starts=(start,), further=(), lengths=found.lengths)
     return min(found, fit_from_best_start(model, again), key=lambda one: one.cost)
-
-
-def _with_states_scanned(model: Model, trial: Trial, found: FitResult) -> Start:
-    """A fit with those states of the last effect scanned that have many narrow basins."""
-    own, rough = model.candidates[trial.effects[-1]].states, model.rough()
-    states = tuple(
-        _scanned(_beside(rough.residual(k, trial.effects), found.values), at, own)
-        for k, at in zip(trial.runs, found.states, strict=True)
-    )
-    return Start(values=found.values, states=states)
-
-
-def _beside(residual: Residual, values: Mapping[str, float]) -> Residual:
-    """The residual as a function of what is not among these values."""
-    return lambda own: residual({**values, **own})
-
-
-def _scanned(
-    residual: Residual, present: Mapping[str, float], unknowns: Sequence[Unknown]
-) -> dict[str, float]:
-    """The best of the present values and those of a scan."""
-    scanned = scan_unknowns(residual, present, unknowns)
-    return min((dict(present), scanned), key=lambda own: cauchy_loss(residual(own)))
-
-
-def _with_sizes_scanned(model: Model, trial: Trial, start: Start) -> Start:
-    """A start with those sizes of the last effect scanned that have many narrow basins.
-
-    The regressions tell little of such a size, because contact jumps with it. The scan goes as far
-    from neutral as the largest size that they try.
-    """
-    candidate = model.candidates[trial.effects[-1]]
-    narrow = [u for u in candidate.sizes if u.step is not None]
-    if not narrow:
-        return start
-    rough = model.rough()
-    of_runs = [
-        _beside(rough.residual(k, trial.effects), {**start.values, **own})
-        for k, own in zip(trial.runs, start.states, strict=True)
-    ]
-
-    def residual(sizes: Mapping[str, float]) -> Array:
-        return np.concatenate([one(sizes).ravel() for one in of_runs])
-
-    present = {u.name: start.values[u.name] for u in narrow}
-    found = _scanned(residual, present, [_within(candidate, u) for u in narrow])
-    return replace(start, values={**start.values, **found})
-
-
-def _within(candidate: Candidate, size: Unknown) -> Unknown:
-    """A size with bounds no further from neutral than the largest size that is screened."""
-    neutral = candidate.neutral[size.name]
-    reach = max(SETTINGS.sizes) * abs(size.start - neutral)
-    lower, upper = max(size.lower, neutral - reach), min(size.upper, neutral + reach)
-    return replace(size, lower=lower, upper=upper)
 
 
 def fit_from_best_start(model: Model, trial: Trial) -> FitResult:

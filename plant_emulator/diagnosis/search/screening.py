@@ -20,9 +20,9 @@ from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.columns import best_score, onset_score
 from plant_emulator.diagnosis.search.promise import Promise, Start, leading
+from plant_emulator.diagnosis.search.scans import start_states
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.simulation_columns import SimulationColumns
-from plant_emulator.estimation.robust_scan import scan_unknowns
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Candidate, Model
     from plant_emulator.diagnosis.search.columns import Score
-    from plant_emulator.estimation.unknowns import Residual, Unknown
 
 
 # The residuals of a regression, and its name in the trace.
@@ -201,36 +200,6 @@ def visible(model: Model, base: FitResult, runs: Sequence[int]) -> dict[str, Can
     """Effects that a fit lacks and that a run can show."""
     hidden = frozenset.intersection(*(model.runs[k].hides for k in runs))
     return {name: one for name, one in _library(model, base).items() if name not in hidden}
-
-
-def start_states(model: Model, asked: tuple[Task, Sequence[str]]) -> dict[str, dict[str, float]]:
-    """States of these effects in the run of the task that their columns are taken at (a step).
-
-    A state with many narrow basins, as a frequency, is scanned on top of a fit without effects.
-    """
-    task, effects = asked
-    return {name: _start_states(model, model.candidates[name], task) for name in effects}
-
-
-def _start_states(model: Model, candidate: Candidate, task: Task) -> dict[str, float]:
-    where = task.base
-    plain = {u.name: u.start for u in candidate.states}
-    if where.effects or all(u.step is None for u in candidate.states):
-        return plain
-    (run,), (fit,) = task.runs, where.states
-    values = {**where.values, **fit, **values_at_size(candidate, SETTINGS.sizes[0])}
-    residual = model.rough().residual(run, (candidate.name,))
-    return scan_states(residual, values, candidate.states, plain)
-
-
-def scan_states(
-    residual: Residual,
-    values: Mapping[str, float],
-    states: Sequence[Unknown],
-    start: Mapping[str, float],
-) -> dict[str, float]:
-    """The best value of each of these states, with all else as given."""
-    return scan_unknowns(lambda own: residual({**values, **own}), start, states)
 
 
 def _leaves_noise(base: FitResult) -> bool:
