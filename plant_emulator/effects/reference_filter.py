@@ -5,6 +5,8 @@
 Source: W. Leonhard, Control of Electrical Drives, chapter on the cascade control of drives
 (smoothing of the reference); K. Ogata, Modern Control Engineering, on second-order systems. A large
 damping zeta makes it a filter of first order with the time constant 2 zeta T. T = 0: no filter.
+zeta = 1 does not overshoot. At zeta = 1 / sqrt(2) a filter is a dead time, up to the second order:
+a small one hardly shows.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ PARAMETERS = {
         neutral=0.0, lower=0.0, upper=1.0, plausible=0.03, unit="s", meaning="T"
     ),
     "damping": EffectParameter(
-        neutral=0.7, lower=0.3, upper=20.0, plausible=0.7, unit="1", meaning="zeta", std=0.3
+        neutral=1.0, lower=0.3, upper=20.0, plausible=1.0, unit="1", meaning="zeta", std=0.3
     ),
 }
 

@@ -2,13 +2,14 @@
 
 The log evidence of a set is half the fall of its penalised cost, less the gain that each of its
 effects needs. The best set is expanded by the effects of largest gain until it leaves only noise or
-what is random, none gains enough, or the cause is foreign. Beside an approximate law, its error
-(`law_error`) must be gained as well.
+what is random, none gains enough, or the cause is foreign. Effects that the runs do not
+confirm (`run_agreement`) stand for the error of another one's law.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from math import inf
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.execution.pool import build_model
@@ -32,9 +33,9 @@ from plant_emulator.diagnosis.search.confirmation import (
     trial_of,
     without_effects,
 )
-from plant_emulator.diagnosis.search.law_error import LawErrors
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
 from plant_emulator.diagnosis.search.promise import leading, rivals
+from plant_emulator.diagnosis.search.run_agreement import run_agreement
 from plant_emulator.diagnosis.search.screening import SIMULATION, promises, rivals_at, visibilities
 from plant_emulator.diagnosis.search.secant_fits import fitted_promises
 from plant_emulator.diagnosis.search.settings import SETTINGS
@@ -79,7 +80,7 @@ class Search:
     promises: dict[frozenset[str], list[Promise]] = field(default_factory=dict)
     expanded: set[frozenset[str]] = field(default_factory=set)
     trace: list[SearchStep] = field(default_factory=list)
-    law_errors: LawErrors = field(default_factory=LawErrors)
+    confirmed: dict[frozenset[str], bool] = field(default_factory=dict)
     reduced_costs: dict[str, float] = field(default_factory=dict)
 
     def explain(self) -> Explanation:
@@ -115,9 +116,9 @@ class Search:
         self.noise = noise
         recipe = WhitenedRecipe(self.declared.recipe, noise)
         self.runner = replace(self.declared, recipe=recipe, model=build_model(recipe))
-        self.law_errors = LawErrors()
         self.promises.clear()
         self.expanded.clear()
+        self.confirmed.clear()
         kept = not_told_apart(self.sets)
         self.sets = {}
         self._fits(refit, kept)
@@ -138,16 +139,14 @@ class Search:
 
     def _queue(self, most_effects: int) -> FitResult:
         """The best set of at most so many effects."""
-        best = min(self.sets.values(), key=self._value)
+        best = self._settled()
         while len(best.effects) < most_effects:
             key = frozenset(best.effects)
             if key in self.expanded or self._is_last(best):
                 break
             self.expanded.add(key)
             self._expand(best)
-            before, best = best, self._settled()
-            if best is before:
-                break
+            best = self._settled()
         return best
 
     def _is_last(self, found: FitResult) -> bool:
@@ -172,9 +171,9 @@ class Search:
             self.promises[key] = promises(self.runner, found)
         return self.promises[key]
 
-    def _needed(self, found: FitResult) -> float:
-        """Least gain of log evidence that one more effect needs on top of a fit."""
-        return SETTINGS.needed_again if found.effects or self.beside_random else SETTINGS.needed
+    def _needed(self, others: int) -> float:
+        """Least gain of log evidence that an effect needs beside so many others."""
+        return SETTINGS.needed_again if others or self.beside_random else SETTINGS.needed
 
     def _promising(self, found: FitResult) -> float:
         """Predicted gain from which on one more effect is fitted on top of a fit."""
@@ -187,8 +186,9 @@ class Search:
         Where there is no effect yet, and none of these is the cause, fits by secants tell.
         """
         least = self._promising(base)
-        found, tried, best = self._screen(base), [], base
-        for one in leading(found, 1, least):
+        found, best, key = self._screen(base), base, frozenset(base.effects)
+        tried = [p.effect for p in found if key and key | {p.effect} in self.sets]
+        for one in leading(found, 1, least, tried):
             fits = self._confirm(base, [one], SETTINGS.leader_iterations)
             best = min((best, *fits), key=lambda fit: fit.cost)
             tried.append(one.effect)
@@ -259,19 +259,19 @@ class Search:
             self.sets[key] = found
 
     def _value(self, found: FitResult) -> float:
-        """Negative log evidence of a set, with the gain that each of its effects needs."""
-        price, smaller = 0.0, self.null
-        for count, _ in enumerate(found.effects, 1):
-            larger = self.sets.get(frozenset(found.effects[:count]), found)
-            feigned = self.law_errors.feigned(self.runner, self.null, smaller, larger)
-            price += self._needed(smaller) + feigned
-            smaller = larger
-        return 0.5 * found.cost + price
+        """Negative log evidence of a set, with the gain that each of its effects needs.
+
+        It is infinite where the runs do not confirm an effect.
+        """
+        if not self.confirmed.get(frozenset(found.effects), True):
+            return inf
+        return 0.5 * found.cost + sum(map(self._needed, range(len(found.effects))))
 
     def _settled(self) -> FitResult:
         """Refit all sets near the best one until they converge; return the best.
 
-        What the best one leaves beyond the noise a set may explain whose fit has not ended.
+        What the best one leaves beyond the noise a set may explain whose fit has not ended. A set
+        with an effect that the runs do not confirm is none.
         """
         done: set[frozenset[str]] = set()
         while True:
@@ -283,11 +283,32 @@ class Search:
                 and len(one.effects) == max(1, len(best.effects))
                 and one.cost < best.cost + SETTINGS.near + (not one.converged) * excess(best)
             ]
-            if not near:
+            if not near and self._confirmed(best):
                 return best
             for one in self._fits(refit, near):
                 done.add(frozenset(one.effects))
                 self.trace.append(search_step(self.null, "converged", one))
+
+    def _confirmed(self, found: FitResult) -> bool:
+        """Whether the runs confirm the last effect of a set as more than the error of others' laws.
+
+        Where they do not, another one may take its place. An effect that a single run shows has
+        nothing to agree with, and must close more than such errors leave.
+        """
+        key, base = frozenset(found.effects), frozenset(found.effects[:-1])
+        if len(key) > 1 and key not in self.confirmed:
+            smaller, library = self.sets.get(base, self.null), self.runner.model.candidates
+            approximate = any(not library[name].exact_form for name in smaller.effects)
+            least = SETTINGS.law_error**2 * approximate * (self.null.cost - smaller.cost)
+            asked = Reduction(found, self.runner.runs, found.effects[-1])
+            (said,) = self.runner.map(run_agreement, [asked])
+            self.confirmed[key] = said.probability >= SETTINGS.agreement and (
+                said.runs > 1 or smaller.cost - found.cost >= least
+            )
+            if not self.confirmed[key]:
+                self.trace.append(search_step(self.null, "the runs do not confirm it", found))
+                self.expanded.discard(base)
+        return self.confirmed.get(key, True)
 
     def _without_needless(self, best: FitResult) -> FitResult:
         """Drop the effect that closes least until each one closes enough; return the set.
@@ -341,7 +362,10 @@ class Search:
         (shown,) = self.runner.map(visibilities, [self._task(self.null)])
         values = {key: self._value(one) for key, one in self.sets.items()}
         screened = self.promises.get(frozenset(final.effects), [])
-        larger = {p.effect: self._needed(final) - p.gains.get(SIMULATION, 0.0) for p in screened}
+        larger = {
+            p.effect: self._needed(len(final.effects)) - p.gains.get(SIMULATION, 0.0)
+            for p in screened
+        }
         library = self.runner.model.candidates
         mending = corrections(library, final, self.reduced_costs)
         if mending:

@@ -493,30 +493,18 @@ def rippled(kink: float, ripple: Array, plausible: float = 0.3) -> Line:
     [
         (2.0, 0.35, {"kink", "wave"}),
         (2.0, 0.2, {"kink"}),
-        # Less or more than what an error of 10 % in the kink would leave.
-        (15.0, 0.4, {"kink"}),
-        (15.0, 0.9, {"kink", "wave"}),
+        # The size of the first one says nothing.
+        (15.0, 0.35, {"kink", "wave"}),
     ],
 )
 def test_second_effect_in_what_looks_like_noise_needs_its_own_evidence(
     kink: float, amplitude: float, named: set[str]
 ) -> None:
-    """By hand: a ripple of amplitude A takes n A^2 / 2 from the squares, 122, 40, 160 or 810 of
-    2000. The kink takes n k^2 / 12, of which 0.01 are 7 or 375. A second effect needs 60 more.
+    """By hand: a ripple of amplitude A takes n A^2 / 2 from 2000 squares, 122 or 40 of them.
+
+    A second effect needs 60.
     """
     model = rippled(kink, amplitude * np.sin(20.0 * TIME))
-    assert set(explained(model).final.effects) == named
-
-
-@pytest.mark.parametrize(("exact", "named"), [(False, {"kink"}), (True, {"kink", "wave"})])
-def test_beside_an_exact_effect_the_share_of_the_gap_says_nothing(
-    exact: bool, named: set[str]
-) -> None:
-    """By hand: the ripple takes 85 from the squares with this noise, less than a thousandth of
-    2000 30^2 / 12.
-    """
-    model = rippled(30.0, 0.25 * np.sin(20.0 * TIME))
-    model.candidates["kink"] = replace(model.candidates["kink"], exact_form=exact)
     assert set(explained(model).final.effects) == named
 
 
