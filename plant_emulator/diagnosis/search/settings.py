@@ -45,9 +45,9 @@ class Settings:
     most_effects: int = 3
     # Relative error of an approximate law: other laws of the same effect differed by up to this.
     law_error: float = 0.1
-    # Probability from which on chance may make the runs differ on a size. On logs with two effects
-    # it was 0.02 or more, where one was needless 1e-5 or less.
-    agreement: float = 1e-4
+    # Probability below which no chance makes the runs differ on a size. Second effects that are
+    # there had 0.4 or more, beside the error that a law is allowed, and needless ones 0.002 or less.
+    agreement: float = 0.01
     # Leading effects of each regression that are fitted beside its leader: contact and limits move
     # with the fit, so that the order by promise is not yet that by fit. Beside other effects the
     # order is nearly right.
