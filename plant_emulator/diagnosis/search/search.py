@@ -1,15 +1,12 @@
 """Searches the set of effects of largest log evidence: expand the best set, then drop the needless.
 
-The log evidence of a set is half the fall of its penalised cost, less the gain that each of its
-effects needs. The best set is expanded by the effects of largest gain until it leaves only noise or
-what is random, none gains enough, or the cause is foreign. Effects that the runs do not
-confirm (`run_agreement`) stand for the error of another one's law.
+The best set (`fitted_sets`) is expanded by the effects of largest gain until it leaves only noise
+or what is random, none gains enough, or the cause is foreign.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import inf
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.execution.pool import build_model
@@ -25,17 +22,14 @@ from plant_emulator.diagnosis.fitting.evidence import (
 )
 from plant_emulator.diagnosis.fitting.explanation import Explanation
 from plant_emulator.diagnosis.fitting.fit_steps import refit, refit_led
-from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.confirmation import (
     Reduction,
-    confirm,
     reduce,
-    trial_of,
     without_effects,
 )
+from plant_emulator.diagnosis.search.fitted_sets import FittedSets
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
 from plant_emulator.diagnosis.search.promise import leading, rivals
-from plant_emulator.diagnosis.search.run_agreement import run_agreement
 from plant_emulator.diagnosis.search.screening import SIMULATION, promises, rivals_at, visibilities
 from plant_emulator.diagnosis.search.secant_fits import fitted_promises
 from plant_emulator.diagnosis.search.settings import SETTINGS
@@ -51,36 +45,24 @@ from plant_emulator.diagnosis.search.summary import (
 from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-
-    from plant_emulator.diagnosis.answer import SearchStep
     from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.search.promise import Promise
     from plant_emulator.estimation.noise.logged_noise import LoggedNoise
 
 
 @dataclass(kw_only=True)
-class Search:
+class Search(FittedSets):
     """The search of one diagnosis; see the module's text.
 
-    declared : in the noise that the sensors declare
-    runner : beside the outliers; null : fit without effects there
-    beside_random : whether a random effect is part of that noise
+    declared : in the noise that the sensors declare; `runner` leaves the outliers out as well
+    noise : that of the logs, and the fit that it was estimated around
+    reduced_costs : of the best set without each of its effects
     """
 
     declared: TaskRunner
-    runner: TaskRunner
-    null: FitResult
-    beside_random: bool = False
     noise: LoggedNoise | None = None
     noise_at: tuple[object, ...] = ()
-    sets: dict[frozenset[str], FitResult] = field(default_factory=dict)
-    promises: dict[frozenset[str], list[Promise]] = field(default_factory=dict)
-    expanded: set[frozenset[str]] = field(default_factory=set)
-    trace: list[SearchStep] = field(default_factory=list)
-    confirmed: dict[frozenset[str], bool] = field(default_factory=dict)
     reduced_costs: dict[str, float] = field(default_factory=dict)
 
     def explain(self) -> Explanation:
@@ -97,7 +79,7 @@ class Search:
             best = self._queue(SETTINGS.most_effects)
         final = self._without_needless(best)
         if not final.converged:
-            (final,) = self._fits(refit, [final])
+            (final,) = self.fits(refit, [final])
             self.null = self.sets[frozenset()]
         return self._explanation(final)
 
@@ -109,7 +91,7 @@ class Search:
         if self.noise_at == where.key or self.beside_random:
             return False
         self.noise_at = where.key
-        (noise,) = self.declared.map(estimate_noise, [self._task(where)])
+        (noise,) = self.declared.map(estimate_noise, [self.task(where)])
         known = self.noise
         if (known is None and noise.plain) or (known is not None and noise.resembles(known)):
             return False
@@ -121,32 +103,21 @@ class Search:
         self.confirmed.clear()
         kept = not_told_apart(self.sets)
         self.sets = {}
-        self._fits(refit, kept)
+        self.fits(refit, kept)
         self.null = self.sets[frozenset()]
         self.trace.append(search_step(self.null, "noise estimated", where))
         return True
 
-    def _task(self, base: FitResult) -> Task:
-        return Task(base=base, runs=self.runner.runs)
-
-    def _fits(
-        self, step: Callable[[Model, Task], FitResult], bases: Iterable[FitResult]
-    ) -> list[FitResult]:
-        """Run a step on each fit, and keep each result under its set of effects."""
-        found = list(self.runner.map(step, [self._task(base) for base in bases]))
-        self.sets |= {frozenset(one.effects): one for one in found}
-        return found
-
     def _queue(self, most_effects: int) -> FitResult:
         """The best set of at most so many effects."""
-        best = self._settled()
+        best = self.settled()
         while len(best.effects) < most_effects:
             key = frozenset(best.effects)
             if key in self.expanded or self._is_last(best):
                 break
             self.expanded.add(key)
             self._expand(best)
-            best = self._settled()
+            best = self.settled()
         return best
 
     def _is_last(self, found: FitResult) -> bool:
@@ -171,10 +142,6 @@ class Search:
             self.promises[key] = promises(self.runner, found)
         return self.promises[key]
 
-    def _needed(self, others: int) -> float:
-        """Least gain of log evidence that an effect needs beside so many others."""
-        return SETTINGS.needed_again if others or self.beside_random else SETTINGS.needed
-
     def _promising(self, found: FitResult) -> float:
         """Predicted gain from which on one more effect is fitted on top of a fit."""
         return SETTINGS.promising_again if found.effects else SETTINGS.promising
@@ -189,7 +156,7 @@ class Search:
         found, best, key = self._screen(base), base, frozenset(base.effects)
         tried = [p.effect for p in found if key and key | {p.effect} in self.sets]
         for one in leading(found, 1, least, tried):
-            fits = self._confirm(base, [one], SETTINGS.leader_iterations)
+            fits = self.confirm(base, [one], SETTINGS.leader_iterations)
             best = min((best, *fits), key=lambda fit: fit.cost)
             tried.append(one.effect)
             if best is not base and best.mean_square <= NOISE_MEAN_SQUARE:
@@ -203,7 +170,7 @@ class Search:
             self._expand(self.null)
             return
         new = rivals_at(self.runner, base, best, rivals(found, base, least, tried), least)
-        best = min((best, *self._confirm(base, new, SETTINGS.iterations)), key=lambda fit: fit.cost)
+        best = min((best, *self.confirm(base, new, SETTINGS.iterations)), key=lambda fit: fit.cost)
         if base.effects or best.mean_square <= NOISE_MEAN_SQUARE:
             return
         reached = 0.0
@@ -212,7 +179,7 @@ class Search:
                 break
             known = self.sets.get(frozenset([one.effect]), base)
             if one.gain > 0.5 * (base.cost - known.cost):
-                (known,) = self._confirm(base, [one], SETTINGS.leader_iterations)
+                (known,) = self.confirm(base, [one], SETTINGS.leader_iterations)
             reached = max(reached, 0.5 * (base.cost - known.cost))
 
     def _led_again(self, found: FitResult) -> FitResult:
@@ -222,8 +189,8 @@ class Search:
         """
         if found.mean_square <= SUSPECT_MEAN_SQUARE or not adequate(found, self.null):
             return found
-        (again,) = self.runner.map(refit_led, [self._task(found)])
-        self._keep(again)
+        (again,) = self.runner.map(refit_led, [self.task(found)])
+        self.keep(again)
         self.trace.append(search_step(self.null, "led again", again))
         return min(found, again, key=lambda one: one.cost)
 
@@ -234,81 +201,8 @@ class Search:
         least = max(EVIDENCE_THRESHOLD, SETTINGS.rival_share * (self.null.cost - found.cost))
         if self.null.cost - null.cost < least:
             return False
-        self._take_null(null)
+        self.take_null(null)
         return True
-
-    def _take_null(self, null: FitResult) -> None:
-        """Take a better fit without effects in the place of the known one."""
-        self.trace.append(search_step(self.null, "fitted anew", null))
-        self.null = self.sets[frozenset()] = null
-        self.promises.pop(frozenset(), None)
-
-    def _confirm(self, base: FitResult, new: Sequence[Promise], iterations: int) -> list[FitResult]:
-        """Fit these effects on top of a set, each for at most so many iterations."""
-        trials = [trial_of(p, base, self.runner.runs, iterations) for p in new]
-        found = list(self.runner.map(confirm, trials))
-        for promise, one in zip(new, found, strict=True):
-            self._keep(one)
-            self.trace.append(search_step(self.null, "confirmed", one, promise.gains))
-        return found
-
-    def _keep(self, found: FitResult) -> None:
-        """Keep a fit if it is the best one of its set."""
-        key = frozenset(found.effects)
-        if key not in self.sets or found.cost < self.sets[key].cost:
-            self.sets[key] = found
-
-    def _value(self, found: FitResult) -> float:
-        """Negative log evidence of a set, with the gain that each of its effects needs.
-
-        It is infinite where the runs do not confirm an effect.
-        """
-        if not self.confirmed.get(frozenset(found.effects), True):
-            return inf
-        return 0.5 * found.cost + sum(map(self._needed, range(len(found.effects))))
-
-    def _settled(self) -> FitResult:
-        """Refit all sets near the best one until they converge; return the best.
-
-        What the best one leaves beyond the noise a set may explain whose fit has not ended. A set
-        with an effect that the runs do not confirm is none.
-        """
-        done: set[frozenset[str]] = set()
-        while True:
-            best = min(self.sets.values(), key=self._value)
-            near = [
-                one
-                for one in self.sets.values()
-                if frozenset(one.effects) not in done
-                and len(one.effects) == max(1, len(best.effects))
-                and one.cost < best.cost + SETTINGS.near + (not one.converged) * excess(best)
-            ]
-            if not near and self._confirmed(best):
-                return best
-            for one in self._fits(refit, near):
-                done.add(frozenset(one.effects))
-                self.trace.append(search_step(self.null, "converged", one))
-
-    def _confirmed(self, found: FitResult) -> bool:
-        """Whether the runs confirm the last effect of a set as more than the error of others' laws.
-
-        Where they do not, another one may take its place. An effect that a single run shows has
-        nothing to agree with, and must close more than such errors leave.
-        """
-        key, base = frozenset(found.effects), frozenset(found.effects[:-1])
-        if len(key) > 1 and key not in self.confirmed:
-            smaller, library = self.sets.get(base, self.null), self.runner.model.candidates
-            approximate = any(not library[name].exact_form for name in smaller.effects)
-            least = SETTINGS.law_error**2 * approximate * (self.null.cost - smaller.cost)
-            asked = Reduction(found, self.runner.runs, found.effects[-1])
-            (said,) = self.runner.map(run_agreement, [asked])
-            self.confirmed[key] = said.probability >= SETTINGS.agreement and (
-                said.runs > 1 or smaller.cost - found.cost >= least
-            )
-            if not self.confirmed[key]:
-                self.trace.append(search_step(self.null, "the runs do not confirm it", found))
-                self.expanded.discard(base)
-        return self.confirmed.get(key, True)
 
     def _without_needless(self, best: FitResult) -> FitResult:
         """Drop the effect that closes least until each one closes enough; return the set.
@@ -326,13 +220,13 @@ class Search:
         if len(asked) == 1:
             return self._beside_renewed_null(best, asked[0])
         for one, found in zip(asked, self.runner.map(reduce, asked), strict=True):
-            self._keep(found)
+            self.keep(found)
             self.reduced_costs[one.effect] = self.sets[frozenset(found.effects)].cost
-        found = self._settled()
+        found = self.settled()
         if found.effects != best.effects:
             return self._without_needless(found)
         cheapest = min(self.reduced_costs, key=self.reduced_costs.__getitem__)
-        (least,) = self._fits(refit, [self.sets[frozenset(best.effects) - {cheapest}]])
+        (least,) = self.fits(refit, [self.sets[frozenset(best.effects) - {cheapest}]])
         self.reduced_costs[cheapest] = least.cost
         fall = least.cost - found.cost
         library = self.runner.model.candidates
@@ -352,18 +246,18 @@ class Search:
         (null,) = self.runner.map(without_effects, [(self.null, asked)])
         if null.cost >= self.null.cost:
             return best
-        self._take_null(null)
-        if min(self.sets.values(), key=self._value).effects == best.effects:
+        self.take_null(null)
+        if min(self.sets.values(), key=self.value).effects == best.effects:
             return best
         self.expanded.discard(frozenset())
         return self._without_needless(self._queue(SETTINGS.most_effects))
 
     def _explanation(self, final: FitResult) -> Explanation:
-        (shown,) = self.runner.map(visibilities, [self._task(self.null)])
-        values = {key: self._value(one) for key, one in self.sets.items()}
+        (shown,) = self.runner.map(visibilities, [self.task(self.null)])
+        values = {key: self.value(one) for key, one in self.sets.items()}
         screened = self.promises.get(frozenset(final.effects), [])
         larger = {
-            p.effect: self._needed(len(final.effects)) - p.gains.get(SIMULATION, 0.0)
+            p.effect: self.needed(len(final.effects)) - p.gains.get(SIMULATION, 0.0)
             for p in screened
         }
         library = self.runner.model.candidates
