@@ -171,7 +171,7 @@ class Search(FittedSets):
             return
         new = rivals_at(self.runner, base, best, rivals(found, base, least, tried), least)
         best = min((best, *self.confirm(base, new, SETTINGS.iterations)), key=lambda fit: fit.cost)
-        if base.effects or best.mean_square <= NOISE_MEAN_SQUARE:
+        if base.effects or self._leaves_law_error(best):
             return
         reached = 0.0
         for one in fitted_promises(self.runner, base)[: SETTINGS.most_followed]:
@@ -181,6 +181,10 @@ class Search(FittedSets):
             if one.gain > 0.5 * (base.cost - known.cost):
                 (known,) = self.confirm(base, [one], SETTINGS.leader_iterations)
             reached = max(reached, 0.5 * (base.cost - known.cost))
+
+    def _leaves_law_error(self, found: FitResult) -> bool:
+        """Whether a fit leaves noise, or no more of the gap than approximate laws do."""
+        return excess(found) <= SETTINGS.law_error**2 * excess(self.null)
 
     def _led_again(self, found: FitResult) -> FitResult:
         """The fit, led along the measured speeds once more where it ended in a local minimum.
@@ -234,7 +238,7 @@ class Search(FittedSets):
         closes = (
             found.mean_square <= NOISE_MEAN_SQUARE
             or leaves_little(found, excess(found) + fall)
-            or (approximate and excess(found) <= SETTINGS.law_error**2 * excess(self.null))
+            or (approximate and self._leaves_law_error(found))
         )
         if closes and evidence_of(fall, found, self.null) >= EVIDENCE_THRESHOLD:
             return found
