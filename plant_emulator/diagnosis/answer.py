@@ -170,7 +170,7 @@ class SearchStep:
     """A step of the search for effects.
 
     action : what was done with the set of effects, as confirmed, converged, led again, fitted anew,
-        or noise estimated there
+        refuted by the runs, or noise estimated there
     promised : gain that the linear regressions promised for the last effect, by regression; of a
         rival of a leader that leaves noise at the leader's parameters
     gain : of log evidence over the fit without effects

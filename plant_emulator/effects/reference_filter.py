@@ -5,8 +5,7 @@
 Source: W. Leonhard, Control of Electrical Drives, chapter on the cascade control of drives
 (smoothing of the reference); K. Ogata, Modern Control Engineering, on second-order systems. A large
 damping zeta makes it a filter of first order with the time constant 2 zeta T. T = 0: no filter.
-zeta = 1 does not overshoot. At zeta = 1 / sqrt(2) a filter is a dead time, up to the second order:
-a small one hardly shows.
+zeta = 1 does not overshoot. At zeta = 1 / sqrt(2) a filter is a dead time up to the second order.
 """
 
 from __future__ import annotations

@@ -8,7 +8,6 @@ effect stands for the error of another one's law.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import inf
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fitting.evidence import excess
@@ -35,7 +34,7 @@ class FittedSets:
 
     runner : in whose noise the costs count; null : fit without effects
     beside_random : whether a random effect is part of that noise
-    sets : the best fit of each set; confirmed : whether the runs confirm it, where they were asked
+    sets : the best fit of each set; agreed : whether the runs agree on it, where they were asked
     promises : what one more effect promises on top of a set
     expanded : sets whose most promising effects were fitted on top of them
     """
@@ -44,7 +43,7 @@ class FittedSets:
     null: FitResult
     beside_random: bool = False
     sets: dict[frozenset[str], FitResult] = field(default_factory=dict)
-    confirmed: dict[frozenset[str], bool] = field(default_factory=dict)
+    agreed: dict[frozenset[str], bool] = field(default_factory=dict)
     promises: dict[frozenset[str], list[Promise]] = field(default_factory=dict)
     expanded: set[frozenset[str]] = field(default_factory=set)
     trace: list[SearchStep] = field(default_factory=list)
@@ -81,59 +80,68 @@ class FittedSets:
         key = frozenset(found.effects)
         if key not in self.sets or found.cost < self.sets[key].cost:
             self.sets[key] = found
+            self.agreed.pop(key, None)
+
+    @property
+    def unrefuted(self) -> dict[frozenset[str], FitResult]:
+        """The sets that the runs do not refute."""
+        return {key: one for key, one in self.sets.items() if self.agreed.get(key, True)}
 
     def needed(self, others: int) -> float:
         """Least gain of log evidence that an effect needs beside so many others."""
         return SETTINGS.needed_again if others or self.beside_random else SETTINGS.needed
 
     def value(self, found: FitResult) -> float:
-        """Negative log evidence of a set, with the gain that each of its effects needs.
-
-        It is infinite where the runs do not confirm an effect.
-        """
-        if not self.confirmed.get(frozenset(found.effects), True):
-            return inf
+        """Negative log evidence of a set, with the gain that each of its effects needs."""
         return 0.5 * found.cost + sum(map(self.needed, range(len(found.effects))))
 
     def settled(self) -> FitResult:
         """Refit all sets near the best one until they converge; return the best.
 
-        What the best one leaves beyond the noise a set may explain whose fit has not ended. A set
-        with an effect that the runs do not confirm is none.
+        What the best one leaves beyond the noise a set may explain whose fit has not ended.
         """
         done: set[frozenset[str]] = set()
         while True:
-            best = min(self.sets.values(), key=self.value)
+            left = self.unrefuted
+            best = min(left.values(), key=self.value)
             near = [
                 one
-                for one in self.sets.values()
-                if frozenset(one.effects) not in done
-                and len(one.effects) == max(1, len(best.effects))
+                for key, one in left.items()
+                if key not in done
+                and len(key) == max(1, len(best.effects))
                 and one.cost < best.cost + SETTINGS.near + (not one.converged) * excess(best)
             ]
-            if not near and self.is_confirmed(best):
+            if not near and self._ask_runs(best):
                 return best
             for one in self.fits(refit, near):
                 done.add(frozenset(one.effects))
                 self.trace.append(search_step(self.null, "converged", one))
 
-    def is_confirmed(self, found: FitResult) -> bool:
-        """Whether the runs confirm the last effect of a set as more than the error of others' laws.
+    def _ask_runs(self, found: FitResult) -> bool:
+        """Ask the runs of the further effects of a set, once; give whether they agree.
 
-        Where they do not, another one may take its place. An effect that a single run shows has
-        nothing to agree with, and must close more than such errors leave.
+        Where they do not, another effect may take the place of the last one. If a single run shows
+        that, it has nothing to agree with, and must close more than laws leave.
         """
         key, base = frozenset(found.effects), frozenset(found.effects[:-1])
-        if len(key) > 1 and key not in self.confirmed:
-            smaller, library = self.sets.get(base, self.null), self.runner.model.candidates
-            approximate = any(not library[name].exact_form for name in smaller.effects)
-            least = SETTINGS.law_error**2 * approximate * (self.null.cost - smaller.cost)
-            asked = Reduction(found, self.runner.runs, found.effects[-1])
-            (said,) = self.runner.map(run_agreement, [asked])
-            self.confirmed[key] = said.probability >= SETTINGS.agreement and (
-                said.runs > 1 or smaller.cost - found.cost >= least
-            )
-            if not self.confirmed[key]:
-                self.trace.append(search_step(self.null, "the runs do not confirm it", found))
-                self.expanded.discard(base)
-        return self.confirmed.get(key, True)
+        if len(key) < 2 or key in self.agreed:
+            return self.agreed.get(key, True)
+        asked = [Reduction(found, self.runner.runs, name) for name in found.effects[1:]]
+        said = list(self.runner.map(run_agreement, asked))
+        least = min(one.probability for one in said)
+        self.agreed[key] = least >= SETTINGS.agreement and (
+            said[-1].runs > 1 or self._closes_more_than_laws_leave(found)
+        )
+        if not self.agreed[key]:
+            action = f"refuted by the runs (probability {least:.1g})"
+            self.trace.append(search_step(self.null, action, found))
+            self.expanded.discard(base)
+        return self.agreed[key]
+
+    def _closes_more_than_laws_leave(self, found: FitResult) -> bool:
+        """Whether the last effect closes more than the laws of the others may leave."""
+        others, library = found.effects[:-1], self.runner.model.candidates
+        smaller = self.sets.get(frozenset(others), self.null)
+        approximate = any(not library[name].exact_form for name in others)
+        share = SETTINGS.law_error**2 * approximate
+        return smaller.cost - found.cost >= share * (self.null.cost - smaller.cost)

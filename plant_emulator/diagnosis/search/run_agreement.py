@@ -1,4 +1,4 @@
-"""Whether the runs confirm an effect: they show it with the same size.
+"""Whether the runs agree on the size of an effect.
 
 An effect has one size in all runs. An effect that stands for the error of another one's law follows
 what differs from run to run. At a fit, the Jacobian's column of a size s is split into one column a
@@ -7,13 +7,14 @@ s_k, with covariance C, agree where chance leaves their chi squared,
 
     (s_k - m)' V^-1 (s_k - m),   V = C + (e s)^2 I
 
-m is their weighted mean, e the relative error of an approximate law. It is the test of homogeneity
-of effect sizes (W. Cochran, Biometrics 10 (1954) 101). A single run is split into its two halves.
+m is their weighted mean, e the relative error of a law. It is the test of homogeneity of effect
+sizes (W. Cochran, Biometrics 10 (1954) 101). A single run is split into its two halves. An error
+that is the same in all runs, as in logs of one program, is not found.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +22,6 @@ from scipy.stats import chi2
 
 from plant_emulator.diagnosis.fitting.joint_fit import (
     SHRINKAGE,
-    SIGNIFICANT_ERRORS,
     effective_fraction,
     linearise,
 )
@@ -40,56 +40,85 @@ if TYPE_CHECKING:
 class RunAgreement:
     """What the runs say of an effect.
 
-    probability : that chance and approximate laws make its sizes differ so much between runs [1]
-    runs : number of runs each of which tells a size for certain
+    probability : that chance and a law's error make its sizes differ so much between runs [1]
+    runs : number of runs that show the effect
     """
 
     probability: float
     runs: int
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Split:
+    """A fit with a size of each run.
+
+    changes : of the size, shape (runs,); covariance : of them, for white residuals of variance 1
+    inflation : of that covariance, by what the split fit leaves and its autocorrelation [1]
+    """
+
+    changes: Array
+    covariance: Array
+    inflation: float
+
+
 def run_agreement(model: Model, asked: Reduction) -> RunAgreement:
-    """What the runs say of an effect of a fit, of its size on which they differ most (a step)."""
-    found, candidate = asked.base, model.candidates[asked.effect]
-    near = linearise(model, found, asked.runs)
-    inflation = max(1.0, found.mean_square) / effective_fraction(near)
+    """What the runs say of an effect of a fit, of its size on which they differ most (a step).
+
+    A run that does not show a size has its prior, and counts as none.
+    """
+    candidate = model.candidates[asked.effect]
+    near = linearise(model, asked.base, asked.runs)
     names = [u.name for u in near.unknowns]
-    probability, telling = 1.0, 0
+    probability, showing = 1.0, 0
     for unknown in candidate.sizes:
         index, neutral = names.index(unknown.name), unknown.scaled(candidate.neutral[unknown.name])
-        size = float(near.z[index]) - neutral
-        if abs(size) <= SIGNIFICANT_ERRORS * near.standard_errors[index]:
-            continue
         widest = SHRINKAGE * abs(unknown.scaled(unknown.start) - neutral)
-        changes, covariance = _changes_by_run(near, index, widest)
-        chance = inflation * covariance
-        spread = _spread(changes, chance + (SETTINGS.law_error * size) ** 2 * np.eye(len(changes)))
-        probability = min(probability, float(chi2.sf(spread, len(changes) - 1)))
-        certain = np.abs(size + changes) > SIGNIFICANT_ERRORS * np.sqrt(np.diag(chance))
-        telling = max(telling, int(np.sum(certain)))
-    return RunAgreement(probability=probability, runs=telling)
+        split = _split(near, index, widest)
+        runs = round(float(np.sum(1.0 - np.diag(split.covariance) / widest**2)))
+        law = SETTINGS.law_error * (float(near.z[index]) - neutral)
+        spread = _spread(
+            split.changes, split.inflation * split.covariance + law**2 * np.eye(len(split.changes))
+        )
+        probability = min(probability, float(chi2.sf(spread, max(1, runs - 1))))
+        showing = max(showing, runs)
+    return RunAgreement(probability=probability, runs=showing)
 
 
-def _changes_by_run(near: Estimate, index: int, widest: float) -> tuple[Array, Array]:
-    """Changes of a size that each run asks for, shape (parts,), and their covariance.
+def _split(near: Estimate, index: int, widest: float) -> _Split:
+    """Give each run a size of its own, at a fit with one size for all.
 
-    index : of the size among the unknowns
-    widest : prior standard deviation of the changes; a run that does not show the size has it
+    index : of the size among the unknowns; widest : prior standard deviation of the changes
     """
-    slopes = [j.reshape(-1, len(near.z)) for j in _parts(near.jacobians)]
-    residuals = [r.ravel() for r in _parts(near.residuals)]
-    precision = np.array([u.scaled_std**-2.0 for u in near.unknowns])
-    precision = np.append(np.delete(precision, index), np.full(len(slopes), widest**-2.0))
-    information, gradient = np.diag(precision), np.zeros(len(precision))
-    for k, (columns, residual) in enumerate(zip(slopes, residuals, strict=True)):
-        own = np.zeros((len(columns), len(slopes)))
-        own[:, k] = columns[:, index]
-        rows = np.hstack([np.delete(columns, index, axis=1), own])
-        information += rows.T @ rows
-        gradient += rows.T @ residual
+    slopes = [_by_run(j, index, k, near) for k, j in enumerate(_parts(near.jacobians))]
+    residuals = _parts(near.residuals)
+    others = [(u, float(z)) for u, z in zip(near.unknowns, near.z, strict=True)]
+    del others[index]
+    precision = [u.scaled_std**-2.0 for u, _ in others] + [widest**-2.0] * len(slopes)
+    # What a prior pulls at the fit, the residuals pull the other way.
+    pull = [0.0 if u.std is None else (z - u.scaled(u.prior)) for u, z in others]
+    gradient = np.array(precision) * np.array([*pull, *np.zeros(len(slopes))])
+    information = np.diag(precision)
+    for columns, residual in zip(slopes, residuals, strict=True):
+        rows = columns.reshape(-1, len(precision))
+        information = information + rows.T @ rows
+        gradient = gradient + rows.T @ residual.ravel()
     covariance = np.linalg.pinv(information, hermitian=True)
+    change = -covariance @ gradient
+    left = tuple(r + columns @ change for r, columns in zip(residuals, slopes, strict=True))
+    square = sum(float(np.sum(r**2)) for r in left) / near.samples
     k = len(slopes)
-    return -(covariance @ gradient)[-k:], covariance[-k:, -k:]
+    return _Split(
+        changes=change[-k:],
+        covariance=covariance[-k:, -k:],
+        inflation=max(1.0, square) / effective_fraction(replace(near, residuals=left)),
+    )
+
+
+def _by_run(slopes: Array, index: int, run: int, near: Estimate) -> Array:
+    """Slopes of a run, with its own column of a size among those of all runs at the end."""
+    own = np.zeros((*slopes.shape[:2], len(_parts(near.residuals))))
+    own[..., run] = slopes[..., index]
+    return np.concatenate([np.delete(slopes, index, axis=-1), own], axis=-1)
 
 
 def _parts(runs: Sequence[Array]) -> list[Array]:

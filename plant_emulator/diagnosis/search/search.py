@@ -98,10 +98,10 @@ class Search(FittedSets):
         self.noise = noise
         recipe = WhitenedRecipe(self.declared.recipe, noise)
         self.runner = replace(self.declared, recipe=recipe, model=build_model(recipe))
+        kept = not_told_apart(self.unrefuted)
         self.promises.clear()
         self.expanded.clear()
-        self.confirmed.clear()
-        kept = not_told_apart(self.sets)
+        self.agreed.clear()
         self.sets = {}
         self.fits(refit, kept)
         self.null = self.sets[frozenset()]
@@ -153,7 +153,8 @@ class Search(FittedSets):
         Where there is no effect yet, and none of these is the cause, fits by secants tell.
         """
         least = self._promising(base)
-        found, best, key = self._screen(base), base, frozenset(base.effects)
+        key, best = frozenset(base.effects), base
+        found = [p for p in self._screen(base) if self.agreed.get(key | {p.effect}, True)]
         tried = [p.effect for p in found if key and key | {p.effect} in self.sets]
         for one in leading(found, 1, least, tried):
             fits = self.confirm(base, [one], SETTINGS.leader_iterations)
@@ -171,7 +172,7 @@ class Search(FittedSets):
             return
         new = rivals_at(self.runner, base, best, rivals(found, base, least, tried), least)
         best = min((best, *self.confirm(base, new, SETTINGS.iterations)), key=lambda fit: fit.cost)
-        if base.effects or self._leaves_law_error(best):
+        if base.effects or self._leaves_hundredth(best):
             return
         reached = 0.0
         for one in fitted_promises(self.runner, base)[: SETTINGS.most_followed]:
@@ -182,8 +183,8 @@ class Search(FittedSets):
                 (known,) = self.confirm(base, [one], SETTINGS.leader_iterations)
             reached = max(reached, 0.5 * (base.cost - known.cost))
 
-    def _leaves_law_error(self, found: FitResult) -> bool:
-        """Whether a fit leaves noise, or no more of the gap than approximate laws do."""
+    def _leaves_hundredth(self, found: FitResult) -> bool:
+        """Whether a fit leaves noise, or at most the part of the gap that laws do."""
         return excess(found) <= SETTINGS.law_error**2 * excess(self.null)
 
     def _led_again(self, found: FitResult) -> FitResult:
@@ -238,12 +239,12 @@ class Search(FittedSets):
         closes = (
             found.mean_square <= NOISE_MEAN_SQUARE
             or leaves_little(found, excess(found) + fall)
-            or (approximate and self._leaves_law_error(found))
+            or (approximate and self._leaves_hundredth(found))
         )
         if closes and evidence_of(fall, found, self.null) >= EVIDENCE_THRESHOLD:
             return found
         self.sets = {k: one for k, one in self.sets.items() if len(k) < len(best.effects)}
-        return self._without_needless(least)
+        return self._without_needless(self.settled())
 
     def _beside_renewed_null(self, best: FitResult, asked: Reduction) -> FitResult:
         """The one effect; what the queue finds where a better fit without it takes its gain."""
@@ -258,11 +259,11 @@ class Search(FittedSets):
 
     def _explanation(self, final: FitResult) -> Explanation:
         (shown,) = self.runner.map(visibilities, [self.task(self.null)])
-        values = {key: self.value(one) for key, one in self.sets.items()}
-        screened = self.promises.get(frozenset(final.effects), [])
+        key, sets = frozenset(final.effects), self.unrefuted
         larger = {
-            p.effect: self.needed(len(final.effects)) - p.gains.get(SIMULATION, 0.0)
-            for p in screened
+            p.effect: self.needed(len(key)) - p.gains.get(SIMULATION, 0.0)
+            for p in self.promises.get(key, [])
+            if self.agreed.get(key | {p.effect}, True)
         }
         library = self.runner.model.candidates
         mending = corrections(library, final, self.reduced_costs)
@@ -272,10 +273,12 @@ class Search(FittedSets):
         return Explanation(
             null=self.null,
             final=final,
-            hypotheses=hypotheses(self.sets, shown),
-            alternatives={name: alternatives(self.sets, final, name) for name in final.effects},
+            hypotheses=hypotheses(sets, shown),
+            alternatives={name: alternatives(sets, final, name) for name in final.effects},
             unconverged=unconverged(final),
-            log_odds=log_odds(self.sets, values, final, larger),
+            log_odds=log_odds(
+                sets, {key: self.value(one) for key, one in sets.items()}, final, larger
+            ),
             reduced_costs=self.reduced_costs,
             corrections=mending,
             trace=tuple(self.trace),
