@@ -30,6 +30,7 @@ LABELS = {
     "refit_led": "fits along the measured speeds",
     "fit_by_secants": "fits along the measured speeds",
     "refit": "fits to their end",
+    "run_agreement": "whether the runs agree",
     "visibilities": "what the logs can show",
     "fit_random_effect": "random effects",
     "fit_alone": "each run alone",

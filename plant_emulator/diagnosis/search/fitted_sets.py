@@ -1,8 +1,8 @@
 """The sets of effects that a search has fitted, and which of them the logs ask for most.
 
 The log evidence of a set is half the fall of its penalised cost, less the gain that each of its
-effects needs. A set whose last effect the runs do not confirm (`run_agreement`) has none: that
-effect stands for the error of another one's law.
+effects needs. A set on whose further effects the runs do not agree (`run_agreement`) is refuted:
+they stand for the error of the first one's law.
 """
 
 from __future__ import annotations

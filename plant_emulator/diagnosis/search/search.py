@@ -252,7 +252,7 @@ class Search(FittedSets):
         if null.cost >= self.null.cost:
             return best
         self.take_null(null)
-        if min(self.sets.values(), key=self.value).effects == best.effects:
+        if min(self.unrefuted.values(), key=self.value).effects == best.effects:
             return best
         self.expanded.discard(frozenset())
         return self._without_needless(self._queue(SETTINGS.most_effects))
@@ -277,7 +277,7 @@ class Search(FittedSets):
             alternatives={name: alternatives(sets, final, name) for name in final.effects},
             unconverged=unconverged(final),
             log_odds=log_odds(
-                sets, {key: self.value(one) for key, one in sets.items()}, final, larger
+                sets, {names: self.value(one) for names, one in sets.items()}, final, larger
             ),
             reduced_costs=self.reduced_costs,
             corrections=mending,
