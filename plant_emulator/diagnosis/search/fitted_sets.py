@@ -120,28 +120,16 @@ class FittedSets:
     def _ask_runs(self, found: FitResult) -> bool:
         """Ask the runs of the further effects of a set, once; give whether they agree.
 
-        Where they do not, another effect may take the place of the last one. If a single run shows
-        that, it has nothing to agree with, and must close more than laws leave.
+        Where they do not, another effect may take the place of the last one.
         """
         key, base = frozenset(found.effects), frozenset(found.effects[:-1])
         if len(key) < 2 or key in self.agreed:
             return self.agreed.get(key, True)
         asked = [Reduction(found, self.runner.runs, name) for name in found.effects[1:]]
-        said = list(self.runner.map(run_agreement, asked))
-        least = min(one.probability for one in said)
-        self.agreed[key] = least >= SETTINGS.agreement and (
-            said[-1].runs > 1 or self._closes_more_than_laws_leave(found)
-        )
+        least = min(self.runner.map(run_agreement, asked))
+        self.agreed[key] = least >= SETTINGS.agreement
         if not self.agreed[key]:
             action = f"refuted by the runs (probability {least:.1g})"
             self.trace.append(search_step(self.null, action, found))
             self.expanded.discard(base)
         return self.agreed[key]
-
-    def _closes_more_than_laws_leave(self, found: FitResult) -> bool:
-        """Whether the last effect closes more than the laws of the others may leave."""
-        others, library = found.effects[:-1], self.runner.model.candidates
-        smaller = self.sets.get(frozenset(others), self.null)
-        approximate = any(not library[name].exact_form for name in others)
-        share = SETTINGS.law_error**2 * approximate
-        return smaller.cost - found.cost >= share * (self.null.cost - smaller.cost)

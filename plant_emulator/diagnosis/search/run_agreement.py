@@ -2,14 +2,15 @@
 
 An effect has one size in all runs. An effect that stands for the error of another one's law follows
 what differs from run to run. At a fit, the Jacobian's column of a size s is split into one column a
-run: least squares then tell a size of its own for each run, beside all other unknowns. The sizes
-s_k, with covariance C, agree where chance leaves their chi squared,
+part of the logs: least squares then tell a size of its own for each part, beside all other
+unknowns. The sizes s_k, with covariance C, agree where chance leaves their chi squared,
 
     (s_k - m)' V^-1 (s_k - m),   V = C + (e s)^2 I
 
 m is their weighted mean, e the relative error of a law. It is the test of homogeneity of effect
-sizes (W. Cochran, Biometrics 10 (1954) 101). A single run is split into its two halves. An error
-that is the same in all runs, as in logs of one program, is not found.
+sizes (W. Cochran, Biometrics 10 (1954) 101). Each run is a part; of a run that shows the effect
+nearly alone, each half of what it shows. An error that is the same in all runs, as in logs of one
+program, is not found.
 """
 
 from __future__ import annotations
@@ -28,8 +29,6 @@ from plant_emulator.diagnosis.fitting.joint_fit import (
 from plant_emulator.diagnosis.search.settings import SETTINGS
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.search.confirmation import Reduction
     from plant_emulator.estimation.unknowns import Estimate
@@ -37,22 +36,10 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunAgreement:
-    """What the runs say of an effect.
-
-    probability : that chance and a law's error make its sizes differ so much between runs [1]
-    runs : number of runs that show the effect
-    """
-
-    probability: float
-    runs: int
-
-
-@dataclass(frozen=True, kw_only=True)
 class _Split:
-    """A fit with a size of each run.
+    """A fit with a size of each part.
 
-    changes : of the size, shape (runs,); covariance : of them, for white residuals of variance 1
+    changes : of the size, shape (parts,); covariance : of them, for white residuals of variance 1
     inflation : of that covariance, by what the split fit leaves and its autocorrelation [1]
     """
 
@@ -61,52 +48,54 @@ class _Split:
     inflation: float
 
 
-def run_agreement(model: Model, asked: Reduction) -> RunAgreement:
-    """What the runs say of an effect of a fit, of its size on which they differ most (a step).
+def run_agreement(model: Model, asked: Reduction) -> float:
+    """Probability that the runs differ so much by chance and by a law's error (a step).
 
-    A run that does not show a size has its prior, and counts as none.
+    It is that of the size of the effect of a fit on which they differ most. A part that does not
+    show a size has its prior, and counts as none.
     """
     candidate = model.candidates[asked.effect]
     near = linearise(model, asked.base, asked.runs)
     names = [u.name for u in near.unknowns]
-    probability, showing = 1.0, 0
+    probability = 1.0
     for unknown in candidate.sizes:
         index, neutral = names.index(unknown.name), unknown.scaled(candidate.neutral[unknown.name])
         widest = SHRINKAGE * abs(unknown.scaled(unknown.start) - neutral)
         split = _split(near, index, widest)
-        runs = round(float(np.sum(1.0 - np.diag(split.covariance) / widest**2)))
+        showing = round(float(np.sum(1.0 - np.diag(split.covariance) / widest**2)))
         law = SETTINGS.law_error * (float(near.z[index]) - neutral)
         spread = _spread(
             split.changes, split.inflation * split.covariance + law**2 * np.eye(len(split.changes))
         )
-        probability = min(probability, float(chi2.sf(spread, max(1, runs - 1))))
-        showing = max(showing, runs)
-    return RunAgreement(probability=probability, runs=showing)
+        probability = min(probability, float(chi2.sf(spread, max(1, showing - 1))))
+    return probability
 
 
 def _split(near: Estimate, index: int, widest: float) -> _Split:
-    """Give each run a size of its own, at a fit with one size for all.
+    """Give each part a size of its own, at a fit with one size for all.
 
     index : of the size among the unknowns; widest : prior standard deviation of the changes
     """
-    slopes = [_by_run(j, index, k, near) for k, j in enumerate(_parts(near.jacobians))]
-    residuals = _parts(near.residuals)
+    slopes = [
+        np.concatenate([np.delete(j, index, axis=-1), j[..., [index]] * own], axis=-1)
+        for j, own in zip(near.jacobians, _parts(near, index), strict=True)
+    ]
     others = [(u, float(z)) for u, z in zip(near.unknowns, near.z, strict=True)]
     del others[index]
-    precision = [u.scaled_std**-2.0 for u, _ in others] + [widest**-2.0] * len(slopes)
+    k = slopes[0].shape[-1] - len(others)
+    precision = [u.scaled_std**-2.0 for u, _ in others] + [widest**-2.0] * k
     # What a prior pulls at the fit, the residuals pull the other way.
     pull = [0.0 if u.std is None else (z - u.scaled(u.prior)) for u, z in others]
-    gradient = np.array(precision) * np.array([*pull, *np.zeros(len(slopes))])
+    gradient = np.array(precision) * np.array([*pull, *np.zeros(k)])
     information = np.diag(precision)
-    for columns, residual in zip(slopes, residuals, strict=True):
+    for columns, residual in zip(slopes, near.residuals, strict=True):
         rows = columns.reshape(-1, len(precision))
         information = information + rows.T @ rows
         gradient = gradient + rows.T @ residual.ravel()
     covariance = np.linalg.pinv(information, hermitian=True)
     change = -covariance @ gradient
-    left = tuple(r + columns @ change for r, columns in zip(residuals, slopes, strict=True))
+    left = tuple(r + columns @ change for r, columns in zip(near.residuals, slopes, strict=True))
     square = sum(float(np.sum(r**2)) for r in left) / near.samples
-    k = len(slopes)
     return _Split(
         changes=change[-k:],
         covariance=covariance[-k:, -k:],
@@ -114,16 +103,19 @@ def _split(near: Estimate, index: int, widest: float) -> _Split:
     )
 
 
-def _by_run(slopes: Array, index: int, run: int, near: Estimate) -> Array:
-    """Slopes of a run, with its own column of a size among those of all runs at the end."""
-    own = np.zeros((*slopes.shape[:2], len(_parts(near.residuals))))
-    own[..., run] = slopes[..., index]
-    return np.concatenate([np.delete(slopes, index, axis=-1), own], axis=-1)
+def _parts(near: Estimate, index: int) -> list[Array]:
+    """Which part each sample of a run belongs to, one column of 0 and 1 a part.
 
-
-def _parts(runs: Sequence[Array]) -> list[Array]:
-    """The runs, shape (channels, samples, ...) each, or the halves of a single one."""
-    return list(runs) if len(runs) > 1 else np.array_split(runs[0], 2, axis=1)
+    A run that holds nearly all of the column's sum of squares is halved, where half of it is past.
+    """
+    squares = [np.cumsum(np.sum(j[..., index] ** 2, axis=0)) for j in near.jacobians]
+    total = sum(one[-1] for one in squares)
+    parts, known = [], 0
+    for one in squares:
+        halved = 2.0 * one[-1] >= 1.5 * total
+        parts.append(known + halved * (2.0 * one > one[-1]))
+        known += 1 + halved
+    return [np.eye(known)[part.astype(int)] for part in parts]
 
 
 def _spread(values: Array, covariance: Array) -> float:

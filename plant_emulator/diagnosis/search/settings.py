@@ -46,7 +46,7 @@ class Settings:
     # Relative error of an approximate law: other laws of the same effect differed by up to this.
     law_error: float = 0.1
     # Probability below which no chance makes the runs differ on a size. Second effects that are
-    # there had 0.4 or more, beside the error that a law may have, and needless ones 0.002 or less.
+    # there had 0.4 or more, beside the error that a law may have, and needless ones 0.006 or less.
     agreement: float = 0.01
     # Leading effects of each regression that are fitted beside its leader: contact and limits move
     # with the fit, so that the order by promise is not yet that by fit. Beside other effects the
