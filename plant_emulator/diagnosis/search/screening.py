@@ -232,17 +232,19 @@ def _scores(
 
 
 def _first_score(fidelity: Fidelity, candidate: Candidate, asked: Screening) -> Score | None:
-    """Score of an effect at the first size, or that of its slopes near the noise.
+    """Score of an effect at the first size; near the noise by slopes, or beside what follows it.
 
-    Relations hold between samples: nothing adds up in them, and their columns hardly bend.
+    Relations hold between samples: nothing adds up in them, and their columns hardly bend. A slope
+    is right for effects that the parameters cannot follow far, a column beside them for contact
+    that they keep as it is.
     """
-    states = asked.states[candidate.name]
-    found = best_score(fidelity, candidate, SETTINGS.sizes[:1], states)
+    sizes, states = SETTINGS.sizes[:1], asked.states[candidate.name]
     near = asked.base.mean_square <= SETTINGS.linear_mean_square
     if asked.fidelity != SIMULATION or not near:
-        return found
+        return best_score(fidelity, candidate, sizes, states)
     slopes = best_score(fidelity, candidate, (1.0,), states, SETTINGS.slope_share)
-    return max((found, slopes), key=_gain)
+    beside = best_score(fidelity, candidate, sizes, states, followed=True)
+    return max((slopes, beside), key=_gain)
 
 
 def _gain(score: Score | None) -> float:

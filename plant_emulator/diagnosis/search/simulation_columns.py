@@ -56,8 +56,12 @@ class SimulationColumns:
     def data(self) -> Regression:
         """Data and nuisance; an unknown without a prior gets one of a deviation of 1."""
         slopes = np.concatenate([j.reshape(-1, len(self.found.z)) for j in self.found.jacobians])
-        shift = np.array([self._prior(u, z) - z for u, z in self._pairs()])
-        return Regression.of(self.base + slopes @ shift, -slopes * self.deviations)
+        return Regression.of(self.base - slopes @ self._shift, -slopes * self.deviations)
+
+    @cached_property
+    def _shift(self) -> Array:
+        """Distance of the fit from the prior means, on the scale of the estimation."""
+        return np.array([z - self._prior(u, z) for u, z in self._pairs()])
 
     @cached_property
     def deviations(self) -> Array:
@@ -84,6 +88,24 @@ class SimulationColumns:
         return self._plain - self._residual((*self.where.effects, effect), sizes, states)
 
     unwhitened = column
+
+    def followed(
+        self,
+        effect: str,
+        sizes: Mapping[str, float],
+        states: Sequence[Mapping[str, float]],
+        /,
+        *,
+        column: Array,
+    ) -> tuple[Array, Array] | None:
+        """See `Fidelity`. Where an effect and what follows it both act, contact comes and goes as
+        beside the true cause; where one of them acts alone, columns bend.
+        """
+        follows = self.data.follow(column)
+        values, moved = self.values_at(self._shift / self.deviations - follows)
+        there = [{**own, **more} for own, more in zip(moved, states, strict=True)]
+        beside = self.column(effect, {**values, **sizes}, there)
+        return None if beside is None else (beside, follows)
 
     def values_at(self, theta: Array) -> Values:
         """See `Fidelity`."""
