@@ -85,7 +85,11 @@ class FittedSets:
     @property
     def unrefuted(self) -> dict[frozenset[str], FitResult]:
         """The sets that the runs do not refute."""
-        return {key: one for key, one in self.sets.items() if self.agreed.get(key, True)}
+        return {key: one for key, one in self.sets.items() if not self.refuted(key)}
+
+    def refuted(self, key: frozenset[str]) -> bool:
+        """Whether the runs refute a set, or a part of it: others may only hide what they found."""
+        return any(part <= key and not agreed for part, agreed in self.agreed.items())
 
     def needed(self, others: int) -> float:
         """Least gain of log evidence that an effect needs beside so many others."""

@@ -123,6 +123,7 @@ class Search(FittedSets):
     def _is_last(self, found: FitResult) -> bool:
         """Whether no effect is worth adding: the cause is foreign, or what is left is random.
 
+        Near the noise one of two causes may leave most of the gap: a regression tells the other.
         The noise of a random effect is that of few courses of its law. A gain within it means
         little.
         """
@@ -131,7 +132,8 @@ class Search(FittedSets):
             return True
         if not found.effects:
             return False
-        foreign = excess(self.null) > SETTINGS.needed and leaves_most(found, self.null)
+        far = found.mean_square > SETTINGS.linear_mean_square
+        foreign = far and leaves_most(found, self.null)
         if found.mean_square > NOISE_MEAN_SQUARE:
             return foreign or (leaves_random(found) and not self.beside_random)
         return all(p.gain <= self._promising(found) for p in self._screen(found))
@@ -154,7 +156,7 @@ class Search(FittedSets):
         """
         least = self._promising(base)
         key, best = frozenset(base.effects), base
-        found = [p for p in self._screen(base) if self.agreed.get(key | {p.effect}, True)]
+        found = [p for p in self._screen(base) if not self.refuted(key | {p.effect})]
         tried = [p.effect for p in found if key and key | {p.effect} in self.sets]
         for one in leading(found, 1, least, tried):
             fits = self.confirm(base, [one], SETTINGS.leader_iterations)
@@ -263,7 +265,7 @@ class Search(FittedSets):
         larger = {
             p.effect: self.needed(len(key)) - p.gains.get(SIMULATION, 0.0)
             for p in self.promises.get(key, [])
-            if self.agreed.get(key | {p.effect}, True)
+            if not self.refuted(key | {p.effect})
         }
         library = self.runner.model.candidates
         mending = corrections(library, final, self.reduced_costs)

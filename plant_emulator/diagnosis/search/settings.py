@@ -30,7 +30,8 @@ class Settings:
     # So many effects of each score are tried at the other sizes; the true one was among three.
     tried_further: int = 6
     # Mean square up to which a linear model around a fit is as good as a fit with the cause: noise
-    # is estimated beside it, and the relations are those at its parameters.
+    # is estimated beside it, the relations are those at its parameters, and they tell a second
+    # cause of which the first one leaves most.
     linear_mean_square: float = 1.5
     # Gain that an effect needs: odds of e^15, one of 30 effects by chance in 100 000 logs.
     needed: float = 15.0

@@ -6,10 +6,19 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
+from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null, linearise
 from plant_emulator.diagnosis.search.confirmation import Reduction
 from plant_emulator.diagnosis.search.run_agreement import _split, run_agreement
-from tests.plant_emulator.diagnosis.line import SHAPES, TIME, Line, explained, linear, noisy
+from plant_emulator.diagnosis.search.search import Search
+from tests.plant_emulator.diagnosis.line import (
+    SHAPES,
+    TIME,
+    Line,
+    explained,
+    linear,
+    noisy,
+    runner,
+)
 
 WAVE = SHAPES["wave"](TIME)
 
@@ -124,3 +133,14 @@ def test_a_second_effect_has_one_size_in_all_runs(
     assert found.final.effects == named
     refuted = any(step.action.startswith("refuted by the runs") for step in found.trace)
     assert refuted == (len(named) == 1)
+
+
+def test_a_set_that_holds_a_refuted_one_is_refuted() -> None:
+    """A third effect would only hide what the runs do not agree on."""
+    model = Line([noisy(3.0 * TIME**3)], ("cube", "wave", "kink"))
+    there = runner(model)
+    search = Search(declared=there, runner=there, null=fit_null(model, there.runs))
+    cube, pair, other = (frozenset(n.split()) for n in ("cube", "cube wave", "cube kink"))
+    search.sets = dict.fromkeys((cube, pair, other, pair | other), search.null)
+    search.agreed = {pair: False, other: True}
+    assert set(search.unrefuted) == {cube, other}
