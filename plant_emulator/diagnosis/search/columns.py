@@ -197,7 +197,8 @@ def _score(
         abs(values[name] - neutral[name]) / abs(at[name] - neutral[name])
         for name in {c.size for c in columns}
     )
-    theta = fidelity.data.theta(products, beta) - beta @ np.stack([c.follows for c in columns])
+    follows = np.stack([c.follows for c in columns]) / share
+    theta = fidelity.data.theta(products, beta) - beta @ follows
     return True, Score(gain=value, factor=factor, values=values, states=own, theta=theta)
 
 

@@ -106,13 +106,14 @@ def _split(near: Estimate, index: int, widest: float) -> _Split:
 def _parts(near: Estimate, index: int) -> list[Array]:
     """Which part each sample of a run belongs to, one column of 0 and 1 a part.
 
-    A run that holds nearly all of the column's sum of squares is halved, where half of it is past.
+    A run that holds three quarters of the column's sum of squares has too little to agree with: it
+    is halved, where half of its own is past.
     """
     squares = [np.cumsum(np.sum(j[..., index] ** 2, axis=0)) for j in near.jacobians]
     total = sum(one[-1] for one in squares)
     parts, known = [], 0
     for one in squares:
-        halved = 2.0 * one[-1] >= 1.5 * total
+        halved = one[-1] >= 0.75 * total
         parts.append(known + halved * (2.0 * one > one[-1]))
         known += 1 + halved
     return [np.eye(known)[part.astype(int)] for part in parts]
