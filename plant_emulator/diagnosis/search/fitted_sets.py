@@ -8,6 +8,7 @@ they stand for the error of the first one's law.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import inf
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fitting.evidence import excess
@@ -88,8 +89,17 @@ class FittedSets:
         return {key: one for key, one in self.sets.items() if not self.refuted(key)}
 
     def refuted(self, key: frozenset[str]) -> bool:
-        """Whether the runs refute a set, or a part of it: others may only hide what they found."""
-        return any(part <= key and not agreed for part, agreed in self.agreed.items())
+        """Whether the runs refute a set, a part of it, or as many effects that fit better.
+
+        Further effects may only hide what the runs found, and what gains less than the error of a
+        law does may be that error as well.
+        """
+        cost = self.sets[key].cost if key in self.sets else -inf
+        return any(
+            other <= key or (len(other) == len(key) and self.sets[other].cost <= cost)
+            for other, agreed in self.agreed.items()
+            if not agreed and other in self.sets
+        )
 
     def needed(self, others: int) -> float:
         """Least gain of log evidence that an effect needs beside so many others."""
