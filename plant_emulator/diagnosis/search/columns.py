@@ -37,13 +37,11 @@ class Column:
     """A column of an effect: change of the data at one size.
 
     size : the size parameter's name; run : of a column with an angle, else None
-    follows : nuisance coefficients that the change is taken beside, see `Fidelity.followed`
     """
 
     size: str
     run: int | None
     change: Array
-    follows: Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,17 +67,14 @@ def best_score(
     sizes: Sequence[float],
     states: States,
     share: float = 1.0,
-    *,
-    followed: bool = False,
 ) -> Score | None:
     """Score of an effect at the size that gains most; None: it shows nothing here.
 
     states : of the effect in each run, but for an angle
     share : of each size that the columns are taken at; scaled up, those of a small share are slopes
-    followed : whether the columns are taken beside the parameters that follow the effect
     """
     scores = (
-        _score(fidelity, candidate, way * size, states, share, followed=followed)[1]
+        _score(fidelity, candidate, way * size, states, share)[1]
         for way in signs(candidate.sizes)
         for size in sizes
     )
@@ -128,17 +123,16 @@ def _bisect(
 
 
 def _columns(
-    fidelity: Fidelity, candidate: Candidate, size: float, states: States, *, followed: bool
+    fidelity: Fidelity, candidate: Candidate, size: float, states: States, share: float
 ) -> Iterator[Column | None]:
-    """Columns of the size parameters that change the data visibly at this size.
+    """Columns of the size parameters that change the data visibly at this share of a size.
 
-    None: the model cannot be simulated at it. No parameter follows an unknown angle of each run.
+    They are scaled up to the size. None: the model cannot be simulated at it
     """
     angle = next((u.name for u in candidate.states if u.angle), None)
     single = len(candidate.sizes) == 1
-    still = np.zeros_like(fidelity.data.mean)
     for u in candidate.sizes:
-        values = values_at_size(candidate, size, None if single else u.name)
+        values = values_at_size(candidate, share * size, None if single else u.name)
         change = fidelity.column(candidate.name, values, states)
         if change is None:
             yield None
@@ -150,35 +144,26 @@ def _columns(
             aside = [{**s, angle: pi / 2} for s in states]
             turned = fidelity.column(candidate.name, values, aside)
         if turned is None or np.allclose(turned, change):
-            found: tuple[Array, Array] | None = (change, still)
-            if followed:
-                found = fidelity.followed(candidate.name, values, states, column=change)
-            yield found and Column(size=u.name, run=None, change=found[0], follows=found[1])
+            yield Column(size=u.name, run=None, change=change / share)
             continue
         for run in range(len(states)):
-            for one in (change, turned):
-                own = np.where(fidelity.owners == run, one, 0.0)
-                yield Column(size=u.name, run=run, change=own, follows=still)
+            own = fidelity.owners == run
+            yield Column(size=u.name, run=run, change=np.where(own, change / share, 0.0))
+            yield Column(size=u.name, run=run, change=np.where(own, turned / share, 0.0))
 
 
 def _score(
-    fidelity: Fidelity,
-    candidate: Candidate,
-    size: float,
-    states: States,
-    share: float = 1.0,
-    *,
-    followed: bool = False,
+    fidelity: Fidelity, candidate: Candidate, size: float, states: States, share: float = 1.0
 ) -> tuple[bool, Score | None]:
     """Whether the columns show anything, and their gain with one-sided sizes kept on their side.
 
     None: they show nothing, cannot be simulated, or are all on the other side
     """
-    every = list(_columns(fidelity, candidate, share * size, states, followed=followed))
+    every = list(_columns(fidelity, candidate, size, states, share))
     columns = [one for one in every if one is not None]
     if not columns:
         return bool(every), None
-    products = fidelity.data.products(np.stack([c.change for c in columns]).T / share)
+    products = fidelity.data.products(np.stack([c.change for c in columns]).T)
     two_sided = np.array([c.run is not None for c in columns])
     keep = np.arange(len(columns))
     while len(keep):
@@ -197,8 +182,7 @@ def _score(
         abs(values[name] - neutral[name]) / abs(at[name] - neutral[name])
         for name in {c.size for c in columns}
     )
-    follows = np.stack([c.follows for c in columns]) / share
-    theta = fidelity.data.theta(products, beta) - beta @ follows
+    theta = fidelity.data.theta(products, beta)
     return True, Score(gain=value, factor=factor, values=values, states=own, theta=theta)
 
 

@@ -2,13 +2,13 @@
 
 The log evidence of a set is half the fall of its penalised cost, less the gain that each of its
 effects needs. A set on whose further effects the runs do not agree (`run_agreement`) is refuted:
-they stand for the error of the first one's law.
+they stand for the error of the first one's law. So is each set that holds it, and each last effect
+that gains no more beside the same others.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import inf
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fitting.evidence import excess
@@ -89,17 +89,24 @@ class FittedSets:
         return {key: one for key, one in self.sets.items() if not self.refuted(key)}
 
     def refuted(self, key: frozenset[str]) -> bool:
-        """Whether the runs refute a set, a part of it, or as many effects that fit better.
+        """Whether the runs refute a set, or a part of it, or its last effect gains no more.
 
-        Further effects may only hide what the runs found, and what gains less than the error of a
-        law does may be that error as well.
+        Further effects may only hide what the runs found. An effect that gains no more than one
+        that stood for the error of the same laws may stand for it as well.
         """
-        cost = self.sets[key].cost if key in self.sets else -inf
         return any(
-            other <= key or (len(other) == len(key) and self.sets[other].cost <= cost)
+            other <= key or self._gains_no_more(key, other)
             for other, agreed in self.agreed.items()
-            if not agreed and other in self.sets
+            if not agreed
         )
+
+    def _gains_no_more(self, key: frozenset[str], other: frozenset[str]) -> bool:
+        """Whether a fit that has ended gains no more than one more effect of the same others."""
+        if len(key) != len(other) or key not in self.sets or other not in self.sets:
+            return False
+        one, refuted = self.sets[key], self.sets[other]
+        same = key > set(refuted.effects[:-1])
+        return same and one.converged and one.cost >= refuted.cost
 
     def needed(self, others: int) -> float:
         """Least gain of log evidence that an effect needs beside so many others."""
@@ -134,7 +141,7 @@ class FittedSets:
     def _ask_runs(self, found: FitResult) -> bool:
         """Ask the runs of the further effects of a set, once; give whether they agree.
 
-        Where they do not, another effect may take the place of the last one.
+        Where they do not, an effect that gains more may take the place of the last one.
         """
         key, base = frozenset(found.effects), frozenset(found.effects[:-1])
         if len(key) < 2 or key in self.agreed:

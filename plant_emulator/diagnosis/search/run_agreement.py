@@ -8,8 +8,8 @@ unknowns. The sizes s_k, with covariance C, agree where chance leaves their chi 
     (s_k - m)' V^-1 (s_k - m),   V = C + (e s)^2 I
 
 m is their weighted mean, e the relative error of a law. It is the test of homogeneity of effect
-sizes (W. Cochran, Biometrics 10 (1954) 101). Each run is a part; of a run that shows the effect
-nearly alone, each half of what it shows. An error that is the same in all runs, as in logs of one
+sizes (W. Cochran, Biometrics 10 (1954) 101). Each run is a part. A run that alone shows the effect
+has nothing to agree with: it is two parts. An error that is the same in all runs, as in logs of one
 program, is not found.
 """
 
@@ -49,7 +49,7 @@ class _Split:
 
 
 def run_agreement(model: Model, asked: Reduction) -> float:
-    """Probability that the runs differ so much by chance and by a law's error (a step).
+    """Probability that the parts differ so much by chance and by a law's error (a step).
 
     It is that of the size of the effect of a fit on which they differ most. A part that does not
     show a size has its prior, and counts as none.
@@ -62,23 +62,31 @@ def run_agreement(model: Model, asked: Reduction) -> float:
         index, neutral = names.index(unknown.name), unknown.scaled(candidate.neutral[unknown.name])
         widest = SHRINKAGE * abs(unknown.scaled(unknown.start) - neutral)
         split = _split(near, index, widest)
-        showing = round(float(np.sum(1.0 - np.diag(split.covariance) / widest**2)))
+        if _showing(split, widest) < 2:
+            alone = int(np.argmin(np.diag(split.covariance)))
+            split = _split(near, index, widest, alone)
         law = SETTINGS.law_error * (float(near.z[index]) - neutral)
         spread = _spread(
             split.changes, split.inflation * split.covariance + law**2 * np.eye(len(split.changes))
         )
-        probability = min(probability, float(chi2.sf(spread, max(1, showing - 1))))
+        probability = min(probability, float(chi2.sf(spread, max(1, _showing(split, widest) - 1))))
     return probability
 
 
-def _split(near: Estimate, index: int, widest: float) -> _Split:
+def _showing(split: _Split, widest: float) -> int:
+    """Number of parts that show the size."""
+    return round(float(np.sum(1.0 - np.diag(split.covariance) / widest**2)))
+
+
+def _split(near: Estimate, index: int, widest: float, alone: int | None = None) -> _Split:
     """Give each part a size of its own, at a fit with one size for all.
 
     index : of the size among the unknowns; widest : prior standard deviation of the changes
+    alone : a run of two parts
     """
     slopes = [
         np.concatenate([np.delete(j, index, axis=-1), j[..., [index]] * own], axis=-1)
-        for j, own in zip(near.jacobians, _parts(near, index), strict=True)
+        for j, own in zip(near.jacobians, _parts(near, index, alone), strict=True)
     ]
     others = [(u, float(z)) for u, z in zip(near.unknowns, near.z, strict=True)]
     del others[index]
@@ -103,20 +111,17 @@ def _split(near: Estimate, index: int, widest: float) -> _Split:
     )
 
 
-def _parts(near: Estimate, index: int) -> list[Array]:
+def _parts(near: Estimate, index: int, alone: int | None) -> list[Array]:
     """Which part each sample of a run belongs to, one column of 0 and 1 a part.
 
-    A run that holds three quarters of the column's sum of squares has too little to agree with: it
-    is halved, where half of its own is past.
+    The second part of a run begins where half of the column's sum of squares is past.
     """
-    squares = [np.cumsum(np.sum(j[..., index] ** 2, axis=0)) for j in near.jacobians]
-    total = sum(one[-1] for one in squares)
-    parts, known = [], 0
-    for one in squares:
-        halved = one[-1] >= 0.75 * total
-        parts.append(known + halved * (2.0 * one > one[-1]))
-        known += 1 + halved
-    return [np.eye(known)[part.astype(int)] for part in parts]
+    parts = [np.full(j.shape[1], k) for k, j in enumerate(near.jacobians)]
+    if alone is not None:
+        past = np.cumsum(np.sum(near.jacobians[alone][..., index] ** 2, axis=0))
+        parts[alone][2.0 * past > past[-1]] = len(parts)
+    every = np.eye(len(parts) + (alone is not None))
+    return [every[part] for part in parts]
 
 
 def _spread(values: Array, covariance: Array) -> float:

@@ -137,8 +137,11 @@ def test_a_second_effect_has_one_size_in_all_runs(
 
 
 def test_what_the_runs_refute_takes_more_with_it() -> None:
-    """A third effect would hide what the runs do not agree on; a worse pair may be it as well."""
-    model = Line([noisy(3.0 * TIME**3)], ("cube", "wave", "kink", "near kink"))
+    """A third effect would hide what the runs do not agree on, and a lesser one may be it as well.
+
+    A pair of other effects may not, nor one whose fit has not ended.
+    """
+    model = Line([noisy(3.0 * TIME**3)], tuple(SHAPES))
     there = runner(model)
     search = Search(declared=there, runner=there, null=fit_null(model, there.runs))
     costs = {
@@ -146,8 +149,16 @@ def test_what_the_runs_refute_takes_more_with_it() -> None:
         ("cube", "wave"): 200.0,
         ("cube", "kink"): 100.0,
         ("cube", "near kink"): 250.0,
+        ("kink", "near kink"): 250.0,
         ("cube", "wave", "kink"): 90.0,
     }
-    search.sets = {frozenset(key): replace(search.null, cost=c) for key, c in costs.items()}
+    search.sets = {
+        frozenset(key): replace(search.null, effects=key, cost=cost, converged=True)
+        for key, cost in costs.items()
+    }
     search.agreed = {frozenset(("cube", "wave")): False, frozenset(("cube", "kink")): True}
-    assert set(search.unrefuted) == {frozenset(["cube"]), frozenset(["cube", "kink"])}
+    kept = {frozenset(key) for key in (("cube",), ("cube", "kink"), ("kink", "near kink"))}
+    assert set(search.unrefuted) == kept
+    lesser = frozenset(("cube", "near kink"))
+    search.sets[lesser] = replace(search.sets[lesser], converged=False)
+    assert set(search.unrefuted) == {*kept, lesser}
