@@ -37,11 +37,13 @@ class Column:
     """A column of an effect: change of the data at one size.
 
     size : the size parameter's name; run : of a column with an angle, else None
+    follows : nuisance coefficients that the change is taken beside, see `Fidelity.followed`
     """
 
     size: str
     run: int | None
     change: Array
+    follows: Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,14 +69,17 @@ def best_score(
     sizes: Sequence[float],
     states: States,
     share: float = 1.0,
+    *,
+    followed: bool = False,
 ) -> Score | None:
     """Score of an effect at the size that gains most; None: it shows nothing here.
 
     states : of the effect in each run, but for an angle
     share : of each size that the columns are taken at; scaled up, those of a small share are slopes
+    followed : whether the columns are taken beside the parameters that follow the effect
     """
     scores = (
-        _score(fidelity, candidate, way * size, states, share)[1]
+        _score(fidelity, candidate, way * size, states, share, followed=followed)[1]
         for way in signs(candidate.sizes)
         for size in sizes
     )
@@ -123,16 +128,17 @@ def _bisect(
 
 
 def _columns(
-    fidelity: Fidelity, candidate: Candidate, size: float, states: States, share: float
+    fidelity: Fidelity, candidate: Candidate, size: float, states: States, *, followed: bool
 ) -> Iterator[Column | None]:
-    """Columns of the size parameters that change the data visibly at this share of a size.
+    """Columns of the size parameters that change the data visibly at this size.
 
-    They are scaled up to the size. None: the model cannot be simulated at it
+    None: the model cannot be simulated at it. No parameter follows an unknown angle of each run.
     """
     angle = next((u.name for u in candidate.states if u.angle), None)
     single = len(candidate.sizes) == 1
+    still = np.zeros_like(fidelity.data.mean)
     for u in candidate.sizes:
-        values = values_at_size(candidate, share * size, None if single else u.name)
+        values = values_at_size(candidate, size, None if single else u.name)
         change = fidelity.column(candidate.name, values, states)
         if change is None:
             yield None
@@ -144,26 +150,35 @@ def _columns(
             aside = [{**s, angle: pi / 2} for s in states]
             turned = fidelity.column(candidate.name, values, aside)
         if turned is None or np.allclose(turned, change):
-            yield Column(size=u.name, run=None, change=change / share)
+            found: tuple[Array, Array] | None = (change, still)
+            if followed:
+                found = fidelity.followed(candidate.name, values, states, column=change)
+            yield found and Column(size=u.name, run=None, change=found[0], follows=found[1])
             continue
         for run in range(len(states)):
-            own = fidelity.owners == run
-            yield Column(size=u.name, run=run, change=np.where(own, change / share, 0.0))
-            yield Column(size=u.name, run=run, change=np.where(own, turned / share, 0.0))
+            for one in (change, turned):
+                own = np.where(fidelity.owners == run, one, 0.0)
+                yield Column(size=u.name, run=run, change=own, follows=still)
 
 
 def _score(
-    fidelity: Fidelity, candidate: Candidate, size: float, states: States, share: float = 1.0
+    fidelity: Fidelity,
+    candidate: Candidate,
+    size: float,
+    states: States,
+    share: float = 1.0,
+    *,
+    followed: bool = False,
 ) -> tuple[bool, Score | None]:
     """Whether the columns show anything, and their gain with one-sided sizes kept on their side.
 
     None: they show nothing, cannot be simulated, or are all on the other side
     """
-    every = list(_columns(fidelity, candidate, size, states, share))
+    every = list(_columns(fidelity, candidate, share * size, states, followed=followed))
     columns = [one for one in every if one is not None]
     if not columns:
         return bool(every), None
-    products = fidelity.data.products(np.stack([c.change for c in columns]).T)
+    products = fidelity.data.products(np.stack([c.change for c in columns]).T / share)
     two_sided = np.array([c.run is not None for c in columns])
     keep = np.arange(len(columns))
     while len(keep):
@@ -182,7 +197,8 @@ def _score(
         abs(values[name] - neutral[name]) / abs(at[name] - neutral[name])
         for name in {c.size for c in columns}
     )
-    theta = fidelity.data.theta(products, beta)
+    follows = np.stack([c.follows for c in columns]) / share
+    theta = fidelity.data.theta(products, beta) - beta @ follows
     return True, Score(gain=value, factor=factor, values=values, states=own, theta=theta)
 
 

@@ -95,7 +95,7 @@ def promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
     fidelities: tuple[str, ...] = (RELATIONS, SIMULATION)
     if _leaves_noise(base):
         fidelities = (SIMULATION,)
-    elif not base.effects and not _near(base):
+    elif not base.effects and base.mean_square > SETTINGS.linear_mean_square:
         fidelities = (NOMINAL_RELATIONS, SIMULATION)
     return regressions(runner, base, tuple(visible(runner.model, base, runner.runs)), fidelities)
 
@@ -184,7 +184,7 @@ def _fidelity(model: Model, asked: Screening) -> Fidelity | None:
     if asked.fidelity == OBSERVER:
         observer = model.observer(CORRECTION_INTERVALS[0])
         return SimulationColumns(observer, asked.base, asked.runs, LED_DIFFERENCE)
-    return SimulationColumns(model, asked.base, asked.runs, beside=_near(asked.base))
+    return SimulationColumns(model, asked.base, asked.runs)
 
 
 def _library(model: Model, base: FitResult) -> dict[str, Candidate]:
@@ -232,21 +232,19 @@ def _scores(
 
 
 def _first_score(fidelity: Fidelity, candidate: Candidate, asked: Screening) -> Score | None:
-    """Score of an effect at the first size, or that of its slopes near the noise.
+    """Score of an effect at the first size; near the noise by slopes, or beside what follows it.
 
-    Relations hold between samples: nothing adds up in them, and their columns hardly bend.
+    Relations hold between samples: nothing adds up in them, and their columns hardly bend. A slope
+    is right for effects that the parameters cannot follow far, a column beside them for contact
+    that they keep as it is.
     """
-    states = asked.states[candidate.name]
-    found = best_score(fidelity, candidate, SETTINGS.sizes[:1], states)
-    if asked.fidelity != SIMULATION or not _near(asked.base):
-        return found
+    sizes, states = SETTINGS.sizes[:1], asked.states[candidate.name]
+    near = asked.base.mean_square <= SETTINGS.linear_mean_square
+    if asked.fidelity != SIMULATION or not near:
+        return best_score(fidelity, candidate, sizes, states)
     slopes = best_score(fidelity, candidate, (1.0,), states, SETTINGS.slope_share)
-    return max((found, slopes), key=_gain)
-
-
-def _near(base: FitResult) -> bool:
-    """Whether a linear model around a fit is right."""
-    return base.mean_square <= SETTINGS.linear_mean_square
+    beside = best_score(fidelity, candidate, sizes, states, followed=True)
+    return max((slopes, beside), key=_gain)
 
 
 def _gain(score: Score | None) -> float:

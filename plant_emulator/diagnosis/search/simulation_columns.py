@@ -24,11 +24,7 @@ if TYPE_CHECKING:
 
 
 class SimulationColumns:
-    """The residual of the simulation, free or led, and its tangents; see `Fidelity`.
-
-    beside : whether a column is taken where the nuisance makes up for the effect. Where the effect
-        or a parameter moves alone, a contact comes or goes, and columns bend
-    """
+    """The residual of the simulation, free or led, and its tangents; see `Fidelity`."""
 
     def __init__(
         self,
@@ -36,10 +32,7 @@ class SimulationColumns:
         where: FitValues,
         runs: Sequence[int],
         difference: float = DIFFERENCE_NORM,
-        *,
-        beside: bool = False,
     ) -> None:
-        self.beside = beside
         self.model, self.where, self.runs = model, where, tuple(runs)
         self.found = linearise(model, where, runs, difference)
         self.base = np.concatenate([r.ravel() for r in self.found.residuals])
@@ -63,13 +56,12 @@ class SimulationColumns:
     def data(self) -> Regression:
         """Data and nuisance; an unknown without a prior gets one of a deviation of 1."""
         slopes = np.concatenate([j.reshape(-1, len(self.found.z)) for j in self.found.jacobians])
-        shift = -self._coefficients * self.deviations
-        return Regression.of(self.base + slopes @ shift, -slopes * self.deviations)
+        return Regression.of(self.base - slopes @ self._shift, -slopes * self.deviations)
 
     @cached_property
-    def _coefficients(self) -> Array:
-        """Nuisance coefficients at the fit, shape (k,)."""
-        return np.array([z - self._prior(u, z) for u, z in self._pairs()]) / self.deviations
+    def _shift(self) -> Array:
+        """Distance of the fit from the prior means, on the scale of the estimation."""
+        return np.array([z - self._prior(u, z) for u, z in self._pairs()])
 
     @cached_property
     def deviations(self) -> Array:
@@ -93,40 +85,37 @@ class SimulationColumns:
         self, effect: str, sizes: Mapping[str, float], states: Sequence[Mapping[str, float]]
     ) -> Array | None:
         """See `Fidelity`."""
-        change = self.unwhitened(effect, sizes, states)
-        if not self.beside:
-            return change
-        at = self._coefficients - self.data.follow(change)
-        values, moved = self.values_at(at)
-        there = [{**own, **more} for own, more in zip(moved, states, strict=True)]
-        # What the nuisance does there is taken off again: it has columns of its own.
-        nuisance = self.data.nuisance @ (self._coefficients - self._within(at))
-        return self.unwhitened(effect, {**values, **sizes}, there) + nuisance
-
-    def unwhitened(
-        self, effect: str, sizes: Mapping[str, float], states: Sequence[Mapping[str, float]]
-    ) -> Array:
-        """See `Fidelity`."""
         return self._plain - self._residual((*self.where.effects, effect), sizes, states)
+
+    unwhitened = column
+
+    def followed(
+        self,
+        effect: str,
+        sizes: Mapping[str, float],
+        states: Sequence[Mapping[str, float]],
+        /,
+        *,
+        column: Array,
+    ) -> tuple[Array, Array] | None:
+        """See `Fidelity`. Where an effect and what follows it both act, contact comes and goes as
+        beside the true cause; where one of them acts alone, columns bend.
+        """
+        follows = self.data.follow(column)
+        values, moved = self.values_at(self._shift / self.deviations - follows)
+        there = [{**own, **more} for own, more in zip(moved, states, strict=True)]
+        beside = self.column(effect, {**values, **sizes}, there)
+        return None if beside is None else (beside, follows)
 
     def values_at(self, theta: Array) -> Values:
         """See `Fidelity`."""
         values: dict[str, float] = {}
         states: list[dict[str, float]] = [{} for _ in self.runs]
-        coefficients = self._within(theta) * self.deviations
-        for (u, z), off in zip(self._pairs(), coefficients, strict=True):
-            value = u.value(self._prior(u, z) + float(off))
-            (values if u.run is None else states[u.run])[u.name] = value
+        for (u, z), t, std in zip(self._pairs(), theta, self.deviations, strict=True):
+            scaled = self._prior(u, z) + std * float(t)
+            scaled = float(np.clip(scaled, u.scaled(u.lower), u.scaled(u.upper)))
+            (values if u.run is None else states[u.run])[u.name] = u.value(scaled)
         return values, states
-
-    def _within(self, theta: Array) -> Array:
-        """Nuisance coefficients within the bounds of their unknowns, shape (k,)."""
-        bounds = [
-            (u.scaled(u.lower) - self._prior(u, z), u.scaled(u.upper) - self._prior(u, z))
-            for u, z in self._pairs()
-        ]
-        lower, upper = np.array(bounds).T / self.deviations
-        return np.clip(theta, lower, upper)
 
     def confounded_with(self, column: Array) -> str:
         """The unknown that follows a change of the data most."""
