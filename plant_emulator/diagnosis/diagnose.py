@@ -123,10 +123,13 @@ class _Tests:
     def reference(self, gaps: Gaps) -> Gap | None:
         """The gap that the decision closes a share of.
 
-        None: the decision names no cause, no run can be predicted with it, or the cause is a random
-        effect, whose course nothing predicts.
+        None: the decision names no cause, no run can be predicted with it, or nothing predicts the
+        course of a random effect, which is the cause or hides what the others close.
         """
         if not gaps.predictable or (self.decision.effects and not self.effects):
+            return None
+        random = self.explained.random_effects and self.effects
+        if random and not shows_shrinkage(gaps.null, gaps.by_effects[self.effects]):
             return None
         return {"parameter": gaps.nominal, "effect": gaps.null}.get(self.decision.kind)
 

@@ -135,22 +135,28 @@ class Procedure:
         estimated = None if beside is None else beside.estimated
         noise = estimated or self.disturbances
         plain = _whitened(self.runner, noise)
-        null = base if beside is None else beside.explained.null
-        runner, null, name = self._weighted(plain, base, null)
+        runner, name = self._weighted(plain, base)
         if not name:
             return None
         # Beside a random effect outliers stand out that its large residuals hid before.
-        ((_, hidden),) = runner.map(find_disturbances, [Task(base=null, runs=self.runner.runs)])
+        (shown,) = runner.map(refit, [Task(base=base, runs=runner.runs)])
+        ((_, hidden),) = runner.map(find_disturbances, [Task(base=shown, runs=runner.runs)])
         if hidden is not None:
             noise = hidden if noise is None else noise.with_outliers_of(hidden)
             plain = _whitened(self.runner, noise)
-            runner, null, name = self._weighted(plain, base, null)
+            runner, name = self._weighted(plain, base)
             if not name:
                 return None
+        # The search begins with the fit that showed the random effect, too: it may be far from the
+        # other one.
+        known = {(): base if beside is None else beside.explained.null, base.effects: base}
+        fits = runner.map(refit, [Task(base=one, runs=runner.runs) for one in known.values()])
+        sets = {frozenset(one.effects): one for one in fits}
         search = Search(
             declared=runner,
             runner=runner,
-            null=null,
+            null=sets[frozenset()],
+            sets=sets,
             beside_random=True,
             noise=noise,
         )
@@ -161,24 +167,20 @@ class Procedure:
         explained = replace(explained, random_effects=tuple(last))
         return _Tested(explained=_with_regularities(explained, runner), runner=runner)
 
-    def _weighted(
-        self, plain: TaskRunner, base: FitResult, null: FitResult
-    ) -> tuple[TaskRunner, FitResult, str]:
-        """The runner with the best random effect as part of the noise, and a fit anew in it.
+    def _weighted(self, plain: TaskRunner, base: FitResult) -> tuple[TaskRunner, str]:
+        """The runner with the best random effect as part of the noise, and the effect's name.
 
-        base : fit whose residual shows the random effect; null : the other fit
-        Give the effect's name as well; it is empty, and the others are as given, without one.
+        base : fit whose residual shows the random effect
+        Without one, the runner is as given and the name is empty.
         """
         model = plain.model
         found = self._fit_random_effects(plain, base, model.candidates)
         best = max(found, key=lambda one: one.evidence, default=None)
         if best is None:
-            return plain, null, ""
+            return plain, ""
         weights = dict(zip(plain.runs, best.weights, strict=True))
         every = tuple(weights.get(k, np.ones(1)) for k in range(len(model.runs)))
-        runner = replace(plain, recipe=WeightedRecipe(plain.recipe, every))
-        (null,) = runner.map(refit, [Task(base=null, runs=runner.runs)])
-        return runner, null, best.effect
+        return replace(plain, recipe=WeightedRecipe(plain.recipe, every)), best.effect
 
     def _fit_random_effects(
         self, runner: TaskRunner, base: FitResult, names: Iterable[str]

@@ -42,7 +42,6 @@ from plant_emulator.diagnosis.search.summary import (
     search_step,
     unconverged,
 )
-from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.execution.pool import TaskRunner
@@ -71,7 +70,7 @@ class Search(FittedSets):
         The noise is estimated around the fit without effects where that is near the noise, and
         around the best set. Where that shows another noise, the queue starts again.
         """
-        self.sets = {frozenset(): self.null}
+        self.sets[frozenset()] = self.null
         far = self.null.mean_square > SETTINGS.linear_mean_square
         self._estimate_noise(self._queue(1) if far else self.null)
         best = self._queue(SETTINGS.most_effects)
@@ -190,11 +189,11 @@ class Search(FittedSets):
         return excess(found) <= SETTINGS.law_error**2 * excess(self.null)
 
     def _led_again(self, found: FitResult) -> FitResult:
-        """The fit, led along the measured speeds once more where it ended in a local minimum.
+        """The fit, led along the measured speeds once more where it may be in a local minimum.
 
-        It explains most of the gap there, and leaves more than laws and noise do.
+        It explains a part of the gap there, and leaves more than noise does.
         """
-        if found.mean_square <= SUSPECT_MEAN_SQUARE or not adequate(found, self.null):
+        if found.mean_square <= NOISE_MEAN_SQUARE or leaves_most(found, self.null):
             return found
         (again,) = self.runner.map(refit_led, [self.task(found)])
         self.keep(again)

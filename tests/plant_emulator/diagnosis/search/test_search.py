@@ -103,6 +103,17 @@ def test_rival_of_a_second_effect_is_fitted_where_little_of_the_gap_is_left() ->
     assert sorted(map(sorted, found.classes())) == [["kink", "near kink"], ["wave"]]
 
 
+def test_search_goes_on_from_the_sets_that_are_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No regression shows the wave, as where the fit without effects is far off."""
+    model = Line([noisy(2.0 + 3.0 * TIME + 40.0 * np.sin(20.0 * TIME))])
+    there, null = runner(model), fit_null(model, (0,))
+    known = fit(model, ("wave",), (0,), {**null.values, "wave_size": 39.0}, [{}])
+    monkeypatch.setattr(search, "promises", lambda *_: [])
+    sets = {frozenset(known.effects): known}
+    found = Search(declared=there, runner=there, null=null, sets=sets, beside_random=True).explain()
+    assert found.final.effects == ("wave",)
+
+
 def test_relations_are_not_asked_beside_effects_that_leave_noise(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
