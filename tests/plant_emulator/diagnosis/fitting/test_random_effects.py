@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.decision.procedure import Procedure
+from plant_emulator.diagnosis.diagnose import Diagnose
 from plant_emulator.diagnosis.execution.pool import InProcess
+from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
 from plant_emulator.diagnosis.fitting.random_effects import WeightedRecipe, fit_random_effect
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.machine import Course
+from plant_emulator.diagnosis.prediction.held_out import Plan
 from plant_emulator.diagnosis.search.screening import screen
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import (
@@ -210,6 +213,25 @@ def test_wave_beside_a_great_unrest_is_an_effect_too() -> None:
     found, decision, _ = Procedure(runner=runner(Shaken([y]))).run()
     assert decision.effects == ("shake", "wave")
     assert found.final.values["wave_size"] == pytest.approx(0.5, abs=0.15)
+
+
+def test_held_out_runs_that_an_unrest_fills_deny_no_effect() -> None:
+    """By hand: a wave of 1 closes 0.5 of a gap of 8^2 mean(SLOPE^2) = 384 of the noise."""
+
+    class Unplanned(Shaken):
+        def with_planned_runs(self, where: FitResult, runs: Sequence[int]) -> Line:
+            return self
+
+        def missing_experiments(self, runs: Sequence[int]) -> dict[str, tuple[str, ...]]:
+            return {}
+
+    wave = 2.0 + 3.0 * TIME + np.sin(20.0 * TIME)
+    model = Unplanned([noisy(wave, seed) + shaken(8.0, seed) for seed in (11, 12, 13)])
+    folds = (((1, 2), (0,)), ((0, 2), (1,)), ((0, 1), (2,)))
+    plan = Plan(fitted=(0, 1, 2), folds=folds)
+    answer = Diagnose(InProcess(), Given(model), plan, settings={}).diagnose().answer
+    assert answer.verdict.effects == ("shake", "wave")
+    assert answer.gap.closed_fraction is None
 
 
 def test_no_effect_is_named_within_the_noise_of_a_random_one() -> None:
