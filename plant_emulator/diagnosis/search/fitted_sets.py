@@ -35,7 +35,8 @@ class FittedSets:
 
     runner : in whose noise the costs count; null : fit without effects
     beside_random : whether a random effect is part of that noise
-    sets : the best fit of each set, at first of those that are known; agreed : whether the runs agree on it, where they were asked
+    sets : the best fit of each set, at first of those that are known
+    agreed : whether the runs agree on it, where they were asked
     promises : what one more effect promises on top of a set
     expanded : sets whose most promising effects were fitted on top of them
     """
