@@ -26,13 +26,13 @@ def test_the_share_of_right_answers_is_the_confidence_where_all_stand_alike() ->
 
 
 def test_answers_whose_rival_is_one_needless_effect_more_have_the_larger_confidence() -> None:
-    """Drawn by the law log(p / (1 - p)) = 3 - log(1 + |30 - odds|), which is found again."""
+    """Drawn by the law log(p / (1 - p)) = 3 - log(1 + |40 - odds|), which is found again."""
     random = np.random.default_rng(4)
-    odds = random.uniform(0.0, 60.0, 4000)
-    share = 1.0 / (1.0 + np.exp(np.log1p(np.abs(30.0 - odds)) - 3.0))
+    odds = random.uniform(0.0, 80.0, 4000)
+    share = 1.0 / (1.0 + np.exp(np.log1p(np.abs(40.0 - odds)) - 3.0))
     known = cases("effect", odds, (random.random(4000) < share).tolist())
-    for one in (0.0, 25.0, 30.0, 50.0):
-        true = 1.0 / (1.0 + np.exp(np.log1p(abs(30.0 - one)) - 3.0))
+    for one in (0.0, 35.0, 40.0, 60.0):
+        true = 1.0 / (1.0 + np.exp(np.log1p(abs(40.0 - one)) - 3.0))
         assert confidence(known, answer(one)) == pytest.approx(true, abs=0.05)
 
 
