@@ -24,6 +24,8 @@ DETECTABLE_NORM = 7.0
 # Share of the gap that an adequate model may leave. Laws slightly other than the library's left up
 # to 0.17. Where the true effect was not in the library, the best one left 0.4 and more.
 UNEXPLAINED_SHARE = 0.2
+# Share of the gap that the larger one of two causes explains at least, unless they counteract.
+LARGER_SHARE = 0.5
 # Mean square up to which a fit leaves nothing but noise: its variance is uncertain by 2 % (one
 # standard deviation), and the noise of real logs is no exact model of theirs.
 NOISE_MEAN_SQUARE = 1.05
@@ -67,8 +69,8 @@ def leaves_little(found: FitResult, gap: float) -> bool:
 
 
 def leaves_most(found: FitResult, null: FitResult) -> bool:
-    """Whether a fit leaves most of the gap without effects, so that the library lacks the cause."""
-    return excess(found) > (1.0 - UNEXPLAINED_SHARE) * excess(null)
+    """Whether a fit leaves more of the gap without effects than the larger one of two causes."""
+    return excess(found) > (1.0 - LARGER_SHARE) * excess(null)
 
 
 def adequate(found: FitResult, null: FitResult) -> bool:

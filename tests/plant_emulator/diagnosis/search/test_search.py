@@ -406,6 +406,22 @@ def test_second_cause_is_asked_for_where_the_first_leaves_most_near_the_noise(
     assert set(explained(model).final.effects) == effects
 
 
+@pytest.mark.parametrize(("causes", "most"), [(NAMES[:2], 2), (NAMES, 1)])
+def test_second_cause_is_sought_beside_one_that_explains_half(
+    causes: tuple[str, ...], most: int
+) -> None:
+    """Causes of equal squares beside a line: of two the first explains half, of three a third."""
+    line = np.stack([np.ones_like(TIME), TIME], axis=1)
+    y = 2.0 + 3.0 * TIME
+    for name in causes:
+        shape = SHAPES[name](TIME)
+        beside = shape - line @ np.linalg.lstsq(line, shape, rcond=None)[0]
+        y = y + np.sqrt(10.0) * shape / beside.std()
+    found = explained(Line([noisy(y)], NAMES))
+    assert max(len(one.effects) for one in found.trace) == most
+    assert decide(Line([noisy(y)], NAMES), found).kind == ("effect" if most == 2 else "unknown")
+
+
 def test_set_that_leaves_what_is_random_is_not_expanded() -> None:
     """Where a part of the log is far noisier, chance promises more than a second effect needs."""
     random = 20.0 * np.random.default_rng(8).standard_normal(len(TIME)) * (np.abs(TIME) > 0.8)
