@@ -22,8 +22,8 @@ CLASS_MARGIN = 10.0
 # An effect is detectable from this norm of its orthogonal signature on, at its plausible size [1].
 DETECTABLE_NORM = 7.0
 # Share of the gap that an adequate model may leave. Laws slightly other than the library's left up
-# to 0.17. Where the true effect was not in the library, the best one left 0.4 and more.
-UNEXPLAINED_SHARE = 0.2
+# to 0.06. Where the true effect was not in the library, the best one left 0.14 and more.
+UNEXPLAINED_SHARE = 0.1
 # Share of the gap that the larger one of two causes explains at least, unless they counteract.
 LARGER_SHARE = 0.5
 # Mean square up to which a fit leaves nothing but noise: its variance is uncertain by 2 % (one
