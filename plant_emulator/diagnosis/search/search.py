@@ -57,12 +57,14 @@ class Search(FittedSets):
     declared : in the noise that the sensors declare; `runner` leaves the outliers out as well
     noise : that of the logs, and the fit that it was estimated around
     reduced_costs : of the best set without each of its effects
+    secants_fitted : whether the library was fitted by secants; another noise hardly changes them
     """
 
     declared: TaskRunner
     noise: LoggedNoise | None = None
     noise_at: tuple[object, ...] = ()
     reduced_costs: dict[str, float] = field(default_factory=dict)
+    secants_fitted: bool = False
 
     def explain(self) -> Explanation:
         """Go through the queue in the logs' own noise.
@@ -173,8 +175,9 @@ class Search(FittedSets):
             return
         new = rivals_at(self.runner, base, best, rivals(found, base, least, tried), least)
         best = min((best, *self.confirm(base, new, SETTINGS.iterations)), key=lambda fit: fit.cost)
-        if base.effects or self._leaves_hundredth(best):
+        if base.effects or self.secants_fitted or self._leaves_hundredth(best):
             return
+        self.secants_fitted = True
         reached = 0.0
         for one in fitted_promises(self.runner, base)[: SETTINGS.most_followed]:
             if one.gain <= max(least, SETTINGS.rival_share * reached):

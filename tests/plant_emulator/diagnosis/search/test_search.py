@@ -394,6 +394,18 @@ def test_effect_follows_a_leader_that_does_not_keep_what_it_promised(
     assert ["kink"] not in steps[len(confirmed) :]
 
 
+def test_library_is_fitted_by_secants_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No effect explains a ripple of mean square 18, in either noise that it is searched in."""
+    fitted: list[FitResult] = []
+    monkeypatch.setattr(search, "fitted_promises", lambda _, base: fitted.append(base) or [])
+    model = Line([noisy(6.0 * RIPPLE)], NAMES)
+    one = KnownNoise(declared=runner(model), runner=runner(model), null=fit_null(model, [0]))
+    one.explain()
+    one.expanded.clear()
+    one.explain()
+    assert len(fitted) == 1
+
+
 @pytest.mark.parametrize(
     ("amplitude", "effects"), [(0.9, {"kink", "waved kink"}), (3.0, {"waved kink"})]
 )
