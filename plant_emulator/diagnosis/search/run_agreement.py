@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from plant_emulator.diagnosis.fitting.joint_fit import (
     SHRINKAGE,
@@ -69,7 +69,7 @@ def run_agreement(model: Model, asked: Reduction) -> float:
         spread = _spread(
             split.changes, split.inflation * split.covariance + law**2 * np.eye(len(split.changes))
         )
-        probability = min(probability, float(chi2.sf(spread, max(1, _showing(split, widest) - 1))))
+        probability = min(probability, float(chdtrc(max(1, _showing(split, widest) - 1), spread)))
     return probability
 
 
