@@ -39,6 +39,8 @@ class FittedSets:
     agreed : whether the runs agree on it, where they were asked
     promises : what one more effect promises on top of a set
     expanded : sets whose most promising effects were fitted on top of them
+    secants_fitted : whether the library was fitted by secants from this fit without effects; in
+        another noise these fits choose hardly otherwise
     """
 
     runner: TaskRunner
@@ -48,6 +50,7 @@ class FittedSets:
     agreed: dict[frozenset[str], bool] = field(default_factory=dict)
     promises: dict[frozenset[str], list[Promise]] = field(default_factory=dict)
     expanded: set[frozenset[str]] = field(default_factory=set)
+    secants_fitted: bool = False
     trace: list[SearchStep] = field(default_factory=list)
 
     def task(self, base: FitResult) -> Task:
@@ -67,6 +70,7 @@ class FittedSets:
         self.trace.append(search_step(self.null, "fitted anew", null))
         self.null = self.sets[frozenset()] = null
         self.promises.pop(frozenset(), None)
+        self.secants_fitted = False
 
     def confirm(self, base: FitResult, new: Sequence[Promise], iterations: int) -> list[FitResult]:
         """Fit these effects on top of a set, each for at most so many iterations."""

@@ -57,20 +57,19 @@ class Search(FittedSets):
     declared : in the noise that the sensors declare; `runner` leaves the outliers out as well
     noise : that of the logs, and the fit that it was estimated around
     reduced_costs : of the best set without each of its effects
-    secants_fitted : whether the library was fitted by secants; another noise hardly changes them
     """
 
     declared: TaskRunner
     noise: LoggedNoise | None = None
     noise_at: tuple[object, ...] = ()
     reduced_costs: dict[str, float] = field(default_factory=dict)
-    secants_fitted: bool = False
 
     def explain(self) -> Explanation:
         """Go through the queue in the logs' own noise.
 
         The noise is estimated around the fit without effects where that is near the noise, and
-        around the best set. Where that shows another noise, the queue starts again.
+        around the best set that explains half of the gap. Where that shows another noise, the queue
+        starts again.
         """
         self.sets[frozenset()] = self.null
         far = self.null.mean_square > SETTINGS.linear_mean_square
@@ -194,7 +193,7 @@ class Search(FittedSets):
     def _led_again(self, found: FitResult) -> FitResult:
         """The fit, led along the measured speeds once more where it may be in a local minimum.
 
-        It explains a part of the gap there, and leaves more than noise does.
+        It explains half of the gap there, and leaves more than noise does.
         """
         if found.mean_square <= NOISE_MEAN_SQUARE or leaves_most(found, self.null):
             return found
