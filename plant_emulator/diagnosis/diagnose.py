@@ -20,7 +20,11 @@ from plant_emulator.diagnosis.decision.verdict import without_uncertain
 from plant_emulator.diagnosis.design.next_experiment import Advice
 from plant_emulator.diagnosis.execution.pool import TaskRunner, build_model
 from plant_emulator.diagnosis.execution.progress import ReportingPool
-from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
+from plant_emulator.diagnosis.fitting.evidence import (
+    LARGER_SHARE,
+    NOISE_MEAN_SQUARE,
+    UNEXPLAINED_SHARE,
+)
 from plant_emulator.diagnosis.fitting.fit_steps import simulate_once
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.prediction.gap import shows_shrinkage
@@ -62,6 +66,10 @@ if TYPE_CHECKING:
 THRESHOLDS = {
     "gain of log evidence that an effect needs": f"{SETTINGS.needed:g}",
     "gain that one more effect needs": f"{SETTINGS.needed_again:g}",
+    "share of the gap that named effects may leave": f"{UNEXPLAINED_SHARE:g}",
+    "share of the gap that an effect explains, beside which another one is sought": (
+        f"{LARGER_SHARE:g}"
+    ),
     "mean square over the noise up to which a fit leaves noise": f"{NOISE_MEAN_SQUARE:g}",
 }
 
