@@ -38,8 +38,9 @@ class Settings:
     # Predicted gain from which on a first effect is fitted: parameters that bend together make the
     # gain of a weak effect several times the predicted one.
     promising: float = 5.0
-    # Gain that one more effect needs: needless ones came to 35, and a true one to 45. Less must be
-    # predicted: parameters that follow nearly all of an effect blur what its slopes tell.
+    # Gain that one more effect needs: needless ones that no run refutes came to 35 (to 152 beside a
+    # law that was wrong), and a true one to 45. Less must be predicted: parameters that follow
+    # nearly all of an effect blur what its slopes tell.
     needed_again: float = 40.0
     promising_again: float = 15.0
     # Most effects of a set: nobody has told more than three causes apart in one set of logs.
