@@ -8,7 +8,7 @@ mass is lowest. At the start of a run theta_d is `start_angle`.
 
 from __future__ import annotations
 
-from math import sin
+from math import pi, sin
 from typing import TYPE_CHECKING
 
 from plant_emulator.effects.declaration import EffectParameter, Memory
@@ -17,19 +17,21 @@ if TYPE_CHECKING:
     from plant_emulator.model.records import Record
 
 SUBSYSTEM = "drum"
+# The angle may leave [-pi, pi], so that a fit that begins on the wrong side can go on past half a
+# turn. Its std is that of an angle anywhere on the circle.
 PARAMETERS = {
     "moment": EffectParameter(
         neutral=0.0, lower=0.0, upper=200.0, plausible=10.0, unit="N m", meaning="M"
     ),
     "start_angle": EffectParameter(
         neutral=0.0,
-        lower=-3.2,
-        upper=3.2,
+        lower=-2.0 * pi,
+        upper=2.0 * pi,
         plausible=0.0,
         unit="rad",
         meaning="theta_d at start",
         per_run=True,
-        std=2.0,
+        std=pi / 3.0**0.5,
     ),
 }
 

@@ -58,14 +58,13 @@ def trial_of(
 def confirm(model: Model, trial: Trial) -> FitResult:
     """Fit a hypothesis from its best start (a step).
 
-    Of the last effect, sizes with many narrow basins are scanned at its starts, and such states
-    once more where the fit leaves more than noise: until then the effect was missing.
+    Of the last effect, sizes with many narrow basins are scanned at its starts, and such states and
+    angles once more where the fit leaves more than noise: until then the effect was missing.
     """
     starts = tuple(scan_sizes(model, trial.effects, trial.runs, one) for one in trial.starts)
     further = tuple(scan_sizes(model, trial.effects, trial.runs, one) for one in trial.further)
     found = fit_from_best_start(model, replace(trial, starts=starts, further=further))
-    own = model.candidates[trial.effects[-1]].states
-    if found.mean_square <= NOISE_MEAN_SQUARE or all(u.step is None for u in own):
+    if found.mean_square <= NOISE_MEAN_SQUARE:
         return found
     start = scan_states(model, found, trial.runs)
     if start.states == found.states:

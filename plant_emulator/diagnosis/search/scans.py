@@ -47,7 +47,7 @@ def _start_states(model: Model, candidate: Candidate, task: Task) -> dict[str, f
 
 
 def scan_states(model: Model, found: FitResult, runs: Sequence[int]) -> Start:
-    """A fit with those states of its last effect scanned that have many narrow basins."""
+    """A fit with those states of its last effect scanned that have many basins, and its angles."""
     own, rough = model.candidates[found.effects[-1]].states, model.rough()
     states = tuple(
         _best(_beside(rough.residual(k, found.effects), found.values), at, own)

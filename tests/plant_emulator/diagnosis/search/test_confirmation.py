@@ -97,6 +97,49 @@ def test_frequency_far_from_its_start_is_found_by_a_scan(narrow: str, side: floa
     assert at["frequency"] == pytest.approx(side * 37.3, abs=0.1)
 
 
+class TurnedTone(Line):
+    """A line with a tone of one amplitude and an angle of each run."""
+
+    def __init__(self, measured: Sequence[Array]) -> None:
+        super().__init__(measured)
+        amplitude = replace(linear("amplitude", 1.0), lower=0.1)
+        angle = replace(linear("angle", 0.0), lower=-1.0, upper=6.0, angle=True)
+        self.candidates = {
+            "tone": replace(
+                effect("tone"),
+                sizes=(amplitude,),
+                states=(replace(angle, std=np.pi / 3.0**0.5),),
+                neutral={"amplitude": 0.0},
+            )
+        }
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+
+        def residual(v: Mapping[str, float]) -> Array:
+            y = v["a"] + v["b"] * TIME + v["amplitude"] * np.sin(20.0 * TIME + v["angle"])
+            return (self.measured[run] - y)[None, :]
+
+        return residual
+
+
+def test_angle_that_descends_to_its_bound_is_found_by_a_scan() -> None:
+    """From -0.4 the nearest way to 2.9 leads down past -1; the other run pays for the tone."""
+    angles = (0.3, 2.9)
+    plain = 2.0 + 3.0 * TIME
+    model = TurnedTone([noisy(plain + 4.0 * np.sin(20.0 * TIME + angle)) for angle in angles])
+    start = Start(
+        values={"a": 2.0, "b": 3.0, "amplitude": 4.0},
+        states=({"angle": 0.3}, {"angle": -0.4}),
+    )
+    trial = Trial(("tone",), (0, 1), (start,))
+    assert fit_from_best_start(model, trial).values["amplitude"] < 3.0
+    found = confirm(model, trial)
+    assert found.values["amplitude"] == pytest.approx(4.0, abs=0.15)
+    turned = [own["angle"] - angle for own, angle in zip(found.states, angles, strict=True)]
+    assert np.cos(turned) == pytest.approx(1.0, abs=0.01)
+
+
 def test_set_without_an_effect_starts_where_the_slopes_tell_it_to_be(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
