@@ -6,7 +6,8 @@ A drive's reference is smooth between its corners: straight, or bent slowly. A r
 late shows a reference further along, so on a slope its departure from a local line, over the slope,
 is how late it was. All channels of a row were taken together, so one corrected stamp serves all.
 Where the reference stands still no departure shows. What is not known of a row's time is noise of
-all its channels, in proportion to their rates of change (`recording`).
+all its channels, in proportion to their rates of change (`recording`). A log whose reference tells
+nothing has the jitter of the others, because the same logger took its rows.
 """
 
 from __future__ import annotations
@@ -16,10 +17,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.signals.log import KNEE_TIME, TIMING_ERROR
+from plant_emulator.signals.log import KNEE_TIME, TIMING_ERROR, WHEEL_TORQUE
 from plant_emulator.signals.noise import deviation_without_outliers
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from plant_emulator.signals.log import Array, Log
 
 # Half widths of windows [samples] by the degree of their local polynomial: long straight ones tell
@@ -30,6 +33,8 @@ HALF_WIDTHS = {1: (20, 8), 4: (30, 20, 14, 9)}
 LARGEST_CHANCE = 2.0
 # Times that the jitter is taken from the chosen windows; the last time changes it little.
 PASSES = 3
+# Apparent jitter of a reference over the logger's from which on noise moves it as much [1].
+NOISY = 2.0**0.5
 # A slope that tells a row's time [rad/s^2], and the least jitter worth correcting [s].
 TELLING_SLOPE, LEAST_JITTER = 10.0, 2e-4
 # Rows that tell nothing of a jitter.
@@ -38,25 +43,64 @@ FEW_ROWS = 60
 LARGEST_DEPARTURE = 0.4
 
 
-def restamp(log: Log) -> tuple[Log, float]:
+def restamp_all(logs: Sequence[Log]) -> list[tuple[Log, float]]:
+    """The logs of one logger, each corrected, with the deviation of its jitter [s].
+
+    A log whose reference tells nothing has the jitter of the others.
+    """
+    found = [restamp(log) for log in logs]
+    told = [jitter for _, jitter in found if jitter is not None]
+    others = float(np.median(told)) if told else 0.0
+    return [
+        (_beside_jitter(log, others), others) if jitter is None else (log, jitter)
+        for log, jitter in found
+    ]
+
+
+def _beside_jitter(log: Log, jitter: float) -> Log:
+    """A log whose rows stay on their stamps, with this jitter [s].
+
+    The PLC holds the reference from stamp to stamp. It is put back on its stamps, unless noise of
+    its own moves it as much (that of a torque sensor, by a regulator).
+    """
+    if jitter == 0.0:
+        return log
+    reference = log["speed_reference"]
+    late, leverage = lateness(log.time, reference)
+    told = leverage < 1.0
+    if told.any() and deviation_without_outliers(late[told]) < NOISY * jitter:
+        reference = np.interp(log.time, log.time + late, reference)
+    uncertain = _uncertain(log, jitter)
+    return replace(uncertain, signals={**uncertain.signals, "speed_reference": reference})
+
+
+def _uncertain(log: Log, deviation: float | Array) -> Log:
+    """The log with this deviation of the times of its rows [s]."""
+    errors = np.broadcast_to(deviation, log.time.shape)
+    return replace(log, signals={**log.signals, TIMING_ERROR: errors})
+
+
+def restamp(log: Log) -> tuple[Log, float | None]:
     """The log with its rows at the times that its reference shows, and the jitter's deviation [s].
 
-    It then tells how uncertain these times are. A staircase (a log with a truck) tells nothing and
-    stays as it is. So does one with knees between its samples, which bears the stamps of the PLC
-    itself.
+    It then tells how uncertain these times are. A log with knees between its samples bears the
+    stamps of the PLC itself and has no jitter.
+    None: the reference tells nothing, as a staircase does (a log with a truck); the log stays
     """
-    if "wheel_torque" in log or KNEE_TIME in log or len(log.time) < FEW_ROWS:
+    if KNEE_TIME in log:
         return log, 0.0
+    if WHEEL_TORQUE in log or len(log.time) < FEW_ROWS:
+        return log, None
     late, leverage = lateness(log.time, log["speed_reference"])
     told = leverage < 1.0
     if told.sum() < FEW_ROWS:
-        return log, 0.0
+        return log, None
     # Without outliers: at corners that a window does not miss a line departs, jittered or not.
     deviation = deviation_without_outliers(late[told])
     if deviation < LEAST_JITTER:
         return log, 0.0
-    signals = {**log.signals, TIMING_ERROR: deviation * np.sqrt(leverage)}
-    return replace(log, time=log.time + late, signals=signals), deviation
+    late_log = _uncertain(log, deviation * np.sqrt(leverage))
+    return replace(late_log, time=log.time + late), deviation
 
 
 def lateness(time: Array, reference: Array) -> tuple[Array, Array]:

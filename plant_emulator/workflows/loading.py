@@ -20,7 +20,7 @@ from plant_emulator.recordings.preflight import NAMES, preflight
 from plant_emulator.recordings.recording import recording
 from plant_emulator.recordings.same_bench import check_same_bench
 from plant_emulator.recordings.shared_noise import with_shared_noise
-from plant_emulator.recordings.stamps import restamp
+from plant_emulator.recordings.stamps import restamp_all
 from plant_emulator.recordings.wheel_torque import mark_informative, with_estimated_torque
 from plant_emulator.signals.log import KNEE_TIME, VOLTAGE, Log
 from plant_emulator.simulation.simulate import values_of
@@ -79,18 +79,18 @@ def load_recordings(
     taken: list[Log] = []
     uses: list[Mapping[str, NDArray[np.bool_]]] = []
     notes: list[str] = []
-    for source in sources:
-        log = source if isinstance(source, Log) else logs.read(source)
+    read = [source if isinstance(source, Log) else logs.read(source) for source in sources]
+    for log in read:
         check_unlabelled(log)
         check_signals(log, NEEDED)
-        checked = preflight(log, parameters.value("gear_ratio"))
-        log, jitter = restamp(log)
+    checks = [preflight(log, parameters.value("gear_ratio")) for log in read]
+    for (stamped, jitter), checked in zip(restamp_all(read), checks, strict=True):
         if jitter > 0.0:
             notes.append(
-                f"{log.source}: rows were taken {1e3 * jitter:.1f} ms (rms) off their stamps, as "
-                "the reference tells; the stamps are corrected"
+                f"{stamped.source}: rows were taken {1e3 * jitter:.1f} ms (rms) off their stamps; "
+                "what the reference tells of that is corrected"
             )
-        log, use = bridge_holes(log, checked.use)
+        log, use = bridge_holes(stamped, checked.use)
         known = with_estimated_torque(log, parameters.values())
         if known is not log:
             told = mark_informative(known, parameters.values())

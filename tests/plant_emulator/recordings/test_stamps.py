@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from plant_emulator.recordings.recording import recording
-from plant_emulator.recordings.stamps import lateness, restamp
+from plant_emulator.recordings.stamps import lateness, restamp, restamp_all
 from plant_emulator.signals.log import TIMING_ERROR, Log
 
 RATE = 75.0
@@ -82,7 +82,40 @@ def test_rows_on_their_stamps_stay() -> None:
 def test_a_staircase_tells_nothing() -> None:
     time = np.arange(0.0, 15.0, 0.01)
     given = log(time, time + 1e-3 * np.sin(time), wheel_torque=np.zeros(len(time)))
-    assert restamp(given) == (given, 0.0)
+    assert restamp(given) == (given, None)
+    assert restamp_all([given]) == [(given, 0.0)]
+
+
+def test_a_staircase_has_the_jitter_of_the_other_logs() -> None:
+    """The reference is what the PLC held at the stamps, and all channels are uncertain in time."""
+    time = np.arange(0.0, 15.0, 0.01)
+    random = np.random.default_rng(1)
+    off, other = random.uniform(-2e-3, 2e-3, (2, len(time)))
+    truck = log(time, time + off, wheel_torque=np.zeros(len(time)))
+    (_, told), (found, jitter) = restamp_all([log(time, time + other), truck])
+    assert jitter == told
+    assert jitter == pytest.approx(2e-3 / np.sqrt(3.0), rel=0.1)
+    assert found[TIMING_ERROR] == pytest.approx(jitter)
+    assert np.array_equal(found.time, time)
+    ramp = np.abs(np.gradient(reference(time), time)) > 50.0
+    before, after = (
+        np.sqrt(np.mean((one["speed_reference"] - reference(time))[ramp] ** 2))
+        for one in (truck, found)
+    )
+    assert before == pytest.approx(RATE * jitter, rel=0.1)
+    assert after < 0.3 * before
+
+
+def test_a_reference_that_noise_moves_stays() -> None:
+    """Noise of 0.2 rad/s on a slope of 75 rad/s^2 looks like a jitter of 2.7 ms, not 1.2."""
+    time = np.arange(0.0, 15.0, 0.01)
+    random = np.random.default_rng(1)
+    other = random.uniform(-2e-3, 2e-3, len(time))
+    truck = log(time, time, wheel_torque=np.zeros(len(time)))
+    truck.signals["speed_reference"] += random.normal(0.0, 0.2, len(time))
+    (_, jitter), (found, _) = restamp_all([log(time, time + other), truck])
+    assert np.array_equal(found["speed_reference"], truck["speed_reference"])
+    assert found[TIMING_ERROR] == pytest.approx(jitter)
 
 
 def test_rows_off_their_stamps_on_a_wave_of_one_hertz() -> None:
