@@ -7,7 +7,7 @@ late shows a reference further along, so on a slope its departure from a local l
 is how late it was. All channels of a row were taken together, so one corrected stamp serves all.
 Where the reference stands still no departure shows. What is not known of a row's time is noise of
 all its channels, in proportion to their rates of change (`recording`). A log whose reference tells
-nothing has the jitter of the others, because the same logger took its rows.
+nothing has the jitter of the others, because the same logger took the rows of all.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.signals.log import KNEE_TIME, TIMING_ERROR, WHEEL_TORQUE
+from plant_emulator.signals.log import KNEE_TIME, TIMING_ERROR, has_truck
 from plant_emulator.signals.noise import deviation_without_outliers
 
 if TYPE_CHECKING:
@@ -33,7 +33,8 @@ HALF_WIDTHS = {1: (20, 8), 4: (30, 20, 14, 9)}
 LARGEST_CHANCE = 2.0
 # Times that the jitter is taken from the chosen windows; the last time changes it little.
 PASSES = 3
-# Apparent jitter of a reference over the logger's from which on noise moves it as much [1].
+# What moves a reference on its slopes, over the logger's jitter there, from which on noise moves it
+# as much [1].
 NOISY = 2.0**0.5
 # A slope that tells a row's time [rad/s^2], and the least jitter worth correcting [s].
 TELLING_SLOPE, LEAST_JITTER = 10.0, 2e-4
@@ -43,33 +44,42 @@ FEW_ROWS = 60
 LARGEST_DEPARTURE = 0.4
 
 
-def restamp_all(logs: Sequence[Log]) -> list[tuple[Log, float]]:
+def restamp_all(logs: Sequence[Log], fitted: int | None = None) -> list[tuple[Log, float]]:
     """The logs of one logger, each corrected, with the deviation of its jitter [s].
 
     A log whose reference tells nothing has the jitter of the others.
+    fitted : so many logs, the first ones, tell the jitter of all; None: all of them do
     """
     found = [restamp(log) for log in logs]
-    told = [jitter for _, jitter in found if jitter is not None]
+    # Knees bear the stamps of the PLC: they tell nothing of a logger.
+    told = [own for log, own in found[:fitted] if own is not None and KNEE_TIME not in log]
     others = float(np.median(told)) if told else 0.0
+    if others < LEAST_JITTER:
+        others = 0.0
     return [
-        (_beside_jitter(log, others), others) if jitter is None else (log, jitter)
-        for log, jitter in found
+        (_beside_jitter(log, others), others) if own is None else (log, own) for log, own in found
     ]
 
 
 def _beside_jitter(log: Log, jitter: float) -> Log:
     """A log whose rows stay on their stamps, with this jitter [s].
 
-    The PLC holds the reference from stamp to stamp. It is put back on its stamps, unless noise of
-    its own moves it as much (that of a torque sensor, by a regulator).
+    Rows that were read between the steps of a staircase, by interpolation, show its values of other
+    times. Where the jitter explains how the reference moves on its slopes, it is put back on its
+    stamps. It stays where noise moves it more (that of a torque sensor, by a regulator).
     """
     if jitter == 0.0:
         return log
-    reference = log["speed_reference"]
-    late, leverage = lateness(log.time, reference)
-    told = leverage < 1.0
-    if told.any() and deviation_without_outliers(late[told]) < NOISY * jitter:
-        reference = np.interp(log.time, log.time + late, reference)
+    time, reference = log.time, log["speed_reference"]
+    slope = np.abs(np.gradient(reference, time))
+    telling = slope > TELLING_SLOPE
+    if telling.sum() >= FEW_ROWS:
+        # White noise has third differences of sqrt(20) times its deviation.
+        differences = np.diff(reference, 3)[telling[1:-2]]
+        moved = deviation_without_outliers(differences) / 20.0**0.5
+        if moved < NOISY * jitter * np.median(slope[telling]):
+            late, _ = lateness(time, reference)
+            reference = np.interp(time, time + late, reference)
     uncertain = _uncertain(log, jitter)
     return replace(uncertain, signals={**uncertain.signals, "speed_reference": reference})
 
@@ -85,11 +95,11 @@ def restamp(log: Log) -> tuple[Log, float | None]:
 
     It then tells how uncertain these times are. A log with knees between its samples bears the
     stamps of the PLC itself and has no jitter.
-    None: the reference tells nothing, as a staircase does (a log with a truck); the log stays
+    None: the reference tells nothing, as a staircase does (a log with a truck); the log stays.
     """
     if KNEE_TIME in log:
         return log, 0.0
-    if WHEEL_TORQUE in log or len(log.time) < FEW_ROWS:
+    if has_truck(log) or len(log.time) < FEW_ROWS:
         return log, None
     late, leverage = lateness(log.time, log["speed_reference"])
     told = leverage < 1.0

@@ -84,11 +84,11 @@ def load_recordings(
         check_unlabelled(log)
         check_signals(log, NEEDED)
     checks = [preflight(log, parameters.value("gear_ratio")) for log in read]
-    for (stamped, jitter), checked in zip(restamp_all(read), checks, strict=True):
+    for (stamped, jitter), checked in zip(restamp_all(read, fitted), checks, strict=True):
         if jitter > 0.0:
             notes.append(
                 f"{stamped.source}: rows were taken {1e3 * jitter:.1f} ms (rms) off their stamps; "
-                "what the reference tells of that is corrected"
+                "what the references of the logs tell of that is corrected"
             )
         log, use = bridge_holes(stamped, checked.use)
         known = with_estimated_torque(log, parameters.values())

@@ -58,13 +58,16 @@ def trial_of(
 def confirm(model: Model, trial: Trial) -> FitResult:
     """Fit a hypothesis from its best start (a step).
 
-    Of the last effect, sizes with many narrow basins are scanned at its starts, and such states and
-    angles once more where the fit leaves more than noise: until then the effect was missing.
+    Of the last effect, sizes with many narrow basins are scanned at its starts. Such states, and
+    the angle of each run, are scanned once more where the fit leaves more than noise: until then
+    the effect was missing.
     """
     starts = tuple(scan_sizes(model, trial.effects, trial.runs, one) for one in trial.starts)
     further = tuple(scan_sizes(model, trial.effects, trial.runs, one) for one in trial.further)
     found = fit_from_best_start(model, replace(trial, starts=starts, further=further))
-    if found.mean_square <= NOISE_MEAN_SQUARE:
+    own = model.candidates[trial.effects[-1]].states
+    narrow = any(u.step is not None or u.angle for u in own)
+    if found.mean_square <= NOISE_MEAN_SQUARE or not narrow:
         return found
     start = scan_states(model, found, trial.runs)
     if start.states == found.states:

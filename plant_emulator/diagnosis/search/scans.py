@@ -1,4 +1,4 @@
-"""Scans of what an effect adds with many narrow basins: the pause of a converter, a frequency.
+"""Scans of what an effect adds with many basins: the pause of a converter, a frequency, an angle.
 
 Regressions tell little of such an unknown, because contact jumps with it, or a wave is out of
 phase. A scan with a robust loss finds its basin (`estimation.robust_scan`).
@@ -47,7 +47,7 @@ def _start_states(model: Model, candidate: Candidate, task: Task) -> dict[str, f
 
 
 def scan_states(model: Model, found: FitResult, runs: Sequence[int]) -> Start:
-    """A fit with those states of its last effect scanned that have many basins, and its angles."""
+    """A fit with those states of its last effect scanned that have many basins, or are angles."""
     own, rough = model.candidates[found.effects[-1]].states, model.rough()
     states = tuple(
         _best(_beside(rough.residual(k, found.effects), found.values), at, own)

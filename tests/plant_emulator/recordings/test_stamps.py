@@ -9,7 +9,7 @@ import pytest
 
 from plant_emulator.recordings.recording import recording
 from plant_emulator.recordings.stamps import lateness, restamp, restamp_all
-from plant_emulator.signals.log import TIMING_ERROR, Log
+from plant_emulator.signals.log import KNEE_TIME, TIMING_ERROR, TRUCK, Log
 
 RATE = 75.0
 
@@ -86,8 +86,8 @@ def test_a_staircase_tells_nothing() -> None:
     assert restamp_all([given]) == [(given, 0.0)]
 
 
-def test_a_staircase_has_the_jitter_of_the_other_logs() -> None:
-    """The reference is what the PLC held at the stamps, and all channels are uncertain in time."""
+def test_a_log_with_a_truck_has_the_jitter_of_the_other_logs() -> None:
+    """A reference that was read between two steps is that of its stamps; all else is uncertain."""
     time = np.arange(0.0, 15.0, 0.01)
     random = np.random.default_rng(1)
     off, other = random.uniform(-2e-3, 2e-3, (2, len(time)))
@@ -106,16 +106,35 @@ def test_a_staircase_has_the_jitter_of_the_other_logs() -> None:
     assert after < 0.3 * before
 
 
-def test_a_reference_that_noise_moves_stays() -> None:
-    """Noise of 0.2 rad/s on a slope of 75 rad/s^2 looks like a jitter of 2.7 ms, not 1.2."""
+@pytest.mark.parametrize(("half_width", "noise"), [(2e-3, 0.2), (2e-3, 0.5), (3e-3, 0.3)])
+def test_a_reference_that_noise_moves_stays(half_width: float, noise: float) -> None:
+    """A jitter of 1.2 ms moves a slope of 75 rad/s^2 by 0.09 rad/s, one of 1.7 ms by 0.13."""
     time = np.arange(0.0, 15.0, 0.01)
     random = np.random.default_rng(1)
-    other = random.uniform(-2e-3, 2e-3, len(time))
+    other = random.uniform(-half_width, half_width, len(time))
     truck = log(time, time, wheel_torque=np.zeros(len(time)))
-    truck.signals["speed_reference"] += random.normal(0.0, 0.2, len(time))
+    truck.signals["speed_reference"] += random.normal(0.0, noise, len(time))
     (_, jitter), (found, _) = restamp_all([log(time, time + other), truck])
     assert np.array_equal(found["speed_reference"], truck["speed_reference"])
     assert found[TIMING_ERROR] == pytest.approx(jitter)
+
+
+def test_neither_held_out_logs_nor_stamps_of_the_plc_tell_a_jitter() -> None:
+    time = np.arange(0.0, 15.0, 0.01)
+    off = np.random.default_rng(1).uniform(-2e-3, 2e-3, len(time))
+    jittered, truck = log(time, time + off), log(time, time, wheel_torque=np.zeros(len(time)))
+    knees = log(time, time, **{KNEE_TIME: np.zeros(len(time))})
+    assert restamp_all([truck, jittered], fitted=1)[0] == (truck, 0.0)
+    found = restamp_all([knees, knees, jittered, truck])
+    assert [jitter for _, jitter in found[:2]] == [0.0, 0.0]
+    assert found[3][1] == found[2][1] > 1e-3
+
+
+def test_the_reference_of_a_truck_whose_torque_nobody_measured_tells_nothing() -> None:
+    time = np.arange(0.0, 15.0, 0.01)
+    given = log(time, time, **{TRUCK: np.ones(len(time))})
+    given.signals["speed_reference"] += np.random.default_rng(1).normal(0.0, 0.08, len(time))
+    assert restamp(given) == (given, None)
 
 
 def test_rows_off_their_stamps_on_a_wave_of_one_hertz() -> None:
