@@ -50,12 +50,12 @@ def test_fit_along_the_measured_speeds_leads_to_the_noise(model: BenchModel) -> 
 
 
 def test_best_of_the_starts_is_led_on(model: BenchModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The inertia of the other start is half of the true one."""
+    """The gap of the other start is half of the true one, which no few iterations mend."""
     start = nominal_start(model)
-    values = {**start.values, "drum_inertia": 0.5 * start.values["drum_inertia"]}
+    values = {**start.values, "backlash_half_gap": 0.5 * start.values["backlash_half_gap"]}
     wrong = FitValues(effects=(), values=values, states=start.states)
     first = [lead(model, one, RUNS, iterations=FIRST_ITERATIONS) for one in (start, wrong)]
-    assert first[0].cost < first[1].cost
+    assert 2.0 * first[0].cost < first[1].cost
     monkeypatch.setattr(joint_fit, "CORRECTION_INTERVALS", ())
     for starts in ([wrong, start], [start, wrong]):
         led = approach(model, starts, RUNS)
