@@ -109,8 +109,8 @@ def restamp(log: Log) -> tuple[Log, float | None]:
     deviation = deviation_without_outliers(late[told])
     if deviation < LEAST_JITTER:
         return log, 0.0
-    late_log = _uncertain(log, deviation * np.sqrt(leverage))
-    return replace(late_log, time=log.time + late), deviation
+    uncertain = _uncertain(log, deviation * np.sqrt(leverage))
+    return replace(uncertain, time=log.time + late), deviation
 
 
 def lateness(time: Array, reference: Array) -> tuple[Array, Array]:

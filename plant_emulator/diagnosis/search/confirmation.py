@@ -66,8 +66,8 @@ def confirm(model: Model, trial: Trial) -> FitResult:
     further = tuple(scan_sizes(model, trial.effects, trial.runs, one) for one in trial.further)
     found = fit_from_best_start(model, replace(trial, starts=starts, further=further))
     own = model.candidates[trial.effects[-1]].states
-    narrow = any(u.step is not None or u.angle for u in own)
-    if found.mean_square <= NOISE_MEAN_SQUARE or not narrow:
+    scanned = any(u.step is not None or u.angle for u in own)
+    if found.mean_square <= NOISE_MEAN_SQUARE or not scanned:
         return found
     start = scan_states(model, found, trial.runs)
     if start.states == found.states:
