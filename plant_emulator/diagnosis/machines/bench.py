@@ -69,8 +69,7 @@ COARSE_TOLERANCE = 1e-4
 ROUGH_TOLERANCE = 1e-5
 # Largest step [s], over some samples. It takes a third of the time off smooth runs. That of
 # `simulate` is shorter, because step control does not watch the memories of effects; with those of
-# the library a run is as exact in these steps. Nor does it watch the speed's integrator: in either
-# steps a contact after a long flight of the drum comes some ms off in a few runs of a hundred.
+# the library a run is as exact in these steps.
 LONGEST_STEP = 0.03
 
 

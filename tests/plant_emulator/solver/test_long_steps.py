@@ -46,6 +46,49 @@ def test_error_of_long_steps_falls_with_their_tolerance(nominal: ParameterSet) -
     assert errors[1] < 2e-4
 
 
+@pytest.mark.parametrize(
+    ("gap", "values"),
+    [
+        (
+            -0.77,
+            {
+                "flux_constant_1": 404.3,
+                "flux_constant_2": 4.032,
+                "drum_shaft_damping": 130400.0,
+                "gear_coulomb_friction": 31.9,
+                "gear_viscous_friction": 329.7,
+                "gear_friction_exponent": 0.437,
+                "backlash_half_gap": 0.1203,
+                "drum_inertia": 305.4,
+                "dead_time": 0.05841,
+            },
+        ),
+        (
+            0.97,
+            {
+                "flux_constant_1": 400.3,
+                "flux_constant_2": 4.032,
+                "drum_shaft_damping": 143400.0,
+                "gear_coulomb_friction": 36.49,
+                "gear_viscous_friction": 390.9,
+                "gear_friction_exponent": 0.4503,
+                "backlash_half_gap": 0.1783,
+                "drum_inertia": 313.7,
+                "dead_time": 0.06065,
+            },
+        ),
+    ],
+)
+def test_contact_after_a_flight_does_not_depend_on_the_step(
+    nominal: ParameterSet, gap: float, values: dict[str, float]
+) -> None:
+    """A limit of the current ends just before the drum flies: 1 ms moves the contact after it."""
+    inputs, whole = inputs_of("program3"), {**nominal.values(), **values}
+    fine = simulate(inputs, whole, gap_position=gap, tolerance=1e-9, largest_step=2e-3)
+    coarse = simulate(inputs, whole, gap_position=gap, tolerance=1e-6, largest_step=0.03)
+    assert np.linalg.norm(coarse["shaft_torque"] - fine["shaft_torque"]) < 0.5
+
+
 def test_no_sample_is_left_out_where_corners_lie_on_samples(nominal: ParameterSet) -> None:
     values = {**nominal.values(), "dead_time": 0.0}
     inputs = linear((0.1, 0.0), (0.5, 80.0), (0.73, 80.0), (0.9, 20.0), duration=1.2)

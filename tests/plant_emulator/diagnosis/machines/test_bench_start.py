@@ -27,7 +27,10 @@ def test_a_bench_whose_voltage_does_not_suffice_is_fitted(
     log = add_noise(simulate(inputs_of(asked), values, gap_position=0.3, step=1e-3), seed)
     asked_speed, speed = log["speed_reference"], log["motor_speed"]
     assert (speed - asked_speed)[asked_speed > 370.0].min() < -50.0
-    found = fit_null(BenchModel([recording(log)], nominal, {}), [0])
+    model = BenchModel([recording(log)], nominal, {})
+    start, _ = model.start_values([0])
+    assert start["flux_constant_1"] == pytest.approx(flux, rel=0.03)
+    found = fit_null(model, [0])
     assert found.mean_square < 1.1
     assert found.values["flux_constant_1"] == pytest.approx(flux, rel=0.01)
 
