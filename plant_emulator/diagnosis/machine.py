@@ -39,7 +39,6 @@ class Candidate:
         them; empty for an effect that is not random
     exact_form : whether its law can have no other form, as a factor or an offset; such a law leaves
         nothing where it is the cause
-    quantities : names of the quantities of the machine that its law changes
     """
 
     name: str
@@ -54,7 +53,6 @@ class Candidate:
     needs: str = ""
     stochastic: tuple[Unknown, ...] = ()
     exact_form: bool = False
-    quantities: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, kw_only=True)

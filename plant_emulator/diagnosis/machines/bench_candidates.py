@@ -79,7 +79,6 @@ def candidate(effect: Effect, *, voltage: bool = False, unknown_torque: bool = F
         needs=_needs(effect, voltage=voltage, unknown_torque=unknown_torque),
         stochastic=tuple(unknowns["stochastic"]),
         exact_form=effect.exact,
-        quantities=frozenset(effect.laws),
     )
 
 

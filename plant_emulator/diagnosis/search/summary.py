@@ -55,10 +55,11 @@ def alternatives(sets: Sets, final: FitResult, name: str) -> dict[str, float]:
 def corrections(
     library: Mapping[str, Candidate], final: FitResult, reduced_costs: Mapping[str, float]
 ) -> frozenset[str]:
-    """Effects of a set that only correct the law of another one that changes the same quantity.
+    """Effects of a set that only correct the law of another one of the same subsystem.
 
-    An approximate law leaves up to the square of its relative error of what it closes, and not only
-    at the samples where it closes most: a ramp that lands softly is wrong at its ends.
+    Torques of one subsystem add up, and its speed does not tell which of them is wrong. An
+    approximate law leaves up to the square of its relative error of what it closes, and not only at
+    the samples where it closes most: a ramp that lands softly is wrong at its ends.
 
     reduced_costs : of the set without each effect
     """
@@ -69,7 +70,7 @@ def corrections(
         name
         for name in closed
         for law in laws
-        if law.quantities & library[name].quantities and closed[name] < share * closed[law.name]
+        if law.subsystem == library[name].subsystem and closed[name] < share * closed[law.name]
     )
 
 

@@ -144,7 +144,7 @@ def test_effect_that_only_corrects_a_law_is_fitted_noted_and_not_named(
     gap = 30.0 * SHAPES["late"](TIME) + 1.5 * SHAPES["wave"](TIME)
     model = Unplanned([noisy(gap, seed) for seed in (1, 2, 3)], ["late", "wave"])
     model.candidates = {
-        name: replace(one, quantities=frozenset(["load"])) for name, one in model.candidates.items()
+        name: replace(one, subsystem="load") for name, one in model.candidates.items()
     }
     found = diagnosed(model)
     assert found.answer.verdict.effects == ("late",)
