@@ -42,7 +42,7 @@ INSIDE = (
     # The steepest ramps of the programs exceed these slopes. A steeper limit would have no effect.
     Entry(
         effect="reference_ramp_limit",
-        law="soft_landing_ramp",
+        law="rounded_ramp",
         ranges={"ramp_time": (4.5, 16.0)},
     ),
     Entry(effect="reference_filter", law="three_lag_reference"),

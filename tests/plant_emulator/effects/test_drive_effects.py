@@ -36,6 +36,24 @@ def test_ramp_limit_lets_the_motor_reach_full_speed_in_the_ramp_time(nominal: Pa
         assert slope == pytest.approx(sign * 505.796417 / 8.0, rel=3e-3)
 
 
+def test_ramp_lands_as_far_below_the_reference_as_its_slope_and_landing_time(
+    nominal: ParameterSet,
+) -> None:
+    """By hand, at 63.2 rad/s^2 and 0.1 s: straight up to 6.32 rad/s below 60 rad/s, then slower."""
+    slope, landing = 505.796417 / 8.0, 0.1
+    step = linear((0.2, 0.0), (0.2005, 60.0), duration=2.0, period=5e-4)
+    straight = (60.0 - slope * landing) / slope
+    after = np.maximum(0.0, step.time - 0.2)
+    lands = 60.0 - slope * landing * np.exp(-np.maximum(0.0, after - straight) / landing)
+    by_hand = np.where(after < straight, slope * after, lands)
+    expected = simulate(Log(step.time, {"speed_reference": by_hand}, "hand"), nominal.values())
+    values = effect(nominal, "reference_ramp_limit", ramp_time=8.0, landing_time=landing)
+    found = simulate(step, values)
+    assert np.abs(found["motor_speed"] - expected["motor_speed"]).max() < 0.05
+    corner = simulate(step, effect(nominal, "reference_ramp_limit", ramp_time=8.0))
+    assert np.abs(corner["motor_speed"] - expected["motor_speed"]).max() > 1.0
+
+
 def test_ramp_that_is_slow_enough_passes_the_limit(nominal: ParameterSet) -> None:
     slow = linear((0.2, 0.0), (3.2, 150.0), (4.0, 150.0), duration=5.0)
     plain = simulate(slow, nominal.values())
