@@ -9,8 +9,9 @@ unknowns. The sizes s_k, with covariance C, agree where chance leaves their chi 
 
 m is their weighted mean, e the relative error of a law. It is the test of homogeneity of effect
 sizes (W. Cochran, Biometrics 10 (1954) 101). Each run is a part. A run that alone shows the effect
-has nothing to agree with: it is two parts. An error that is the same in all runs, as in logs of one
-program, is not found.
+has nothing to agree with: it is two parts. So is each run of an effect with an angle of its own in
+each run: the amplitude of a wave is positive in all of them, whatever its angle follows. An error
+that is the same in all parts, as in logs of one program, is not found.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ from plant_emulator.diagnosis.fitting.joint_fit import (
 from plant_emulator.diagnosis.search.settings import SETTINGS
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.search.confirmation import Reduction
     from plant_emulator.estimation.unknowns import Estimate
@@ -61,10 +64,11 @@ def run_agreement(model: Model, asked: Reduction) -> float:
     for unknown in candidate.sizes:
         index, neutral = names.index(unknown.name), unknown.scaled(candidate.neutral[unknown.name])
         widest = SHRINKAGE * abs(unknown.scaled(unknown.start) - neutral)
-        split = _split(near, index, widest)
+        angle = any(u.angle for u in candidate.states)
+        split = _split(near, index, widest, range(len(asked.runs)) if angle else ())
         if _showing(split, widest) < 2:
             alone = int(np.argmin(np.diag(split.covariance)))
-            split = _split(near, index, widest, alone)
+            split = _split(near, index, widest, (alone,))
         law = SETTINGS.law_error * (float(near.z[index]) - neutral)
         spread = _spread(
             split.changes, split.inflation * split.covariance + law**2 * np.eye(len(split.changes))
@@ -78,15 +82,15 @@ def _showing(split: _Split, widest: float) -> int:
     return round(float(np.sum(1.0 - np.diag(split.covariance) / widest**2)))
 
 
-def _split(near: Estimate, index: int, widest: float, alone: int | None = None) -> _Split:
+def _split(near: Estimate, index: int, widest: float, halved: Sequence[int]) -> _Split:
     """Give each part a size of its own, at a fit with one size for all.
 
     index : of the size among the unknowns; widest : prior standard deviation of the changes
-    alone : a run of two parts
+    halved : runs of two parts
     """
     slopes = [
         np.concatenate([np.delete(j, index, axis=-1), j[..., [index]] * own], axis=-1)
-        for j, own in zip(near.jacobians, _parts(near, index, alone), strict=True)
+        for j, own in zip(near.jacobians, _parts(near, index, halved), strict=True)
     ]
     others = [(u, float(z)) for u, z in zip(near.unknowns, near.z, strict=True)]
     del others[index]
@@ -111,16 +115,16 @@ def _split(near: Estimate, index: int, widest: float, alone: int | None = None) 
     )
 
 
-def _parts(near: Estimate, index: int, alone: int | None) -> list[Array]:
+def _parts(near: Estimate, index: int, halved: Sequence[int]) -> list[Array]:
     """Which part each sample of a run belongs to, one column of 0 and 1 a part.
 
     The second part of a run begins where half of the column's sum of squares is past.
     """
     parts = [np.full(j.shape[1], k) for k, j in enumerate(near.jacobians)]
-    if alone is not None:
-        past = np.cumsum(np.sum(near.jacobians[alone][..., index] ** 2, axis=0))
-        parts[alone][2.0 * past > past[-1]] = len(parts)
-    every = np.eye(len(parts) + (alone is not None))
+    for more, run in enumerate(halved):
+        past = np.cumsum(np.sum(near.jacobians[run][..., index] ** 2, axis=0))
+        parts[run][2.0 * past > past[-1]] = len(parts) + more
+    every = np.eye(len(parts) + len(halved))
     return [every[part] for part in parts]
 
 

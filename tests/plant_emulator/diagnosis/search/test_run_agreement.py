@@ -1,5 +1,6 @@
 """Whether the runs agree on the size of an effect, against hand calculations."""
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import isfinite
 
@@ -11,6 +12,7 @@ from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null, linearise
 from plant_emulator.diagnosis.search.confirmation import Reduction
 from plant_emulator.diagnosis.search.run_agreement import _split, run_agreement
 from plant_emulator.diagnosis.search.search import Search
+from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import (
     SHAPES,
     TIME,
@@ -91,7 +93,7 @@ def test_a_prior_that_holds_a_parameter_back_moves_no_size(monkeypatch: pytest.M
     found = fit(model, ("cube",), (0, 1), {"a": 0.0, "b": 0.0}, [{}, {}])
     near = linearise(model, found, (0, 1))
     names = [u.name for u in near.unknowns]
-    split = _split(near, names.index("cube_size"), 2.0)
+    split = _split(near, names.index("cube_size"), 2.0, ())
     assert split.changes == pytest.approx([0.0, 0.0], abs=1e-6)
 
 
@@ -101,7 +103,7 @@ def test_a_run_alone_tells_its_size_with_its_own_samples() -> None:
     found = fit(model, ("wave",), (0, 1), {"a": 0.0, "b": 0.0}, [{}, {}])
     near = linearise(model, found, (0, 1))
     index = [u.name for u in near.unknowns].index("wave_size")
-    split = _split(near, index, 2.0)
+    split = _split(near, index, 2.0, ())
     assert np.diag(split.covariance) == pytest.approx([1.0 / float(WAVE @ WAVE)] * 2, rel=0.02)
     assert split.inflation == pytest.approx(1.0, abs=0.1)
 
@@ -119,6 +121,29 @@ def test_a_run_that_alone_shows_an_effect_has_two_halves(
     runs = tuple(range(1 + others))
     found = fit(model, ("wave",), runs, {"a": 0.0, "b": 0.0}, [{} for _ in runs])
     assert (run_agreement(model, Reduction(found, runs, "wave")) > 0.01) == agree
+
+
+@pytest.mark.parametrize(("later", "agree"), [(3.0, True), (1.0, False)])
+def test_a_wave_with_an_angle_in_each_run_has_one_size_in_both_halves(
+    monkeypatch: pytest.MonkeyPatch, later: float, agree: bool
+) -> None:
+    """Both runs hold the same amplitudes, 3 and the later one, each at an angle of its own."""
+    sizes = np.where(TIME < 0.0, 3.0, later)
+    model = Line([noisy(sizes * np.sin(20.0 * TIME + angle)) for angle in (0.5, -1.0)], ("wave",))
+    angle = replace(linear("wave_angle", 0.0, std=1.8), angle=True)
+    model.candidates = {"wave": replace(model.candidates["wave"], states=(angle,))}
+
+    def residual(run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        def of(v: Mapping[str, float]) -> Array:
+            wave = v["wave_size"] * np.sin(20.0 * TIME + v["wave_angle"])
+            return (model.measured[run] - v["a"] - v["b"] * TIME - wave)[None, :]
+
+        return of
+
+    monkeypatch.setattr(model, "residual", residual)
+    start, states = {"a": 0.0, "b": 0.0}, [{"wave_angle": 0.4}, {"wave_angle": -0.9}]
+    found = fit(model, ("wave",), (0, 1), start, states)
+    assert (run_agreement(model, Reduction(found, (0, 1), "wave")) > 0.01) == agree
 
 
 @pytest.mark.parametrize(
