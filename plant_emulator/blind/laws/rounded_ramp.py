@@ -1,6 +1,6 @@
 """A ramp generator limits the slope of the drive's reference and rounds both ends of the ramp.
 
-    tau dv/dt + v = (reference - omega_r) / (4 tau),   limited to +-omega_max / T;   domega_r/dt = v
+    domega_r/dt = v,   tau dv/dt + v = limited((reference - omega_r) / (4 tau), omega_max / T)
 
 Source: L. Biagiotti, C. Melchiorri, Trajectory Planning for Automatic Machines and Robots, on
 trajectories with limited jerk. The gain 1 / (4 tau) lets the ramp end as fast as it can without

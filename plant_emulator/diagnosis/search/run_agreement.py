@@ -60,12 +60,12 @@ def run_agreement(model: Model, asked: Reduction) -> float:
     candidate = model.candidates[asked.effect]
     near = linearise(model, asked.base, asked.runs)
     names = [u.name for u in near.unknowns]
+    halved = range(len(asked.runs)) if any(u.angle for u in candidate.states) else ()
     probability = 1.0
     for unknown in candidate.sizes:
         index, neutral = names.index(unknown.name), unknown.scaled(candidate.neutral[unknown.name])
         widest = SHRINKAGE * abs(unknown.scaled(unknown.start) - neutral)
-        angle = any(u.angle for u in candidate.states)
-        split = _split(near, index, widest, range(len(asked.runs)) if angle else ())
+        split = _split(near, index, widest, halved)
         if _showing(split, widest) < 2:
             alone = int(np.argmin(np.diag(split.covariance)))
             split = _split(near, index, widest, (alone,))
