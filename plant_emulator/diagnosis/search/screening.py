@@ -1,10 +1,11 @@
 """Screens the effects: the gain of log evidence that each promises on top of a fit.
 
 A linear regression predicts it, in the relations and in the simulation's residual. What is local is
-clean in the first; what is slow and faint adds up in the second. A large gap bends the parameters
-of the fit without effects, and slopes there mislead. The relations are those at the nominal
-parameters then. On top of effects that leave noise the simulation is right, and tells all that the
-relations tell.
+clean in the first; what is slow and faint adds up in the second. A gap bends the parameters of a
+fit, and slopes there mislead: the relations are those at the nominal parameters then. A sagging
+voltage beside a lag promised nothing at parameters that had made its limit inactive, and 85 000 at
+the nominal ones. On top of effects that leave noise the simulation is right, and tells all that
+the relations tell.
 """
 
 from __future__ import annotations
@@ -95,7 +96,7 @@ def promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
     fidelities: tuple[str, ...] = (RELATIONS, SIMULATION)
     if _leaves_noise(base):
         fidelities = (SIMULATION,)
-    elif not base.effects and base.mean_square > SETTINGS.linear_mean_square:
+    elif base.effects or base.mean_square > SETTINGS.linear_mean_square:
         fidelities = (NOMINAL_RELATIONS, SIMULATION)
     return regressions(runner, base, tuple(visible(runner.model, base, runner.runs)), fidelities)
 
