@@ -171,8 +171,7 @@ class SearchStep:
 
     action : what was done with the set of effects, as confirmed, converged, led again, fitted anew,
         refuted by the runs, or noise estimated there
-    promised : gain that the linear regressions promised for the last effect, by regression; of a
-        rival of a leader that leaves noise at the leader's parameters
+    promised : gain that the linear regressions promised for the last effect, by regression
     gain : of log evidence over the fit without effects
     mean_square : of the whitened residual that the fit leaves
     """

@@ -161,13 +161,27 @@ def approach(
     """Values and states near the data, from which a fit of these effects may begin.
 
     Far from the data a free simulation has one local minimum for every way in which contact may
-    come and go. The fit is led along the measured outputs first, from the first start that a few
-    such iterations bring near the data, or else from the best one, and then left to run freely for
+    come and go. The fit is led along the measured outputs first, and then left to run freely for
     longer and longer times (homotopy from prediction errors to simulation errors).
 
+    starts, iterations, far : see `lead_best`
+    """
+    return let_go(model, lead_best(model, starts, runs, iterations, far), runs, iterations)
+
+
+def lead_best(
+    model: Model,
+    starts: Sequence[FitValues],
+    runs: Sequence[int],
+    iterations: int = APPROACH_ITERATIONS,
+    far: float = SUSPECT_MEAN_SQUARE,
+) -> FitResult:
+    """The fit along the measured outputs from the best start.
+
+    That is the first one that a few iterations bring near the data, or else the one of least cost.
+
     starts : all with the same effects, the most promising ones first
-    iterations : of each fit along the measured outputs at most so many
-    far : mean square above which a start is far from the data
+    iterations : at most so many; far : mean square above which a start is far from the data
     """
     best = starts[0]
     if len(starts) > 1:
@@ -177,9 +191,16 @@ def approach(
             if first[-1].mean_square <= far:
                 break
         best = min(first, key=lambda one: one.cost)
-    for interval in CORRECTION_INTERVALS:
-        best = lead(model, best, runs, interval, iterations)
-    return best
+    return lead(model, best, runs, iterations=iterations)
+
+
+def let_go(
+    model: Model, led: FitValues, runs: Sequence[int], iterations: int = APPROACH_ITERATIONS
+) -> FitValues:
+    """A fit along the measured outputs, left to run freely for longer and longer times."""
+    for interval in CORRECTION_INTERVALS[1:]:
+        led = lead(model, led, runs, interval, iterations)
+    return led
 
 
 def _mean_square(model: Model, start: FitValues, runs: Sequence[int]) -> float:

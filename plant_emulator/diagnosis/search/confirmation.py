@@ -11,8 +11,9 @@ from plant_emulator.diagnosis.fit_result import FitValues
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.joint_fit import (
     APPROACH_ITERATIONS,
-    approach,
     fit,
+    lead_best,
+    let_go,
     linearise,
     nearest,
 )
@@ -23,6 +24,8 @@ from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.search.promise import Promise
@@ -36,6 +39,8 @@ class Trial:
     further : starts for the case that all others are far from the data
     lengths : of slopes nearby, see `Estimate.lengths`
     iterations : of each fit at most so many; None: until it converges
+    promised : predicted gains of the last effect by score
+    led : the fit along the measured outputs from the best start; None: not known
     """
 
     effects: tuple[str, ...]
@@ -44,6 +49,8 @@ class Trial:
     further: tuple[Start, ...] = ()
     lengths: Lengths = field(default_factory=dict)
     iterations: int | None = None
+    promised: Mapping[str, float] = field(default_factory=dict)
+    led: FitResult | None = None
 
 
 def trial_of(
@@ -52,19 +59,24 @@ def trial_of(
     """The trial of one more effect on top of a fit."""
     starts, further = starts_of(promise, base)
     effects = (*base.effects, promise.effect)
-    return Trial(effects, runs, starts, further, base.lengths, iterations)
+    return Trial(effects, runs, starts, further, base.lengths, iterations, promise.gains)
+
+
+def with_led_start(model: Model, trial: Trial) -> Trial:
+    """The trial with its best start led along the measured outputs (a step)."""
+    scanned = _with_scanned_sizes(model, trial)
+    return replace(scanned, led=_lead(model, scanned, SUSPECT_MEAN_SQUARE))
 
 
 def confirm(model: Model, trial: Trial) -> FitResult:
     """Fit a hypothesis from its best start (a step).
 
-    Of the last effect, sizes with many narrow basins are scanned at its starts. Such states, and
-    the angle of each run, are scanned once more where the fit leaves more than noise: until then
-    the effect was missing.
+    Such states of the last effect as have many narrow basins, and the angle of each run, are
+    scanned once more where the fit leaves more than noise: until then the effect was missing.
     """
-    starts = tuple(scan_sizes(model, trial.effects, trial.runs, one) for one in trial.starts)
-    further = tuple(scan_sizes(model, trial.effects, trial.runs, one) for one in trial.further)
-    found = fit_from_best_start(model, replace(trial, starts=starts, further=further))
+    if trial.led is None:
+        trial = _with_scanned_sizes(model, trial)
+    found = fit_from_best_start(model, trial)
     own = model.candidates[trial.effects[-1]].states
     scanned = any(u.step is not None or u.angle for u in own)
     if found.mean_square <= NOISE_MEAN_SQUARE or not scanned:
@@ -72,7 +84,7 @@ def confirm(model: Model, trial: Trial) -> FitResult:
     start = scan_states(model, found, trial.runs)
     if start.states == found.states:
         return found
-    again = replace(trial, starts=(start,), further=(), lengths=found.lengths)
+    again = replace(trial, starts=(start,), further=(), lengths=found.lengths, led=None)
     return min(found, fit_from_best_start(model, again), key=lambda one: one.cost)
 
 
@@ -88,9 +100,8 @@ def fit_from_best_start(model: Model, trial: Trial) -> FitResult:
     far = NOISE_MEAN_SQUARE if several else SUSPECT_MEAN_SQUARE
     near = nearest(model, starts, trial.runs, far)
     if near is None:
-        more = [*trial.further, *(_plausible(model, trial, one) for one in trial.starts[:1])]
-        every = [*starts, *(_values(trial, one) for one in more)]
-        near = approach(model, every, trial.runs, trial.iterations or APPROACH_ITERATIONS, far)
+        led = trial.led or _lead(model, trial, far)
+        near = let_go(model, led, trial.runs, trial.iterations or APPROACH_ITERATIONS)
     own = starts[-1]
     found = [
         fit(
@@ -105,6 +116,22 @@ def fit_from_best_start(model: Model, trial: Trial) -> FitResult:
         for one in ([near, own] if several and near is not own else [near])
     ]
     return min(found, key=lambda one: one.cost)
+
+
+def _lead(model: Model, trial: Trial, far: float) -> FitResult:
+    """The fit along the measured outputs from the best of all starts."""
+    plausible = (_plausible(model, trial, one) for one in trial.starts[:1])
+    starts = [_values(trial, one) for one in (*trial.starts, *trial.further, *plausible)]
+    return lead_best(model, starts, trial.runs, trial.iterations or APPROACH_ITERATIONS, far)
+
+
+def _with_scanned_sizes(model: Model, trial: Trial) -> Trial:
+    """The trial with those sizes of the last effect scanned that have many narrow basins."""
+    starts, further = (
+        tuple(scan_sizes(model, trial.effects, trial.runs, one) for one in some)
+        for some in (trial.starts, trial.further)
+    )
+    return replace(trial, starts=starts, further=further)
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,22 @@ that gains no more beside the same others.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.evidence import excess
-from plant_emulator.diagnosis.fitting.fit_steps import refit
+import numpy as np
+
+from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, excess
+from plant_emulator.diagnosis.fitting.fit_steps import refit, refit_along
 from plant_emulator.diagnosis.fitting.task import Task
-from plant_emulator.diagnosis.search.confirmation import Reduction, confirm, trial_of
+from plant_emulator.diagnosis.search.confirmation import (
+    Reduction,
+    confirm,
+    trial_of,
+    with_led_start,
+)
 from plant_emulator.diagnosis.search.run_agreement import run_agreement
+from plant_emulator.diagnosis.search.screening import SIMULATION
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.summary import search_step
 
@@ -26,6 +34,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model
+    from plant_emulator.diagnosis.search.confirmation import Trial
     from plant_emulator.diagnosis.search.promise import Promise
 
 
@@ -72,13 +81,37 @@ class FittedSets:
         self.promises.pop(frozenset(), None)
         self.secants_fitted = False
 
-    def confirm(self, base: FitResult, new: Sequence[Promise], iterations: int) -> list[FitResult]:
-        """Fit these effects on top of a set, each for at most so many iterations."""
-        trials = [trial_of(p, base, self.runner.runs, iterations) for p in new]
+    def fit_on_top(self, base: FitResult, new: Sequence[Promise], least: float) -> list[FitResult]:
+        """Fit effects on top of a fit; least : gain that one must promise.
+
+        Where the base leaves more than noise, a regression may mislead, and a free fit is long. The
+        effects are led along the measured outputs first. The one that gains most there is fitted
+        freely, and of the others those that gain half of that, or whose simulation promises half of
+        what the first one reached: what is slow adds up in a free simulation only.
+        """
+        trials = [trial_of(p, base, self.runner.runs, SETTINGS.leader_iterations) for p in new]
+        gains = np.full(len(trials), np.inf)
+        if base.mean_square > NOISE_MEAN_SQUARE and len(trials) > 1:
+            (own,) = self.runner.map(refit_along, [self.task(base)])
+            trials = list(self.runner.map(with_led_start, trials))
+            gains = np.array([own.cost - one.led.cost for one in trials if one.led])
+        order = np.argsort(-gains, kind="stable")
+        found = self.confirm([trials[k] for k in order[:1]])
+        reached = max((0.5 * (base.cost - one.cost) for one in found), default=0.0)
+        others = [
+            replace(trials[k], iterations=SETTINGS.iterations)
+            for k in order[1:]
+            if gains[k] >= max(0.0, SETTINGS.rival_share * gains[order[0]])
+            or trials[k].promised.get(SIMULATION, 0.0) > max(least, SETTINGS.rival_share * reached)
+        ]
+        return [*found, *self.confirm(others)]
+
+    def confirm(self, trials: Sequence[Trial]) -> list[FitResult]:
+        """Fit these trials, and keep what they reach."""
         found = list(self.runner.map(confirm, trials))
-        for promise, one in zip(new, found, strict=True):
+        for trial, one in zip(trials, found, strict=True):
             self.keep(one)
-            self.trace.append(search_step(self.null, "confirmed", one, promise.gains))
+            self.trace.append(search_step(self.null, "confirmed", one, trial.promised))
         return found
 
     def keep(self, found: FitResult) -> None:

@@ -62,32 +62,33 @@ def starts_of(promise: Promise, base: FitResult) -> tuple[tuple[Start, ...], tup
 
 
 def leading(
-    found: Sequence[Promise], most: int, least: float, tried: Sequence[str] = ()
+    found: Sequence[Promise], most: int, least: float, tried: Sequence[str], share: float
 ) -> list[Promise]:
-    """So many effects of each score that gain half of its most or more, score by score.
+    """So many effects of each score that gain this share of its most or more, score by score.
 
     least : gain that an effect must promise; tried : effects to leave out
     """
     near: dict[str, Promise] = {}
     for score in dict.fromkeys(score for p in found for score in p.gains):
         order = sorted(found, key=lambda p: -p.gains.get(score, 0.0))
-        needed = max(least, SETTINGS.rival_share * order[0].gains.get(score, 0.0))
+        needed = max(least, share * order[0].gains.get(score, 0.0))
         rest = [p for p in order if p.effect not in tried][:most]
         near |= {p.effect: p for p in rest if p.gains.get(score, 0.0) > needed}
     return list(near.values())
 
 
-def rivals(
+def candidates(
     found: Sequence[Promise], base: FitResult, least: float, tried: Sequence[str]
 ) -> list[Promise]:
-    """Effects to fit beside those that were tried on top of a fit.
+    """Effects to try on top of a fit: the leading ones that were not tried.
 
-    They are those that nearly lead. Without effects, where no more than noise is left, an effect is
-    faint: its gain may be several times the promised one, and a fit is cheap. All that promise
-    something are fitted there.
+    Without effects, where no more than noise is left, an effect is faint: its gain may be several
+    times the promised one, and a fit is cheap. All that promise something are tried there. Beside
+    effects that leave more than noise, a cause may promise less than half of what others do that
+    only follow parameters which are not nominal.
     """
-    if base.effects:
-        return leading(found, SETTINGS.rivals_beside, least, tried)
-    if base.mean_square <= NOISE_MEAN_SQUARE:
-        return [p for p in found if p.gain > least and p.effect not in tried]
-    return leading(found, SETTINGS.rivals, least, tried)
+    noise = base.mean_square <= NOISE_MEAN_SQUARE
+    if noise and not base.effects:
+        return [p for p in found if p.gain > least]
+    share = SETTINGS.rival_share if noise or not base.effects else 0.0
+    return leading(found, SETTINGS.leaders, least, tried, share)

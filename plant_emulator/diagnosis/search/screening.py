@@ -1,11 +1,12 @@
 """Screens the effects: the gain of log evidence that each promises on top of a fit.
 
 A linear regression predicts it, in the relations and in the simulation's residual. What is local is
-clean in the first; what is slow and faint adds up in the second. A gap bends the parameters of a
-fit, and slopes there mislead: the relations are those at the nominal parameters then. A sagging
-voltage beside a lag promised nothing at parameters that had made its limit inactive, and 85 000 at
-the nominal ones. On top of effects that leave noise the simulation is right, and tells all that
-the relations tell.
+clean in the first; what is slow and faint adds up in the second. A large gap bends the parameters
+of the fit without effects, and slopes there mislead. The relations are those at the nominal
+parameters then. Beside effects that leave a gap they are both: the fit may be near the truth, or
+bent as well. A sagging voltage beside a lag promised nothing at parameters that had made its limit
+inactive, and 85 000 at the nominal ones. On top of effects that leave noise the simulation is
+right, and tells all that the relations tell.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from plant_emulator.diagnosis.fitting.joint_fit import CORRECTION_INTERVALS, LED
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.columns import best_score, onset_score
-from plant_emulator.diagnosis.search.promise import Promise, Start, leading
+from plant_emulator.diagnosis.search.promise import Promise, Start
 from plant_emulator.diagnosis.search.scans import start_states
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.simulation_columns import SimulationColumns
@@ -96,7 +97,9 @@ def promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
     fidelities: tuple[str, ...] = (RELATIONS, SIMULATION)
     if _leaves_noise(base):
         fidelities = (SIMULATION,)
-    elif base.effects or base.mean_square > SETTINGS.linear_mean_square:
+    elif base.effects:
+        fidelities = (RELATIONS, NOMINAL_RELATIONS, SIMULATION)
+    elif base.mean_square > SETTINGS.linear_mean_square:
         fidelities = (NOMINAL_RELATIONS, SIMULATION)
     return regressions(runner, base, tuple(visible(runner.model, base, runner.runs)), fidelities)
 
@@ -123,30 +126,6 @@ def regressions(
             starts={**known.starts, **one.starts},
         )
     return sorted(found.values(), key=lambda p: -p.gain)
-
-
-def rivals_at(
-    runner: TaskRunner,
-    base: FitResult,
-    leader: FitResult,
-    supposed: Sequence[Promise],
-    least: float,
-) -> list[Promise]:
-    """Those of the supposed rivals of a leader that promise much at its parameters as well.
-
-    Where a leader leaves noise, and the fit without its effect more, that fit has bent its own
-    parameters. Elsewhere all stay, and where the regressions there do not even see the leader.
-
-    base : fit that the rivals are to join; least : gain that one must promise
-    """
-    if not supposed or not leader.mean_square <= NOISE_MEAN_SQUARE < base.mean_square:
-        return list(supposed)
-    own = leader.effects[-1]
-    names = (own, *(p.effect for p in supposed))
-    found = regressions(runner, base.moved_to(leader), names, (RELATIONS, SIMULATION))
-    if not any(p.effect == own and p.gain > least for p in found):
-        return list(supposed)
-    return leading(found, len(supposed), least, (own,))
 
 
 def screen(model: Model, asked: Screening) -> list[Promise]:

@@ -25,12 +25,13 @@ from plant_emulator.diagnosis.fitting.fit_steps import refit, refit_led
 from plant_emulator.diagnosis.search.confirmation import (
     Reduction,
     reduce,
+    trial_of,
     without_effects,
 )
 from plant_emulator.diagnosis.search.fitted_sets import FittedSets
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
-from plant_emulator.diagnosis.search.promise import leading, rivals
-from plant_emulator.diagnosis.search.screening import SIMULATION, promises, rivals_at, visibilities
+from plant_emulator.diagnosis.search.promise import candidates
+from plant_emulator.diagnosis.search.screening import SIMULATION, promises, visibilities
 from plant_emulator.diagnosis.search.secant_fits import fitted_promises
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.summary import (
@@ -151,29 +152,21 @@ class Search(FittedSets):
     def _expand(self, base: FitResult) -> None:
         """Fit the effects of largest gain on top of a set.
 
-        Regressions predict it. Their leaders are fitted until one leaves noise, then its rivals.
+        Regressions predict it, and fits along the measured outputs choose among their leaders.
         Where there is no effect yet, and none of these is the cause, fits by secants tell.
         """
         least = self._promising(base)
-        key, best = frozenset(base.effects), base
+        key = frozenset(base.effects)
         found = [p for p in self._screen(base) if not self.refuted(key | {p.effect})]
         tried = [p.effect for p in found if key and key | {p.effect} in self.sets]
-        for one in leading(found, 1, least, tried):
-            fits = self.confirm(base, [one], SETTINGS.leader_iterations)
-            best = min((best, *fits), key=lambda fit: fit.cost)
-            tried.append(one.effect)
-            if best is not base and best.mean_square <= NOISE_MEAN_SQUARE:
-                break
+        new = candidates(found, base, least, tried)
+        best = min((base, *self.fit_on_top(base, new, least)), key=lambda fit: fit.cost)
         if best is not base:
             best = self._led_again(best)
-        if base.effects and not adequate(best, self.null):
-            return
         tells = not base.effects and best is not base and not leaves_most(best, self.null)
         if tells and self._renew_null(best):
             self._expand(self.null)
             return
-        new = rivals_at(self.runner, base, best, rivals(found, base, least, tried), least)
-        best = min((best, *self.confirm(base, new, SETTINGS.iterations)), key=lambda fit: fit.cost)
         if base.effects or self.secants_fitted or self._leaves_hundredth(best):
             return
         self.secants_fitted = True
@@ -183,7 +176,8 @@ class Search(FittedSets):
                 break
             known = self.sets.get(frozenset([one.effect]), base)
             if one.gain > 0.5 * (base.cost - known.cost):
-                (known,) = self.confirm(base, [one], SETTINGS.leader_iterations)
+                trial = trial_of(one, base, self.runner.runs, SETTINGS.leader_iterations)
+                (known,) = self.confirm([trial])
             reached = max(reached, 0.5 * (base.cost - known.cost))
 
     def _leaves_hundredth(self, found: FitResult) -> bool:

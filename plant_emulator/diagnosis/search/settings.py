@@ -50,15 +50,15 @@ class Settings:
     # Probability below which no chance makes the runs differ on a size. Second effects that are
     # there had 0.4 or more, beside the error that a law may have, and needless ones 0.006 or less.
     agreement: float = 0.01
-    # Leading effects of each regression that are fitted beside its leader: contact and limits move
-    # with the fit, so that the order by promise is not yet that by fit. Beside other effects the
-    # order is nearly right.
-    rivals: int = 2
-    rivals_beside: int = 1
+    # Leading effects of each regression that are led along the measured outputs, or fitted where
+    # only noise is left: contact and limits move with the fit, so that the order by promise is not
+    # yet that by fit.
+    leaders: int = 3
     # Effects that lead the fits by secants and are fitted freely, at most: a leader may not keep
     # what it promised.
     most_followed: int = 3
-    # Gain over the largest one that a rival needs, the largest promise or what a leader reached.
+    # Gain over the largest one that a rival needs: promised, along the measured outputs, or
+    # reached.
     rival_share: float = 0.5
     # Iterations of a first fit, enough to tell a basin from a slope: of a rival, and of a leader.
     # Fits that may win go on.

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
-from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
-from plant_emulator.diagnosis.search.promise import Promise, Start, leading, rivals, starts_of
-from plant_emulator.diagnosis.search.screening import promises, rivals_at
+from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.search.fitted_sets import FittedSets
+from plant_emulator.diagnosis.search.promise import Promise, Start, candidates, leading, starts_of
+from plant_emulator.diagnosis.search.screening import promises
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import TIME, Line, noisy, runner
 
@@ -27,9 +28,10 @@ def test_leaders_of_each_score_gain_half_of_its_most() -> None:
         promise("d", relations=15.0, simulation=47.0),
         promise("e", relations=13.0, simulation=44.0),
     ]
-    assert [p.effect for p in leading(found, 2, 5.0, ["a"])] == ["b", "d", "c"]
-    assert [p.effect for p in leading(found, 2, 25.0, ["a"])] == ["c", "d"]
-    assert [p.effect for p in leading(found, 1, 5.0)] == ["b", "a"]
+    assert [p.effect for p in leading(found, 2, 5.0, ["a"], 0.5)] == ["b", "d", "c"]
+    assert [p.effect for p in leading(found, 2, 25.0, ["a"], 0.5)] == ["c", "d"]
+    assert [p.effect for p in leading(found, 1, 5.0, [], 0.5)] == ["b", "a"]
+    assert [p.effect for p in leading(found, 3, 7.0, ["b"], 0.0)] == ["d", "e", "c", "a"]
 
 
 class Bending(Line):
@@ -45,44 +47,65 @@ class Bending(Line):
         return residual
 
 
-def test_rivals_of_a_leader_that_leaves_noise_are_told_at_its_parameters() -> None:
+def test_effects_that_gain_half_of_the_most_along_the_measured_outputs_are_fitted() -> None:
     """Without the kink a is bent from 2 to 4.5, where a wave acts; the kink's twin stays.
 
-    Beside a leader that leaves more than noise all stay.
+    By hand: the kink gains 2000 5^2 / 24 = 2083, the wave 2000 0.5^2 / 4 = 125.
     """
     y = noisy(2.0 + 3.0 * TIME + 5.0 * abs(TIME) + 0.5 * np.sin(20.0 * TIME))
     model = Bending([y], ("kink", "near kink", "wave"))
     null = fit_null(model, (0,))
-    leader = fit(model, ("kink",), (0,), {**null.values, "kink_size": 5.0}, [{}])
-    supposed = [p for p in promises(runner(model), null) if p.effect != "kink"]
+    supposed = sorted(promises(runner(model), null), key=lambda p: p.effect == "kink")
     assert all(p.gain > 50.0 for p in supposed)
-    assert leader.mean_square > NOISE_MEAN_SQUARE
-    assert rivals_at(runner(model), null, leader, supposed, 5.0) == supposed
-    quiet = replace(leader, sum_of_squares=1.0 * leader.samples)
-    assert rivals_at(runner(model), null, quiet, supposed, 1e6) == supposed  # not even the leader
-    told = rivals_at(runner(model), null, quiet, supposed, 5.0)
-    assert [p.effect for p in told] == ["near kink"]
-    start = told[0].starts["simulation"]
-    assert start.values["a"] == pytest.approx(2.0, abs=0.2)
-    assert start.values["near kink_size"] == pytest.approx(5.0, abs=0.3)
+    sets = FittedSets(runner=runner(model), null=null)
+    found = sets.fit_on_top(null, supposed, 5.0)
+    assert [one.effects for one in found] == [("kink",), ("near kink",)]
+    assert null.cost - found[0].cost == pytest.approx(2.0 * 2083.0, rel=0.1)
+    assert [step.promised for step in sets.trace] == [
+        p.gains for name in ("kink", "near kink") for p in supposed if p.effect == name
+    ]
 
 
-def test_all_that_promise_something_are_rivals_where_only_noise_is_left() -> None:
+def test_effect_whose_simulation_promises_half_of_what_was_reached_is_fitted_too() -> None:
+    """What is slow gains little along the measured outputs; this wave is none and gains nothing."""
+    y = noisy(2.0 + 3.0 * TIME + 5.0 * abs(TIME))
+    model = Line([y], ("kink", "wave"))
+    null = fit_null(model, (0,))
+    for promised, fitted in ((900.0, [("kink",)]), (1100.0, [("kink",), ("wave",)])):
+        supposed = [
+            replace(p, gains={"simulation": promised}) if p.effect == "wave" else p
+            for p in promises(runner(model), null)
+        ]
+        sets = FittedSets(runner=runner(model), null=null)
+        assert [one.effects for one in sets.fit_on_top(null, supposed, 5.0)] == fitted
+
+
+def test_all_effects_are_fitted_on_top_of_a_fit_that_leaves_noise() -> None:
+    model = Line([noisy(2.0 + 3.0 * TIME + 0.3 * abs(TIME))], ("wave", "kink"))
+    null = fit_null(model, (0,))
+    assert null.mean_square <= NOISE_MEAN_SQUARE
+    sets = FittedSets(runner=runner(model), null=null)
+    found = sets.fit_on_top(null, promises(runner(model), null), 5.0)
+    assert {one.effects for one in found} == {("wave",), ("kink",)}
+
+
+def test_all_that_promise_something_are_candidates_where_only_noise_is_left() -> None:
     """A faint effect that was promised 8 gained 42, and the leader's 37 were none."""
     found = [
         promise("a", simulation=37.0),
         promise("b", simulation=30.0),
-        promise("c", simulation=27.0),
+        promise("c", simulation=17.0),
         promise("d", simulation=8.0),
         promise("e", simulation=0.5),
     ]
     noise = fit_null(Line([noisy(2.0 + 3.0 * TIME)]), (0,))
-    names = {p.effect for p in rivals(found, noise, 5.0, ["a"])}
-    assert names == {"b", "c", "d"}
+    assert {p.effect for p in candidates(found, noise, 5.0, [])} == {"a", "b", "c", "d"}
     gap = replace(noise, sum_of_squares=2.0 * noise.samples)
-    assert {p.effect for p in rivals(found, gap, 5.0, ["a"])} == {"b", "c"}
-    beside = replace(noise, effects=("a",))
-    assert {p.effect for p in rivals(found, beside, 5.0, [])} == {"a"}
+    assert {p.effect for p in candidates(found, gap, 5.0, [])} == {"a", "b"}
+    beside = replace(noise, effects=("f",))
+    assert {p.effect for p in candidates(found, beside, 5.0, ["a"])} == {"b"}
+    far = replace(gap, effects=("f",))
+    assert {p.effect for p in candidates(found, far, 5.0, ["a"])} == {"b", "c", "d"}
 
 
 def test_effect_also_starts_at_the_parameters_of_the_set() -> None:
