@@ -169,10 +169,11 @@ class Undetectable:
 class SearchStep:
     """A step of the search for effects.
 
-    action : what was done with the set of effects, as confirmed, converged, led again, fitted anew,
-        refuted by the runs, or noise estimated there
+    action : what was done with the set of effects, as led (along the measured speeds), confirmed,
+        converged, led again, fitted anew, refuted by the runs, or noise estimated there
     promised : gain that the linear regressions promised for the last effect, by regression
-    gain : of log evidence over the fit without effects
+    gain : of log evidence over the fit without effects; of a led fit over the set without its last
+        effect, led as well
     mean_square : of the whitened residual that the fit leaves
     """
 

@@ -26,6 +26,7 @@ LABELS = {
     "start_states": "what each effect promises",
     "screen": "what each effect promises",
     "confirm": "first fits of effects",
+    "lead_start": "fits along the measured speeds",
     "refit_along": "fits along the measured speeds",
     "refit_led": "fits along the measured speeds",
     "fit_by_secants": "fits along the measured speeds",

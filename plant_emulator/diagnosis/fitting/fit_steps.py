@@ -30,7 +30,7 @@ def refit(model: Model, task: Task) -> FitResult:
 
 def refit_led(model: Model, task: Task) -> FitResult:
     """The fit of `task.base` with its effects, approached anew from its values (a step)."""
-    near = approach(model, [task.base], task.runs)
+    near = approach(model, task.base, task.runs)
     return fit(model, near.effects, task.runs, near.values, near.states, lengths=near.lengths)
 
 

@@ -151,29 +151,21 @@ def nearest(
     return starts[int(np.argmin(squares))] if min(squares) <= far else None
 
 
-def approach(
-    model: Model,
-    starts: Sequence[FitValues],
-    runs: Sequence[int],
-    iterations: int = APPROACH_ITERATIONS,
-    far: float = SUSPECT_MEAN_SQUARE,
-) -> FitValues:
+def approach(model: Model, start: FitValues, runs: Sequence[int]) -> FitValues:
     """Values and states near the data, from which a fit of these effects may begin.
 
     Far from the data a free simulation has one local minimum for every way in which contact may
     come and go. The fit is led along the measured outputs first, and then left to run freely for
     longer and longer times (homotopy from prediction errors to simulation errors).
-
-    starts, iterations, far : see `lead_best`
     """
-    return let_go(model, lead_best(model, starts, runs, iterations, far), runs, iterations)
+    return let_go(model, lead(model, start, runs), runs)
 
 
 def lead_best(
     model: Model,
     starts: Sequence[FitValues],
     runs: Sequence[int],
-    iterations: int = APPROACH_ITERATIONS,
+    iterations: int,
     far: float = SUSPECT_MEAN_SQUARE,
 ) -> FitResult:
     """The fit along the measured outputs from the best start.
@@ -183,14 +175,12 @@ def lead_best(
     starts : all with the same effects, the most promising ones first
     iterations : at most so many; far : mean square above which a start is far from the data
     """
-    best = starts[0]
-    if len(starts) > 1:
-        first: list[FitResult] = []
-        for one in starts:
-            first.append(lead(model, one, runs, iterations=FIRST_ITERATIONS))
-            if first[-1].mean_square <= far:
-                break
-        best = min(first, key=lambda one: one.cost)
+    first: list[FitResult] = []
+    for one in starts:
+        first.append(lead(model, one, runs, iterations=FIRST_ITERATIONS))
+        if first[-1].mean_square <= far:
+            break
+    best = min(first, key=lambda one: one.cost)
     return lead(model, best, runs, iterations=iterations)
 
 
@@ -314,5 +304,5 @@ def fit_null(model: Model, runs: Sequence[int]) -> FitResult:
     """Fit without effects from the model's own start values."""
     values, states = model.start_values(runs)
     start = FitValues(effects=(), values=values, states=tuple(states))
-    near = nearest(model, [start], runs) or approach(model, [start], runs)
+    near = nearest(model, [start], runs) or approach(model, start, runs)
     return fit(model, (), runs, near.values, near.states, lengths=near.lengths)

@@ -58,21 +58,30 @@ def trial_of(
 ) -> Trial:
     """The trial of one more effect on top of a fit."""
     starts, further = starts_of(promise, base)
-    effects = (*base.effects, promise.effect)
-    return Trial(effects, runs, starts, further, base.lengths, iterations, promise.gains)
+    return Trial(
+        effects=(*base.effects, promise.effect),
+        runs=runs,
+        starts=starts,
+        further=further,
+        lengths=base.lengths,
+        iterations=iterations,
+        promised=promise.gains,
+    )
 
 
-def with_led_start(model: Model, trial: Trial) -> Trial:
-    """The trial with its best start led along the measured outputs (a step)."""
+def lead_start(model: Model, trial: Trial) -> tuple[Trial, FitResult]:
+    """The trial with its best start led along the measured outputs, and that fit (a step)."""
     scanned = _with_scanned_sizes(model, trial)
-    return replace(scanned, led=_lead(model, scanned, SUSPECT_MEAN_SQUARE))
+    led = _lead(model, scanned)
+    return replace(scanned, led=led), led
 
 
 def confirm(model: Model, trial: Trial) -> FitResult:
     """Fit a hypothesis from its best start (a step).
 
-    Such states of the last effect as have many narrow basins, and the angle of each run, are
-    scanned once more where the fit leaves more than noise: until then the effect was missing.
+    Where it is not led yet, sizes of the last effect with many narrow basins are scanned at its
+    starts. Such states, and the angle of each run, are scanned once more where the fit leaves more
+    than noise: until then the effect was missing.
     """
     if trial.led is None:
         trial = _with_scanned_sizes(model, trial)
@@ -97,10 +106,10 @@ def fit_from_best_start(model: Model, trial: Trial) -> FitResult:
     """
     starts = [_values(trial, one) for one in trial.starts]
     several = len(trial.effects) > 1
-    far = NOISE_MEAN_SQUARE if several else SUSPECT_MEAN_SQUARE
-    near = nearest(model, starts, trial.runs, far)
+    known = [*starts, trial.led] if trial.led else starts
+    near = nearest(model, known, trial.runs, _far(trial))
     if near is None:
-        led = trial.led or _lead(model, trial, far)
+        led = trial.led or _lead(model, trial)
         near = let_go(model, led, trial.runs, trial.iterations or APPROACH_ITERATIONS)
     own = starts[-1]
     found = [
@@ -118,11 +127,17 @@ def fit_from_best_start(model: Model, trial: Trial) -> FitResult:
     return min(found, key=lambda one: one.cost)
 
 
-def _lead(model: Model, trial: Trial, far: float) -> FitResult:
+def _far(trial: Trial) -> float:
+    """Mean square above which a start is far from the data."""
+    return NOISE_MEAN_SQUARE if len(trial.effects) > 1 else SUSPECT_MEAN_SQUARE
+
+
+def _lead(model: Model, trial: Trial) -> FitResult:
     """The fit along the measured outputs from the best of all starts."""
     plausible = (_plausible(model, trial, one) for one in trial.starts[:1])
     starts = [_values(trial, one) for one in (*trial.starts, *trial.further, *plausible)]
-    return lead_best(model, starts, trial.runs, trial.iterations or APPROACH_ITERATIONS, far)
+    iterations = trial.iterations or APPROACH_ITERATIONS
+    return lead_best(model, starts, trial.runs, iterations, _far(trial))
 
 
 def _with_scanned_sizes(model: Model, trial: Trial) -> Trial:

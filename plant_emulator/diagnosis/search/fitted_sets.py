@@ -19,8 +19,8 @@ from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.confirmation import (
     Reduction,
     confirm,
+    lead_start,
     trial_of,
-    with_led_start,
 )
 from plant_emulator.diagnosis.search.run_agreement import run_agreement
 from plant_emulator.diagnosis.search.screening import SIMULATION
@@ -47,7 +47,7 @@ class FittedSets:
     sets : the best fit of each set, at first of those that are known
     agreed : whether the runs agree on it, where they were asked
     promises : what one more effect promises on top of a set
-    expanded : sets whose most promising effects were fitted on top of them
+    expanded : sets whose most promising effects were tried on top of them
     secants_fitted : whether the library was fitted by secants from this fit without effects; in
         another noise these fits choose hardly otherwise
     """
@@ -86,23 +86,26 @@ class FittedSets:
 
         Where the base leaves more than noise, a regression may mislead, and a free fit is long. The
         effects are led along the measured outputs first. The one that gains most there is fitted
-        freely, and of the others those that gain half of that, or whose simulation promises half of
-        what the first one reached: what is slow adds up in a free simulation only.
+        freely, and of the others those that gain half of that there, or half of what the first one
+        reached, or whose simulation promises that: what is slow adds up in a free simulation only.
         """
         trials = [trial_of(p, base, self.runner.runs, SETTINGS.leader_iterations) for p in new]
         gains = np.full(len(trials), np.inf)
         if base.mean_square > NOISE_MEAN_SQUARE and len(trials) > 1:
             (own,) = self.runner.map(refit_along, [self.task(base)])
-            trials = list(self.runner.map(with_led_start, trials))
-            gains = np.array([own.cost - one.led.cost for one in trials if one.led])
+            pairs = list(self.runner.map(lead_start, trials))
+            trials = [trial for trial, _ in pairs]
+            gains = np.array([0.5 * (own.cost - led.cost) for _, led in pairs])
+            self.trace += [search_step(own, "led", led, trial.promised) for trial, led in pairs]
         order = np.argsort(-gains, kind="stable")
         found = self.confirm([trials[k] for k in order[:1]])
         reached = max((0.5 * (base.cost - one.cost) for one in found), default=0.0)
+        least_led = SETTINGS.rival_share * min(gains.max(initial=0.0), reached)
+        least = max(least, SETTINGS.rival_share * reached)
         others = [
             replace(trials[k], iterations=SETTINGS.iterations)
             for k in order[1:]
-            if gains[k] >= max(0.0, SETTINGS.rival_share * gains[order[0]])
-            or trials[k].promised.get(SIMULATION, 0.0) > max(least, SETTINGS.rival_share * reached)
+            if gains[k] >= max(0.0, least_led) or trials[k].promised.get(SIMULATION, 0.0) > least
         ]
         return [*found, *self.confirm(others)]
 

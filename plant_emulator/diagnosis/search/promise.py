@@ -77,7 +77,7 @@ def leading(
     return list(near.values())
 
 
-def candidates(
+def to_try(
     found: Sequence[Promise], base: FitResult, least: float, tried: Sequence[str]
 ) -> list[Promise]:
     """Effects to try on top of a fit: the leading ones that were not tried.

@@ -151,10 +151,21 @@ def screen(model: Model, asked: Screening) -> list[Promise]:
 
 
 def _at_nominal(model: Model, asked: Screening) -> FitResult:
-    """The base of a screening with the nominal parameters, and the states that suit them."""
-    values = model.nominal(asked.runs)
-    states = tuple(model.initial_states(k, asked.base.effects, values) for k in asked.runs)
-    return replace(asked.base, values={**asked.base.values, **values}, states=states)
+    """The base of a screening with the nominal parameters, and the states that suit them.
+
+    The states of its effects stay, as their sizes do.
+    """
+    base = asked.base
+    values = {**base.values, **model.nominal(asked.runs)}
+    own = {u.name for effect in base.effects for u in model.candidates[effect].states}
+    states = tuple(
+        {
+            **model.initial_states(k, base.effects, values),
+            **{name: value for name, value in fitted.items() if name in own},
+        }
+        for k, fitted in zip(asked.runs, base.states, strict=True)
+    )
+    return replace(base, values=values, states=states)
 
 
 def _fidelity(model: Model, asked: Screening) -> Fidelity | None:

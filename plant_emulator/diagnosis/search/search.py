@@ -30,7 +30,7 @@ from plant_emulator.diagnosis.search.confirmation import (
 )
 from plant_emulator.diagnosis.search.fitted_sets import FittedSets
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
-from plant_emulator.diagnosis.search.promise import candidates
+from plant_emulator.diagnosis.search.promise import to_try
 from plant_emulator.diagnosis.search.screening import SIMULATION, promises, visibilities
 from plant_emulator.diagnosis.search.secant_fits import fitted_promises
 from plant_emulator.diagnosis.search.settings import SETTINGS
@@ -159,7 +159,7 @@ class Search(FittedSets):
         key = frozenset(base.effects)
         found = [p for p in self._screen(base) if not self.refuted(key | {p.effect})]
         tried = [p.effect for p in found if key and key | {p.effect} in self.sets]
-        new = candidates(found, base, least, tried)
+        new = to_try(found, base, least, tried)
         best = min((base, *self.fit_on_top(base, new, least)), key=lambda fit: fit.cost)
         if best is not base:
             best = self._led_again(best)

@@ -225,7 +225,8 @@ def search_steps(steps: Sequence[SearchStep]) -> Markup:
     heads = ["promised gain", "gain", "mean square left"]
     return table(
         "The search in its order. Gains are of log evidence: those that the linear regressions "
-        "promise for the last effect, and that of the fit over the fit without effects. A mean "
+        "promise for the last effect, and that of the fit over the fit without effects, or of a "
+        "fit that is led along the measured speeds over such a fit without its last effect. A mean "
         "square of 1 is noise.",
         ["step", "effects", *map(right, heads)],
         rows,

@@ -40,7 +40,7 @@ def nominal_start(model: BenchModel) -> FitValues:
 
 
 def test_fit_along_the_measured_speeds_leads_to_the_noise(model: BenchModel) -> None:
-    near = approach(model, [nominal_start(model)], RUNS)
+    near = approach(model, nominal_start(model), RUNS)
     found = fit(model, (), RUNS, near.values, near.states)
     assert found.mean_square == pytest.approx(1.0, abs=0.03)
     # tests/data/README.md: what the bench was made with
@@ -57,9 +57,9 @@ def test_best_of_the_starts_is_led_on(model: BenchModel) -> None:
     wrong = FitValues(effects=(), values=values, states=start.states)
     first = [lead(model, one, RUNS, iterations=FIRST_ITERATIONS) for one in (start, wrong)]
     assert 2.0 * first[0].cost < first[1].cost
-    on = lead(model, first[0], RUNS)
+    on = lead(model, first[0], RUNS, iterations=5)
     for starts in ([wrong, start], [start, wrong]):
-        led = lead_best(model, starts, RUNS)
+        led = lead_best(model, starts, RUNS, 5)
         assert led.values["drum_inertia"] == pytest.approx(on.values["drum_inertia"], rel=1e-6)
 
 
@@ -68,7 +68,7 @@ def test_first_start_that_comes_near_the_data_is_led_on(
 ) -> None:
     """No iteration is spent on a start behind one that a few iterations bring to the noise."""
     start, led = nominal_start(model), []
-    right = approach(model, [start], RUNS)
+    right = approach(model, start, RUNS)
     wrong = replace(start, values={**start.values, "drum_inertia": 150.0})
 
     def listed(there: BenchModel, one: FitValues, *args: object, **more: object) -> FitResult:
@@ -76,13 +76,13 @@ def test_first_start_that_comes_near_the_data_is_led_on(
         return lead(there, one, *args, **more)  # type: ignore[arg-type]
 
     monkeypatch.setattr(joint_fit, "lead", listed)
-    approach(model, [wrong, right, start], RUNS)
+    lead_best(model, [wrong, right, start], RUNS, FIRST_ITERATIONS)
     assert led[:2] == [wrong.values, right.values]
     assert start.values not in led
 
 
 def test_start_near_the_noise_is_kept(model: BenchModel) -> None:
-    near = approach(model, [nominal_start(model)], RUNS)
+    near = approach(model, nominal_start(model), RUNS)
     reached = fit(model, (), RUNS, near.values, near.states)
     assert nearest(model, [nominal_start(model), reached], RUNS) is reached
     assert nearest(model, [nominal_start(model)], RUNS) is None

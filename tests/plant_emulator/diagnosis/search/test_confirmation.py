@@ -16,6 +16,7 @@ from plant_emulator.diagnosis.search.confirmation import (
     Trial,
     confirm,
     fit_from_best_start,
+    lead_start,
     reduce,
     without_effects,
 )
@@ -23,7 +24,15 @@ from plant_emulator.diagnosis.search.promise import Promise, Start
 from plant_emulator.diagnosis.search.screening import promises
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.signals.log import Array
-from tests.plant_emulator.diagnosis.line import TIME, Line, effect, explained, linear, noisy
+from tests.plant_emulator.diagnosis.line import (
+    TIME,
+    Line,
+    effect,
+    explained,
+    linear,
+    noisy,
+    runner,
+)
 
 WAVE = noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME))
 
@@ -121,6 +130,48 @@ class TurnedTone(Line):
             return (self.measured[run] - y)[None, :]
 
         return residual
+
+
+def test_led_start_far_from_the_noise_is_let_go_and_not_led_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The line also has a cosine of 2, so that no start comes near the noise."""
+    y = 2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME) + 2.0 * np.cos(37.0 * TIME)
+    model = Line([noisy(y)])
+    start = Start(values={"a": 9.0, "b": -9.0, "wave_size": 0.0}, states=({},))
+    trial, led = lead_start(model, Trial(("wave",), (0,), (start,)))
+    assert led.values["wave_size"] == pytest.approx(4.0, abs=0.15)
+    monkeypatch.setattr(confirmation, "lead_best", None)
+    found = confirm(model, trial)
+    assert found.values["wave_size"] == pytest.approx(4.0, abs=0.15)
+
+
+def test_fit_begins_at_a_led_start_that_is_near_the_noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = Line([noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME))])
+    start = Start(values={"a": 9.0, "b": -9.0, "wave_size": 0.0}, states=({},))
+    trial, led = lead_start(model, Trial(("wave",), (0,), (start,)))
+    begun = []
+    monkeypatch.setattr(confirmation, "fit", lambda *args, **_: begun.append(args[3]) or led)
+    confirm(model, trial)
+    assert begun == [led.values]
+
+
+def test_states_of_the_effects_stay_at_the_nominal_parameters(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The tone keeps its angle; a scan without its amplitude would tell any."""
+    asked: list[FitResult] = []
+    measured = noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME + 0.7) + np.cos(37.0 * TIME))
+    model = TurnedTone([measured])
+    monkeypatch.setattr(TurnedTone, "relations", lambda _, where, *__: asked.append(where))
+    monkeypatch.setattr(TurnedTone, "initial_states", lambda *_: {"angle": -1.0})
+    values = {"a": 2.0, "b": 3.0, "amplitude": 4.0}
+    base = fit(model, ("tone",), (0,), values, [{"angle": 0.7}])
+    promises(runner(model), base)
+    nominal = asked[1]
+    assert nominal.values["a"] == 0.0
+    assert nominal.values["amplitude"] == pytest.approx(4.0, abs=0.15)
+    assert nominal.states[0]["angle"] == pytest.approx(0.7, abs=0.05)
 
 
 def test_angle_that_descends_to_its_bound_is_found_by_a_scan() -> None:
