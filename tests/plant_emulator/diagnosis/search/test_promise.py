@@ -2,15 +2,9 @@
 
 from dataclasses import replace
 
-import numpy as np
-import pytest
-
-from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.joint_fit import fit_null
-from plant_emulator.diagnosis.search.fitted_sets import FittedSets
 from plant_emulator.diagnosis.search.promise import Promise, Start, leading, starts_of, to_try
-from plant_emulator.diagnosis.search.screening import promises
-from tests.plant_emulator.diagnosis.line import TIME, Line, noisy, runner
+from tests.plant_emulator.diagnosis.line import TIME, Line, noisy
 
 
 def promise(effect: str, **gains: float) -> Promise:
@@ -30,52 +24,6 @@ def test_leaders_of_each_score_gain_half_of_its_most() -> None:
     assert [p.effect for p in leading(found, 2, 25.0, ["a"], 0.5)] == ["c", "d"]
     assert [p.effect for p in leading(found, 1, 5.0, [], 0.5)] == ["b", "a"]
     assert [p.effect for p in leading(found, 3, 7.0, ["b"], 0.0)] == ["d", "e", "c", "a"]
-
-
-@pytest.mark.parametrize(("wave", "fitted"), [(1.0, [("kink",)]), (1.6, [("kink",), ("wave",)])])
-def test_effects_that_gain_half_of_the_most_along_the_measured_outputs_are_fitted(
-    wave: float, fitted: list[tuple[str, ...]]
-) -> None:
-    """By hand: 5 |t| gains 2000 5^2 / 24 = 2083, a wave of 1 2000 / 4 = 500, one of 1.6 1280.
-
-    The regressions tell nothing, so that only the led fits can choose.
-    """
-    y = noisy(2.0 + 3.0 * TIME + 5.0 * abs(TIME) + wave * np.sin(20.0 * TIME))
-    model = Line([y], ("cube", "wave", "kink"))
-    null = fit_null(model, (0,))
-    alike = [
-        replace(p, gains={"relations": 60.0}, starts={"relations": p.starts["simulation"]})
-        for p in promises(runner(model), null)
-    ]
-    sets = FittedSets(runner=runner(model), null=null)
-    found = sets.fit_on_top(null, alike, 5.0)
-    assert [one.effects for one in found] == fitted
-    led = {step.effects: step.gain for step in sets.trace if step.action == "led"}
-    assert led["kink",] == pytest.approx(2083.0, rel=0.1)
-    assert led["wave",] == pytest.approx(500.0 * wave**2, rel=0.1)
-
-
-def test_effect_whose_simulation_promises_half_of_what_was_reached_is_fitted_too() -> None:
-    """What is slow gains little along the measured outputs; this wave is none and gains nothing."""
-    y = noisy(2.0 + 3.0 * TIME + 5.0 * abs(TIME))
-    model = Line([y], ("kink", "wave"))
-    null = fit_null(model, (0,))
-    for promised, fitted in ((900.0, [("kink",)]), (1100.0, [("kink",), ("wave",)])):
-        supposed = [
-            replace(p, gains={"simulation": promised}) if p.effect == "wave" else p
-            for p in promises(runner(model), null)
-        ]
-        sets = FittedSets(runner=runner(model), null=null)
-        assert [one.effects for one in sets.fit_on_top(null, supposed, 5.0)] == fitted
-
-
-def test_all_effects_are_fitted_on_top_of_a_fit_that_leaves_noise() -> None:
-    model = Line([noisy(2.0 + 3.0 * TIME + 0.3 * abs(TIME))], ("wave", "kink"))
-    null = fit_null(model, (0,))
-    assert null.mean_square <= NOISE_MEAN_SQUARE
-    sets = FittedSets(runner=runner(model), null=null)
-    found = sets.fit_on_top(null, promises(runner(model), null), 5.0)
-    assert {one.effects for one in found} == {("wave",), ("kink",)}
 
 
 def test_all_that_promise_something_are_tried_where_only_noise_is_left() -> None:
