@@ -39,7 +39,7 @@ SCANS: tuple[tuple[str, float, int], ...] = (
 )
 FINE_SCANS = SCANS[-3:]
 # Accuracy of a scan: tolerance and largest step [s].
-SCAN_TOLERANCE, SCAN_STEP = 1e-4, 0.1
+SCAN_TOLERANCE, SCAN_STEP = 1e-3, 0.1
 # Relative difference of the loss that tells no value from another; the nearest of these is taken.
 SAME_LOSS = 1e-3
 

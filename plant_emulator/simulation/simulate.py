@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 Hold = Literal["linear", "staircase"]
 
 # Error per step over what `sdirk.WEIGHT` allows [1].
-TOLERANCE = 1e-6
+TOLERANCE = 2e-5
 # Largest step [s], or one sample if that is shorter. The step control watches the nominal states,
 # but not the memories of effects. With such steps a run also changes smoothly with its parameters,
 # which a fit needs.
@@ -283,7 +283,7 @@ def fit_start(log: Log, run: RunInputs, values: Mapping[str, float], points: int
 
     def cost(position: float) -> float:
         return mean_square_residual(
-            log, simulate(run, values, gap_position=position, tolerance=1e-4)
+            log, simulate(run, values, gap_position=position, tolerance=1e-3)
         )
 
     grid = np.linspace(-1.0, 1.0, points)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plant_emulator.solver.sdirk import GAMMA, SMALLEST_STEP
+from plant_emulator.solver.sdirk import GAMMA, MIDDLE, SMALLEST_STEP
 
 if TYPE_CHECKING:
     from plant_emulator.model.records import State
@@ -30,8 +30,8 @@ def reference_at(tau: float, k: int, time: State, value: State, slope: State) ->
 
 def stage_references(
     t: float, length: float, b: float, segment: int, time: State, value: State, slope: State
-) -> tuple[int, tuple[float, float]]:
-    """Segment at the end of a step, and the delayed reference at its two stages [rad/s].
+) -> tuple[int, tuple[float, float, float]]:
+    """Segment at the end of a step, and the delayed reference at its three stages [rad/s].
 
     A corner that is closer than the smallest step to an end of the step is taken to lie there.
 
@@ -39,9 +39,11 @@ def stage_references(
     segment : where the search for the segment begins
     """
     early = segment_at(t + max(GAMMA * length, SMALLEST_STEP) - b, segment, time)
-    segment = segment_at(t + max(length - SMALLEST_STEP, SMALLEST_STEP) - b, early, time)
+    middle = segment_at(t + max(MIDDLE * length, SMALLEST_STEP) - b, early, time)
+    segment = segment_at(t + max(length - SMALLEST_STEP, SMALLEST_STEP) - b, middle, time)
     return segment, (
         reference_at(t + GAMMA * length - b, early, time, value, slope),
+        reference_at(t + MIDDLE * length - b, middle, time, value, slope),
         reference_at(t + length - b, segment, time, value, slope),
     )
 

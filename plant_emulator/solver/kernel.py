@@ -92,9 +92,9 @@ class Kernel:
         return vector(x)
 
     def work(self) -> State:
-        """Work space of the stepper, four state vectors."""
+        """Work space of the stepper, five state vectors."""
         size = stage.FIRST_MEMORY + len(self.starts)
-        rows = [[0.0] * size for _ in range(4)]
+        rows = [[0.0] * size for _ in range(5)]
         return np.array(rows) if compiler.ENABLED else rows
 
 

@@ -1,4 +1,4 @@
-"""The stepper: SDIRK2 over a whole log, with fixed or adapted steps. `sdirk` is one step.
+"""The stepper: SDIRK3 over a whole log, with fixed or adapted steps. `sdirk` is one step.
 
 Steps end on samples and on every corner of the delayed reference. A step may pass samples while the
 truck's torque does not change. The states at these samples come from cubic interpolation.
@@ -32,6 +32,7 @@ from plant_emulator.solver.dead_time import (
 )
 from plant_emulator.solver.sdirk import (
     GAMMA,
+    MIDDLE,
     SMALLEST_STEP,
     UNSETTLED,
     accept,
@@ -259,6 +260,7 @@ def advance(
             break
         r = (
             past_reference(lag + 1.0 - GAMMA, newest, history),
+            past_reference(lag + 1.0 - MIDDLE, newest, history),
             past_reference(lag, newest, history),
         )
         step(h, s.time, r, x, w, s, p)

@@ -63,10 +63,10 @@ if TYPE_CHECKING:
 # Tolerance of a run with a truck or of one that is led. It takes half the time of the others or
 # less, because every sample of the one is a corner and every correction of the other is a jump. It
 # changes the residual by a hundredth of the noise.
-COARSE_TOLERANCE = 1e-4
+COARSE_TOLERANCE = 2e-3
 # Tolerance of rough runs. They take two thirds of the time, and change the residual by some
 # hundredths of the noise, which is more than a derivative bears.
-ROUGH_TOLERANCE = 1e-5
+ROUGH_TOLERANCE = 2e-4
 # Largest step [s], over some samples. It takes a third of the time off smooth runs. That of
 # `simulate` is shorter, because step control does not watch the memories of effects; with those of
 # the library a run is as exact in these steps.

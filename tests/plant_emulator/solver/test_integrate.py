@@ -13,6 +13,7 @@ from plant_emulator.simulation.fit_metrics import validate
 from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram
 from plant_emulator.simulation.simulate import inputs_of
 from plant_emulator.simulation.simulate import simulate as simulate_run
+from plant_emulator.solver import sdirk
 from plant_emulator.solver.kernel import Kernel
 from tests.plant_emulator.runs import BACKLASH, CURRENT, DRUM, MOTOR, Piecewise, linear, simulate
 
@@ -20,21 +21,33 @@ from tests.plant_emulator.runs import BACKLASH, CURRENT, DRUM, MOTOR, Piecewise,
 RAMP = ((0.0, 0.0), (5.0, 380.0), (14.0, 380.0), (17.5, 0.0))
 
 
-def end_of_smooth_stretch(nominal: ParameterSet, step: float | None) -> np.ndarray:
-    """0.4 s of a ramp in contact, below base speed, whose fast modes have died out."""
-    bench = Piecewise(nominal.values(), gap_position=1.0, tolerance=1e-9)
+def after_a_corner(nominal: ParameterSet, step: float) -> np.ndarray:
+    """States 50 ms after a corner of a ramp in contact, below base speed."""
+    bench = Piecewise(nominal.values(), gap_position=1.0, tolerance=1e-11)
     bench.to(0.5, 30.0)
     bench.step = step
-    bench.to(0.9, 60.0)
+    bench.to(0.55, 37.5)
     return np.array(bench.x)
 
 
-def test_stepper_has_order_two(nominal: ParameterSet) -> None:
-    exact = end_of_smooth_stretch(nominal, 2e-5)
-    errors = [np.abs(end_of_smooth_stretch(nominal, step) - exact) for step in (4e-3, 2e-3, 1e-3)]
+def test_stepper_has_order_three(nominal: ParameterSet) -> None:
+    exact = after_a_corner(nominal, 1e-5)
+    errors = [np.abs(after_a_corner(nominal, step) - exact) for step in (2e-3, 1e-3, 5e-4)]
     for state in (CURRENT, MOTOR, BACKLASH, DRUM):
         orders = [np.log2(coarse[state] / fine[state]) for coarse, fine in pairwise(errors)]
-        assert orders == pytest.approx([2.0, 2.0], abs=0.1), state
+        assert orders == pytest.approx([3.0, 3.0], abs=0.1), state
+
+
+def test_estimated_error_is_that_of_the_method() -> None:
+    """For x' = -x, with the coefficients of Alexander's table: one step by hand."""
+    gamma, middle, first, second = 0.4358665215, 0.7179332608, 1.2084966492, -0.6443631707
+    h = 0.05
+    one = 1.0 / (1.0 + gamma * h)
+    two = (1.0 - (middle - gamma) * h * one) / (1.0 + gamma * h)
+    three = (1.0 - h * (first * one + second * two)) / (1.0 + gamma * h)
+    weights = (sdirk.ERROR_0, sdirk.ERROR_1, sdirk.ERROR_2, sdirk.ERROR_3)
+    estimated = sum(-h * w * x for w, x in zip(weights, (1.0, one, two, three), strict=True))
+    assert estimated == pytest.approx(three - np.exp(-h), rel=0.2)
 
 
 def worst(measured: Log, simulated: Log) -> float:
