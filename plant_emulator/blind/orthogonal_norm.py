@@ -16,17 +16,18 @@ import numpy as np
 
 from plant_emulator.blind.dirt import whiten
 from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
-from plant_emulator.errors import UnsettledError
 from plant_emulator.estimation.free_parameters import free_parameters, unknowns
 from plant_emulator.estimation.least_squares import estimate, linearise_at
-from plant_emulator.model.stage import GAP_POSITION, split_gap_position
+from plant_emulator.estimation.nearby import Changed, OrImpossible
+from plant_emulator.estimation.residuals import SimulatedRun
+from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import IMPOSSIBLE
 from plant_emulator.signals.log import COMPARED
 from plant_emulator.simulation.sensor_noise import SENSORS
-from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
+from plant_emulator.simulation.simulate import TOLERANCE, inputs_of, values_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from plant_emulator.blind.case import Case, Hidden
     from plant_emulator.estimation.unknowns import Residual, Unknown
@@ -73,7 +74,9 @@ def _norm(case: Case, hidden: Hidden, logs: Sequence[Log], parameters: Parameter
     if norm <= DETECTABLE:
         return norm
     away = [_minus(p, w) for p, w in zip(without, whole, strict=True)]
-    bounded = [or_impossible(one, w) for one, w in zip(away, whole, strict=True)]
+    bounded = [
+        OrImpossible(one, np.full_like(w, IMPOSSIBLE)) for one, w in zip(away, whole, strict=True)
+    ]
     return min(norm, _norm_after_fit(wanted, bounded))
 
 
@@ -93,24 +96,9 @@ def _norm_after_fit(wanted: Sequence[Unknown], residuals: Sequence[Residual]) ->
     return float(np.sqrt(min(one.cost for one in (coarse, found))))
 
 
-def or_impossible(residual: Residual, like: Array) -> Residual:
-    """The residual; a huge constant, shape of `like`, if the simulation does not converge.
-
-    The search then turns away from such parameters instead of ending.
-    """
-
-    def evaluate(values: Mapping[str, float]) -> Array:
-        try:
-            return residual(values)
-        except UnsettledError:
-            return np.full_like(like, IMPOSSIBLE)
-
-    return evaluate
-
-
 def _minus(simulated: Residual, base: Array) -> Residual:
     """A simulation minus the constant `base`."""
-    return lambda found: simulated(found) - base
+    return Changed(simulated, lambda rows: rows - base)
 
 
 def _simulation(
@@ -121,10 +109,7 @@ def _simulation(
     effects = {h.law: h.in_run(run) for h in hidden}
     fixed = values_of(parameters.with_values(case.parameters), effects)
 
-    def evaluate(found: Mapping[str, float]) -> Array:
-        values, gap = split_gap_position({**fixed, **found})
-        out = simulate(inputs, values, gap_position=gap)
-        signals = np.stack([out[name] for name in COMPARED])
-        return whiten(signals, log.time, levels, case.dirt)
+    def whitened(out: Log) -> Array:
+        return whiten(np.stack([out[name] for name in COMPARED]), log.time, levels, case.dirt)
 
-    return evaluate
+    return Changed(SimulatedRun(inputs, fixed, TOLERANCE), whitened)

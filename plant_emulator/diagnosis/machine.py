@@ -133,9 +133,6 @@ class Model(Protocol):
         It is the same as `residual` where the noise is white.
         """
 
-    def rough(self) -> Model:
-        """Give the machine with residuals that are good enough to compare, not to differentiate."""
-
     def observer(self, interval: float) -> Model:
         """Give the machine with residuals that are led along the measured outputs.
 

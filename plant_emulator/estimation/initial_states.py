@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.estimation.least_squares import estimate
-from plant_emulator.estimation.residuals import residual_function
+from plant_emulator.estimation.residuals import run_residual
 from plant_emulator.estimation.robust_scan import scan_unknowns
 from plant_emulator.estimation.start_search import StartSearch
 from plant_emulator.estimation.unknowns import Unknown
@@ -86,7 +86,7 @@ def fit_states(
     values : all parameters [SI]; states : the gap position among them
     """
     values = {**values, **recording.logged_values}
-    residual = residual_function(recording, values)
+    residual = run_residual(recording, values)
     others = [u for u in states if u.name != GAP_POSITION]
     starts = scan_states(recording, values, [others], residual)
     return fit_from(starts, states, residual).states(0)

@@ -139,13 +139,11 @@ def linearise_at(
     residuals: Sequence[Residual],
     *,
     lengths: Lengths = MappingProxyType({}),
-    difference: float = DIFFERENCE_NORM,
 ) -> Estimate:
     """Linearise the residuals at the starts of the unknowns, and return it as an estimate there.
 
     lengths : of slopes nearby, which tell the steps of the differences. Where they are not known,
         the steps follow from a first differencing
-    difference : see `estimate`
     """
     unknowns = tuple(unknowns)
     problem = SimulatedProblem(
@@ -154,7 +152,6 @@ def linearise_at(
         None,
         SecantSlopes(unknowns),
         _lengths_of(unknowns, lengths),
-        difference,
     )
     z = np.array([u.scaled(u.start) for u in unknowns])
     problem.learn_steps(z)

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from plant_emulator.errors import UnsettledError
+from plant_emulator.estimation.nearby import Changed, OrImpossible
 from plant_emulator.model.stage import split_gap_position
 from plant_emulator.recordings.input_noise import noise_directions
-from plant_emulator.simulation.simulate import TOLERANCE
+from plant_emulator.recordings.recording import IMPOSSIBLE
+from plant_emulator.simulation.simulate import FIT_TOLERANCE, Settings, simulate_with_steps
+from plant_emulator.solver.stepper import NO_STEPS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -14,42 +22,89 @@ if TYPE_CHECKING:
     from plant_emulator.estimation.unknowns import Estimate, Residual
     from plant_emulator.recordings.input_noise import NoiseDirections
     from plant_emulator.recordings.recording import Recording
-    from plant_emulator.signals.log import Array
+    from plant_emulator.signals.log import Array, Log
+    from plant_emulator.simulation.simulate import MeasuredSpeeds, RunInputs
 
 
-def residual_function(
-    recording: Recording, values: Mapping[str, float], tolerance: float = TOLERANCE
-) -> Residual:
-    """Residual of a run as a function of the unknowns, shape (channels, samples).
+@dataclass
+class SimulatedRun:
+    """The simulated log of a run as a function of the unknowns; see `nearby.Stepped`.
 
     values : of everything that is not unknown [SI]
+    tolerance, largest_step, along, follow : see `simulate`
     """
 
-    def residual(found: Mapping[str, float]) -> Array:
-        return recording.residual(*split_gap_position({**values, **found}), tolerance)
+    inputs: RunInputs
+    values: Mapping[str, float]
+    tolerance: float = FIT_TOLERANCE
+    largest_step: float | None = None
+    along: MeasuredSpeeds | None = None
+    follow: Array = field(default_factory=lambda: NO_STEPS)
+    _last: tuple[dict[str, float], Array] | None = None
 
-    return residual
+    def __call__(self, found: Mapping[str, float], /) -> Log:
+        """The log that the run would have given at these values.
+
+        Raises UnsettledError where the equations were not solved.
+        """
+        values, gap = split_gap_position({**self.values, **found})
+        settings = Settings(gap, self.tolerance, self.largest_step, self.along, self.follow)
+        try:
+            log, steps = simulate_with_steps(self.inputs, values, settings)
+        except UnsettledError:
+            if not len(self.follow):
+                raise
+            log, steps = simulate_with_steps(
+                self.inputs, values, settings._replace(follow=NO_STEPS)
+            )
+        self._last = dict(found), steps
+        return log
+
+    def near(self, found: Mapping[str, float], /) -> SimulatedRun:
+        """See `Stepped`; nothing is simulated where these values were the last ones."""
+        if self._last is None or self._last[0] != found:
+            with suppress(UnsettledError):
+                self(found)
+        known = self._last is not None and self._last[0] == found
+        return replace(self, follow=self._last[1] if self._last and known else NO_STEPS)
+
+
+def run_residual(
+    recording: Recording,
+    values: Mapping[str, float],
+    tolerance: float = FIT_TOLERANCE,
+    largest_step: float | None = None,
+    along: MeasuredSpeeds | None = None,
+) -> Residual:
+    """Whitened residual of a run as a function of the unknowns, shape (channels, samples).
+
+    Where the model cannot be simulated, every sample is IMPOSSIBLE.
+
+    values : of everything that is not unknown [SI]
+    tolerance, largest_step, along : see `simulate`
+    """
+    run = SimulatedRun(recording.inputs, values, tolerance, largest_step, along)
+    impossible = np.where(recording.use, IMPOSSIBLE, 0.0)
+    return OrImpossible(Changed(run, recording.residual_of), impossible)
 
 
 def whiten_function(residual: Residual, noise: NoiseDirections | None) -> Residual:
     """The residual function, whitened for the noise of a measured input; None: as it is."""
-    if noise is None:
-        return residual
-    return lambda found: noise.whiten(residual(found))
+    return residual if noise is None else Changed(residual, noise.whiten)
 
 
 def residual_functions(
     recordings: Sequence[Recording],
     values: Mapping[str, float],
     free: Sequence[str],
-    tolerance: float = TOLERANCE,
+    tolerance: float = FIT_TOLERANCE,
 ) -> list[Residual]:
     """Residual function of every run.
 
     values : of all parameters [SI]; those in `free` are among the unknowns
     """
     fixed = {n: v for n, v in values.items() if n not in free}
-    return [residual_function(r, {**fixed, **r.logged_values}, tolerance) for r in recordings]
+    return [run_residual(r, {**fixed, **r.logged_values}, tolerance) for r in recordings]
 
 
 def whiten_functions(

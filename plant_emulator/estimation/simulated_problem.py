@@ -1,7 +1,7 @@
 """Residuals of simulated runs and their slopes, as functions of the unknowns of a fit (pure).
 
-The Jacobian is made of forward differences so small that the simulation keeps its sequence of
-steps; a state costs a simulation of its own run only. In a rough fit nothing is differenced after a
+The Jacobian is made of forward differences, whose simulations follow the steps of the one at the
+point; a state costs a simulation of its own run only. In a rough fit nothing is differenced after a
 step that the slopes predicted well: they follow the step by secants.
 """
 
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.estimation.nearby import near
 from plant_emulator.estimation.unknowns import column_lengths
 
 if TYPE_CHECKING:
@@ -23,14 +24,17 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 # Forward differences: a change of the residual vector of this norm, within these steps of z. It is
-# small against what the noise hides (1), far above the simulation's own jitter (1e-5), and wide
-# enough to look over the kinks that contact and limits leave in the cost.
-DIFFERENCE_NORM = 0.3
+# small against what the noise hides (1), so that slopes are those of the point itself, and far
+# above the last digits of a simulation (1e-6).
+DIFFERENCE_NORM = 0.03
 SMALLEST_DIFFERENCE, LARGEST_DIFFERENCE = 1e-6, 1e-3
 # Largest step of the slopes that standard errors come from. Over a thousandth, the slope of a weak
 # parameter was that of the one sample in which a contact fell: its standard error was wrong by
 # four, and which sample that was, the last bits of the linear algebra decided.
 WIDEST_DIFFERENCE = 1e-2
+# Change of the residual vector that the noise hides [norm]: the slopes of weak parameters are taken
+# over it, and slopes that follow by secants may miss it.
+HIDDEN_NORM = 0.3
 # Step of the first differences, before any slope is known.
 FIRST_DIFFERENCE = 1e-5
 # Share of the change of the residual vector that the slopes may miss in a step that they follow by
@@ -58,6 +62,7 @@ class SimulatedProblem:
     known: tuple[bytes, list[Array]] = (b"", [])
     based: tuple[bytes, list[Array]] = (b"", [])
     slopes_known: tuple[bytes, list[Array]] = (b"", [])
+    near: tuple[bytes, list[Residual]] = (b"", [])
 
     def residual(self, z: Array) -> list[Array]:
         """Residual of every run at z, shape (channels, samples) each."""
@@ -98,9 +103,9 @@ class SimulatedProblem:
     def _jacobian(self, z: Array) -> list[Array]:
         base = self.residual(z)
         self.based = z.tobytes(), base
-        differenced = self.secants.differenced(z, base, self.difference)
+        differenced = self.secants.differenced(z, base)
         jacobians = self.secants.copies(base)
-        steps = self._steps()
+        steps = self._steps(self.difference, LARGEST_DIFFERENCE)
         for j in np.flatnonzero(differenced):
             self._difference(z, int(j), steps[j], jacobians)
         # Where no step was known, the slopes only tell the next steps, and are not followed.
@@ -109,28 +114,36 @@ class SimulatedProblem:
         self.lengths = column_lengths(jacobians)
         return jacobians
 
-    def _steps(self, most: float = LARGEST_DIFFERENCE) -> Array:
-        """Steps of z that change the residual vector by a norm, within their bounds."""
-        steps = np.clip(
-            self.difference / self.lengths, SMALLEST_DIFFERENCE, most * max(1.0, self.difference)
-        )
+    def _steps(self, norm: float, most: float) -> Array:
+        """Steps of z that change the residual vector by a norm, but none larger than `most`."""
+        steps = np.clip(norm / self.lengths, SMALLEST_DIFFERENCE, most * max(1.0, norm))
         return np.where(np.isnan(self.lengths), FIRST_DIFFERENCE, steps)
 
     def _difference(self, z: Array, j: int, step: float, jacobians: Sequence[Array]) -> None:
         """Fill in the column of one unknown."""
         unknown, base = self.unknowns[j], self.residual(z)
+        if self.near[0] != z.tobytes():
+            self.near = (
+                z.tobytes(),
+                [
+                    near(residual, _values(self.unknowns, z, k))
+                    for k, residual in enumerate(self.residuals)
+                ],
+            )
         if z[j] + step > unknown.scaled(unknown.upper):
             step = -step
         changed = z.copy()
         changed[j] += step
         for k in range(len(base)) if unknown.run is None else (unknown.run,):
-            jacobians[k][..., j] = (self._run(k, changed) - base[k]) / (changed[j] - z[j])
+            self.simulations += 1
+            there = self.near[1][k](_values(self.unknowns, changed, k))
+            jacobians[k][..., j] = (there - base[k]) / (changed[j] - z[j])
 
     def wide_jacobian(self, z: Array) -> list[Array]:
         """Jacobian of every run at z, with the columns of weak unknowns over wider differences."""
         jacobians = [j.copy() for j in self.jacobian(z)]
-        narrow, wide = self._steps(), self._steps(WIDEST_DIFFERENCE)
-        for j in np.flatnonzero(wide > narrow):
+        wide = self._steps(HIDDEN_NORM, WIDEST_DIFFERENCE)
+        for j in np.flatnonzero(wide > LARGEST_DIFFERENCE):
             self._difference(z, int(j), wide[j], jacobians)
         return jacobians
 
@@ -189,16 +202,13 @@ class SecantSlopes:
         self._begun = None if other is None else [j[..., wanted] for j in other.jacobians]
         self._last: tuple[Array, Sequence[Array], Sequence[Array]] | None = None
 
-    def differenced(self, z: Array, residuals: Sequence[Array], least: float) -> NDArray[np.bool_]:
-        """Columns to difference at z, shape (unknowns,).
-
-        least : norm of what the slopes may have missed in any case
-        """
+    def differenced(self, z: Array, residuals: Sequence[Array]) -> NDArray[np.bool_]:
+        """Columns to difference at z, shape (unknowns,)."""
         if self._last is not None and self.rough:
             before, old, slopes = self._last
             changes = [now - then for now, then in zip(residuals, old, strict=True)]
             missed = [c - j @ (z - before) for c, j in zip(changes, slopes, strict=True)]
-            if _norm(missed) <= max(least, MISSED_SHARE * _norm(changes)):
+            if _norm(missed) <= max(HIDDEN_NORM, MISSED_SHARE * _norm(changes)):
                 return np.zeros_like(self.followed)
         return ~self.followed
 

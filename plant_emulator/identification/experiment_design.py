@@ -25,7 +25,9 @@ import numpy as np
 from plant_emulator.errors import UnsettledError
 from plant_emulator.estimation.covariance import data_errors
 from plant_emulator.estimation.least_squares import linearise_at
+from plant_emulator.estimation.nearby import Changed
 from plant_emulator.estimation.noise.channel_noise import ChannelNoise, Whitener
+from plant_emulator.estimation.residuals import run_residual
 from plant_emulator.identification.identify import FINAL_TOLERANCE
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import Recording
@@ -205,9 +207,7 @@ def _planned_residual(
     everything = np.ones(len(run.time), bool)
     whiteners = [Whitener(shown.get(name, ChannelNoise()), everything, run.time) for name in noise]
 
-    def residual(found: Mapping[str, float]) -> Array:
-        trial = {**values, **found}
-        rows = planned.strict_residual(trial, trial.pop(GAP_POSITION), FINAL_TOLERANCE)
+    def white(rows: Array) -> Array:
         return np.stack([w.white(row) for w, row in zip(whiteners, rows, strict=True)])
 
-    return residual
+    return Changed(run_residual(planned, values, FINAL_TOLERANCE), white)

@@ -31,7 +31,7 @@ from plant_emulator.estimation.residuals import residual_functions, whiten_funct
 from plant_emulator.estimation.start_search import FINE_SCANS, StartSearch
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.signals.noise import NoiseSeries
-from plant_emulator.simulation.simulate import TOLERANCE, values_of
+from plant_emulator.simulation.simulate import FIT_TOLERANCE, values_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -177,7 +177,7 @@ def _without_outdone_priors(first: Estimate) -> list[Unknown]:
 def _tolerance(recordings: Sequence[Recording]) -> float:
     """Tolerance of the simulations of a last fit."""
     truck = any(recording.inputs.truck for recording in recordings)
-    return TOLERANCE if truck else FINAL_TOLERANCE
+    return FIT_TOLERANCE if truck else FINAL_TOLERANCE
 
 
 def _refit(

@@ -54,7 +54,7 @@ TORQUE_ERROR_TIME = 1.0
 # Standard deviation along a direction from which on it counts, in the noise of the sensors.
 COUNTED_DEVIATION = 1.0
 # Of the simulations: a direction need not be known better.
-DIRECTION_TOLERANCE = 1e-4
+DIRECTION_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)

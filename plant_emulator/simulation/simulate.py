@@ -9,16 +9,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import inf, nan
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
 from plant_emulator.errors import UnsettledError
-from plant_emulator.signals.log import COMPARED, KNEE, WHEEL_TORQUE, Array, Log
+from plant_emulator.signals.log import KNEE, WHEEL_TORQUE, Array, Log
 from plant_emulator.simulation.sensing import Sensing, reference_nodes, sensing_of
-from plant_emulator.simulation.sensor_noise import SENSORS
 from plant_emulator.solver.kernel import kernel_for
-from plant_emulator.solver.stepper import CHANNELS, Inputs
+from plant_emulator.solver.stepper import CHANNELS, NEVER, NO_STEPS, NOT_MEASURED, Inputs
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -31,10 +30,15 @@ Hold = Literal["linear", "staircase"]
 
 # Error per step over what `sdirk.WEIGHT` allows [1].
 TOLERANCE = 2e-5
+# The same for a fit: it changes the residual of a log by some hundredths of the noise, and slopes
+# along the same steps by a hundredth.
+FIT_TOLERANCE = 2e-4
 # Largest step [s], or one sample if that is shorter. The step control watches the nominal states,
 # but not the memories of effects. With such steps a run also changes smoothly with its parameters,
 # which a fit needs.
 LARGEST_STEP = 0.01
+# Steps of a run that are kept for others to follow, at most [per sample].
+MOST_STEPS = 64
 # Least change of the slope of the reference that ends a step [rad/s^2]. The error control handles
 # smaller ones.
 CORNER = 1.0
@@ -155,6 +159,7 @@ def simulate(
     largest_step: float | None = None,
     step: float | None = None,
     along: MeasuredSpeeds | None = None,
+    follow: Array = NO_STEPS,
     kernel: Kernel | None = None,
 ) -> Log:
     """Simulate a run; the resulting log has the inputs and all channels of the bench [SI].
@@ -167,21 +172,60 @@ def simulate(
         steps pass over samples. Without effects they make smooth runs two to three times faster.
     step : a fixed step in place of adapted steps [s]
     along : measured speeds to lead the simulation along; None: it runs freely
+    follow : steps of a run with other values, see `simulate_with_steps`, in place of adapted steps
     kernel : the kernel to use; None: the smallest that has the effects
     Raises ParameterError for a name in `values` that is no parameter, and UnsettledError where the
     equations were not solved.
+    """
+    if step is not None:
+        tolerance, largest_step = inf, step
+    settings = Settings(gap_position, tolerance, largest_step, along, follow)
+    return _simulate(run, values, settings, NO_STEPS, kernel)[0]
+
+
+class Settings(NamedTuple):
+    """How a run is simulated; see `simulate`."""
+
+    gap_position: float
+    tolerance: float
+    largest_step: float | None
+    along: MeasuredSpeeds | None = None
+    follow: Array = NO_STEPS
+
+
+def simulate_with_steps(
+    run: RunInputs, values: Mapping[str, float], settings: Settings
+) -> tuple[Log, Array]:
+    """Simulate as `simulate` does, and give the steps too, for runs with other values to follow.
+
+    Where there were too many of them, the result has none, and the other runs adapt their own.
+    """
+    return _simulate(run, values, settings, np.empty((MOST_STEPS * len(run.time), 2)), None)
+
+
+def _simulate(
+    run: RunInputs,
+    values: Mapping[str, float],
+    settings: Settings,
+    taken: Array,
+    kernel: Kernel | None,
+) -> tuple[Log, Array]:
+    """The log of a run, and its steps if all are among those taken.
+
+    taken : it is filled, see `stepper.run`
     """
     model, values = (kernel, values) if kernel is not None else kernel_for(values)
     coarse, run = run, refine_inputs(run)
     out = np.zeros((len(run.time), len(CHANNELS)))
     p = model.parameter_record(values)
-    x = model.state(p, gap_position * values["backlash_half_gap"])
+    x = model.state(p, settings.gap_position * values["backlash_half_gap"])
+    largest_step = settings.largest_step
     if largest_step is None:
         largest_step = min(LARGEST_STEP, run.interval)
-    settings = (tolerance, largest_step) if step is None else (inf, step)
     stage = model.stage_record()
     stage.truck = float(run.truck)
-    model.run(
+    due, motor_speed, drum_speed = _corrections(coarse, run, settings.along)
+    steps = model.run(
         Inputs(
             run.time,
             run.reference,
@@ -189,11 +233,15 @@ def simulate(
             run.corners,
             run.wheel_torque,
             run.parked,
-            *_corrections(coarse, run, along),
+            due,
+            motor_speed,
+            drum_speed,
+            settings.follow,
         ),
-        settings,
+        (inf if len(settings.follow) else settings.tolerance, largest_step),
         x,
         model.work(),
+        taken,
         stage,
         p,
         out,
@@ -204,19 +252,20 @@ def simulate(
         signals = {name: run.sensing.show(name, values) for name, values in signals.items()}
     if not run.truck:  # a log with this column would be read as a staircase with a parked truck
         del signals["wheel_torque"]
-    return Log(coarse.time, {"speed_reference": coarse.reference, **signals}, run.source)
+    log = Log(coarse.time, {"speed_reference": coarse.reference, **signals}, run.source)
+    return log, taken[:steps].copy() if steps <= len(taken) else NO_STEPS
 
 
 def _corrections(
     coarse: RunInputs, run: RunInputs, along: MeasuredSpeeds | None
-) -> tuple[Array, ...]:
+) -> tuple[Array, Array, Array]:
     """Samples to correct the speeds at, and the measured speeds, as `stepper.Inputs` has them.
 
     coarse, run : inputs at the samples of the log, and at those that are simulated
     along : None: none, for a free run
     """
     if along is None:
-        return ()
+        return NEVER, NOT_MEASURED, NOT_MEASURED
     rows = np.arange(len(run.time)) if run.sensing is None else run.sensing.rows
     passed = np.floor((coarse.time - coarse.time[0]) / along.interval)
     due = rows[1:][np.diff(passed) > 0.0]
@@ -258,37 +307,3 @@ def values_of(
     both = {**parameters.effects, **(effects or {})}
     flat = {f"{e}_{key}": v for e, table in both.items() for key, v in table.items()}
     return {**parameters.values(), **flat}
-
-
-def mean_square_residual(measured: Log, simulated: Log) -> float:
-    """Mean square of the residual in units of the sensors' noise [1].
-
-    The mean is over the compared channels except the voltage, whose sensor may have an offset.
-    """
-    squares = [
-        np.mean(((measured[name] - simulated[name]) / SENSORS[name][0]) ** 2)
-        for name in COMPARED
-        if name in measured
-    ]
-    return float(np.mean(squares))
-
-
-def fit_start(log: Log, run: RunInputs, values: Mapping[str, float], points: int = 41) -> float:
-    """Fit the gap position at the start of a run to its log, -1 to 1 [1].
-
-    The cost has many local minima, because the gap position decides when the first contact comes.
-    Therefore a scan over `points` positions finds the best basin, and a bounded search its minimum.
-    """
-    from scipy.optimize import minimize_scalar
-
-    def cost(position: float) -> float:
-        return mean_square_residual(
-            log, simulate(run, values, gap_position=position, tolerance=1e-3)
-        )
-
-    grid = np.linspace(-1.0, 1.0, points)
-    best = float(grid[np.argmin([cost(float(position)) for position in grid])])
-    width = float(grid[1] - grid[0])
-    bounds = (max(-1.0, best - width), min(1.0, best + width))
-    found = minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": 1e-4})
-    return float(found.x) if found.fun < cost(best) else best

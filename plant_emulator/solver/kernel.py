@@ -25,7 +25,7 @@ from plant_emulator import effects
 from plant_emulator.errors import ParameterError
 from plant_emulator.model import drive, drum, gear, implicit_stage, laws, stage
 from plant_emulator.model.parameters import UNITS
-from plant_emulator.solver import binding, compiler, dead_time, glue, sdirk, stepper
+from plant_emulator.solver import binding, compiler, dead_time, glue, observer, sdirk, stepper
 from plant_emulator.solver.binding import bind, own_functions
 from plant_emulator.solver.effect_check import check_effects, memory_names, raise_in_effects
 
@@ -42,6 +42,7 @@ MODULES: tuple[ModuleType, ...] = (
     implicit_stage,
     sdirk,
     dead_time,
+    observer,
     stepper,
 )
 

@@ -1,16 +1,19 @@
 """The stepper: SDIRK3 over a whole log, with fixed or adapted steps. `sdirk` is one step.
 
-Steps end on samples and on every corner of the delayed reference. A step may pass samples while the
-truck's torque does not change. The states at these samples come from cubic interpolation.
+Steps end on samples and on every corner of the delayed reference. The step after a corner is as
+long as the one that the corner before allowed, because one corner is like the next. A step may pass
+samples while neither the truck's torque nor the dead time changes. The states at these samples come
+from cubic interpolation.
 
-A run may be led along a measured one, as an observer is (D. Luenberger, IEEE Trans. Autom. Control
-16 (1971) 596): at some samples the speeds are corrected by a share of what they have missed since
-the correction before.
+A run may follow the steps of another one. A small change of a parameter then changes the result
+smoothly, and steps of its own would not (internal numerical differentiation: H. G. Bock, in
+Modelling of Chemical Reaction Systems, Springer (1981) 102). A run may also be led along a measured
+one, see `observer`.
 """
 
 from __future__ import annotations
 
-from math import ceil, inf, isnan
+from math import ceil, inf
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -23,13 +26,13 @@ from plant_emulator.model.laws import (
     measured_shaft_torque,
     shell_temperature,
 )
-from plant_emulator.model.stage import BACKLASH, DRUM_SPEED, GEAR_SPEED, MOTOR_SPEED
 from plant_emulator.solver.dead_time import (
     past_reference,
     reference_at,
     segment_at,
     stage_references,
 )
+from plant_emulator.solver.observer import correct
 from plant_emulator.solver.sdirk import (
     GAMMA,
     MIDDLE,
@@ -56,11 +59,13 @@ CHANNELS = (
     "wheel_torque",
 )
 
-# Gain of the observer: share of the missed speed that one correction gives back, enough to end a
-# drift within some of them.
-OBSERVER_GAIN = 0.6
 # Corrections of a free run: the first one is due past its last sample.
 NEVER, NOT_MEASURED = np.array([np.iinfo(np.int64).max]), np.empty(0)
+# Steps of a run that adapts its own, and of a run whose steps nobody wants.
+NO_STEPS = np.empty((0, 2))
+# A step to a sample or a corner may be longer by this share than the error control allows: two
+# steps of half the length would cost twice the time.
+STRETCH = 0.05
 
 
 class Inputs(NamedTuple):
@@ -72,6 +77,7 @@ class Inputs(NamedTuple):
     parked : 1 for an interval in which the truck is parked, else 0
     corrections : samples to correct the speeds at, ascending; then one past the last sample
     motor_speed, drum_speed : measured, for these corrections; NaN: not measured [rad/s]
+    steps : begin and length of the steps to follow [s], shape (steps, 2); empty: they are adapted
     """
 
     time: State
@@ -83,6 +89,7 @@ class Inputs(NamedTuple):
     corrections: State = NEVER
     motor_speed: State = NOT_MEASURED
     drum_speed: State = NOT_MEASURED
+    steps: State = NO_STEPS
 
 
 def observe(row: int, out: State, s: Record, p: Record) -> None:
@@ -96,8 +103,29 @@ def observe(row: int, out: State, s: Record, p: Record) -> None:
     out[row, 6] = acting_wheel_torque(s, p)
 
 
-def landing_sample(row: int, reach: float, time: State, wheel_torque: State, parked: State) -> int:
-    """Last sample before the time `reach` [s], from `row` on, with the truck's torque unchanged."""
+def begin(time: float, reference: float, out: State, x: State, s: Record, p: Record) -> None:
+    """Write the first sample to the log, at the state x and that reference [rad/s]."""
+    load(x, s)
+    s.time, s.delayed_reference = time, reference
+    evaluate_laws(s, p)
+    observe(0, out, s, p)
+
+
+def landing_sample(
+    row: int,
+    reach: float,
+    b: float,
+    time: State,
+    wheel_torque: State,
+    parked: State,
+    s: Record,
+    p: Record,
+) -> int:
+    """Last sample before the time `reach` [s], from `row` on, with the truck's torque unchanged.
+
+    It is `row` itself if the dead time there is no more b [s]: a step has one dead time.
+    """
+    first = row
     while (
         row + 1 < len(time)
         and time[row + 1] <= reach * (1.0 + 1e-12)
@@ -105,35 +133,11 @@ def landing_sample(row: int, reach: float, time: State, wheel_torque: State, par
         and parked[row + 1] == parked[row]
     ):
         row += 1
+    if row > first:
+        s.time = time[row]
+        if dead_time(s, p) != b:
+            return first
     return row
-
-
-def missed(first: int, last: int, measured: State, column: int, out: State) -> float:
-    """Mean of measured minus simulated in these samples, of those that are measured [rad/s]."""
-    total, count = 0.0, 0
-    for row in range(first, last + 1):
-        difference = measured[row] - out[row, column]
-        if not isnan(difference):
-            total += difference
-            count += 1
-    return total / count if count > 0 else 0.0
-
-
-def correct(
-    first: int, last: int, inputs: Inputs, out: State, x: State, s: Record, p: Record
-) -> None:
-    """Correct the speeds by a share of what they have missed in these samples.
-
-    Motor and gear move together, and in contact the drum moves with them, so that its torque does
-    not jump.
-    """
-    motor = OBSERVER_GAIN * missed(first, last, inputs.motor_speed, 0, out)
-    drum = motor / p.gear_ratio
-    x[MOTOR_SPEED] += motor
-    x[GEAR_SPEED] += drum
-    if abs(x[BACKLASH]) < s.backlash_half_gap:
-        drum = OBSERVER_GAIN * missed(first, last, inputs.drum_speed, 1, out)
-    x[DRUM_SPEED] += drum
 
 
 def private_copy(stage: Record) -> Record:
@@ -152,6 +156,16 @@ def next_corner(edge: int, now: float, edges: State) -> int:
     return edge
 
 
+def step_to_follow(k: int, now: float, steps: State) -> int:
+    """Index of the step to follow at the time `now` [s]; the search begins at k.
+
+    It is the one of which most is still to come: a corner moves with the dead time.
+    """
+    while k + 1 < len(steps) and steps[k, 0] + 0.5 * steps[k, 1] <= now:
+        k += 1
+    return k
+
+
 def step_error(length: float, tolerance: float, unsettled: bool, x: State, w: State) -> float:
     """Error of a step, in tolerances [1]; an unsolved stage counts as UNSETTLED."""
     if unsettled:  # in a shorter step the linearisations hold better
@@ -164,40 +178,42 @@ def run(
     settings: tuple[float, float],
     x: State,
     w: State,
+    taken: State,
     stage: Record,
     p: Record,
     out: State,
 ) -> int:
     """Simulate a whole log and return the number of steps.
 
-    settings : tolerance [1], infinite for fixed steps; largest step [s]
+    settings : tolerance [1], infinite for steps that are fixed or followed; largest step [s]
     x, w : state at the first sample, work space; stage, p : stage record and parameter record
+    taken : begin and length of the first steps [s], shape (some steps, 2); it is filled
     out : the channels at every sample, shape (samples, channels); it is filled
     """
-    time, value, slope, edges, wheel_torque, parked, corrections, _, _ = inputs
+    time, value, slope, edges, wheel_torque, parked, corrections, motor, drum, given = inputs
     tolerance, largest = settings
     s, p = private_copy(stage), private_copy(p)
-    load(x, s)
-    s.time, s.delayed_reference = time[0], value[0]
-    evaluate_laws(s, p)
-    observe(0, out, s, p)
-    t, h, segment, edge, steps, row, due, corrected = time[0], largest, 0, 0, 0, 1, 0, 0
+    begin(time[0], value[0], out, x, s, p)
+    t, h, segment, edge, steps, row, due, corrected, k = time[0], largest, 0, 0, 0, 1, 0, 0, 0
+    past_corner, after_corner = False, largest
     while row < len(time):
         s.time, s.wheel_torque, s.parked = t, wheel_torque[row], parked[row]
         b = dead_time(s, p)
         edge = next_corner(edge, t - b, edges)
-        h = min(h, largest)
+        k = step_to_follow(k, t, given)
+        h = min(given[k, 1] if len(given) > 0 else h, largest)
         # These lines are no function: a call with all these arrays costs a twelfth of a run.
         corner = edges[edge] + b if edge < len(edges) else inf
         reach = min(t + h, corner + SMALLEST_STEP)
-        landing = min(landing_sample(row, reach, time, wheel_torque, parked), corrections[due])
+        landing = min(
+            landing_sample(row, reach, b, time, wheel_torque, parked, s, p), corrections[due]
+        )
         end = corner if corner < time[landing] - SMALLEST_STEP else time[landing]
-        pieces = 1 if landing > row else ceil((end - t) / h - 1e-9)
+        pieces = 1 if landing > row else max(1, ceil((end - t) / h - STRETCH))
         length = (end - t) / pieces
         segment, r = stage_references(t, length, b, segment, time, value, slope)
         unsettled = s.unsettled
         step(length, t, r, x, w, s, p)
-        steps += 1
         if tolerance < 1e9:
             error = step_error(length, tolerance, s.unsettled > unsettled, x, w)
             h = length * growth(error)
@@ -206,21 +222,27 @@ def run(
                 continue
             if s.unsettled > unsettled:
                 break  # even the smallest step is not solved: the caller refuses the result
+        after_corner = h if past_corner else after_corner
+        past_corner = t + length >= corner - SMALLEST_STEP
+        h = min(h, after_corner) if past_corner else h
+        if steps < len(taken):
+            taken[steps, 0], taken[steps, 1] = t, length
+        steps += 1
         if pieces == 1 and end == time[landing]:
             observe(landing, out, s, p)
             early = segment
-            for k in range(row, landing):
-                early = segment_at(time[k] - b, early, time)
+            for passed in range(row, landing):
+                early = segment_at(time[passed] - b, early, time)
                 s.time, s.delayed_reference = (
-                    time[k],
-                    reference_at(time[k] - b, early, time, value, slope),
+                    time[passed],
+                    reference_at(time[passed] - b, early, time, value, slope),
                 )
-                show(interpolate(time[k] - t, length, x, w), s, p)
-                observe(k, out, s, p)
+                show(interpolate(time[passed] - t, length, x, w), s, p)
+                observe(passed, out, s, p)
             row = landing + 1
         accept(length, x, w)
         if row > corrections[due]:
-            correct(corrected + 1, landing, inputs, out, x, s, p)
+            correct(corrected + 1, landing, (motor, drum), out, x, s, p)
             due, corrected = due + 1, landing
         t = end if pieces == 1 else t + length
     write_back(s, stage)

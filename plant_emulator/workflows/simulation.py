@@ -19,7 +19,8 @@ from plant_emulator.signals.log import Log, without_voltage
 from plant_emulator.simulation import simulate as kernel_level
 from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram, TravelProgram, program
 from plant_emulator.simulation.sensor_noise import add_noise
-from plant_emulator.simulation.simulate import Hold, fit_start, inputs_of, values_of
+from plant_emulator.simulation.simulate import Hold, inputs_of, values_of
+from plant_emulator.simulation.start_in_gap import fit_start
 from plant_emulator.simulation.travel_program import simulate_travel
 from plant_emulator.solver.kernel import kernel
 from plant_emulator.workflows.arguments import (

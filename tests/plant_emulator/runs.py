@@ -14,7 +14,7 @@ from plant_emulator.simulation.simulate import inputs_of
 from plant_emulator.simulation.simulate import simulate as simulate_run
 from plant_emulator.solver import compiler
 from plant_emulator.solver.kernel import Kernel, kernel
-from plant_emulator.solver.stepper import Inputs
+from plant_emulator.solver.stepper import NO_STEPS, Inputs
 
 needs_compiler = pytest.mark.skipif(
     not compiler.ENABLED, reason="is about the compiler, which NUMBA_DISABLE_JIT switches off"
@@ -72,7 +72,7 @@ class Piecewise:
         free = np.zeros(pieces + 1)
         work, stage = self.model.work(), self.model.stage_record()
         inputs = Inputs(times, references, slope, np.array([]), torque, free)
-        self.model.run(inputs, settings, self.x, work, stage, self.p, out)
+        self.model.run(inputs, settings, self.x, work, NO_STEPS, stage, self.p, out)
         self.time, self.reference = time, reference
         return out
 

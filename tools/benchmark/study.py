@@ -15,7 +15,7 @@ from plant_emulator import parameter_sets
 from plant_emulator.signals.log import Array, Log
 from plant_emulator.simulation import programs
 from plant_emulator.simulation.simulate import LARGEST_STEP, inputs_of, simulate
-from plant_emulator.solver.stepper import CHANNELS, Inputs
+from plant_emulator.solver.stepper import CHANNELS, NO_STEPS, Inputs
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -58,7 +58,7 @@ class Study:
         def action() -> Array:
             work[:] = 0.0
             x = model.state(p, 0.0)
-            model.run(inputs, (tolerance, step), x, work, stage, p, out)
+            model.run(inputs, (tolerance, step), x, work, NO_STEPS, stage, p, out)
             return out
 
         return action

@@ -75,10 +75,6 @@ class _InputNoiseModel:
             "Model", _InputNoiseModel(self._model.with_planned_runs(where, runs), self._noise)
         )
 
-    def rough(self) -> Model:
-        """See `Model`."""
-        return cast("Model", _InputNoiseModel(self._model.rough(), self._noise))
-
     def observer(self, interval: float) -> Model:
         """See `Model`."""
         return cast("Model", _InputNoiseModel(self._model.observer(interval), self._noise))

@@ -23,7 +23,6 @@ import numpy as np
 from plant_emulator.diagnosis.fit_result import FitResult, FitValues
 from plant_emulator.estimation.covariance import correlation_time, structure
 from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE, estimate, linearise_at
-from plant_emulator.estimation.simulated_problem import DIFFERENCE_NORM
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -38,10 +37,8 @@ COST_TOLERANCE = 1e-5
 COARSE_COST_TOLERANCE = 1e-4
 # Iterations of a fit along the measured outputs that tell the best start, and at most so many more.
 FIRST_ITERATIONS, APPROACH_ITERATIONS = 3, 25
-# Relative fall of the cost that ends a fit along the measured outputs, and norm of the change that
-# its slopes are taken over: it is a start only, and its residuals are rough.
+# Relative fall of the cost that ends a fit along the measured outputs: it is a start only.
 LED_COST_TOLERANCE = 1e-3
-LED_DIFFERENCE = 10.0
 # Times between the corrections that lead a simulation along the measured outputs [s]: in the first
 # a speed that is off by some percent crosses a tenth of the backlash, in the third most of it. Each
 # is some 2.5 times the one before: jumps of five ended in local minima where the drum rocks to and
@@ -105,7 +102,6 @@ def fit(
     *,
     shrinkage: bool = False,
     lengths: Lengths = MappingProxyType({}),
-    difference: float = DIFFERENCE_NORM,
 ) -> FitResult:
     """Fit parameters, states and these effects to these runs, from these start values.
 
@@ -113,7 +109,7 @@ def fit(
     near : an estimate of the same runs; slopes of its unknowns follow by secants, see `estimate`.
         The standard errors are then those of white residuals of variance 1
     shrinkage : see `joint_unknowns`
-    lengths, difference : of the slopes, see `estimate`
+    lengths : of the slopes, see `estimate`
     """
     unknowns = with_starts(
         joint_unknowns(model, effects, runs, shrinkage=shrinkage), values, states
@@ -127,7 +123,6 @@ def fit(
         iterations=iterations,
         follow=near,
         lengths=lengths,
-        difference=difference,
     )
     candidates = {name: model.candidates[name] for name in effects}
     reached = to_result(effects, found, len(runs), _chosen(model, effects))
@@ -221,7 +216,6 @@ def lead(
         [observer.residual(k, start.effects) for k in runs],
         settled=LED_COST_TOLERANCE,
         iterations=iterations,
-        difference=LED_DIFFERENCE,
         rough=True,
     )
     return to_result(start.effects, found, len(runs), _chosen(model, start.effects))
@@ -252,13 +246,11 @@ def fit_from(
     return fit(model, effects, runs, start.values, start.states, iterations, lengths=start.lengths)
 
 
-def linearise(
-    model: Model, found: FitValues, runs: Sequence[int], difference: float = DIFFERENCE_NORM
-) -> Estimate:
+def linearise(model: Model, found: FitValues, runs: Sequence[int]) -> Estimate:
     """Compute residuals, Jacobians and covariance at the values of a fit, without fitting."""
     unknowns = with_starts(joint_unknowns(model, found.effects, runs), found.values, found.states)
     residuals = [model.residual(k, found.effects) for k in runs]
-    return linearise_at(unknowns, residuals, lengths=found.lengths, difference=difference)
+    return linearise_at(unknowns, residuals, lengths=found.lengths)
 
 
 def to_result(

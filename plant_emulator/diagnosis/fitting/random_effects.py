@@ -26,6 +26,7 @@ from plant_emulator.diagnosis.fit_result import VarianceComponent
 from plant_emulator.diagnosis.fitting.evidence import EVIDENCE_THRESHOLD
 from plant_emulator.diagnosis.fitting.joint_fit import AT_BOUND, fit_from
 from plant_emulator.estimation.covariance import structure
+from plant_emulator.estimation.nearby import Changed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -197,22 +198,14 @@ class _WeightedModel:
             "Model", _WeightedModel(self._model.with_planned_runs(where, runs), self._weights)
         )
 
-    def rough(self) -> Model:
-        """See `Model`."""
-        return cast("Model", _WeightedModel(self._model.rough(), self._weights))
-
     def observer(self, interval: float) -> Model:
         """See `Model`."""
         return cast("Model", _WeightedModel(self._model.observer(interval), self._weights))
 
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
         """See `Model`."""
-        plain, weight = self._model.residual(run, effects), self._weights.get(run, 1.0)
-
-        def residual(values: Mapping[str, float]) -> Array:
-            return np.asarray(plain(values) * weight)
-
-        return residual
+        weight = self._weights.get(run, 1.0)
+        return Changed(self._model.residual(run, effects), lambda rows: rows * weight)
 
 
 @dataclass(frozen=True)

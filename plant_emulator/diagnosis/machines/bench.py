@@ -34,14 +34,14 @@ from plant_emulator.estimation.initial_states import (
     states_of,
     with_logged_values,
 )
+from plant_emulator.estimation.residuals import SimulatedRun, run_residual
 from plant_emulator.estimation.start_search import StartSearch
 from plant_emulator.model.array_laws import base_speed
 from plant_emulator.model.parameters import UNITS
 from plant_emulator.model.stage import GAP_POSITION, split_gap_position
 from plant_emulator.recordings.input_noise import noise_directions
-from plant_emulator.recordings.recording import IMPOSSIBLE
 from plant_emulator.signals.log import VOLTAGE
-from plant_emulator.simulation.simulate import TOLERANCE, simulate, values_of
+from plant_emulator.simulation.simulate import FIT_TOLERANCE, values_of
 from plant_emulator.solver.kernel import kernel, use_own_effects
 
 if TYPE_CHECKING:
@@ -57,16 +57,13 @@ if TYPE_CHECKING:
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.input_noise import NoiseDirections
     from plant_emulator.recordings.recording import Recording
-    from plant_emulator.signals.log import Array, Log
+    from plant_emulator.signals.log import Log
     from plant_emulator.simulation.simulate import MeasuredSpeeds
 
 # Tolerance of a run with a truck or of one that is led. It takes half the time of the others or
 # less, because every sample of the one is a corner and every correction of the other is a jump. It
 # changes the residual by a hundredth of the noise.
 COARSE_TOLERANCE = 2e-3
-# Tolerance of rough runs. They take two thirds of the time, and change the residual by some
-# hundredths of the noise, which is more than a derivative bears.
-ROUGH_TOLERANCE = 2e-4
 # Largest step [s], over some samples. It takes a third of the time off smooth runs. That of
 # `simulate` is shorter, because step control does not watch the memories of effects; with those of
 # the library a run is as exact in these steps.
@@ -94,7 +91,6 @@ class BenchModel:
         self._effects = effects
         self._values = values_of(parameters)
         self.nominal_set = parameters
-        self._roughly: BenchModel | None = None  # a rough model is its own
         self._along: list[MeasuredSpeeds] | None = None
         known = {**kernel().effects, **effects}
         plausible = {name: effect.plausible() for name, effect in effects.items()}
@@ -139,48 +135,29 @@ class BenchModel:
 
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
         """See `Model`."""
-        recording, fixed = self._recordings[run], self.fixed_values(run, effects)
-
-        def residual(found: Mapping[str, float]) -> Array:
-            try:
-                return recording.residual_of(self.simulated(run, {**fixed, **found}))
-            except UnsettledError:
-                return np.where(recording.use, IMPOSSIBLE, 0.0)
-
-        return residual
+        fixed, (tolerance, along) = self.fixed_values(run, effects), self._course_of(run)
+        return run_residual(self._recordings[run], fixed, tolerance, LONGEST_STEP, along)
 
     unwhitened_residual = residual
 
-    def rough(self) -> BenchModel:
-        """See `Model`: simulated to a larger tolerance."""
-        if self._roughly is None:
-            self._roughly = copy(self)
-            vars(self._roughly).update(_roughly=self._roughly)
-        return self._roughly
+    def _course_of(self, run: int) -> tuple[float, MeasuredSpeeds | None]:
+        """Tolerance of a run, and the speeds that it is led along."""
+        along = None if self._along is None else self._along[run]
+        coarse = self._recordings[run].inputs.truck or along is not None
+        return COARSE_TOLERANCE if coarse else FIT_TOLERANCE, along
 
     def observer(self, interval: float) -> BenchModel:
         """See `Model`: led along the measured speeds."""
         found = copy(self)
         along = [r.measured_speeds(interval) for r in self._recordings]
-        vars(found).update(_roughly=None, _along=along)
+        vars(found).update(_along=along)
         return found
 
     def simulated(self, run: int, values: Mapping[str, float]) -> Log:
         """The log that a run would have given at these values of everything."""
+        tolerance, along = self._course_of(run)
         inputs = self._recordings[run].inputs
-        along = None if self._along is None else self._along[run]
-        own, gap = split_gap_position(values)
-        tolerance = ROUGH_TOLERANCE if self._roughly is self else TOLERANCE
-        if inputs.truck or along is not None:
-            tolerance = COARSE_TOLERANCE
-        return simulate(
-            inputs,
-            own,
-            gap_position=gap,
-            tolerance=tolerance,
-            largest_step=LONGEST_STEP,
-            along=along,
-        )
+        return SimulatedRun(inputs, values, tolerance, LONGEST_STEP, along)({})
 
     def relations(
         self,
@@ -190,7 +167,7 @@ class BenchModel:
     ) -> BenchRelations | None:
         """See `Model`; None with effects of the set, and where the fit cannot be simulated."""
         with suppress(UnsettledError):
-            return None if self._given else BenchRelations(self.rough(), where, runs, whiteners)
+            return None if self._given else BenchRelations(self, where, runs, whiteners)
         return None
 
     def input_noise(

@@ -100,13 +100,12 @@ def try_law(model: Model, law: DraftedLaw) -> FitResult:
     nominal = {**law.null.values, **model.nominal(law.runs)}
     told = {**law.null.values, **law.values}
     starts = [(told, law.null.states), (nominal, [{} for _ in law.runs])]
-    rough = model.rough()
     limit = FAR_OFF * law.null.sum_of_squares
     # A law that no regression told begins at its plausible size, whatever that leaves.
     trials = [
-        _fit_from_start(rough, law, values, states)
+        _fit_from_start(model, law, values, states)
         for values, states in starts
-        if not law.values or _squares_at(rough, law, values) < limit
+        if not law.values or _squares_at(model, law, values) < limit
     ]
     return min(trials, key=lambda found: found.cost, default=law.null)
 

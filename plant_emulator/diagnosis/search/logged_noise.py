@@ -16,6 +16,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.search.rich_model import rich_columns
 from plant_emulator.diagnosis.search.simulation_columns import SimulationColumns
+from plant_emulator.estimation.nearby import Changed
 from plant_emulator.estimation.noise.disturbances import outlying
 from plant_emulator.estimation.noise.logged_noise import disturbances_of_runs, noise_of_runs
 from plant_emulator.estimation.regression import Regression
@@ -119,10 +120,6 @@ class _WhitenedModel:
         """See `Model`; the planned runs follow the model's own, and are not whitened."""
         return cast("Model", _WhitenedModel(self._model.with_planned_runs(where, runs), self.noise))
 
-    def rough(self) -> Model:
-        """See `Model`."""
-        return cast("Model", _WhitenedModel(self._model.rough(), self.noise))
-
     def observer(self, interval: float) -> Model:
         """See `Model`."""
         return cast("Model", _WhitenedModel(self._model.observer(interval), self.noise))
@@ -135,28 +132,21 @@ class _WhitenedModel:
 
     def residual(self, run: int, effects: Sequence[str]) -> Residual:
         """See `Model`."""
-        plain, found = self._model.residual(run, effects), self.noise.whiteners.get(run)
-        if found is None:
-            return plain
-
-        def residual(values: Mapping[str, float]) -> Array:
-            rows = plain(values)
-            return np.stack([w.white(row) for w, row in zip(found, rows, strict=True)])
-
-        return residual
+        plain = self._model.residual(run, effects)
+        return self.noise.whitened(run, plain) if run in self.noise.whiteners else plain
 
     def unwhitened_residual(self, run: int, effects: Sequence[str]) -> Residual:
         """See `Model`; samples that are outliers do not count."""
-        plain, found = self._model.unwhitened_residual(run, effects), self.noise.whiteners.get(run)
+        found = self.noise.whiteners.get(run)
         level = self._model.runs[run].noise / self.runs[run].noise
 
-        def residual(values: Mapping[str, float]) -> Array:
-            rows = plain(values) * level[:, None]
+        def scaled(rows: Array) -> Array:
+            rows = rows * level[:, None]
             if found is None:
                 return np.where([outlying(row, row != 0.0) for row in rows], 0.0, rows)
             return np.where([w.use for w in found], rows, 0.0)
 
-        return residual
+        return Changed(self._model.unwhitened_residual(run, effects), scaled)
 
 
 @dataclass(frozen=True)

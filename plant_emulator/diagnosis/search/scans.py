@@ -42,15 +42,15 @@ def _start_states(model: Model, candidate: Candidate, task: Task) -> dict[str, f
         return plain
     (run,), (fit,) = task.runs, where.states
     values = {**where.values, **fit, **values_at_size(candidate, SETTINGS.sizes[0])}
-    residual = model.rough().residual(run, (candidate.name,))
+    residual = model.residual(run, (candidate.name,))
     return scan_unknowns(_beside(residual, values), plain, candidate.states)
 
 
 def scan_states(model: Model, found: FitResult, runs: Sequence[int]) -> Start:
     """A fit with those states of its last effect scanned that have many basins, or are angles."""
-    own, rough = model.candidates[found.effects[-1]].states, model.rough()
+    own = model.candidates[found.effects[-1]].states
     states = tuple(
-        _best(_beside(rough.residual(k, found.effects), found.values), at, own)
+        _best(_beside(model.residual(k, found.effects), found.values), at, own)
         for k, at in zip(runs, found.states, strict=True)
     )
     return Start(values=found.values, states=states)
@@ -65,9 +65,8 @@ def scan_sizes(model: Model, effects: Sequence[str], runs: Sequence[int], start:
     narrow = [u for u in candidate.sizes if u.step is not None]
     if not narrow:
         return start
-    rough = model.rough()
     of_runs = [
-        _beside(rough.residual(k, effects), {**start.values, **own})
+        _beside(model.residual(k, effects), {**start.values, **own})
         for k, own in zip(runs, start.states, strict=True)
     ]
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
-from plant_emulator.diagnosis.fitting.joint_fit import CORRECTION_INTERVALS, LED_DIFFERENCE
+from plant_emulator.diagnosis.fitting.joint_fit import CORRECTION_INTERVALS
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.columns import best_score, onset_score
@@ -174,7 +174,7 @@ def _fidelity(model: Model, asked: Screening) -> Fidelity | None:
         return model.relations(asked.base, asked.runs)
     if asked.fidelity == OBSERVER:
         observer = model.observer(CORRECTION_INTERVALS[0])
-        return SimulationColumns(observer, asked.base, asked.runs, LED_DIFFERENCE)
+        return SimulationColumns(observer, asked.base, asked.runs)
     return SimulationColumns(model, asked.base, asked.runs)
 
 

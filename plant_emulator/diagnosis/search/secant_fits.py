@@ -19,7 +19,6 @@ import numpy as np
 from plant_emulator.diagnosis.fitting.fit_steps import refit_along
 from plant_emulator.diagnosis.fitting.joint_fit import (
     CORRECTION_INTERVALS,
-    LED_DIFFERENCE,
     fit,
     linearise,
 )
@@ -85,7 +84,7 @@ def fitted_promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
 def fit_by_secants(model: Model, asked: SecantFits) -> list[Promise]:
     """Gain of each of these effects after some iterations of its fit (a step)."""
     model = model.observer(CORRECTION_INTERVALS[0])
-    near = linearise(model, asked.base, asked.runs, LED_DIFFERENCE)
+    near = linearise(model, asked.base, asked.runs)
     return [_promise(model, asked, name, near) for name in asked.effects]
 
 
@@ -109,7 +108,6 @@ def _promise(model: Model, asked: SecantFits, name: str, near: Estimate) -> Prom
                 states,
                 asked.iterations,
                 near,
-                difference=LED_DIFFERENCE,
             )
             for values in starts
         ),

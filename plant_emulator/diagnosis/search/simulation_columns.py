@@ -9,7 +9,6 @@ import numpy as np
 
 from plant_emulator.diagnosis.fitting.joint_fit import linearise
 from plant_emulator.estimation.regression import Regression
-from plant_emulator.estimation.simulated_problem import DIFFERENCE_NORM
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -26,17 +25,10 @@ if TYPE_CHECKING:
 class SimulationColumns:
     """The residual of the simulation, free or led, and its tangents; see `Fidelity`."""
 
-    def __init__(
-        self,
-        model: Model,
-        where: FitValues,
-        runs: Sequence[int],
-        difference: float = DIFFERENCE_NORM,
-    ) -> None:
+    def __init__(self, model: Model, where: FitValues, runs: Sequence[int]) -> None:
         self.model, self.where, self.runs = model, where, tuple(runs)
-        self.found = linearise(model, where, runs, difference)
+        self.found = linearise(model, where, runs)
         self.base = np.concatenate([r.ravel() for r in self.found.residuals])
-        self._rough = model.rough()
         self._plain = self._residual(where.effects, {}, [{} for _ in runs])
 
     def _residual(
@@ -45,9 +37,9 @@ class SimulationColumns:
         sizes: Mapping[str, float],
         states: Sequence[Mapping[str, float]],
     ) -> Array:
-        """Rough residual at the fit with these effects, shape (n,)."""
+        """Residual at the fit with these effects, shape (n,)."""
         parts = [
-            self._rough.residual(k, effects)({**self.where.values, **own, **more, **sizes}).ravel()
+            self.model.residual(k, effects)({**self.where.values, **own, **more, **sizes}).ravel()
             for k, own, more in zip(self.runs, self.where.states, states, strict=True)
         ]
         return np.concatenate(parts)

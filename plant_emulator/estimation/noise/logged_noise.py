@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.estimation.nearby import Changed
 from plant_emulator.estimation.noise.channel_noise import ChannelNoise, Whitener
 from plant_emulator.estimation.noise.disturbances import outlying
 from plant_emulator.estimation.noise.estimate import estimate_channel_noise
@@ -72,11 +73,10 @@ class LoggedNoise:
         """The residual function of a run, whitened for this noise."""
         whiteners = self.whiteners[run]
 
-        def white(values: Mapping[str, float]) -> Array:
-            rows = residual(values)
+        def white(rows: Array) -> Array:
             return np.stack([w.white(row) for w, row in zip(whiteners, rows, strict=True)])
 
-        return white
+        return Changed(residual, white)
 
 
 def _same_lines(first: Sequence[float], second: Sequence[float]) -> bool:

@@ -1,6 +1,5 @@
 """The logs of a case, and the orthogonal norm of its hidden effects."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +9,9 @@ from plant_emulator.blind import laws
 from plant_emulator.blind.dirt import Dirt
 from plant_emulator.blind.draw import draw
 from plant_emulator.blind.generate import measure, simulate_truth
-from plant_emulator.blind.orthogonal_norm import norms, or_impossible
-from plant_emulator.errors import UnsettledError
+from plant_emulator.blind.orthogonal_norm import norms
 from plant_emulator.model.parameters import ParameterSet
-from plant_emulator.signals.log import COMPARED, Array
+from plant_emulator.signals.log import COMPARED
 from plant_emulator.simulation.sensor_noise import SENSORS
 from plant_emulator.simulation.simulate import inputs_of, simulate
 from plant_emulator.solver.kernel import kernel, use_own_effects
@@ -106,18 +104,3 @@ def test_effect_confounded_with_parameter_deviations_is_not_detectable(
     """
     case = case_with(hidden("friction_asymmetry", "gear", asymmetry=asymmetry))
     assert norms(case, simulate_truth(case, nominal), nominal)["friction_asymmetry"] < left
-
-
-def test_parameters_without_a_simulation_have_a_huge_residual_and_raise_nothing() -> None:
-    """The nuisance fit may try any parameters."""
-
-    def residual(values: Mapping[str, float]) -> Array:
-        if values["drum_inertia"] < 100.0:
-            raise UnsettledError("program1: 1 implicit stages did not settle")
-        return np.full((4, 3), values["drum_inertia"])
-
-    found = or_impossible(residual, np.zeros((4, 3)))
-    assert (found({"drum_inertia": 300.0}) == 300.0).all()
-    bad = found({"drum_inertia": 50.0})
-    assert bad.shape == (4, 3)
-    assert np.mean(bad**2) >= 100.0**2

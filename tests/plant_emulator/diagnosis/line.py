@@ -81,10 +81,6 @@ class Line:
 
         return residual
 
-    def rough(self) -> "Line":
-        """See `Model`."""
-        return self
-
     def observer(self, interval: float) -> "Line":
         """See `Model`: a line has nothing to lead it along."""
         return self

@@ -99,10 +99,6 @@ class Slope:
         x, y = self.speeds[run], self.measured[run]
         return lambda v: ((y - self.foretold(x, effects, v)) / 0.01)[None, :]
 
-    def rough(self) -> "Slope":
-        """See `Model`."""
-        return self
-
     def observer(self, interval: float) -> "Slope":
         """See `Model`."""
         return self
