@@ -30,9 +30,6 @@ if TYPE_CHECKING:
 # Eigenvalue of an information matrix of unit diagonal that is 0 but for rounding [the largest], and
 # the part that an unknown has in such a direction.
 EIGENVALUE_ROUNDING, LEAST_PART = 1e-14, 1e-6
-# Norm of the slope of an unknown that is rounding: its standard error would be a thousand on the
-# scale of the estimation. The last digits of a simulation (1e-9) are a slope of 1e-5 at most.
-ROUNDING_SLOPE = 1e-3
 # Half width of a 95 % confidence interval of a normal distribution [standard errors].
 NORMAL_95 = 1.959964
 
@@ -43,11 +40,11 @@ def data_errors(information: Array) -> Array:
     information : matrix, shape (unknowns, unknowns)
     """
     scale = np.sqrt(np.diag(information))
-    safe = np.where(scale > ROUNDING_SLOPE, scale, np.inf)
+    safe = np.where(scale > 0.0, scale, 1.0)
     values, vectors = np.linalg.eigh(information / np.outer(safe, safe))
     weight = np.where(values > EIGENVALUE_ROUNDING * values[-1], values, 1e-300)
     variance = (vectors**2 / weight).sum(axis=1) / safe**2
-    return np.where(scale > ROUNDING_SLOPE, np.sqrt(variance), np.inf)
+    return np.where(scale > 0.0, np.sqrt(variance), np.inf)
 
 
 def sandwich(

@@ -80,7 +80,7 @@ def estimate(
     )
     start, lower, upper = _start(unknowns)
     known = np.isfinite(problem.lengths)
-    if known.any() and not known.all():  # what follows secants must not begin in the jitter
+    if known.any() and not known.all():  # what follows secants must not begin in last digits
         problem.learn_steps(start)
     free = any(u.std is None for u in unknowns)
     if free and not any(slopes.any() for slopes in problem.jacobian(start)):

@@ -47,6 +47,22 @@ class Changed:
 
 
 @dataclass(frozen=True)
+class Beside:
+    """A function of the unknowns beside, or in place of, values that stay as they are."""
+
+    function: Callable[[Mapping[str, float]], Array]
+    values: Mapping[str, float]
+
+    def __call__(self, found: Mapping[str, float], /) -> Array:
+        """The result at these values beside the others."""
+        return self.function({**self.values, **found})
+
+    def near(self, found: Mapping[str, float], /) -> Beside:
+        """See `Stepped`."""
+        return Beside(near(self.function, {**self.values, **found}), self.values)
+
+
+@dataclass(frozen=True)
 class OrImpossible:
     """A function of the unknowns, and its result where the model cannot be simulated.
 

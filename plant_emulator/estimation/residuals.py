@@ -40,7 +40,9 @@ class SimulatedRun:
     largest_step: float | None = None
     along: MeasuredSpeeds | None = None
     follow: Array = field(default_factory=lambda: NO_STEPS)
-    _last: tuple[dict[str, float], Array] | None = None
+    _last: tuple[dict[str, float] | None, Array] = field(
+        default=(None, NO_STEPS), init=False, repr=False
+    )
 
     def __call__(self, found: Mapping[str, float], /) -> Log:
         """The log that the run would have given at these values.
@@ -62,11 +64,10 @@ class SimulatedRun:
 
     def near(self, found: Mapping[str, float], /) -> SimulatedRun:
         """See `Stepped`; nothing is simulated where these values were the last ones."""
-        if self._last is None or self._last[0] != found:
+        if self._last[0] != found:
             with suppress(UnsettledError):
                 self(found)
-        known = self._last is not None and self._last[0] == found
-        return replace(self, follow=self._last[1] if self._last and known else NO_STEPS)
+        return replace(self, follow=self._last[1] if self._last[0] == found else NO_STEPS)
 
 
 def run_residual(

@@ -25,8 +25,13 @@ if TYPE_CHECKING:
 
 # Forward differences: a change of the residual vector of this norm, within these steps of z. It is
 # small against what the noise hides (1), so that slopes are those of the point itself, and far
-# above the last digits of a simulation (1e-6).
+# above the last digits of a simulation, which are a norm of 1e-9.
 DIFFERENCE_NORM = 0.03
+# Largest such norm at which simulations follow the steps of the point: nothing watches their error.
+FOLLOWED_NORM = 1.0
+# Norm of a slope that is made of last digits: its standard error would be a thousand on the scale
+# of the estimation. It counts as none.
+ROUNDING_SLOPE = 1e-3
 SMALLEST_DIFFERENCE, LARGEST_DIFFERENCE = 1e-6, 1e-3
 # Largest step of the slopes that standard errors come from. Over a thousandth, the slope of a weak
 # parameter was that of the one sample in which a contact fell: its standard error was wrong by
@@ -62,7 +67,7 @@ class SimulatedProblem:
     known: tuple[bytes, list[Array]] = (b"", [])
     based: tuple[bytes, list[Array]] = (b"", [])
     slopes_known: tuple[bytes, list[Array]] = (b"", [])
-    near: tuple[bytes, list[Residual]] = (b"", [])
+    beside: tuple[bytes, Sequence[Residual]] = (b"", ())
 
     def residual(self, z: Array) -> list[Array]:
         """Residual of every run at z, shape (channels, samples) each."""
@@ -92,7 +97,7 @@ class SimulatedProblem:
     def learn_steps(self, z: Array) -> None:
         """Take the steps of the differences at z from first slopes where they are not known yet.
 
-        Over FIRST_DIFFERENCE the slope of a weak parameter is lost in the jitter of the simulation.
+        Over FIRST_DIFFERENCE the slope of a weak parameter may be lost in last digits.
         """
         first = [np.zeros((*r.shape, len(z))) for r in self.residual(z)]
         unknown = np.isnan(self.lengths)
@@ -122,22 +127,26 @@ class SimulatedProblem:
     def _difference(self, z: Array, j: int, step: float, jacobians: Sequence[Array]) -> None:
         """Fill in the column of one unknown."""
         unknown, base = self.unknowns[j], self.residual(z)
-        if self.near[0] != z.tobytes():
-            self.near = (
-                z.tobytes(),
-                [
-                    near(residual, _values(self.unknowns, z, k))
-                    for k, residual in enumerate(self.residuals)
-                ],
-            )
         if z[j] + step > unknown.scaled(unknown.upper):
             step = -step
         changed = z.copy()
         changed[j] += step
         for k in range(len(base)) if unknown.run is None else (unknown.run,):
             self.simulations += 1
-            there = self.near[1][k](_values(self.unknowns, changed, k))
-            jacobians[k][..., j] = (there - base[k]) / (changed[j] - z[j])
+            there = self._residuals_beside(z)[k](_values(self.unknowns, changed, k))
+            column = (there - base[k]) / (changed[j] - z[j])
+            shown = np.linalg.norm(column) > ROUNDING_SLOPE
+            jacobians[k][..., j] = column if shown else 0.0
+
+    def _residuals_beside(self, z: Array) -> Sequence[Residual]:
+        """The residual functions for values beside z."""
+        if self.difference > FOLLOWED_NORM:
+            return self.residuals
+        if self.beside[0] != z.tobytes():
+            values = [_values(self.unknowns, z, k) for k in range(len(self.residuals))]
+            pairs = zip(self.residuals, values, strict=True)
+            self.beside = z.tobytes(), [near(residual, there) for residual, there in pairs]
+        return self.beside[1]
 
     def wide_jacobian(self, z: Array) -> list[Array]:
         """Jacobian of every run at z, with the columns of weak unknowns over wider differences."""

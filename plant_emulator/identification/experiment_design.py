@@ -27,7 +27,7 @@ from plant_emulator.estimation.covariance import data_errors
 from plant_emulator.estimation.least_squares import linearise_at
 from plant_emulator.estimation.nearby import Changed
 from plant_emulator.estimation.noise.channel_noise import ChannelNoise, Whitener
-from plant_emulator.estimation.residuals import run_residual
+from plant_emulator.estimation.residuals import SimulatedRun
 from plant_emulator.identification.identify import FINAL_TOLERANCE
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import Recording
@@ -210,4 +210,5 @@ def _planned_residual(
     def white(rows: Array) -> Array:
         return np.stack([w.white(row) for w, row in zip(whiteners, rows, strict=True)])
 
-    return Changed(run_residual(planned, values, FINAL_TOLERANCE), white)
+    simulated = SimulatedRun(planned.inputs, values, FINAL_TOLERANCE)
+    return Changed(Changed(simulated, planned.residual_of), white)

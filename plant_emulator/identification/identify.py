@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 # The last fit, but for a truck, whose staircase of references takes ten times as long: a step more
 # or less in the simulation then changes the cost by less than a thousandth of a standard error.
-FINAL_TOLERANCE = 1e-6
+FINAL_TOLERANCE = 5e-7
 # Share of the prior deviation (or of the value) under which a standard error is information.
 INFORMED = 0.5
 INFORMED_WITHOUT_PRIOR = 0.1

@@ -30,12 +30,10 @@ Hold = Literal["linear", "staircase"]
 
 # Error per step over what `sdirk.WEIGHT` allows [1].
 TOLERANCE = 2e-5
-# The same for a fit: it changes the residual of a log by some hundredths of the noise, and slopes
-# along the same steps by a hundredth.
+# The same for a fit: it changes the residual of a log by some thousandths of the noise.
 FIT_TOLERANCE = 2e-4
 # Largest step [s], or one sample if that is shorter. The step control watches the nominal states,
-# but not the memories of effects. With such steps a run also changes smoothly with its parameters,
-# which a fit needs.
+# but not the memories of effects.
 LARGEST_STEP = 0.01
 # Steps of a run that are kept for others to follow, at most [per sample].
 MOST_STEPS = 64
@@ -48,7 +46,7 @@ WHEEL_TORQUE_STARTS = 10.0
 
 @dataclass(frozen=True, kw_only=True)
 class MeasuredSpeeds:
-    """Speeds that a simulation is led along, as an observer is; see `stepper`.
+    """Speeds that a simulation is led along, as an observer is; see `solver.observer`.
 
     motor_speed, drum_speed : of the samples of the run; NaN: not measured [rad/s], shape (n,)
     interval : the speeds are corrected at the first sample of each such interval [s]
@@ -159,7 +157,6 @@ def simulate(
     largest_step: float | None = None,
     step: float | None = None,
     along: MeasuredSpeeds | None = None,
-    follow: Array = NO_STEPS,
     kernel: Kernel | None = None,
 ) -> Log:
     """Simulate a run; the resulting log has the inputs and all channels of the bench [SI].
@@ -170,21 +167,23 @@ def simulate(
     tolerance : error per step over what `sdirk.WEIGHT` allows of each state [1]
     largest_step : largest adapted step [s]; None: one sample of the log, at most 10 ms. Longer
         steps pass over samples. Without effects they make smooth runs two to three times faster.
-    step : a fixed step in place of adapted steps [s]
+    step : a fixed step in place of adapted steps [s]. Either may be a twentieth longer to a sample
     along : measured speeds to lead the simulation along; None: it runs freely
-    follow : steps of a run with other values, see `simulate_with_steps`, in place of adapted steps
     kernel : the kernel to use; None: the smallest that has the effects
     Raises ParameterError for a name in `values` that is no parameter, and UnsettledError where the
     equations were not solved.
     """
     if step is not None:
         tolerance, largest_step = inf, step
-    settings = Settings(gap_position, tolerance, largest_step, along, follow)
-    return _simulate(run, values, settings, NO_STEPS, kernel)[0]
+    settings = Settings(gap_position, tolerance, largest_step, along)
+    return _simulate(run, values, settings, kernel)[0]
 
 
 class Settings(NamedTuple):
-    """How a run is simulated; see `simulate`."""
+    """How a run is simulated; see `simulate`.
+
+    follow : steps of a run with other values, see `simulate_with_steps`; empty: they are adapted
+    """
 
     gap_position: float
     tolerance: float
@@ -198,25 +197,23 @@ def simulate_with_steps(
 ) -> tuple[Log, Array]:
     """Simulate as `simulate` does, and give the steps too, for runs with other values to follow.
 
-    Where there were too many of them, the result has none, and the other runs adapt their own.
+    Where there were too many of them, or the run followed others itself, the result has none, and
+    runs that are to follow them adapt their own.
     """
-    return _simulate(run, values, settings, np.empty((MOST_STEPS * len(run.time), 2)), None)
+    return _simulate(run, values, settings, None, most=0 if len(settings.follow) else MOST_STEPS)
 
 
 def _simulate(
     run: RunInputs,
     values: Mapping[str, float],
     settings: Settings,
-    taken: Array,
     kernel: Kernel | None,
+    most: int = 0,
 ) -> tuple[Log, Array]:
-    """The log of a run, and its steps if all are among those taken.
-
-    taken : it is filled, see `stepper.run`
-    """
+    """The log of a run, and its steps if there are no more of them than `most` a sample."""
     model, values = (kernel, values) if kernel is not None else kernel_for(values)
     coarse, run = run, refine_inputs(run)
-    out = np.zeros((len(run.time), len(CHANNELS)))
+    out, taken = np.zeros((len(run.time), len(CHANNELS))), np.empty((most * len(run.time), 2))
     p = model.parameter_record(values)
     x = model.state(p, settings.gap_position * values["backlash_half_gap"])
     largest_step = settings.largest_step

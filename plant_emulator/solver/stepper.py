@@ -64,7 +64,8 @@ NEVER, NOT_MEASURED = np.array([np.iinfo(np.int64).max]), np.empty(0)
 # Steps of a run that adapts its own, and of a run whose steps nobody wants.
 NO_STEPS = np.empty((0, 2))
 # A step to a sample or a corner may be longer by this share than the error control allows: two
-# steps of half the length would cost twice the time.
+# steps of half the length would cost twice the time. It is below what the SAFETY of the control
+# leaves, so that a refused step still becomes shorter.
 STRETCH = 0.05
 
 
@@ -123,20 +124,19 @@ def landing_sample(
 ) -> int:
     """Last sample before the time `reach` [s], from `row` on, with the truck's torque unchanged.
 
-    It is `row` itself if the dead time there is no more b [s]: a step has one dead time.
+    The dead time there is b [s] too, because a step has one dead time. The samples' times are
+    written to s.
     """
-    first = row
     while (
         row + 1 < len(time)
         and time[row + 1] <= reach * (1.0 + 1e-12)
         and wheel_torque[row + 1] == wheel_torque[row]
         and parked[row + 1] == parked[row]
     ):
-        row += 1
-    if row > first:
-        s.time = time[row]
+        s.time = time[row + 1]
         if dead_time(s, p) != b:
-            return first
+            break
+        row += 1
     return row
 
 

@@ -34,14 +34,15 @@ from plant_emulator.estimation.initial_states import (
     states_of,
     with_logged_values,
 )
-from plant_emulator.estimation.residuals import SimulatedRun, run_residual
+from plant_emulator.estimation.nearby import Beside
+from plant_emulator.estimation.residuals import run_residual
 from plant_emulator.estimation.start_search import StartSearch
 from plant_emulator.model.array_laws import base_speed
 from plant_emulator.model.parameters import UNITS
 from plant_emulator.model.stage import GAP_POSITION, split_gap_position
 from plant_emulator.recordings.input_noise import noise_directions
 from plant_emulator.signals.log import VOLTAGE
-from plant_emulator.simulation.simulate import FIT_TOLERANCE, values_of
+from plant_emulator.simulation.simulate import FIT_TOLERANCE, simulate, values_of
 from plant_emulator.solver.kernel import kernel, use_own_effects
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ if TYPE_CHECKING:
 
 # Tolerance of a run with a truck or of one that is led. It takes half the time of the others or
 # less, because every sample of the one is a corner and every correction of the other is a jump. It
-# changes the residual by a hundredth of the noise.
+# changes the residual by some hundredths of the noise.
 COARSE_TOLERANCE = 2e-3
 # Largest step [s], over some samples. It takes a third of the time off smooth runs. That of
 # `simulate` is shorter, because step control does not watch the memories of effects; with those of
@@ -156,8 +157,15 @@ class BenchModel:
     def simulated(self, run: int, values: Mapping[str, float]) -> Log:
         """The log that a run would have given at these values of everything."""
         tolerance, along = self._course_of(run)
-        inputs = self._recordings[run].inputs
-        return SimulatedRun(inputs, values, tolerance, LONGEST_STEP, along)({})
+        own, gap = split_gap_position(values)
+        return simulate(
+            self._recordings[run].inputs,
+            own,
+            gap_position=gap,
+            tolerance=tolerance,
+            largest_step=LONGEST_STEP,
+            along=along,
+        )
 
     def relations(
         self,
@@ -218,7 +226,7 @@ class BenchModel:
             self._recordings[run],
             {**self.fixed_values(run, effects), **values},
             groups,
-            lambda states: residual({**values, **states}),
+            Beside(residual, values),
             plain,
         )
 

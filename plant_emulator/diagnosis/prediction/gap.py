@@ -18,6 +18,7 @@ from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
 from plant_emulator.diagnosis.fitting.nuisance_space import NuisanceSpace
 from plant_emulator.diagnosis.prediction import block_bootstrap
 from plant_emulator.estimation.initial_states import fit_from
+from plant_emulator.estimation.nearby import Beside
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -129,16 +130,12 @@ def _predict_run(
     near : states to fit from; None: they are looked for
     """
     effects = found.effects
-    residual = model.residual(run, effects)
-
-    def residual_at(states: Mapping[str, float]) -> Array:
-        return residual({**found.values, **states})
-
+    residual = Beside(model.residual(run, effects), found.values)
     own = (*model.states, *(u for name in effects for u in model.candidates[name].states))
     states, converged = known or {}, True
     if known is None and own:
         start = near or model.initial_states(run, effects, found.values)
-        estimated = fit_from(start, own, residual_at)
+        estimated = fit_from(start, own, residual)
         states, converged = estimated.states(0), estimated.converged
     return model.unwhitened_residual(run, effects)({**found.values, **states}), converged
 

@@ -14,6 +14,7 @@ import numpy as np
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.search.promise import Start
 from plant_emulator.diagnosis.search.settings import SETTINGS
+from plant_emulator.estimation.nearby import Beside
 from plant_emulator.estimation.robust_scan import cauchy_loss, scan_unknowns
 
 if TYPE_CHECKING:
@@ -43,14 +44,14 @@ def _start_states(model: Model, candidate: Candidate, task: Task) -> dict[str, f
     (run,), (fit,) = task.runs, where.states
     values = {**where.values, **fit, **values_at_size(candidate, SETTINGS.sizes[0])}
     residual = model.residual(run, (candidate.name,))
-    return scan_unknowns(_beside(residual, values), plain, candidate.states)
+    return scan_unknowns(Beside(residual, values), plain, candidate.states)
 
 
 def scan_states(model: Model, found: FitResult, runs: Sequence[int]) -> Start:
     """A fit with those states of its last effect scanned that have many basins, or are angles."""
     own = model.candidates[found.effects[-1]].states
     states = tuple(
-        _best(_beside(model.residual(k, found.effects), found.values), at, own)
+        _best(Beside(model.residual(k, found.effects), found.values), at, own)
         for k, at in zip(runs, found.states, strict=True)
     )
     return Start(values=found.values, states=states)
@@ -66,7 +67,7 @@ def scan_sizes(model: Model, effects: Sequence[str], runs: Sequence[int], start:
     if not narrow:
         return start
     of_runs = [
-        _beside(model.residual(k, effects), {**start.values, **own})
+        Beside(model.residual(k, effects), {**start.values, **own})
         for k, own in zip(runs, start.states, strict=True)
     ]
 
@@ -76,11 +77,6 @@ def scan_sizes(model: Model, effects: Sequence[str], runs: Sequence[int], start:
     present = {u.name: start.values[u.name] for u in narrow}
     found = _best(residual, present, [_within(candidate, u) for u in narrow])
     return replace(start, values={**start.values, **found})
-
-
-def _beside(residual: Residual, values: Mapping[str, float]) -> Residual:
-    """The residual as a function of what is given beside, or in place of, these values."""
-    return lambda own: residual({**values, **own})
 
 
 def _best(

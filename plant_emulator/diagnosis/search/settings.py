@@ -14,8 +14,8 @@ class Settings:
     # effects that leave noise: they are faint.
     sizes: tuple[float, ...] = (0.3, 0.1, 1.0, 3.0)
     # Share of a plausible size whose columns are slopes: a simulation adds up, so that columns may
-    # bend from a tenth of a plausible size on (a contact comes or stays away). Rough and fine
-    # simulations still tell such a slope alike, within some hundredths.
+    # bend from a tenth of a plausible size on (a contact comes or stays away). Simulations
+    # still tell such a slope within some hundredths.
     slope_share: float = 0.01
     # Sizes that a fit by secants begins at: most laws bend less at the first, and a limit does not
     # act there.

@@ -29,7 +29,6 @@ class SimulationColumns:
         self.model, self.where, self.runs = model, where, tuple(runs)
         self.found = linearise(model, where, runs)
         self.base = np.concatenate([r.ravel() for r in self.found.residuals])
-        self._plain = self._residual(where.effects, {}, [{} for _ in runs])
 
     def _residual(
         self,
@@ -77,7 +76,7 @@ class SimulationColumns:
         self, effect: str, sizes: Mapping[str, float], states: Sequence[Mapping[str, float]]
     ) -> Array | None:
         """See `Fidelity`."""
-        return self._plain - self._residual((*self.where.effects, effect), sizes, states)
+        return self.base - self._residual((*self.where.effects, effect), sizes, states)
 
     unwhitened = column
 

@@ -8,7 +8,7 @@ import pytest
 
 from plant_emulator.errors import UnsettledError
 from plant_emulator.estimation.least_squares import linearise_at
-from plant_emulator.estimation.nearby import Changed, OrImpossible, near
+from plant_emulator.estimation.nearby import Beside, Changed, OrImpossible, near
 from plant_emulator.estimation.unknowns import Unknown
 
 A = Unknown(name="a", start=2.0, lower=0.0, upper=10.0, logarithmic=False)
@@ -37,7 +37,8 @@ class Fine(Coarse):
 
 def test_slopes_are_taken_along_the_steps_at_the_point() -> None:
     """By hand 2 * 100; differences of coarse values over so small a step are 0."""
-    inside = OrImpossible(Changed(Coarse(), lambda rows: 2.0 * rows), np.zeros((1, 50)))
+    beside = Beside(Coarse(), {"a": 7.0, "b": 0.0})
+    inside = OrImpossible(Changed(beside, lambda rows: 2.0 * rows), np.zeros((1, 50)))
     found = linearise_at([A], [inside])
     assert found.jacobians[0][0, 0, 0] == pytest.approx(200.0, rel=1e-6)
 
