@@ -52,7 +52,8 @@ def draw(bins: Sequence[Sequence[tuple[float, bool]]], path: Path) -> None:
         mean, share, low, high = summary(one)
         axes.errorbar(mean, share, [[share - low], [high - share]], fmt="o", color="#0072B2")
         axes.annotate(f"{len(one)}", (mean, share), (6, -12), textcoords="offset points")
-    axes.set(xlabel="confidence", ylabel="share of right answers", xlim=(0, 1), ylim=(0, 1.02))
+    least = np.floor(10.0 * min(summary(one)[0] for one in bins)) / 10.0
+    axes.set(xlabel="confidence", ylabel="share of right answers", xlim=(least, 1), ylim=(0, 1.02))
     axes.legend(loc="upper left", frameon=False)
     figure.savefig(path, dpi=120)
 

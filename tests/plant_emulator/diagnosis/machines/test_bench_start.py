@@ -14,7 +14,10 @@ from plant_emulator.simulation.sensor_noise import add_noise
 from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
 
 
-@pytest.mark.parametrize(("flux", "seed"), [(410.0, 2), (410.0, 3), (412.0, 2)])
+@pytest.mark.parametrize(
+    ("flux", "seed"),
+    [(408.0, 6), (410.0, 2), (410.0, 3), (410.0, 9), (412.0, 2), (412.0, 8)],
+)
 def test_a_bench_whose_voltage_does_not_suffice_is_fitted(
     flux: float, seed: int, bench_log: Callable[[str], Log], nominal: ParameterSet
 ) -> None:
