@@ -40,6 +40,9 @@ WIDEST_DIFFERENCE = 1e-2
 # Change of the residual vector that the noise hides [norm]: the slopes of weak parameters are taken
 # over it, and slopes that follow by secants may miss it.
 HIDDEN_NORM = 0.3
+# Change of the residual vector over which symmetric slopes are taken to each side [norm]: over one
+# standard deviation in all, because over less a slope may be that of a single contact.
+HALF_DEVIATION = 0.5
 # Step of the first differences, before any slope is known.
 FIRST_DIFFERENCE = 1e-5
 # Share of the change of the residual vector that the slopes may miss in a step that they follow by
@@ -127,7 +130,7 @@ class SimulatedProblem:
     def _difference(self, z: Array, j: int, step: float, jacobians: Sequence[Array]) -> None:
         """Fill in the column of one unknown."""
         unknown, base = self.unknowns[j], self.residual(z)
-        if z[j] + step > unknown.scaled(unknown.upper):
+        if not unknown.scaled(unknown.lower) <= z[j] + step <= unknown.scaled(unknown.upper):
             step = -step
         changed = z.copy()
         changed[j] += step
@@ -154,6 +157,18 @@ class SimulatedProblem:
         wide = self._steps(HIDDEN_NORM, WIDEST_DIFFERENCE)
         for j in np.flatnonzero(wide > LARGEST_DIFFERENCE):
             self._difference(z, int(j), wide[j], jacobians)
+        return jacobians
+
+    def symmetric_jacobian(self, z: Array) -> list[Array]:
+        """Jacobian of every run at z, over a standard deviation around it."""
+        jacobians = [j.copy() for j in self.jacobian(z)]
+        back = [np.zeros_like(j) for j in jacobians]
+        steps = self._steps(HALF_DEVIATION, WIDEST_DIFFERENCE)
+        for j, unknown in enumerate(self.unknowns):
+            self._difference(z, j, steps[j], jacobians)
+            self._difference(z, j, -steps[j], back)
+            for k in range(len(back)) if unknown.run is None else (unknown.run,):
+                jacobians[k][..., j] = 0.5 * (jacobians[k][..., j] + back[k][..., j])
         return jacobians
 
     def rows(self, z: Array) -> Array:

@@ -165,7 +165,7 @@ def _linearisations(
         with suppress(UnsettledError):
             residual = _planned_residual(run, {**values, **_starts(unknowns)}, noise, found.noise)
             lengths = lengths or linearise_at(unknowns, [residual]).lengths
-            yield linearise_at(unknowns, [residual], lengths=lengths)
+            yield linearise_at(unknowns, [residual], lengths=lengths, symmetric=True)
 
 
 def _unknowns(found: Identification, position: float) -> list[Unknown]:

@@ -162,7 +162,9 @@ def fit_from(
     report = _report_cost(recordings, progress)
     wanted = unknowns(parameters, free, search.values, search.gaps, states)
     first = least_squares.estimate(wanted, coarse, progress=report)
-    last = least_squares.estimate(_without_outdone_priors(first), fine, progress=report)
+    last = least_squares.estimate(
+        _without_outdone_priors(first), fine, progress=report, symmetric=True
+    )
     return replace(last, simulations=first.simulations + last.simulations)
 
 
@@ -192,7 +194,9 @@ def _refit(
     """
     near = [replace(u, start=u.value(float(z))) for u, z in zip(wanted, best.z, strict=True)]
     first = least_squares.estimate(near, residuals, progress=report)
-    last = least_squares.estimate(_without_outdone_priors(first), residuals, progress=report)
+    last = least_squares.estimate(
+        _without_outdone_priors(first), residuals, progress=report, symmetric=True
+    )
     simulations = best.simulations + first.simulations + last.simulations
     return replace(last, simulations=simulations)
 
