@@ -54,7 +54,7 @@ def draw(bins: Sequence[Sequence[tuple[float, bool]]], path: Path) -> None:
         axes.annotate(f"{len(one)}", (mean, share), (6, -12), textcoords="offset points")
     least = np.floor(10.0 * min(summary(one)[0] for one in bins)) / 10.0
     axes.set(xlabel="confidence", ylabel="share of right answers", xlim=(least, 1), ylim=(0, 1.02))
-    axes.legend(loc="upper left", frameon=False)
+    axes.legend(loc="lower left", frameon=False)
     figure.savefig(path, dpi=120)
 
 
