@@ -36,8 +36,9 @@ from plant_emulator.diagnosis.wording import percent
 from plant_emulator.model.stage import split_gap_position
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
+from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.sensor_noise import add_noise
-from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
+from plant_emulator.simulation.simulate import simulate, values_of
 from plant_emulator.solver.kernel import kernel, use_own_effects
 from plant_emulator.workflows.diagnosis.drafting import draft
 from plant_emulator.workflows.diagnosis.runs import bench_runs

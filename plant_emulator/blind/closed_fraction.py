@@ -18,7 +18,8 @@ from plant_emulator.estimation.initial_states import fit_states, states_of, with
 from plant_emulator.model.stage import split_gap_position
 from plant_emulator.recordings.recording import Recording
 from plant_emulator.signals.log import COMPARED
-from plant_emulator.simulation.simulate import inputs_of, values_of
+from plant_emulator.simulation.run_inputs import inputs_of
+from plant_emulator.simulation.simulate import values_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

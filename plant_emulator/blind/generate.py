@@ -11,8 +11,9 @@ from plant_emulator.blind.dirt import soil, take_rows
 from plant_emulator.errors import UnsettledError
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation.programs import SpeedProgram, program
+from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.sensor_noise import add_noise
-from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
+from plant_emulator.simulation.simulate import simulate, values_of
 from plant_emulator.simulation.travel_program import simulate_travel
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.blind.case import Case
     from plant_emulator.model.parameters import ParameterSet
-    from plant_emulator.simulation.simulate import RunInputs
+    from plant_emulator.simulation.run_inputs import RunInputs
 
 # [s] A fiftieth of a sample. The diagnosis uses adaptive steps of up to a whole sample. The step is
 # halved at most HALVINGS times if the solver does not converge.

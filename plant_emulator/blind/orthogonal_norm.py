@@ -23,8 +23,9 @@ from plant_emulator.estimation.residuals import SimulatedRun
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import IMPOSSIBLE
 from plant_emulator.signals.log import COMPARED
+from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.sensor_noise import SENSORS
-from plant_emulator.simulation.simulate import TOLERANCE, inputs_of, values_of
+from plant_emulator.simulation.simulate import TOLERANCE, values_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

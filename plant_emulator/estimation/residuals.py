@@ -13,6 +13,7 @@ from plant_emulator.estimation.nearby import Changed, OrImpossible
 from plant_emulator.model.stage import split_gap_position
 from plant_emulator.recordings.input_noise import noise_directions
 from plant_emulator.recordings.recording import IMPOSSIBLE
+from plant_emulator.simulation.law_forms import size_factors, split_law_forms
 from plant_emulator.simulation.simulate import FIT_TOLERANCE, Settings, simulate_with_steps
 from plant_emulator.solver.stepper import NO_STEPS
 
@@ -23,7 +24,8 @@ if TYPE_CHECKING:
     from plant_emulator.recordings.input_noise import NoiseDirections
     from plant_emulator.recordings.recording import Recording
     from plant_emulator.signals.log import Array, Log
-    from plant_emulator.simulation.simulate import MeasuredSpeeds, RunInputs
+    from plant_emulator.simulation.run_inputs import RunInputs
+    from plant_emulator.simulation.simulate import MeasuredSpeeds
 
 
 @dataclass
@@ -32,6 +34,8 @@ class SimulatedRun:
 
     values : of everything that is not unknown [SI]
     tolerance, largest_step, along, follow : see `simulate`
+    measured : the log of the run, where coefficients of other forms of a law may be among the
+        unknowns, see `law_forms`
     """
 
     inputs: RunInputs
@@ -40,6 +44,7 @@ class SimulatedRun:
     largest_step: float | None = None
     along: MeasuredSpeeds | None = None
     follow: Array = field(default_factory=lambda: NO_STEPS)
+    measured: Log | None = None
     _last: tuple[dict[str, float] | None, Array] = field(
         default=(None, NO_STEPS), init=False, repr=False
     )
@@ -50,7 +55,15 @@ class SimulatedRun:
         Raises UnsettledError where the equations were not solved.
         """
         values, gap = split_gap_position({**self.values, **found})
-        settings = Settings(gap, self.tolerance, self.largest_step, self.along, self.follow)
+        values, forms = split_law_forms(values)
+        settings = Settings(
+            gap,
+            self.tolerance,
+            self.largest_step,
+            self.along,
+            self.follow,
+            {} if self.measured is None else size_factors(forms, self.measured),
+        )
         try:
             log, steps = simulate_with_steps(self.inputs, values, settings)
         except UnsettledError:
@@ -84,7 +97,9 @@ def run_residual(
     values : of everything that is not unknown [SI]
     tolerance, largest_step, along : see `simulate`
     """
-    run = SimulatedRun(recording.inputs, values, tolerance, largest_step, along)
+    run = SimulatedRun(
+        recording.inputs, values, tolerance, largest_step, along, measured=recording.log
+    )
     impossible = np.where(recording.use, IMPOSSIBLE, 0.0)
     return OrImpossible(Changed(run, recording.residual_of), impossible)
 

@@ -33,7 +33,8 @@ from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import Recording
 from plant_emulator.signals.log import COMPARED, VOLTAGE, Log
 from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram
-from plant_emulator.simulation.simulate import inputs_of, simulate
+from plant_emulator.simulation.run_inputs import inputs_of
+from plant_emulator.simulation.simulate import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
     from plant_emulator.estimation.unknowns import Estimate, Lengths, Residual, Unknown
     from plant_emulator.identification.identify import Identification
     from plant_emulator.signals.log import Array
-    from plant_emulator.simulation.simulate import RunInputs
+    from plant_emulator.simulation.run_inputs import RunInputs
 
 # Where in the gap a planned run may start, -1 to 1.
 PLANNED_GAP_POSITIONS = (-0.8, -0.4, 0.0, 0.4, 0.8)

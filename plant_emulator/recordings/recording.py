@@ -23,14 +23,8 @@ from plant_emulator.signals.log import (
 )
 from plant_emulator.signals.mains import noise_beside_lines
 from plant_emulator.signals.noise import FLOOR, noise, value_step
-from plant_emulator.simulation.simulate import (
-    TOLERANCE,
-    Hold,
-    MeasuredSpeeds,
-    RunInputs,
-    inputs_of,
-    simulate,
-)
+from plant_emulator.simulation.run_inputs import Hold, RunInputs, inputs_of
+from plant_emulator.simulation.simulate import TOLERANCE, MeasuredSpeeds, simulate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -1,32 +1,30 @@
 """Simulates a run: the inputs of a log in, a log of simulated signals out.
 
-`RunInputs` are prepared once and simulated many times with other values. Between samples the speed
-reference is linear; in a log with a truck it is a staircase. The wheel torque of a sample acted
-during the interval before the sample.
+`RunInputs` are prepared once and simulated many times with other values. Values of effects may vary
+along a run; see `Settings.factors`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf, nan
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from plant_emulator.errors import UnsettledError
-from plant_emulator.signals.log import KNEE, WHEEL_TORQUE, Array, Log
-from plant_emulator.simulation.sensing import Sensing, reference_nodes, sensing_of
+from plant_emulator.signals.log import Array, Log
+from plant_emulator.simulation.run_inputs import refine_inputs
 from plant_emulator.solver.kernel import kernel_for
 from plant_emulator.solver.stepper import CHANNELS, NEVER, NO_STEPS, NOT_MEASURED, Inputs
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from plant_emulator.model.parameters import ParameterSet
-    from plant_emulator.model.sensors import Sensor
+    from plant_emulator.simulation.run_inputs import RunInputs
     from plant_emulator.solver.kernel import Kernel
-
-Hold = Literal["linear", "staircase"]
 
 # Error per step over what `sdirk.WEIGHT` allows [1].
 TOLERANCE = 2e-5
@@ -37,11 +35,9 @@ FIT_TOLERANCE = 2e-4
 LARGEST_STEP = 0.01
 # Steps of a run that are kept for others to follow, at most [per sample].
 MOST_STEPS = 64
-# Least change of the slope of the reference that ends a step [rad/s^2]. The error control handles
-# smaller ones.
-CORNER = 1.0
-# A truck has started when its torque exceeds the noise of a parked truck [N m at the wheel].
-WHEEL_TORQUE_STARTS = 10.0
+# Samples over which a value that varies keeps its mean: a law that depends on a speed or a torque
+# changes little over them, and each change ends a step.
+KEPT_SAMPLES = 10
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,97 +51,6 @@ class MeasuredSpeeds:
     motor_speed: Array
     drum_speed: Array
     interval: float
-
-
-@dataclass(frozen=True)
-class RunInputs:
-    """The inputs of one run as the kernel takes them, shape (n,) each except `corners`.
-
-    The arrays are those of `stepper.Inputs`.
-
-    truck : whether a truck is on the drum; without a truck the log has no wheel torque
-    source : name of the run in messages; interval : median time between samples [s]
-    sensing : what the declared sensors show; None: every value shows its quantity at once
-    nodes : times [s] and values [rad/s] of a reference with knees between the samples
-    """
-
-    time: Array
-    reference: Array
-    slope: Array
-    corners: Array
-    wheel_torque: Array
-    parked: Array
-    truck: bool
-    source: str
-    interval: float
-    sensing: Sensing | None = None
-    nodes: tuple[Array, Array] | None = None
-
-
-def inputs_of(
-    log: Log, hold: Hold | None = None, sensors: Mapping[str, Sensor] | None = None
-) -> RunInputs:
-    """The inputs of a run, from the speed reference and the wheel torque of its log.
-
-    hold : form of the reference between samples; None: staircase in a log with a truck, else linear
-    sensors : declared sensors by channel
-    """
-    time, reference = log.time, log["speed_reference"]
-    truck = WHEEL_TORQUE in log
-    staircase = (hold or ("staircase" if truck else "linear")) == "staircase" and KNEE not in log
-    slope = np.zeros_like(reference)
-    nodes = reference_nodes(log)
-    if staircase:
-        corners = time[1:][np.diff(reference) != 0.0]
-    else:
-        slope[:-1] = np.diff(reference) / np.diff(time)
-        bends = np.abs(np.diff(np.diff(nodes[1]) / np.diff(nodes[0])))
-        corners = nodes[0][1:-1][bends > CORNER]
-    wheel_torque = log[WHEEL_TORQUE] if truck else np.zeros_like(reference)
-    return RunInputs(
-        time=np.ascontiguousarray(time),
-        reference=np.ascontiguousarray(reference),
-        slope=slope,
-        corners=corners,
-        wheel_torque=np.ascontiguousarray(wheel_torque),
-        parked=_mark_parked(wheel_torque) if truck else np.zeros_like(reference),
-        truck=truck,
-        source=log.source,
-        interval=float(np.median(np.diff(time))),
-        sensing=sensing_of(log, sensors or {}),
-        nodes=nodes if KNEE in log else None,
-    )
-
-
-def refine_inputs(run: RunInputs) -> RunInputs:
-    """The inputs at the finer samples that knees of the reference and lags of sensors need."""
-    if run.sensing is None:
-        return run
-    fine, rows = run.sensing.time, run.sensing.rows
-    places = np.arange(len(fine))
-    before = np.searchsorted(rows, places, side="right") - 1
-    ending = np.searchsorted(rows, places)
-    if run.nodes is None:
-        slope = run.slope[before]
-        reference = run.reference[before] + slope * (fine - run.time[before])
-    else:
-        reference = np.interp(fine, *run.nodes)
-        slope = np.append(np.diff(reference) / np.diff(fine), 0.0)
-    return replace(
-        run,
-        time=fine,
-        reference=reference,
-        slope=slope,
-        wheel_torque=run.wheel_torque[ending],
-        parked=run.parked[ending],
-    )
-
-
-def _mark_parked(wheel_torque: Array) -> Array:
-    """1 for the intervals before the truck's first start, in which it holds the drum; else 0."""
-    started = np.abs(wheel_torque) > WHEEL_TORQUE_STARTS
-    first = int(np.argmax(started)) if started.any() else len(started)
-    return (np.arange(len(wheel_torque)) < first).astype(float)
 
 
 def simulate(
@@ -183,6 +88,8 @@ class Settings(NamedTuple):
     """How a run is simulated; see `simulate`.
 
     follow : steps of a run with other values, see `simulate_with_steps`; empty: they are adapted
+    factors : by name of an effect's parameter: factor on the distance of its value from neutral at
+        each sample of the log, shape (n,)
     """
 
     gap_position: float
@@ -190,6 +97,7 @@ class Settings(NamedTuple):
     largest_step: float | None
     along: MeasuredSpeeds | None = None
     follow: Array = NO_STEPS
+    factors: Mapping[str, Array] = MappingProxyType({})
 
 
 def simulate_with_steps(
@@ -216,33 +124,30 @@ def _simulate(
     out, taken = np.zeros((len(run.time), len(CHANNELS))), np.empty((most * len(run.time), 2))
     p = model.parameter_record(values)
     x = model.state(p, settings.gap_position * values["backlash_half_gap"])
+    work, stage = model.work(), model.stage_record()
+    stage.truck = float(run.truck)
     largest_step = settings.largest_step
     if largest_step is None:
         largest_step = min(LARGEST_STEP, run.interval)
-    stage = model.stage_record()
-    stage.truck = float(run.truck)
-    due, motor_speed, drum_speed = _corrections(coarse, run, settings.along)
-    steps = model.run(
-        Inputs(
-            run.time,
+    tolerance = inf if len(settings.follow) else settings.tolerance
+    corrections = _corrections(coarse, run, settings.along)
+    first, steps = 0, 0
+    for end, varied in _pieces(coarse, run, settings.factors, model.neutral_values):
+        for name, (neutral, factor) in varied.items():
+            setattr(p, name, neutral + (values[name] - neutral) * factor)
+        inputs = Inputs(
+            run.time[: end + 1],
             run.reference,
             run.slope,
             run.corners,
             run.wheel_torque,
             run.parked,
-            due,
-            motor_speed,
-            drum_speed,
+            *corrections,
             settings.follow,
-        ),
-        (inf if len(settings.follow) else settings.tolerance, largest_step),
-        x,
-        model.work(),
-        taken,
-        stage,
-        p,
-        out,
-    )
+        )
+        own = (tolerance, largest_step, first)
+        steps += model.run(inputs, own, x, work, taken[steps:], stage, p, out)
+        first = end
     _refuse_unsolved(run, stage.unsettled, out)
     signals = {name: out[:, k] for k, name in enumerate(CHANNELS)}
     if run.sensing is not None:
@@ -251,6 +156,27 @@ def _simulate(
         del signals["wheel_torque"]
     log = Log(coarse.time, {"speed_reference": coarse.reference, **signals}, run.source)
     return log, taken[:steps].copy() if steps <= len(taken) else NO_STEPS
+
+
+def _pieces(
+    coarse: RunInputs,
+    run: RunInputs,
+    factors: Mapping[str, Array],
+    neutral: Mapping[str, float],
+) -> Iterator[tuple[int, Mapping[str, tuple[float, float]]]]:
+    """The last sample of each piece of a run, and neutral value and factor of what varies in it.
+
+    coarse, run : inputs at the samples of the log, and at those that are simulated
+    """
+    if not factors:
+        yield len(run.time) - 1, {}
+        return
+    rows = np.arange(len(run.time)) if run.sensing is None else run.sensing.rows
+    last = len(coarse.time) - 1
+    for begin in range(0, last, KEPT_SAMPLES):
+        end = min(begin + KEPT_SAMPLES, last)
+        means = {name: float(np.mean(own[begin:end])) for name, own in factors.items()}
+        yield int(rows[end]), {name: (neutral[name], mean) for name, mean in means.items()}
 
 
 def _corrections(

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from plant_emulator.signals.log import Log
-    from plant_emulator.simulation.simulate import RunInputs
+    from plant_emulator.simulation.run_inputs import RunInputs
 
 # Tolerance of the simulations, which are compared over a whole run.
 SCAN_TOLERANCE = 1e-3

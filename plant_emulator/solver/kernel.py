@@ -72,14 +72,15 @@ class Kernel:
         """
         for name in values.keys() - self._names:
             raise ParameterError(f"{name}: neither a parameter of the bench nor of an effect")
-        return record(self.parameters, {**self._neutral_values, **values})
+        return record(self.parameters, {**self.neutral_values, **values})
 
     @cached_property
     def _names(self) -> frozenset[str]:
         return frozenset(self.parameters)
 
     @cached_property
-    def _neutral_values(self) -> Mapping[str, float]:
+    def neutral_values(self) -> Mapping[str, float]:
+        """Values of the effects' parameters at which the bench is nominal [SI]."""
         return effects.neutral_values(self.effects)
 
     def stage_record(self) -> Record:

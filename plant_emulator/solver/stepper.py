@@ -104,12 +104,19 @@ def observe(row: int, out: State, s: Record, p: Record) -> None:
     out[row, 6] = acting_wheel_torque(s, p)
 
 
-def begin(time: float, reference: float, out: State, x: State, s: Record, p: Record) -> None:
-    """Write the first sample to the log, at the state x and that reference [rad/s]."""
+def begin(
+    row: int, time: float, reference: float, out: State, x: State, s: Record, p: Record
+) -> None:
+    """Write the first sample to the log, at the state x and that reference [rad/s].
+
+    A run that goes on from a later row has it already.
+    """
+    if row > 0:
+        return
     load(x, s)
     s.time, s.delayed_reference = time, reference
     evaluate_laws(s, p)
-    observe(0, out, s, p)
+    observe(row, out, s, p)
 
 
 def landing_sample(
@@ -175,7 +182,7 @@ def step_error(length: float, tolerance: float, unsettled: bool, x: State, w: St
 
 def run(
     inputs: Inputs,
-    settings: tuple[float, float],
+    settings: tuple[float, float, int],
     x: State,
     w: State,
     taken: State,
@@ -185,17 +192,18 @@ def run(
 ) -> int:
     """Simulate a whole log and return the number of steps.
 
-    settings : tolerance [1], infinite for steps that are fixed or followed; largest step [s]
+    settings : tolerance [1], infinite for steps that are fixed or followed; largest step [s]; the
+        sample that x and stage belong to: 0, or one that an earlier call has ended at
     x, w : state at the first sample, work space; stage, p : stage record and parameter record
     taken : begin and length of the first steps [s], shape (some steps, 2); it is filled
     out : the channels at every sample, shape (samples, channels); it is filled
     """
     time, value, slope, edges, wheel_torque, parked, corrections, motor, drum, given = inputs
-    tolerance, largest = settings
+    tolerance, largest, first = settings
     s, p = private_copy(stage), private_copy(p)
-    begin(time[0], value[0], out, x, s, p)
-    t, h, segment, edge, steps, row, due, corrected, k = time[0], largest, 0, 0, 0, 1, 0, 0, 0
-    past_corner, after_corner = False, largest
+    begin(first, time[0], value[0], out, x, s, p)
+    t, h, past_corner, after_corner = time[first], largest, False, largest
+    segment, edge, steps, row, due, corrected, k = 0, 0, 0, first + 1, 0, 0, 0
     while row < len(time):
         s.time, s.wheel_torque, s.parked = t, wheel_torque[row], parked[row]
         b = dead_time(s, p)

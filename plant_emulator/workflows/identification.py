@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from plant_emulator.identification.identify import EstimatedParameter, Identification
     from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.recordings.recording import Recording
-    from plant_emulator.simulation.simulate import Hold
+    from plant_emulator.simulation.run_inputs import Hold
     from plant_emulator.workflows.loading import Source
     from plant_emulator.workflows.simulation import Effects
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from plant_emulator.recordings.recording import Recording
     from plant_emulator.signals.axis_log import AxisLog
     from plant_emulator.signals.log import Array
-    from plant_emulator.simulation.simulate import Hold
+    from plant_emulator.simulation.run_inputs import Hold
 
     # A log, or the path of its file.
     Source = str | Path | Log

@@ -15,8 +15,8 @@ from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import Recording
 from plant_emulator.signals.log import COMPARED, Log
 from plant_emulator.simulation.programs import PROGRAMS
+from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.sensor_noise import noise_of
-from plant_emulator.simulation.simulate import inputs_of
 from plant_emulator.workflows.loading import load_recordings
 from plant_emulator.workflows.simulation import simulate
 

@@ -18,8 +18,9 @@ from plant_emulator.recordings.wheel_torque import with_estimated_torque
 from plant_emulator.signals.log import Log, without_voltage
 from plant_emulator.simulation import simulate as kernel_level
 from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram, TravelProgram, program
+from plant_emulator.simulation.run_inputs import Hold, inputs_of
 from plant_emulator.simulation.sensor_noise import add_noise
-from plant_emulator.simulation.simulate import Hold, inputs_of, values_of
+from plant_emulator.simulation.simulate import values_of
 from plant_emulator.simulation.start_in_gap import fit_start
 from plant_emulator.simulation.travel_program import simulate_travel
 from plant_emulator.solver.kernel import kernel

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from plant_emulator.model.parameters import ParameterSet
-    from plant_emulator.simulation.simulate import Hold
+    from plant_emulator.simulation.run_inputs import Hold
     from plant_emulator.workflows.loading import Source
     from plant_emulator.workflows.simulation import Effects, Start
 

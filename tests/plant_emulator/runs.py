@@ -10,7 +10,7 @@ import pytest
 
 from plant_emulator.signals.log import Array, Log
 from plant_emulator.simulation.programs import sample_times
-from plant_emulator.simulation.simulate import inputs_of
+from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.simulate import simulate as simulate_run
 from plant_emulator.solver import compiler
 from plant_emulator.solver.kernel import Kernel, kernel
@@ -67,7 +67,7 @@ class Piecewise:
         references = np.linspace(self.reference, reference, pieces + 1)
         slope = np.full(pieces + 1, (reference - self.reference) / (time - self.time))
         out = np.zeros((pieces + 1, 7))
-        settings = (self.tolerance, 0.01) if self.step is None else (inf, self.step)
+        settings = (self.tolerance, 0.01, 0) if self.step is None else (inf, self.step, 0)
         torque = np.full(pieces + 1, wheel_torque)
         free = np.zeros(pieces + 1)
         work, stage = self.model.work(), self.model.stage_record()

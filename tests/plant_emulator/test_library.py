@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import plant_emulator as pe
-from plant_emulator.simulation.simulate import inputs_of, values_of
+from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.simulate import simulate as simulate_run
+from plant_emulator.simulation.simulate import values_of
 
 ROOT = Path(__file__).parents[2]
 HEAVY = {"numba", "scipy", "matplotlib", "numpy", "pymodbus", "click"}

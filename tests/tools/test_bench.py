@@ -16,7 +16,8 @@ import pytest
 from plant_emulator import parameter_sets
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation import programs
-from plant_emulator.simulation.simulate import inputs_of, simulate
+from plant_emulator.simulation.run_inputs import inputs_of
+from plant_emulator.simulation.simulate import simulate
 
 ROOT = Path(__file__).resolve().parents[2]
 KEYS = {"name", "ours", "peer", "peers", "unit", "ratio", "target", "holds"}

@@ -44,7 +44,8 @@ import sys
 from plant_emulator import parameter_sets
 from plant_emulator.simulation import programs
 from plant_emulator.signals.log import Log
-from plant_emulator.simulation.simulate import inputs_of, simulate
+from plant_emulator.simulation.run_inputs import inputs_of
+from plant_emulator.simulation.simulate import simulate
 time, reference = programs.PROGRAMS[sys.argv[1]].reference()
 simulate(inputs_of(Log(time, {"speed_reference": reference})), parameter_sets.load().values())
 """

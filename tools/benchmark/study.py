@@ -14,7 +14,8 @@ from benchmark.timing import Action, alone
 from plant_emulator import parameter_sets
 from plant_emulator.signals.log import Array, Log
 from plant_emulator.simulation import programs
-from plant_emulator.simulation.simulate import LARGEST_STEP, inputs_of, simulate
+from plant_emulator.simulation.run_inputs import inputs_of
+from plant_emulator.simulation.simulate import LARGEST_STEP, simulate
 from plant_emulator.solver.stepper import CHANNELS, NO_STEPS, Inputs
 
 if TYPE_CHECKING:

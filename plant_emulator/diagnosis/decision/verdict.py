@@ -124,23 +124,23 @@ def without_uncertain(
     final, null = explained.final, explained.null
     if not decision.effects or not final.effects:
         return explained, decision
-    uncertain = _uncertain(final, model.candidates, model_form_errors)
-    squares = {one: _square_without(one, explained) for one in uncertain - explained.corrections}
+    found = _uncertain(final, model.candidates, model_form_errors)
+    squares = {one: _square_without(one, explained) for one in found - explained.uncertain}
     least = min(squares, key=squares.__getitem__, default="")
     if not least or squares[least] > NOISE_MEAN_SQUARE * final.samples:
         return explained, decision
     if len(explained.named) > 1:
-        corrections = explained.corrections | {least}
-        rest = replace(final, effects=tuple(e for e in final.effects if e not in corrections))
+        uncertain = explained.uncertain | {least}
+        rest = replace(final, effects=tuple(e for e in final.effects if e not in uncertain))
         step = search_step(null, f"the size of {least} is uncertain", rest)
-        named = replace(explained, corrections=corrections, trace=(*explained.trace, step))
+        named = replace(explained, uncertain=uncertain, trace=(*explained.trace, step))
         return named, replace(decision, effects=named.named)
     step = search_step(null, f"the size of {least} is uncertain", null)
     without = replace(
         explained,
         trace=(*explained.trace, step),
         final=null,
-        corrections=frozenset(),
+        uncertain=frozenset(),
         reduced_costs={},
         alternatives={},
         unconverged=unconverged(null),

@@ -46,8 +46,7 @@ class Explanation:
     random_effects : accepted random effects, beside the effects of `final`
     reduced_costs : for each of several accepted effects, the least cost of a fit without it; empty
         where the final fit is no cause
-    corrections : effects of the final fit that only correct the law of another one, or have no
-        certain size beside it; they are not named
+    uncertain : effects of the final fit without a certain size beside the others; not named
     trace : the search in its order
     noise : of every channel as the logs show it; empty where it is as declared
     log_odds : of the final set against its best rival, in the mean square that it leaves [nats]
@@ -62,7 +61,7 @@ class Explanation:
     log_odds: float
     random_effects: tuple[VarianceComponent, ...] = ()
     reduced_costs: dict[str, float] = field(default_factory=dict)
-    corrections: frozenset[str] = frozenset()
+    uncertain: frozenset[str] = frozenset()
     trace: tuple[SearchStep, ...] = ()
     noise: Mapping[str, ChannelNoise] = field(default_factory=dict)
     regularities: Sequence[Regularity] = ()
@@ -81,7 +80,7 @@ class Explanation:
     @property
     def _followed(self) -> tuple[str, ...]:
         """The accepted effects of the final fit."""
-        return tuple(e for e in self.final.effects if e not in self.corrections)
+        return tuple(e for e in self.final.effects if e not in self.uncertain)
 
     def evidence(self, hypothesis: Hypothesis) -> float:
         """Evidence of an effect [1]: beside the other accepted effects, or alone."""

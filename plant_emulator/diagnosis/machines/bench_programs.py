@@ -19,7 +19,8 @@ from plant_emulator.recordings.preflight import LEAST_MOTION, NAMES
 from plant_emulator.recordings.recording import Recording
 from plant_emulator.signals.log import VOLTAGE, Log, compared_channels
 from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram, TravelProgram, describe
-from plant_emulator.simulation.simulate import inputs_of, simulate
+from plant_emulator.simulation.run_inputs import inputs_of
+from plant_emulator.simulation.simulate import simulate
 from plant_emulator.simulation.travel_program import simulate_travel
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.simulation.simulate import inputs_of
+from plant_emulator.simulation.run_inputs import inputs_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -18,7 +18,8 @@ from plant_emulator.errors import UnsettledError
 from plant_emulator.identification.experiment_design import noise_levels
 from plant_emulator.model.stage import split_gap_position
 from plant_emulator.simulation.programs import SpeedProgram
-from plant_emulator.simulation.simulate import inputs_of, simulate
+from plant_emulator.simulation.run_inputs import inputs_of
+from plant_emulator.simulation.simulate import simulate
 from register_maps.logs.drive_programs import Sweep
 
 if TYPE_CHECKING:

@@ -22,6 +22,7 @@ from plant_emulator.diagnosis.search.confirmation import (
     lead_start,
     trial_of,
 )
+from plant_emulator.diagnosis.search.law_forms import gain_beside_forms
 from plant_emulator.diagnosis.search.run_agreement import run_agreement
 from plant_emulator.diagnosis.search.screening import SIMULATION
 from plant_emulator.diagnosis.search.settings import SETTINGS
@@ -45,7 +46,7 @@ class FittedSets:
     runner : in whose noise the costs count; null : fit without effects
     beside_random : whether a random effect is part of that noise
     sets : the best fit of each set, at first of those that are known
-    agreed : whether the runs agree on it, where they were asked
+    agreed : whether the runs and other forms of the laws agree on it, where they were asked
     promises : what one more effect promises on top of a set
     expanded : sets whose most promising effects were tried on top of them
     secants_fitted : whether the library was fitted by secants from this fit without effects; in
@@ -126,11 +127,11 @@ class FittedSets:
 
     @property
     def unrefuted(self) -> dict[frozenset[str], FitResult]:
-        """The sets that the runs do not refute."""
+        """The sets that neither the runs nor other forms of the laws refute."""
         return {key: one for key, one in self.sets.items() if not self.refuted(key)}
 
     def refuted(self, key: frozenset[str]) -> bool:
-        """Whether the runs refute a set, or a part of it, or its last effect gains no more.
+        """Whether a set is refuted, or a part of it, or its last effect gains no more.
 
         Further effects may only hide what the runs found. An effect that gains no more than one
         that stood for the error of the same laws may stand for it as well.
@@ -173,25 +174,36 @@ class FittedSets:
                 and len(key) == max(1, len(best.effects))
                 and one.cost < best.cost + SETTINGS.near + (not one.converged) * excess(best)
             ]
-            if not near and self._ask_runs(best):
+            if not near and self._agrees(best):
                 return best
             for one in self.fits(refit, near):
                 done.add(frozenset(one.effects))
                 self.trace.append(search_step(self.null, "converged", one))
 
-    def _ask_runs(self, found: FitResult) -> bool:
-        """Ask the runs of the further effects of a set, once; give whether they agree.
+    def _agrees(self, found: FitResult) -> bool:
+        """Whether each further effect of a set has one size, and gains beside other forms of laws.
 
-        Where they do not, an effect that gains more may take the place of the last one.
+        It is asked once. Where one has not, an effect that gains more may take the place of the
+        last one.
         """
         key, base = frozenset(found.effects), frozenset(found.effects[:-1])
         if len(key) < 2 or key in self.agreed:
             return self.agreed.get(key, True)
         asked = [Reduction(found, self.runner.runs, name) for name in found.effects[1:]]
         least = min(self.runner.map(run_agreement, asked))
-        self.agreed[key] = least >= SETTINGS.agreement
-        if not self.agreed[key]:
+        gain = min(self.gains_beside_forms(found, found.effects[1:]))
+        action = ""
+        if least < SETTINGS.agreement:
             action = f"refuted by the runs (probability {least:.1g})"
+        elif gain < SETTINGS.needed_again:
+            action = f"gains only {gain:.1f} beside other forms of a law"
+        self.agreed[key] = not action
+        if action:
             self.trace.append(search_step(self.null, action, found))
             self.expanded.discard(base)
         return self.agreed[key]
+
+    def gains_beside_forms(self, found: FitResult, effects: Sequence[str]) -> list[float]:
+        """Gain of each of these effects of a fit beside other forms of the laws of its others."""
+        asked = [Reduction(found, self.runner.runs, name) for name in effects]
+        return list(self.runner.map(gain_beside_forms, asked))

@@ -16,7 +16,8 @@ that is the same in all parts, as in logs of one program, is not found.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,10 +25,11 @@ from scipy.special import chdtrc
 
 from plant_emulator.diagnosis.fitting.joint_fit import (
     SHRINKAGE,
-    effective_fraction,
     linearise,
 )
+from plant_emulator.diagnosis.search.relaxation import Relaxed, relax
 from plant_emulator.diagnosis.search.settings import SETTINGS
+from plant_emulator.estimation.unknowns import Unknown
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -36,19 +38,6 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.search.confirmation import Reduction
     from plant_emulator.estimation.unknowns import Estimate
     from plant_emulator.signals.log import Array
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Split:
-    """A fit with a size of each part.
-
-    changes : of the size, shape (parts,); covariance : of them, for white residuals of variance 1
-    inflation : of that covariance, by what the split fit leaves and its autocorrelation [1]
-    """
-
-    changes: Array
-    covariance: Array
-    inflation: float
 
 
 def run_agreement(model: Model, asked: Reduction) -> float:
@@ -71,19 +60,19 @@ def run_agreement(model: Model, asked: Reduction) -> float:
             split = _split(near, index, widest, (alone,))
         law = SETTINGS.law_error * (float(near.z[index]) - neutral)
         spread = _spread(
-            split.changes, split.inflation * split.covariance + law**2 * np.eye(len(split.changes))
+            split.change, split.inflation * split.covariance + law**2 * np.eye(len(split.change))
         )
         probability = min(probability, float(chdtrc(max(1, _showing(split, widest) - 1), spread)))
     return probability
 
 
-def _showing(split: _Split, widest: float) -> int:
+def _showing(split: Relaxed, widest: float) -> int:
     """Number of parts that show the size."""
     return round(float(np.sum(1.0 - np.diag(split.covariance) / widest**2)))
 
 
-def _split(near: Estimate, index: int, widest: float, halved: Sequence[int]) -> _Split:
-    """Give each part a size of its own, at a fit with one size for all.
+def _split(near: Estimate, index: int, widest: float, halved: Sequence[int]) -> Relaxed:
+    """Changes of the size of each part, at a fit with one size for all.
 
     index : of the size among the unknowns; widest : prior standard deviation of the changes
     halved : runs of two parts
@@ -92,27 +81,17 @@ def _split(near: Estimate, index: int, widest: float, halved: Sequence[int]) -> 
         np.concatenate([np.delete(j, index, axis=-1), j[..., [index]] * own], axis=-1)
         for j, own in zip(near.jacobians, _parts(near, index, halved), strict=True)
     ]
-    others = [(u, float(z)) for u, z in zip(near.unknowns, near.z, strict=True)]
-    del others[index]
-    k = slopes[0].shape[-1] - len(others)
-    precision = [u.scaled_std**-2.0 for u, _ in others] + [widest**-2.0] * k
-    # What a prior pulls at the fit, the residuals pull the other way.
-    pull = [0.0 if u.std is None else (z - u.scaled(u.prior)) for u, z in others]
-    gradient = np.array(precision) * np.array([*pull, *np.zeros(k)])
-    information = np.diag(precision)
-    for columns, residual in zip(slopes, near.residuals, strict=True):
-        rows = columns.reshape(-1, len(precision))
-        information = information + rows.T @ rows
-        gradient = gradient + rows.T @ residual.ravel()
-    covariance = np.linalg.pinv(information, hermitian=True)
-    change = -covariance @ gradient
-    left = tuple(r + columns @ change for r, columns in zip(near.residuals, slopes, strict=True))
-    square = sum(float(np.sum(r**2)) for r in left) / near.samples
-    return _Split(
-        changes=change[-k:],
-        covariance=covariance[-k:, -k:],
-        inflation=max(1.0, square) / effective_fraction(replace(near, residuals=left)),
+    k = slopes[0].shape[-1] - len(near.z) + 1
+    own = Unknown(name="", start=0.0, lower=-inf, upper=inf, logarithmic=False, std=widest)
+    beside = relax(
+        replace(
+            near,
+            unknowns=(*near.unknowns[:index], *near.unknowns[index + 1 :], *([own] * k)),
+            z=np.append(np.delete(near.z, index), np.zeros(k)),
+            jacobians=tuple(slopes),
+        )
     )
+    return replace(beside, change=beside.change[-k:], covariance=beside.covariance[-k:, -k:])
 
 
 def _parts(near: Estimate, index: int, halved: Sequence[int]) -> list[Array]:

@@ -36,7 +36,6 @@ from plant_emulator.diagnosis.search.secant_fits import fitted_promises
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.summary import (
     alternatives,
-    corrections,
     hypotheses,
     log_odds,
     not_told_apart,
@@ -239,7 +238,9 @@ class Search(FittedSets):
             or (approximate and self._leaves_hundredth(found))
         )
         if closes and evidence_of(fall, found, self.null) >= EVIDENCE_THRESHOLD:
-            return found
+            (gain,) = self.gains_beside_forms(found, [cheapest])
+            if gain >= SETTINGS.needed_again:
+                return found
         self.sets = {k: one for k, one in self.sets.items() if len(k) < len(best.effects)}
         return self._without_needless(self.settled())
 
@@ -262,11 +263,6 @@ class Search(FittedSets):
             for p in self.promises.get(key, [])
             if not self.refuted(key | {p.effect})
         }
-        library = self.runner.model.candidates
-        mending = corrections(library, final, self.reduced_costs)
-        if mending:
-            named = replace(final, effects=tuple(e for e in final.effects if e not in mending))
-            self.trace.append(search_step(self.null, "others only correct a law", named))
         return Explanation(
             null=self.null,
             final=final,
@@ -277,7 +273,6 @@ class Search(FittedSets):
                 sets, {names: self.value(one) for names, one in sets.items()}, final, larger
             ),
             reduced_costs=self.reduced_costs,
-            corrections=mending,
             trace=tuple(self.trace),
             noise=self.noise.channels if self.noise else {},
         )

@@ -38,14 +38,15 @@ class Settings:
     # Predicted gain from which on a first effect is fitted: parameters that bend together make the
     # gain of a weak effect several times the predicted one.
     promising: float = 5.0
-    # Gain that one more effect needs: needless ones that no run refutes came to 35 (to 152 beside a
-    # law that was wrong), and a true one to 45. Less must be predicted: parameters that follow
-    # nearly all of an effect blur what its slopes tell.
+    # Gain that one more effect needs: needless ones that no run refutes came to 35, or to 38 beside
+    # other forms of the laws; true ones to 45 and 136. Less must be predicted: parameters that
+    # follow nearly all of an effect blur what its slopes tell.
     needed_again: float = 40.0
     promising_again: float = 15.0
     # Most effects of a set: nobody has told more than three causes apart in one set of logs.
     most_effects: int = 3
-    # Relative error of an approximate law: other laws of the same effect differed by up to this.
+    # Relative error of an approximate law: other laws of the same effect differed by up to this. It
+    # is the deviation of each form of the law.
     law_error: float = 0.1
     # Probability below which no chance makes the runs differ on a size. Second effects that are
     # there had 0.4 or more, beside the error that a law may have, and needless ones 0.006 or less.

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.machine import Candidate
     from plant_emulator.diagnosis.search.screening import Visibility
 
     Sets = Mapping[frozenset[str], FitResult]
@@ -50,28 +49,6 @@ def alternatives(sets: Sets, final: FitResult, name: str) -> dict[str, float]:
         for key, one in sets.items()
         if len(key) == len(final.effects) and key >= others
     }
-
-
-def corrections(
-    library: Mapping[str, Candidate], final: FitResult, reduced_costs: Mapping[str, float]
-) -> frozenset[str]:
-    """Effects of a set that only correct the law of another one of the same subsystem.
-
-    Torques of one subsystem add up, and its speed does not tell which of them is wrong. An
-    approximate law leaves up to the square of its relative error of what it closes, and not only at
-    the samples where it closes most: a ramp that lands softly is wrong at its ends.
-
-    reduced_costs : of the set without each effect
-    """
-    share = SETTINGS.law_error**2
-    closed = {name: cost - final.cost for name, cost in reduced_costs.items()}
-    laws = [library[name] for name in closed if not library[name].exact_form]
-    return frozenset(
-        name
-        for name in closed
-        for law in laws
-        if law.subsystem == library[name].subsystem and closed[name] < share * closed[law.name]
-    )
 
 
 def log_odds(

@@ -9,8 +9,9 @@ from plant_emulator.blind.catalogue import INSIDE, OUTSIDE
 from plant_emulator.effects import Effect
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import COMPARED, Log
+from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.sensor_noise import SENSORS
-from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
+from plant_emulator.simulation.simulate import simulate, values_of
 from plant_emulator.solver.kernel import kernel
 from tests.plant_emulator.runs import linear, with_truck
 

@@ -12,8 +12,9 @@ from plant_emulator.blind.generate import measure, simulate_truth
 from plant_emulator.blind.orthogonal_norm import norms
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import COMPARED
+from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.sensor_noise import SENSORS
-from plant_emulator.simulation.simulate import inputs_of, simulate
+from plant_emulator.simulation.simulate import simulate
 from plant_emulator.solver.kernel import kernel, use_own_effects
 from tests.plant_emulator.blind.conftest import case_with, hidden
 

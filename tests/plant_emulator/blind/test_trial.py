@@ -13,8 +13,9 @@ from plant_emulator import logs
 from plant_emulator.cli import main
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import Log
+from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.sensor_noise import add_noise
-from plant_emulator.simulation.simulate import inputs_of, simulate
+from plant_emulator.simulation.simulate import simulate
 from plant_emulator.workflows.blind_trial.examiner import Examiner
 from plant_emulator.workflows.blind_trial.folder import ROOT, program_hash
 from plant_emulator.workflows.blind_trial.trial import BlindTrial

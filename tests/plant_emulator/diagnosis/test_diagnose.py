@@ -135,18 +135,18 @@ def test_runs_that_do_not_agree_alone_are_not_told_apart() -> None:
     assert "each log alone" not in verdict.statement
 
 
-def test_effect_that_only_corrects_a_law_is_fitted_noted_and_not_named(
+def test_effect_of_uncertain_size_is_fitted_noted_and_not_named(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """By hand: 3 * 1125 squares of the wave are less than a hundredth of 3 * 450000."""
+    """By hand: 3 * 80 squares of the wave are below 5 % of 6000; its law is off by two sizes."""
     monkeypatch.setitem(SHAPES, "late", lambda x: (x > 0.0) * np.sin(31.0 * x))
     monkeypatch.setitem(SHAPES, "wave", lambda x: (x < 0.0) * np.sin(20.0 * x))
-    gap = 30.0 * SHAPES["late"](TIME) + 1.5 * SHAPES["wave"](TIME)
-    model = Unplanned([noisy(gap, seed) for seed in (1, 2, 3)], ["late", "wave"])
-    model.candidates = {
-        name: replace(one, subsystem="load") for name, one in model.candidates.items()
-    }
-    found = diagnosed(model)
+    gap = 30.0 * SHAPES["late"](TIME) + 0.4 * SHAPES["wave"](TIME)
+    recipe = Given(Unplanned([noisy(gap, seed) for seed in (1, 2, 3)], ["late", "wave"]))
+    errors = {"wave_size": 2.0}
+    found = Diagnose(
+        InProcess(), recipe, EACH_IN_TURN, settings={}, model_form_errors=errors
+    ).diagnose()
     assert found.answer.verdict.effects == ("late",)
     assert [one.effect for one in found.answer.ranking if one.accepted] == ["late"]
     assert found.fixed.keys() == {"late", "wave"}

@@ -13,7 +13,8 @@ from plant_emulator.model import laws
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.model.stage import STAGE
 from plant_emulator.signals.log import Log
-from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
+from plant_emulator.simulation.run_inputs import inputs_of
+from plant_emulator.simulation.simulate import simulate, values_of
 from plant_emulator.solver.kernel import kernel, partial_kernel
 from tests.plant_emulator.runs import linear
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import Log
+from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.running_bench import Bench
-from plant_emulator.simulation.simulate import inputs_of
 from plant_emulator.simulation.start_in_gap import fit_start, mean_square_residual
 from tests.plant_emulator.model.test_plant import energy
 from tests.plant_emulator.runs import GEAR, Piecewise, linear, simulate

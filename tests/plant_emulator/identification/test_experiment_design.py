@@ -23,8 +23,9 @@ from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import Recording, recording
 from plant_emulator.signals.log import Log, without_voltage
 from plant_emulator.simulation.programs import PROGRAMS
+from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.sensor_noise import add_noise
-from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
+from plant_emulator.simulation.simulate import simulate, values_of
 from tests.plant_emulator.identification.practice import truth
 
 pytestmark = pytest.mark.xdist_group("experiment_design")  # a bench takes seconds to be fitted

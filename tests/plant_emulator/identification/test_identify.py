@@ -18,8 +18,9 @@ from plant_emulator.recordings.recording import Recording, recording
 from plant_emulator.signals.log import COMPARED, Log
 from plant_emulator.simulation.fit_metrics import validate
 from plant_emulator.simulation.programs import PROGRAMS
+from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.sensor_noise import SENSORS, add_noise
-from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
+from plant_emulator.simulation.simulate import simulate, values_of
 from plant_emulator.simulation.start_in_gap import fit_start
 from tests.plant_emulator.identification.practice import DEVIATIONS, FREE, truth
 

@@ -12,8 +12,9 @@ from plant_emulator.identification.identify import Identification, fit_from, ide
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import Recording, recording
 from plant_emulator.signals.log import COMPARED, Array, Log
+from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.sensor_noise import SENSORS
-from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
+from plant_emulator.simulation.simulate import simulate, values_of
 
 FREE = ("drum_inertia", "gear_viscous_friction", "dead_time")
 TIME = np.arange(2500) * 0.01

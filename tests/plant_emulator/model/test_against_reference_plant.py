@@ -6,7 +6,8 @@ import pytest
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import Log
 from plant_emulator.simulation.fit_metrics import validate
-from plant_emulator.simulation.simulate import inputs_of, simulate
+from plant_emulator.simulation.run_inputs import inputs_of
+from plant_emulator.simulation.simulate import simulate
 from tests import reference_plant
 
 RUNS = {

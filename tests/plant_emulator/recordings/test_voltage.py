@@ -26,8 +26,9 @@ from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.preflight import preflight
 from plant_emulator.recordings.recording import OFFSET, Recording, recording
 from plant_emulator.signals.log import COMPARED, VOLTAGE, Log, compared_channels, without_voltage
+from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.sensor_noise import SENSORS, add_noise
-from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
+from plant_emulator.simulation.simulate import simulate, values_of
 from plant_emulator.solver.kernel import kernel
 from plant_emulator.workflows.loading import load_recordings, with_common_voltage
 

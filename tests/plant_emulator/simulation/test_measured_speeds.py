@@ -10,7 +10,8 @@ from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.model.sensors import Sensor
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
-from plant_emulator.simulation.simulate import MeasuredSpeeds, inputs_of, simulate
+from plant_emulator.simulation.run_inputs import inputs_of
+from plant_emulator.simulation.simulate import MeasuredSpeeds, simulate
 from plant_emulator.simulation.start_in_gap import mean_square_residual
 
 ReadLog = Callable[[str], Log]

@@ -11,10 +11,11 @@ from plant_emulator.model.sensors import SENSED, Sensor
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Array, Log
 from plant_emulator.simulation import simulate as level
+from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.running_bench import Bench
 from plant_emulator.simulation.sensing import lag, phase_of, reference_nodes
 from plant_emulator.simulation.sensor_noise import SENSORS
-from plant_emulator.simulation.simulate import inputs_of, values_of
+from plant_emulator.simulation.simulate import values_of
 from plant_emulator.workflows.simulation import simulate
 from tests.plant_emulator.runs import linear
 

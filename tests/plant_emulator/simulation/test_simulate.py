@@ -8,7 +8,8 @@ import pytest
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import COMPARED, Log
 from plant_emulator.simulation.fit_metrics import validate
-from plant_emulator.simulation.simulate import inputs_of, simulate, values_of
+from plant_emulator.simulation.run_inputs import inputs_of
+from plant_emulator.simulation.simulate import simulate, values_of
 from plant_emulator.simulation.start_in_gap import fit_start, mean_square_residual
 from tests.plant_emulator.runs import linear, with_truck
 

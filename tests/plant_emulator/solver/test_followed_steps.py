@@ -15,11 +15,11 @@ from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import COMPARED, Log
 from plant_emulator.simulation import simulate as simulation
+from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.sensor_noise import SENSORS, add_noise
 from plant_emulator.simulation.simulate import (
     FIT_TOLERANCE,
     Settings,
-    inputs_of,
     simulate,
     simulate_with_steps,
 )

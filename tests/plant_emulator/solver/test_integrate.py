@@ -11,7 +11,8 @@ from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.signals.log import COMPARED, Log
 from plant_emulator.simulation.fit_metrics import validate
 from plant_emulator.simulation.programs import PROGRAMS, SpeedProgram
-from plant_emulator.simulation.simulate import TOLERANCE, inputs_of
+from plant_emulator.simulation.run_inputs import inputs_of
+from plant_emulator.simulation.simulate import TOLERANCE
 from plant_emulator.simulation.simulate import simulate as simulate_run
 from plant_emulator.solver import sdirk
 from plant_emulator.solver.kernel import Kernel

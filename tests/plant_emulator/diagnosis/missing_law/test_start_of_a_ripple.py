@@ -15,8 +15,9 @@ from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
+from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.sensor_noise import add_noise
-from plant_emulator.simulation.simulate import inputs_of, simulate
+from plant_emulator.simulation.simulate import simulate
 
 RIPPLE = '''"""The measuring wheel is not round.
 

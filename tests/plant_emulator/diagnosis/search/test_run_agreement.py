@@ -94,7 +94,7 @@ def test_a_prior_that_holds_a_parameter_back_moves_no_size(monkeypatch: pytest.M
     near = linearise(model, found, (0, 1))
     names = [u.name for u in near.unknowns]
     split = _split(near, names.index("cube_size"), 2.0, ())
-    assert split.changes == pytest.approx([0.0, 0.0], abs=1e-6)
+    assert split.change == pytest.approx([0.0, 0.0], abs=1e-6)
 
 
 def test_a_run_alone_tells_its_size_with_its_own_samples() -> None:

@@ -1,0 +1,79 @@
+"""What an effect gains beside other forms of another effect's law, against hand calculations."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+import pytest
+
+from plant_emulator.diagnosis.fitting.joint_fit import fit
+from plant_emulator.diagnosis.search.confirmation import Reduction
+from plant_emulator.diagnosis.search.law_forms import gain_beside_forms
+from plant_emulator.signals.log import Array
+from tests.plant_emulator.diagnosis.line import SHAPES, TIME, Line, explained, noisy
+
+# The cube's law may grow otherwise: x^3 (1 + c sqrt(3) x).
+FORM = "cube_size by x"
+BENT = np.sqrt(3.0) * TIME**4
+
+
+class Bent(Line):
+    """A line whose cube may follow another law."""
+
+    def __init__(self, measured: Sequence[Array], names: Sequence[str]) -> None:
+        super().__init__(measured, names)
+        self.candidates["cube"] = replace(self.candidates["cube"], forms=(FORM,))
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+        plain = super().residual(run, effects)
+
+        def residual(v: Mapping[str, float]) -> Array:
+            return np.asarray(plain(v) - v.get(FORM, 0.0) * v.get("cube_size", 0.0) * BENT)
+
+        return residual
+
+
+def gain(measured: Array, names: tuple[str, ...], effect: str) -> float:
+    """Gain of an effect of a set in one run."""
+    model = Bent([measured], names)
+    found = fit(model, names, (0,), {"a": 0.0, "b": 0.0}, [{}])
+    return gain_beside_forms(model, Reduction(found, (0,), effect))
+
+
+def test_gain_by_hand() -> None:
+    """By hand: the kink of size 2 has the variance of least squares in the columns 1, x, x^3, |x|
+    and 30 sqrt(3) x^4, the last one with the prior 0 +- 0.1. Nothing else follows |x|.
+    """
+    measured = 30.0 * TIME**3 + 2.0 * np.abs(TIME) + np.random.default_rng(1).normal(size=2000)
+    columns = np.stack([TIME**0, TIME, TIME**3, np.abs(TIME), 30.0 * BENT], axis=-1)
+    prior = np.diag([0.01, 0.01, 0.0, 0.0, 100.0])
+    covariance = np.linalg.inv(columns.T @ columns + prior)
+    size = (covariance @ columns.T @ measured)[3]
+    expected = 0.5 * size**2 / covariance[3, 3]
+    assert gain(measured, ("cube", "kink"), "kink") == pytest.approx(expected, rel=0.05)
+
+
+def test_nothing_is_asked_where_no_other_law_has_a_form() -> None:
+    measured = noisy(30.0 * TIME**3 + 2.0 * np.abs(TIME))
+    assert gain(measured, ("cube", "kink"), "cube") == inf
+
+
+@pytest.mark.parametrize(
+    ("error", "hidden", "named"),
+    [(0.018, 0.0, ("cube",)), (0.0, 2.0, ("cube", "kink"))],
+)
+def test_second_effect_that_only_follows_the_error_of_a_law_is_not_named(
+    error: float, hidden: float, named: tuple[str, ...]
+) -> None:
+    """The cube grows otherwise by two percent; a kink follows that, and gains more than 40."""
+    law = 30.0 * (TIME**3 + error * BENT)
+    measured = [noisy(law + hidden * SHAPES["kink"](TIME), k) for k in range(2)]
+    found = explained(Bent(measured, ["cube", "kink"]))
+    assert found.final.effects == named
+    both = [s for s in found.trace if set(s.effects) == {"cube", "kink"}]
+    alone = max(s.gain for s in found.trace if s.effects == ("cube",))
+    assert max(s.gain for s in both) - alone > 40.0
+    refuted = any("beside other forms" in s.action for s in both)
+    assert refuted == (named == ("cube",))
