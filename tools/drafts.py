@@ -29,7 +29,8 @@ from plant_emulator import effects, parameter_sets
 from plant_emulator.blind import draw, laws
 from plant_emulator.blind.generate import measure, simulate_truth
 from plant_emulator.diagnosis.execution.pool import InProcess, TaskRunner, build_model
-from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
+from plant_emulator.diagnosis.fitting.approach import fit_null
+from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.machines.bench import BenchModel, BenchRecipe
 from plant_emulator.diagnosis.missing_law.hypothesis_test import DraftedLaw, compare_laws
 from plant_emulator.diagnosis.wording import percent

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fit_result import FitValues
-from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.machines.bench import BenchModel, BenchRecipe
 from plant_emulator.errors import ParameterError
 from plant_emulator.model.stage import GAP_POSITION

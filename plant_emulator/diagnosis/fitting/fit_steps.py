@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.joint_fit import approach, fit, fit_from, fit_null, lead
+from plant_emulator.diagnosis.fitting.approach import approach, fit_null, lead
+from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_from
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
@@ -37,6 +38,6 @@ def refit_led(model: Model, task: Task) -> FitResult:
 def refit_along(model: Model, task: Task) -> FitResult:
     """The fit of `task.base` with its effects, led along the measured outputs (a step).
 
-    See `joint_fit.lead`.
+    See `approach.lead`.
     """
     return lead(model, task.base, task.runs)

@@ -22,7 +22,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.fit_result import FitResult, FitValues
 from plant_emulator.estimation.covariance import correlation_time, structure
-from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE, estimate, linearise_at
+from plant_emulator.estimation.least_squares import estimate, linearise_at
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -35,15 +35,6 @@ COST_TOLERANCE = 1e-5
 # Relative fall of the cost that ends a fit far from the noise, where it lacks a cause in any case,
 # or a fit whose slopes follow by secants.
 COARSE_COST_TOLERANCE = 1e-4
-# Iterations of a fit along the measured outputs that tell the best start, and at most so many more.
-FIRST_ITERATIONS, APPROACH_ITERATIONS = 3, 25
-# Relative fall of the cost that ends a fit along the measured outputs: it is a start only.
-LED_COST_TOLERANCE = 1e-3
-# Times between the corrections that lead a simulation along the measured outputs [s]: in the first
-# a speed that is off by some percent crosses a tenth of the backlash, in the third most of it. Each
-# is some 2.5 times the one before: jumps of five ended in local minima where the drum rocks to and
-# fro in the backlash.
-CORRECTION_INTERVALS = (0.2, 0.5, 1.2, 3.0, 8.0)
 # A size differs from neutral for certain from so many of its standard errors on.
 SIGNIFICANT_ERRORS = 3.0
 # Share of the largest size allowed from which on an effect stands for something else. An effect
@@ -74,7 +65,7 @@ def _shrunk(size: Unknown, neutral: float) -> Unknown:
     return replace(size, prior=neutral, std=SHRINKAGE * abs(size.start - neutral))
 
 
-def _chosen(model: Model, effects: Sequence[str]) -> list[Unknown]:
+def charged(model: Model, effects: Sequence[str]) -> list[Unknown]:
     """Sizes and shapes of effects, with the priors that the Occam penalty charges."""
     own = [model.candidates[name] for name in effects]
     return [u for c in own for u in (*(_shrunk(u, c.neutral[u.name]) for u in c.sizes), *c.shapes)]
@@ -125,100 +116,11 @@ def fit(
         lengths=lengths,
     )
     candidates = {name: model.candidates[name] for name in effects}
-    reached = to_result(effects, found, len(runs), _chosen(model, effects))
+    reached = to_result(effects, found, len(runs), charged(model, effects))
     return replace(
         reached,
         insignificant=tuple(n for n, c in candidates.items() if not _significant(c, reached)),
     )
-
-
-def nearest(
-    model: Model,
-    starts: Sequence[FitValues],
-    runs: Sequence[int],
-    far: float = SUSPECT_MEAN_SQUARE,
-) -> FitValues | None:
-    """The start that leaves least, all with the same effects; None where it is far from the data.
-
-    far : mean square above which a start is far
-    """
-    squares = [_mean_square(model, one, runs) for one in starts]
-    return starts[int(np.argmin(squares))] if min(squares) <= far else None
-
-
-def approach(model: Model, start: FitValues, runs: Sequence[int]) -> FitValues:
-    """Values and states near the data, from which a fit of these effects may begin.
-
-    Far from the data a free simulation has one local minimum for every way in which contact may
-    come and go. The fit is led along the measured outputs first, and then left to run freely for
-    longer and longer times (homotopy from prediction errors to simulation errors).
-    """
-    return let_go(model, lead(model, start, runs), runs)
-
-
-def lead_best(
-    model: Model,
-    starts: Sequence[FitValues],
-    runs: Sequence[int],
-    iterations: int,
-    far: float = SUSPECT_MEAN_SQUARE,
-) -> FitResult:
-    """The fit along the measured outputs from the best start.
-
-    That is the first one that a few iterations bring near the data, or else the one of least cost.
-
-    starts : all with the same effects, the most promising ones first
-    iterations : at most so many; far : mean square above which a start is far from the data
-    """
-    first: list[FitResult] = []
-    for one in starts:
-        first.append(lead(model, one, runs, iterations=FIRST_ITERATIONS))
-        if first[-1].mean_square <= far:
-            break
-    best = min(first, key=lambda one: one.cost)
-    return lead(model, best, runs, iterations=iterations)
-
-
-def let_go(
-    model: Model, led: FitValues, runs: Sequence[int], iterations: int = APPROACH_ITERATIONS
-) -> FitValues:
-    """A fit along the measured outputs, left to run freely for longer and longer times."""
-    for interval in CORRECTION_INTERVALS[1:]:
-        led = lead(model, led, runs, interval, iterations)
-    return led
-
-
-def _mean_square(model: Model, start: FitValues, runs: Sequence[int]) -> float:
-    """Mean square of the whitened residual at a start."""
-    rows = [
-        model.residual(k, start.effects)({**start.values, **own})
-        for k, own in zip(runs, start.states, strict=True)
-    ]
-    return sum(float(np.sum(r**2)) for r in rows) / sum(np.count_nonzero(r) for r in rows)
-
-
-def lead(
-    model: Model,
-    start: FitValues,
-    runs: Sequence[int],
-    interval: float = CORRECTION_INTERVALS[0],
-    iterations: int = APPROACH_ITERATIONS,
-) -> FitResult:
-    """Fit by a simulation that is led along the measured outputs; see `Model.observer`.
-
-    Its first slopes are its own, and no secants follow them: with the steps of another fit, a bench
-    near the limit of its voltage ended at thirty times its noise.
-    """
-    unknowns = with_starts(joint_unknowns(model, start.effects, runs), start.values, start.states)
-    observer = model.observer(interval)
-    found = estimate(
-        unknowns,
-        [observer.residual(k, start.effects) for k in runs],
-        settled=LED_COST_TOLERANCE,
-        iterations=iterations,
-        rough=True,
-    )
-    return to_result(start.effects, found, len(runs), _chosen(model, start.effects))
 
 
 def _significant(candidate: Candidate, found: FitResult) -> bool:
@@ -262,8 +164,8 @@ def to_result(
     chosen : sizes and shapes of the effects, with the priors that the Occam penalty charges
     """
     errors = zip(found.unknowns, found.z, found.standard_errors, strict=True)
-    charged = {u.name: u for u in chosen}
-    groups = [[charged.get(u.name) if u.run is None else None for u in found.unknowns]]
+    priors = {u.name: u for u in chosen}
+    groups = [[priors.get(u.name) if u.run is None else None for u in found.unknowns]]
     groups += [[u if u.run == k else None for u in found.unknowns] for k in range(runs)]
     penalty = sum(found.occam_penalty(group) for group in groups)
     return FitResult(
@@ -290,21 +192,3 @@ def effective_fraction(found: Estimate) -> float:
     weight = np.array([np.count_nonzero(channel) for channel in channels], float)
     times = np.array([correlation_time(channel) for channel in channels])
     return float(weight.sum() / (weight * times).sum())
-
-
-def fit_null(model: Model, runs: Sequence[int]) -> FitResult:
-    """Fit without effects from the model's own start values.
-
-    A fit that ends far from the data may have taken contact at the wrong time once. It is led along
-    the measured outputs again, and the better fit counts. Of 80 benches near the limit of their
-    voltage 3 ended at 1.7 to 40 times the noise without this, and none with it.
-    """
-    values, states = model.start_values(runs)
-    start = FitValues(effects=(), values=values, states=tuple(states))
-    near = nearest(model, [start], runs) or approach(model, start, runs)
-    found = fit(model, (), runs, near.values, near.states, lengths=near.lengths)
-    if found.mean_square <= SUSPECT_MEAN_SQUARE:
-        return found
-    led = approach(model, found, runs)
-    again = fit(model, (), runs, led.values, led.states)
-    return min(found, again, key=lambda one: one.cost)

@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fit_result import FitValues
-from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
-from plant_emulator.diagnosis.fitting.joint_fit import (
+from plant_emulator.diagnosis.fitting.approach import (
     APPROACH_ITERATIONS,
-    fit,
     lead_best,
     let_go,
-    linearise,
     nearest,
 )
+from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
+from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.search.promise import Start, starts_of
 from plant_emulator.diagnosis.search.scans import scan_sizes, scan_states

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.diagnosis.fitting.approach import CORRECTION_INTERVALS
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
-from plant_emulator.diagnosis.fitting.joint_fit import CORRECTION_INTERVALS
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.columns import best_score, onset_score

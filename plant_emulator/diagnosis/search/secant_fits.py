@@ -16,12 +16,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.diagnosis.fitting.approach import CORRECTION_INTERVALS
 from plant_emulator.diagnosis.fitting.fit_steps import refit_along
-from plant_emulator.diagnosis.fitting.joint_fit import (
-    CORRECTION_INTERVALS,
-    fit,
-    linearise,
-)
+from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
 from plant_emulator.diagnosis.fitting.signature import signs, values_at_size
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.promise import Promise, Start

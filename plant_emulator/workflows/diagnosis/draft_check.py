@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from plant_emulator import effects
 from plant_emulator.diagnosis.answer import Quantity
 from plant_emulator.diagnosis.execution.pool import InProcess, TaskRunner, build_model
-from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.missing_law.hypothesis_test import DraftedLaw, compare_laws, explains
 from plant_emulator.diagnosis.wording import percent, size
 from plant_emulator.errors import InputError

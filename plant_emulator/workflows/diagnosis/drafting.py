@@ -12,7 +12,8 @@ from plant_emulator import effects
 from plant_emulator.diagnosis.answer import Draft
 from plant_emulator.diagnosis.axis.diagnose import AxisRuns
 from plant_emulator.diagnosis.execution.pool import TaskRunner, build_model
-from plant_emulator.diagnosis.fitting.joint_fit import fit_from, fit_null
+from plant_emulator.diagnosis.fitting.approach import fit_null
+from plant_emulator.diagnosis.fitting.joint_fit import fit_from
 from plant_emulator.diagnosis.machines.bench import BenchModel, BenchRecipe
 from plant_emulator.diagnosis.missing_law.bound import Bound
 from plant_emulator.diagnosis.missing_law.draft import sketch

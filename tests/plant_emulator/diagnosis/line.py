@@ -7,8 +7,8 @@ import numpy as np
 
 from plant_emulator.diagnosis.execution.pool import InProcess, Pool, TaskRunner
 from plant_emulator.diagnosis.fit_result import FitResult
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.explanation import Explanation
-from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.machine import Candidate, Course, MeasuredRun
 from plant_emulator.diagnosis.search.search import Search
 from plant_emulator.estimation.unknowns import Unknown

@@ -11,7 +11,7 @@ import pytest
 from plant_emulator import effects
 from plant_emulator.diagnosis.diagnose import Findings
 from plant_emulator.diagnosis.fit_result import FitResult
-from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
 from plant_emulator.diagnosis.report.document import from_json
 from plant_emulator.model.parameters import ParameterSet

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.design.detectability import detection_limits, effect_detectability
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.evidence import LJUNG_BOX_LIMIT
-from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.localisation.block_basis import block_quantities
 from plant_emulator.diagnosis.localisation.locate import WORTHWHILE_BLOCK_GAIN, locate
 from plant_emulator.diagnosis.localisation.measured_signals import measured_signals

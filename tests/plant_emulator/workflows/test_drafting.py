@@ -9,7 +9,7 @@ import pytest
 from plant_emulator import effects, parameter_sets
 from plant_emulator.diagnosis.diagnose import Findings
 from plant_emulator.diagnosis.execution.pool import InProcess
-from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.diagnosis.report.document import from_json
 from plant_emulator.emulator.emulator import Options, build

@@ -7,7 +7,7 @@ import pytest
 
 from plant_emulator.diagnosis.decision import run_consistency
 from plant_emulator.diagnosis.fit_result import FitResult
-from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import recording

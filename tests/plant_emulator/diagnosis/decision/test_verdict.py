@@ -12,8 +12,8 @@ from plant_emulator.diagnosis.decision.verdict import (
     deviations,
     without_uncertain,
 )
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.explanation import Explanation
-from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from tests.plant_emulator.diagnosis.line import TIME, Line, explained, linear, noisy
 
 LINE = 2.0 + 3.0 * TIME

@@ -14,8 +14,9 @@ from plant_emulator.diagnosis.decision.verdict import Decision
 from plant_emulator.diagnosis.design.next_experiment import Advice
 from plant_emulator.diagnosis.execution.pool import InProcess, TaskRunner
 from plant_emulator.diagnosis.fit_result import FitResult
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
-from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
+from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.machine import Candidate, MeasuredRun
 from plant_emulator.diagnosis.machines.bench import BenchRecipe
 from plant_emulator.estimation.unknowns import Unknown

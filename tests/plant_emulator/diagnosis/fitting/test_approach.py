@@ -6,15 +6,15 @@ from dataclasses import replace
 import pytest
 
 from plant_emulator.diagnosis.fit_result import FitResult, FitValues
-from plant_emulator.diagnosis.fitting import joint_fit
-from plant_emulator.diagnosis.fitting.joint_fit import (
+from plant_emulator.diagnosis.fitting import approach as approaching
+from plant_emulator.diagnosis.fitting.approach import (
     FIRST_ITERATIONS,
     approach,
-    fit,
     lead,
     lead_best,
     nearest,
 )
+from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.model.stage import GAP_POSITION
@@ -75,7 +75,7 @@ def test_first_start_that_comes_near_the_data_is_led_on(
         led.append(one.values)
         return lead(there, one, *args, **more)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(joint_fit, "lead", listed)
+    monkeypatch.setattr(approaching, "lead", listed)
     lead_best(model, [wrong, right, start], RUNS, FIRST_ITERATIONS)
     assert led[:2] == [wrong.values, right.values]
     assert start.values not in led

@@ -9,8 +9,8 @@ from scipy.sparse import csr_array
 
 from plant_emulator.diagnosis.decision.procedure import Procedure
 from plant_emulator.diagnosis.fit_result import FitResult
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.input_noise_model import InputNoiseRecipe, whiten_inputs
-from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.recordings.input_noise import NoiseDirections
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import TIME, Given, Line, noisy, runner

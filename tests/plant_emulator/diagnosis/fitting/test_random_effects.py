@@ -10,8 +10,9 @@ from plant_emulator.diagnosis.decision.procedure import Procedure
 from plant_emulator.diagnosis.diagnose import Diagnose
 from plant_emulator.diagnosis.execution.pool import InProcess
 from plant_emulator.diagnosis.fit_result import FitResult
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
-from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
+from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.fitting.random_effects import WeightedRecipe, fit_random_effect
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.machine import Course

@@ -7,7 +7,7 @@ import pytest
 
 from plant_emulator import parameter_sets
 from plant_emulator.diagnosis.answer import Location
-from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.localisation.locate import WORTHWHILE_BLOCK_GAIN, gain_shares, locate
 from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.recordings.recording import recording

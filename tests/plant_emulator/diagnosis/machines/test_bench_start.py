@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import recording

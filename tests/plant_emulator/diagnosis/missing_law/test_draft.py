@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 
 from plant_emulator import parameter_sets
-from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.diagnosis.missing_law.draft import Sketchbook, sketch
 from plant_emulator.recordings.recording import recording

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.fit_result import FitResult
-from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.missing_law.hypothesis_test import (
     DraftedLaw,
     LawResult,

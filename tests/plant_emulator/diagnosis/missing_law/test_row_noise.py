@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
 from plant_emulator.diagnosis.localisation.parity_relations import GEAR
 from plant_emulator.diagnosis.machines.bench import BenchModel

@@ -8,7 +8,8 @@ import pytest
 
 from plant_emulator.diagnosis.execution.pool import TaskRunner
 from plant_emulator.diagnosis.fit_result import FitResult
-from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
+from plant_emulator.diagnosis.fitting.approach import fit_null
+from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.machine import Candidate, Model
 from plant_emulator.diagnosis.search import confirmation, search
 from plant_emulator.diagnosis.search.confirmation import (

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
-from plant_emulator.diagnosis.fitting.joint_fit import fit_null
 from plant_emulator.diagnosis.search.fitted_sets import FittedSets
 from plant_emulator.diagnosis.search.screening import promises
 from tests.plant_emulator.diagnosis.line import TIME, Line, noisy, runner

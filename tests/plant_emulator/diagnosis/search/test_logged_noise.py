@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.logged_noise import estimate_noise
 from tests.plant_emulator.diagnosis.line import SHAPES, TIME, Line, noisy

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null, linearise
+from plant_emulator.diagnosis.fitting.approach import fit_null
+from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
 from plant_emulator.diagnosis.search.confirmation import Reduction
 from plant_emulator.diagnosis.search.run_agreement import _split, run_agreement
 from plant_emulator.diagnosis.search.search import Search

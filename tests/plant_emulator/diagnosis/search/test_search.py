@@ -11,8 +11,9 @@ from plant_emulator.diagnosis.decision.subsystem import faulty_subsystem
 from plant_emulator.diagnosis.decision.verdict import decide
 from plant_emulator.diagnosis.execution.pool import TaskRunner
 from plant_emulator.diagnosis.fit_result import FitResult
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, adequate, excess
-from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
+from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.report.ranking import undetectable
 from plant_emulator.diagnosis.search import search
 from plant_emulator.diagnosis.search.promise import Promise, Start

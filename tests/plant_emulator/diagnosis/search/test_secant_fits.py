@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_null
+from plant_emulator.diagnosis.fitting.approach import fit_null
+from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.search.promise import Promise
 from plant_emulator.diagnosis.search.secant_fits import SecantFits, fit_by_secants
 from plant_emulator.signals.log import Array

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import welch as welch_by_scipy
 
-from plant_emulator.diagnosis.fitting.joint_fit import fit_null
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.report.document import from_json
 from plant_emulator.diagnosis.report.html.page import html
 from plant_emulator.diagnosis.search.spectra import SEGMENT_SAMPLES, spectra, welch
