@@ -39,8 +39,8 @@ class Candidate:
         them; empty for an effect that is not random
     exact_form : whether its law can have no other form, as a factor or an offset; such a law leaves
         nothing where it is the cause
-    forms : names of the coefficients of other forms of its law [1], see `law_forms`; a residual
-        with the effect takes them among its values
+    forms : names of the coefficients of other forms of its law [1], see
+        `simulation.law_forms`; a residual with the effect takes them among its values
     """
 
     name: str

@@ -35,7 +35,7 @@ class SimulatedRun:
     values : of everything that is not unknown [SI]
     tolerance, largest_step, along, follow : see `simulate`
     measured : the log of the run, where coefficients of other forms of a law may be among the
-        unknowns, see `law_forms`
+        unknowns, see `simulation.law_forms`
     """
 
     inputs: RunInputs
@@ -55,14 +55,12 @@ class SimulatedRun:
         Raises UnsettledError where the equations were not solved.
         """
         values, gap = split_gap_position({**self.values, **found})
-        values, forms = split_law_forms(values)
+        factors: Mapping[str, Array] = {}
+        if self.measured is not None:
+            values, forms = split_law_forms(values)
+            factors = size_factors(forms, self.measured)
         settings = Settings(
-            gap,
-            self.tolerance,
-            self.largest_step,
-            self.along,
-            self.follow,
-            {} if self.measured is None else size_factors(forms, self.measured),
+            gap, self.tolerance, self.largest_step, self.along, self.follow, factors
         )
         try:
             log, steps = simulate_with_steps(self.inputs, values, settings)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.polynomial.legendre import Legendre
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from plant_emulator.signals.log import Array, Log
 
@@ -31,10 +31,9 @@ LARGEST = 0.99
 _MARK = " by "
 
 
-def form_names(size: str, logs: Sequence[Log]) -> tuple[str, ...]:
-    """Names of the coefficients of the forms of a size that all of these logs can tell."""
-    known = [channel for channel in CHANNELS if all(channel in log for log in logs)]
-    return tuple(f"{size}{_MARK}{channel} {k}" for channel in known for k in DEGREES)
+def form_names(size: str) -> tuple[str, ...]:
+    """Names of the coefficients of the forms of a size."""
+    return tuple(f"{size}{_MARK}{channel} {k}" for channel in CHANNELS for k in DEGREES)
 
 
 def split_law_forms(values: Mapping[str, float]) -> tuple[dict[str, float], dict[str, float]]:
@@ -44,13 +43,16 @@ def split_law_forms(values: Mapping[str, float]) -> tuple[dict[str, float], dict
 
 
 def size_factors(forms: Mapping[str, float], log: Log) -> dict[str, Array]:
-    """Factor on the distance of each size from neutral at the samples of a log, shape (n,)."""
+    """Factor on the distance of each size from neutral at the samples of a log, shape (n,).
+
+    A value that is not finite counts as 0.
+    """
     factors: dict[str, Array] = {}
     for name, coefficient in forms.items():
         size, _, form = name.partition(_MARK)
         channel, _, degree = form.partition(" ")
         factor = factors.setdefault(size, np.ones_like(log.time))
-        factor += coefficient * _polynomial(np.abs(log[channel]), int(degree))
+        factor += coefficient * _polynomial(np.abs(np.nan_to_num(log[channel])), int(degree))
     return factors
 
 
@@ -58,4 +60,4 @@ def _polynomial(value: Array, degree: int) -> Array:
     """A Legendre polynomial of a channel over its largest value, with a mean square of 1."""
     largest = max(float(np.quantile(value, LARGEST)), np.finfo(float).tiny)
     basis = Legendre.basis(degree, domain=[0.0, 1.0])
-    return np.asarray(np.sqrt(2.0 * degree + 1.0) * basis(np.minimum(value / largest, 1.0)))
+    return np.asarray(np.sqrt(2.0 * degree + 1.0) * basis(np.minimum(value, largest) / largest))

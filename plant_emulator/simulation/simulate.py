@@ -89,7 +89,7 @@ class Settings(NamedTuple):
 
     follow : steps of a run with other values, see `simulate_with_steps`; empty: they are adapted
     factors : by name of an effect's parameter: factor on the distance of its value from neutral at
-        each sample of the log, shape (n,)
+        each sample of the log, shape (n,). A neutral effect stays neutral
     """
 
     gap_position: float
@@ -132,9 +132,11 @@ def _simulate(
     tolerance = inf if len(settings.follow) else settings.tolerance
     corrections = _corrections(coarse, run, settings.along)
     first, steps = 0, 0
-    for end, varied in _pieces(coarse, run, settings.factors, model.neutral_values):
-        for name, (neutral, factor) in varied.items():
-            setattr(p, name, neutral + (values[name] - neutral) * factor)
+    neutral = model.neutral_values
+    factors = {name: own for name, own in settings.factors.items() if name in neutral}
+    for end, varied in _pieces(coarse, run, factors):
+        for name, factor in varied.items():
+            setattr(p, name, neutral[name] + (values[name] - neutral[name]) * factor)
         inputs = Inputs(
             run.time[: end + 1],
             run.reference,
@@ -159,12 +161,9 @@ def _simulate(
 
 
 def _pieces(
-    coarse: RunInputs,
-    run: RunInputs,
-    factors: Mapping[str, Array],
-    neutral: Mapping[str, float],
-) -> Iterator[tuple[int, Mapping[str, tuple[float, float]]]]:
-    """The last sample of each piece of a run, and neutral value and factor of what varies in it.
+    coarse: RunInputs, run: RunInputs, factors: Mapping[str, Array]
+) -> Iterator[tuple[int, Mapping[str, float]]]:
+    """The last sample of each piece of a run, and the factors of what varies in it, by name.
 
     coarse, run : inputs at the samples of the log, and at those that are simulated
     """
@@ -176,7 +175,7 @@ def _pieces(
     for begin in range(0, last, KEPT_SAMPLES):
         end = min(begin + KEPT_SAMPLES, last)
         means = {name: float(np.mean(own[begin:end])) for name, own in factors.items()}
-        yield int(rows[end]), {name: (neutral[name], mean) for name, mean in means.items()}
+        yield int(rows[end]), means
 
 
 def _corrections(

@@ -72,6 +72,8 @@ STRETCH = 0.05
 class Inputs(NamedTuple):
     """The inputs of a log: one value a sample, but for the corners.
 
+    The piece of a log to simulate ends with the last one of `time`; the others may go on.
+
     reference, slope : reference of the PLC [rad/s], and its slope until the next sample [rad/s^2]
     corners : times of the corners of the reference, before the dead time, ascending [s]
     wheel_torque : torque of the truck at its wheel in the interval that ends at the sample [N m]
@@ -104,19 +106,32 @@ def observe(row: int, out: State, s: Record, p: Record) -> None:
     out[row, 6] = acting_wheel_torque(s, p)
 
 
-def begin(
-    row: int, time: float, reference: float, out: State, x: State, s: Record, p: Record
-) -> None:
-    """Write the first sample to the log, at the state x and that reference [rad/s].
-
-    A run that goes on from a later row has it already.
-    """
-    if row > 0:
-        return
+def begin(time: float, reference: float, out: State, x: State, s: Record, p: Record) -> None:
+    """Write the first sample to the log, at the state x and that reference [rad/s]."""
     load(x, s)
     s.time, s.delayed_reference = time, reference
     evaluate_laws(s, p)
-    observe(row, out, s, p)
+    observe(0, out, s, p)
+
+
+def begin_or_go_on(
+    first: int, inputs: Inputs, out: State, x: State, s: Record, p: Record
+) -> tuple[int, int, int, int, int]:
+    """Begin a run, or find the places in the inputs from which it goes on after its sample `first`.
+
+    They are those of the segment between samples, of the next corner, of the next correction and
+    its last sample before, and of the step to follow.
+    """
+    time, value, _, edges, _, _, corrections, _, _, given = inputs
+    if first == 0:
+        begin(time[0], value[0], out, x, s, p)
+        return 0, 0, 0, 0, 0
+    s.time = time[first]
+    corner = int(np.searchsorted(edges, time[first] - dead_time(s, p)))
+    due = int(np.searchsorted(corrections, first + 1))
+    corrected = int(corrections[due - 1]) if due > 0 else 0
+    followed = int(np.searchsorted(given[:, 0], time[first]))
+    return first, corner, due, corrected, max(0, followed - 1)
 
 
 def landing_sample(
@@ -190,20 +205,20 @@ def run(
     p: Record,
     out: State,
 ) -> int:
-    """Simulate a whole log and return the number of steps.
+    """Simulate a log, or one more piece of it, and return the number of steps.
 
     settings : tolerance [1], infinite for steps that are fixed or followed; largest step [s]; the
         sample that x and stage belong to: 0, or one that an earlier call has ended at
-    x, w : state at the first sample, work space; stage, p : stage record and parameter record
+    x, w : state at that sample, work space; stage, p : stage record and parameter record
     taken : begin and length of the first steps [s], shape (some steps, 2); it is filled
     out : the channels at every sample, shape (samples, channels); it is filled
     """
     time, value, slope, edges, wheel_torque, parked, corrections, motor, drum, given = inputs
     tolerance, largest, first = settings
     s, p = private_copy(stage), private_copy(p)
-    begin(first, time[0], value[0], out, x, s, p)
-    t, h, past_corner, after_corner = time[first], largest, False, largest
-    segment, edge, steps, row, due, corrected, k = 0, 0, 0, first + 1, 0, 0, 0
+    segment, edge, due, corrected, k = begin_or_go_on(first, inputs, out, x, s, p)
+    t, h, steps, row = time[first], largest, 0, first + 1
+    past_corner, after_corner = False, largest
     while row < len(time):
         s.time, s.wheel_torque, s.parked = t, wheel_torque[row], parked[row]
         b = dead_time(s, p)

@@ -135,5 +135,5 @@ def fit_null(model: Model, runs: Sequence[int]) -> FitResult:
     if found.mean_square <= SUSPECT_MEAN_SQUARE:
         return found
     led = approach(model, found, runs)
-    again = fit(model, (), runs, led.values, led.states)
+    again = fit(model, (), runs, led.values, led.states, lengths=led.lengths)
     return min(found, again, key=lambda one: one.cost)

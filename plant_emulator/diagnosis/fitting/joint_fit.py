@@ -148,9 +148,15 @@ def fit_from(
     return fit(model, effects, runs, start.values, start.states, iterations, lengths=start.lengths)
 
 
-def linearise(model: Model, found: FitValues, runs: Sequence[int]) -> Estimate:
-    """Compute residuals, Jacobians and covariance at the values of a fit, without fitting."""
-    unknowns = with_starts(joint_unknowns(model, found.effects, runs), found.values, found.states)
+def linearise(
+    model: Model, found: FitValues, runs: Sequence[int], further: Sequence[Unknown] = ()
+) -> Estimate:
+    """Compute residuals, Jacobians and covariance at the values of a fit, without fitting.
+
+    further : unknowns behind those of the fit
+    """
+    own = with_starts(joint_unknowns(model, found.effects, runs), found.values, found.states)
+    unknowns = (*own, *further)
     residuals = [model.residual(k, found.effects) for k in runs]
     return linearise_at(unknowns, residuals, lengths=found.lengths)
 

@@ -101,9 +101,8 @@ class BenchModel:
         self.states = states_of(parameters.effects, known)
         hides = [hidden_effects(effects, r) for r in recordings]
         hidden = frozenset.intersection(*hides) if any(unknown) else frozenset()
-        logs = [r.log for r in recordings]
         self.candidates: Mapping[str, Candidate] = {
-            name: candidate(effect, logs, voltage=all(voltage), unknown_torque=name in hidden)
+            name: candidate(effect, voltage=all(voltage), unknown_torque=name in hidden)
             for name, effect in effects.items()
         }
         self.parameters = tuple(unknowns(parameters, self._free, self._values, ()))

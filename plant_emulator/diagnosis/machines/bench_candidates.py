@@ -11,11 +11,10 @@ from plant_emulator.signals.log import VOLTAGE, WHEEL_TORQUE
 from plant_emulator.simulation.law_forms import form_names
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from plant_emulator.effects import Effect, EffectParameter
     from plant_emulator.recordings.recording import Recording
-    from plant_emulator.signals.log import Log
 
     Role = Literal["size", "shape", "state", "stochastic", "fixed"]
 
@@ -52,16 +51,10 @@ SUBSYSTEMS = {
 SUBSYSTEM_OF = {name: subsystem for subsystem, names in SUBSYSTEMS.items() for name in names}
 
 
-def candidate(
-    effect: Effect,
-    logs: Sequence[Log] = (),
-    *,
-    voltage: bool = False,
-    unknown_torque: bool = False,
-) -> Candidate:
+def candidate(effect: Effect, *, voltage: bool = False, unknown_torque: bool = False) -> Candidate:
     """Turn the declaration of an effect into unknowns.
 
-    logs : that the effect is sought in; voltage : whether all of them have it
+    voltage : whether all logs have it
     unknown_torque : whether a truck's torque that nobody measured hides it
     """
     name, parameters = effect.name, effect.parameters
@@ -74,7 +67,7 @@ def candidate(
         if role in {"fixed", "stochastic"}:
             fixed[f"{name}_{key}"] = declared.plausible
     sizes = () if effect.exact else unknowns["size"]
-    forms = (form for size in sizes for form in form_names(size.name, logs))
+    forms = (form for size in sizes for form in form_names(size.name))
     neutral = {f"{name}_{key}": declared.neutral for key, declared in parameters.items()}
     return Candidate(
         name=name,

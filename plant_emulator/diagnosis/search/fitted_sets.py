@@ -1,9 +1,10 @@
 """The sets of effects that a search has fitted, and which of them the logs ask for most.
 
 The log evidence of a set is half the fall of its penalised cost, less the gain that each of its
-effects needs. A set on whose further effects the runs do not agree (`run_agreement`) is refuted:
-they stand for the error of the first one's law. So is each set that holds it, and each last effect
-that gains no more beside the same others.
+effects needs. A set is refuted where a further effect stands for the error of the others' laws: the
+runs do not agree on its size (`run_agreement`), or it gains little where these laws may have
+another form (`law_forms`). So is each set that holds it, and each last effect that gains no more
+beside the same others.
 """
 
 from __future__ import annotations
@@ -133,8 +134,8 @@ class FittedSets:
     def refuted(self, key: frozenset[str]) -> bool:
         """Whether a set is refuted, or a part of it, or its last effect gains no more.
 
-        Further effects may only hide what the runs found. An effect that gains no more than one
-        that stood for the error of the same laws may stand for it as well.
+        Further effects may only hide what refuted it. An effect that gains no more than one that
+        stood for the error of the same laws may stand for it as well.
         """
         return any(
             other <= key or self._gains_no_more(key, other)
@@ -190,20 +191,22 @@ class FittedSets:
         if len(key) < 2 or key in self.agreed:
             return self.agreed.get(key, True)
         asked = [Reduction(found, self.runner.runs, name) for name in found.effects[1:]]
-        least = min(self.runner.map(run_agreement, asked))
-        gain = min(self.gains_beside_forms(found, found.effects[1:]))
-        action = ""
-        if least < SETTINGS.agreement:
-            action = f"refuted by the runs (probability {least:.1g})"
-        elif gain < SETTINGS.needed_again:
-            action = f"gains only {gain:.1f} beside other forms of a law"
-        self.agreed[key] = not action
-        if action:
+        probability = min(self.runner.map(run_agreement, asked))
+        if probability < SETTINGS.agreement:
+            action = f"refuted by the runs (probability {probability:.1g})"
             self.trace.append(search_step(self.null, action, found))
+            self.agreed[key] = False
+        else:
+            self.agreed[key] = self.gain_beside_forms(found, found.effects[1:])
+        if not self.agreed[key]:
             self.expanded.discard(base)
         return self.agreed[key]
 
-    def gains_beside_forms(self, found: FitResult, effects: Sequence[str]) -> list[float]:
-        """Gain of each of these effects of a fit beside other forms of the laws of its others."""
+    def gain_beside_forms(self, found: FitResult, effects: Sequence[str]) -> bool:
+        """Whether each of these effects of a fit gains enough beside other forms of laws."""
         asked = [Reduction(found, self.runner.runs, name) for name in effects]
-        return list(self.runner.map(gain_beside_forms, asked))
+        gain = min(self.runner.map(gain_beside_forms, asked))
+        if gain < SETTINGS.needed_again:
+            action = f"refuted by other forms of a law (gain {gain:.1f})"
+            self.trace.append(search_step(self.null, action, found))
+        return gain >= SETTINGS.needed_again

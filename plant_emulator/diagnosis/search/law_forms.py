@@ -7,6 +7,9 @@ squares then give the sizes s of the effect, their distance from neutral d and c
 the forms and all other unknowns, and the effect gains
 
     0.5 d' C^-1 d
+
+C is enlarged by what is left, and by its autocorrelation. A size on the other side of neutral is
+another effect: its distance counts as 0.
 """
 
 from __future__ import annotations
@@ -16,10 +19,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.joint_fit import joint_unknowns, with_starts
+from plant_emulator.diagnosis.fitting.joint_fit import linearise
 from plant_emulator.diagnosis.search.relaxation import relax
 from plant_emulator.diagnosis.search.settings import SETTINGS
-from plant_emulator.estimation.least_squares import linearise_at
 from plant_emulator.estimation.unknowns import Unknown
 
 if TYPE_CHECKING:
@@ -37,17 +39,14 @@ def gain_beside_forms(model: Model, asked: Reduction) -> float:
     forms = [_coefficient(name) for one in others for name in one.forms]
     if not forms:
         return inf
-    own = with_starts(joint_unknowns(model, base.effects, asked.runs), base.values, base.states)
-    near = linearise_at(
-        [*own, *forms],
-        [model.residual(k, base.effects) for k in asked.runs],
-        lengths=base.lengths,
-    )
+    near = linearise(model, base, asked.runs, forms)
     beside = relax(near)
     names = [u.name for u in near.unknowns]
     at = [names.index(u.name) for u in candidate.sizes]
-    neutral = [u.scaled(candidate.neutral[u.name]) for u in candidate.sizes]
-    distance = near.z[at] + beside.change[at] - np.array(neutral)
+    neutral = np.array([u.scaled(candidate.neutral[u.name]) for u in candidate.sizes])
+    fitted = near.z[at] - neutral
+    distance = fitted + beside.change[at]
+    distance = np.where(distance * fitted > 0.0, distance, 0.0)
     covariance = beside.inflation * beside.covariance[np.ix_(at, at)]
     return 0.5 * float(distance @ np.linalg.pinv(covariance, hermitian=True) @ distance)
 

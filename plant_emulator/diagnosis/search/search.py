@@ -212,7 +212,8 @@ class Search(FittedSets):
         minimum of theirs. Where a set leaves something correlated, an effect that follows a little
         of it is needless: its evidence among what is left is that of chance. An effect is the cause
         of what the others leave only if it leaves little of that, or no more of the gap than
-        approximate laws do. No part of a set is the cause where the set is none.
+        approximate laws do. The first effect must gain beside other forms of the laws too, if it is
+        the one that closes least. No part of a set is the cause where the set is none.
         """
         self.reduced_costs = {}
         if not best.effects or not adequate(best, self.null):
@@ -237,10 +238,10 @@ class Search(FittedSets):
             or leaves_little(found, excess(found) + fall)
             or (approximate and self._leaves_hundredth(found))
         )
-        if closes and evidence_of(fall, found, self.null) >= EVIDENCE_THRESHOLD:
-            (gain,) = self.gains_beside_forms(found, [cheapest])
-            if gain >= SETTINGS.needed_again:
-                return found
+        needed = closes and evidence_of(fall, found, self.null) >= EVIDENCE_THRESHOLD
+        # The other effects have been asked as further ones.
+        if needed and (cheapest != found.effects[0] or self.gain_beside_forms(found, [cheapest])):
+            return found
         self.sets = {k: one for k, one in self.sets.items() if len(k) < len(best.effects)}
         return self._without_needless(self.settled())
 

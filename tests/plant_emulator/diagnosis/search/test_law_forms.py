@@ -7,11 +7,13 @@ from math import inf
 import numpy as np
 import pytest
 
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.search.confirmation import Reduction
 from plant_emulator.diagnosis.search.law_forms import gain_beside_forms
+from plant_emulator.diagnosis.search.search import Search
 from plant_emulator.signals.log import Array
-from tests.plant_emulator.diagnosis.line import SHAPES, TIME, Line, explained, noisy
+from tests.plant_emulator.diagnosis.line import SHAPES, TIME, Line, explained, noisy, runner
 
 # The cube's law may grow otherwise: x^3 (1 + c sqrt(3) x).
 FORM = "cube_size by x"
@@ -44,7 +46,7 @@ def gain(measured: Array, names: tuple[str, ...], effect: str) -> float:
 
 def test_gain_by_hand() -> None:
     """By hand: the kink of size 2 has the variance of least squares in the columns 1, x, x^3, |x|
-    and 30 sqrt(3) x^4, the last one with the prior 0 +- 0.1. Nothing else follows |x|.
+    and 30 sqrt(3) x^4, the last one with the prior 0 +- 0.1.
     """
     measured = 30.0 * TIME**3 + 2.0 * np.abs(TIME) + np.random.default_rng(1).normal(size=2000)
     columns = np.stack([TIME**0, TIME, TIME**3, np.abs(TIME), 30.0 * BENT], axis=-1)
@@ -75,5 +77,31 @@ def test_second_effect_that_only_follows_the_error_of_a_law_is_not_named(
     both = [s for s in found.trace if set(s.effects) == {"cube", "kink"}]
     alone = max(s.gain for s in found.trace if s.effects == ("cube",))
     assert max(s.gain for s in both) - alone > 40.0
-    refuted = any("beside other forms" in s.action for s in both)
+    refuted = any(s.action.startswith("refuted by other forms") for s in both)
     assert refuted == (named == ("cube",))
+
+
+def test_size_that_would_change_its_side_gains_nothing() -> None:
+    """The law is off by 0.08, and the kink of size -2.5 may only have sizes above 0."""
+    measured = noisy(30.0 * (TIME**3 + 0.08 * BENT) - 2.5 * np.abs(TIME))
+    model = Bent([measured], ("cube", "kink"))
+    kink = model.candidates["kink"]
+    model.candidates["kink"] = replace(kink, sizes=(replace(kink.sizes[0], lower=0.0),))
+    found = fit(model, ("cube", "kink"), (0,), {"a": 0.0, "b": 0.0}, [{}])
+    assert found.values["kink_size"] > 0.5
+    assert gain_beside_forms(model, Reduction(found, (0,), "kink")) == 0.0
+
+
+def test_first_effect_that_lives_on_the_error_of_the_law_of_the_second_falls() -> None:
+    """The kink has been found first; the cube, whose law is off by 0.018, closes nearly all."""
+    measured = [noisy(30.0 * (TIME**3 + 0.018 * BENT), k) for k in range(2)]
+    there = runner(Bent(measured, ["cube", "kink"]))
+    search = Search(declared=there, runner=there, null=fit_null(there.model, there.runs))
+    search.sets[frozenset()] = search.null
+    start = {"a": 0.0, "b": 0.0}
+    for names in (("kink", "cube"), ("cube",)):
+        search.keep(fit(there.model, names, there.runs, start, [{}, {}]))
+    both = search.sets[frozenset(("cube", "kink"))]
+    assert search.value(search.sets[frozenset(("cube",))]) - search.value(both) > 0.0
+    assert search._without_needless(both).effects == ("cube",)
+    assert any(step.action.startswith("refuted by other forms") for step in search.trace)
