@@ -45,7 +45,8 @@ def test_another_solver_finds_the_same_cost_at_our_optimum(fits: Any, ours: Iden
 def test_another_estimator_ends_at_our_optimum(
     fits: Any, ours: Identification, apart: float
 ) -> None:
-    """lmfit's leastsq is MINPACK's Levenberg-Marquardt with its own differences.
+    """lmfit's leastsq is MINPACK's Levenberg-Marquardt with its own differences, here in factors
+    on our values; in their logarithms it stopped 0.06 above our sum of squares.
 
     To four digits, but for what the log says so little of that a tenth of its standard error is
     more than that: leastsq itself ends 0.1 of it apart from the two starts, on both sides of ours.
@@ -55,11 +56,11 @@ def test_another_estimator_ends_at_our_optimum(
 
     unknowns = lmfit.Parameters()
     for k, p in enumerate(ours.parameters):
-        unknowns.add(p.name, value=np.log(p.value) + apart * (-1) ** k)
+        unknowns.add(p.name, value=1.0 + apart * (-1) ** k)
     unknowns.add("gap_position", value=ours.gap_positions[0] + apart, min=-1.0, max=1.0)
 
     def residual(trial: Any) -> np.ndarray:
-        values = {p.name: float(np.exp(trial[p.name].value)) for p in ours.parameters}
+        values = {p.name: p.value * trial[p.name].value for p in ours.parameters}
         gap = float(trial["gap_position"].value)
         own = {**fits.nominal.values(), **values}
         return np.asarray(fits.recording.residual(own, gap, FINAL_TOLERANCE).ravel())
@@ -70,6 +71,6 @@ def test_another_estimator_ends_at_our_optimum(
     assert found.chisqr == pytest.approx(ours.estimate.cost, rel=1e-6)
     assert ours.estimate.cost < found.chisqr + 0.1**2
     for p in ours.parameters:
-        theirs = float(np.exp(found.params[p.name].value))
+        theirs = p.value * found.params[p.name].value
         within = max(1e-4 * p.value, 0.1 * p.standard_error)
         assert abs(theirs - p.value) <= within, p.name

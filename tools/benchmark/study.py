@@ -59,7 +59,7 @@ class Study:
         def action() -> Array:
             work[:] = 0.0
             x = model.state(p, 0.0)
-            model.run(inputs, (tolerance, step), x, work, NO_STEPS, stage, p, out)
+            model.run(inputs, (tolerance, step, 0), x, work, NO_STEPS, stage, p, out)
             return out
 
         return action
