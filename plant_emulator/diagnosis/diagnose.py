@@ -27,6 +27,8 @@ from plant_emulator.diagnosis.fitting.evidence import (
 )
 from plant_emulator.diagnosis.fitting.fit_steps import simulate_once
 from plant_emulator.diagnosis.fitting.task import Task
+from plant_emulator.diagnosis.noise.sensor_noise import sensor_noise
+from plant_emulator.diagnosis.noise.spectra import spectra
 from plant_emulator.diagnosis.prediction.gap import shows_shrinkage
 from plant_emulator.diagnosis.prediction.held_out import HeldOutRuns
 from plant_emulator.diagnosis.report.details import Details
@@ -38,9 +40,7 @@ from plant_emulator.diagnosis.report.ranking import (
 )
 from plant_emulator.diagnosis.report.shrinkage import held_out_gap, waterfall
 from plant_emulator.diagnosis.report.statement import statement, verdict
-from plant_emulator.diagnosis.search.sensor_noise import sensor_noise
 from plant_emulator.diagnosis.search.settings import SETTINGS
-from plant_emulator.diagnosis.search.spectra import spectra
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -58,9 +58,9 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.execution.progress import Progress
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.explanation import Explanation, Hypothesis
+    from plant_emulator.diagnosis.noise.spectra import Spectrum
     from plant_emulator.diagnosis.prediction.gap import Gap
     from plant_emulator.diagnosis.prediction.held_out import Gaps, Plan
-    from plant_emulator.diagnosis.search.spectra import Spectrum
 
 # Thresholds of the hypothesis tests, for the report.
 THRESHOLDS = {

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from plant_emulator.diagnosis.noise.spectra import Spectrum
     from plant_emulator.diagnosis.prediction.remainder import Remainder
     from plant_emulator.diagnosis.prediction.trace import Trace
-    from plant_emulator.diagnosis.search.spectra import Spectrum
     from plant_emulator.signals.log import Array
 
 

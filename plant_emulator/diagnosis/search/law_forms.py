@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fitting.joint_fit import linearise
-from plant_emulator.diagnosis.search.relaxation import relax
+from plant_emulator.diagnosis.fitting.relaxation import relax
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.estimation.unknowns import Unknown
 

@@ -42,10 +42,10 @@ if TYPE_CHECKING:
         ParameterDeviation,
         Undetectable,
     )
+    from plant_emulator.diagnosis.noise.spectra import Spectrum
     from plant_emulator.diagnosis.prediction.remainder import Remainder
     from plant_emulator.diagnosis.prediction.trace import Trace
     from plant_emulator.diagnosis.report.details import Details, EstimatedInput
-    from plant_emulator.diagnosis.search.spectra import Spectrum
 
 HEADING = "Sim-to-real gap"
 # Held-out runs that are drawn: those with the largest gaps. The others are named.

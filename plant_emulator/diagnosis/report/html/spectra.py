@@ -14,7 +14,7 @@ from plant_emulator.diagnosis.wording import in_words
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from plant_emulator.diagnosis.search.spectra import Spectrum
+    from plant_emulator.diagnosis.noise.spectra import Spectrum
 
 
 def noise_spectra(found: Sequence[Spectrum]) -> Markup:

@@ -10,9 +10,9 @@ import pytest
 from scipy.signal import welch as welch_by_scipy
 
 from plant_emulator.diagnosis.fitting.approach import fit_null
+from plant_emulator.diagnosis.noise.spectra import SEGMENT_SAMPLES, spectra, welch
 from plant_emulator.diagnosis.report.document import from_json
 from plant_emulator.diagnosis.report.html.page import html
-from plant_emulator.diagnosis.search.spectra import SEGMENT_SAMPLES, spectra, welch
 from tests.plant_emulator.diagnosis import answers
 from tests.plant_emulator.diagnosis.line import TIME, Line, noisy
 
