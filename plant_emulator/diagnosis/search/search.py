@@ -29,6 +29,7 @@ from plant_emulator.diagnosis.search.confirmation import (
     without_effects,
 )
 from plant_emulator.diagnosis.search.fitted_sets import FittedSets
+from plant_emulator.diagnosis.search.law_forms import errors_beside_forms
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
 from plant_emulator.diagnosis.search.promise import to_try
 from plant_emulator.diagnosis.search.screening import SIMULATION, promises, visibilities
@@ -258,6 +259,8 @@ class Search(FittedSets):
 
     def _explanation(self, final: FitResult) -> Explanation:
         (shown,) = self.runner.map(visibilities, [self.task(self.null)])
+        (errors,) = self.runner.map(errors_beside_forms, [self.task(final)])
+        final = replace(final, standard_errors=errors)
         key, sets = frozenset(final.effects), self.unrefuted
         larger = {
             p.effect: self.needed(len(key)) - p.gains.get(SIMULATION, 0.0)

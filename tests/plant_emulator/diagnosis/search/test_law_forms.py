@@ -9,8 +9,9 @@ import pytest
 
 from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.joint_fit import fit
+from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.confirmation import Reduction
-from plant_emulator.diagnosis.search.law_forms import gain_beside_forms
+from plant_emulator.diagnosis.search.law_forms import errors_beside_forms, gain_beside_forms
 from plant_emulator.diagnosis.search.search import Search
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import SHAPES, TIME, Line, explained, noisy, runner
@@ -60,6 +61,30 @@ def test_gain_by_hand() -> None:
 def test_nothing_is_asked_where_no_other_law_has_a_form() -> None:
     measured = noisy(30.0 * TIME**3 + 2.0 * np.abs(TIME))
     assert gain(measured, ("cube", "kink"), "cube") == inf
+
+
+@pytest.mark.parametrize("error", [0.0, 0.018])
+def test_error_of_a_size_by_hand(error: float) -> None:
+    """By hand: of the kink, the variance beside the form of the cube's law, and the change that the
+    form makes. The cube has no other law beside it, and keeps the error of the fit.
+    """
+    law = 30.0 * (TIME**3 + error * BENT)
+    measured = law + 2.0 * np.abs(TIME) + np.random.default_rng(1).normal(size=2000)
+    model = Bent([measured], ("cube", "kink"))
+    found = fit(model, ("cube", "kink"), (0,), {"a": 0.0, "b": 0.0}, [{}])
+    fitted = [found.values[name] for name in ("a", "b", "cube_size", "kink_size")]
+    plain = np.stack([TIME**0, TIME, TIME**3, np.abs(TIME)], axis=-1)
+    columns = np.column_stack([plain, fitted[2] * BENT])
+    prior = np.diag([0.01, 0.01, 0.0, 0.0, 100.0])
+    covariance = np.linalg.inv(columns.T @ columns + prior)
+    size = (covariance @ columns.T @ measured)[3]
+    errors = errors_beside_forms(model, Task(base=found, runs=(0,)))
+    expected = np.hypot(np.sqrt(covariance[3, 3]), size - fitted[3])
+    assert errors["kink_size"] == pytest.approx(expected, rel=0.03)
+    assert errors["cube_size"] == found.standard_errors["cube_size"]
+    wide = abs(fitted[3] - 2.0) > 2.0 * found.standard_errors["kink_size"]
+    assert wide == (error > 0.0)
+    assert abs(fitted[3] - 2.0) < 2.0 * errors["kink_size"]
 
 
 @pytest.mark.parametrize(
