@@ -73,10 +73,7 @@ THRESHOLDS = {
     "mean square over the noise up to which a fit leaves noise": f"{NOISE_MEAN_SQUARE:g}",
 }
 
-CORRECTS = (
-    "the fit has it, but it is not named; it closes no more than the law of another effect may"
-    " leave, or its size is smaller than its own error"
-)
+UNCERTAIN = "the fit has it, but it is not named: its size is smaller than its own error"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,7 +113,7 @@ class _Tests:
     def notes(self) -> tuple[str, ...]:
         """A note on each effect that was fitted and is not named."""
         unnamed = [name for name in self.fitted if name not in self.decision.effects]
-        return tuple(f"{name}: {CORRECTS}" for name in unnamed)
+        return tuple(f"{name}: {UNCERTAIN}" for name in unnamed)
 
     @property
     def final(self) -> FitResult:

@@ -62,7 +62,7 @@ class FitResult(FitValues):
     samples : number of samples that count
     effective_fraction : share of the samples that are independent, from the residual's
         autocorrelation time
-    standard_errors : of `values`, by name
+    standard_errors : of `values`, by name; of the final fit of a search, with those of the laws
     converged : whether the fit ended before its iterations did
     ljung_box_excess : Ljung-Box statistic of the residuals beyond its expected value, summed over
         the channels; see `covariance.structure`

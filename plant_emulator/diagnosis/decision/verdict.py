@@ -115,8 +115,8 @@ def without_uncertain(
 ) -> tuple[Explanation, Decision]:
     """Name no effect that noise can do without, and none of whose sizes is told from neutral.
 
-    Such an effect repairs a local minimum, or the laws of others. The error of a size holds that of
-    its own law. Beside others the effect stays in the fit, and only the one that closes least falls
+    Such an effect repairs a local minimum, or the laws of others. The error of a size holds those
+    of all laws. Beside others the effect stays in the fit, and only the one that closes least falls
     (the others may need each other). Alone, the fit without effects decides.
 
     model_form_errors : relative, of the sizes by name; see `calibration.model_form_error`

@@ -32,6 +32,8 @@ LABELS = {
     "fit_by_secants": "fits along the measured speeds",
     "refit": "fits to their end",
     "run_agreement": "whether the runs agree",
+    "gain_beside_forms": "what other forms of the laws gain",
+    "errors_beside_forms": "errors of the sizes",
     "visibilities": "what the logs can show",
     "fit_random_effect": "random effects",
     "fit_alone": "each run alone",

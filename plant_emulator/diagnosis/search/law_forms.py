@@ -11,14 +11,17 @@ the forms and all other unknowns, and the effect gains
 C is enlarged by what is left, and by its autocorrelation. A size on the other side of neutral is
 another effect: its distance counts as 0.
 
-A value of the fit is off by what the other laws are off by, and no residual shows it. Its standard
-error is the root of its variance in C and of the square of its change, each beside the forms.
+A value of a fit is off by what the other laws are off by, and no residual shows that. Where the
+values follow the coefficients as B c, and these are c with covariance K, the variance of the value
+grows by its part of
+
+    B (K + c c') B'
+
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from math import inf
+from math import hypot, inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,12 +32,13 @@ from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.estimation.unknowns import Unknown
 
 if TYPE_CHECKING:
-    from collections.abc import Container
+    from collections.abc import Sequence
 
     from plant_emulator.diagnosis.fitting.task import Task
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.search.confirmation import Reduction
     from plant_emulator.estimation.unknowns import Estimate
+    from plant_emulator.signals.log import Array
 
 
 def gain_beside_forms(model: Model, asked: Reduction) -> float:
@@ -63,34 +67,47 @@ def errors_beside_forms(model: Model, task: Task) -> dict[str, float]:
     """Standard errors of the values of a fit beside other forms of the laws, by name (a step).
 
     A size or a shape is asked beside the forms of the other effects, a parameter beside all forms.
-    A value beside which no law has another form keeps its error.
+    None is less than that of the fit.
     """
-    base = task.base
-    errors = dict(base.standard_errors)
-    own = [model.candidates[name] for name in base.effects]
-    near = linearise(model, base, task.runs, [_coefficient(f) for one in own for f in one.forms])
+    errors = dict(task.base.standard_errors)
+    own = [model.candidates[name] for name in task.base.effects]
+    forms = [form for one in own for form in one.forms]
+    if not forms:
+        return errors
+    near = linearise(model, task.base, task.runs, [_coefficient(name) for name in forms])
     groups = [({u.name for u in (*one.sizes, *one.shapes)}, one.forms) for one in own]
     for names, left_out in [*groups, ({u.name for u in model.parameters}, ())]:
-        if all(set(one.forms) <= set(left_out) for one in own):
-            continue
-        asked = _without(near, left_out)
-        beside = relax(asked)
-        variances = beside.inflation * np.diag(beside.covariance) + beside.change**2
-        for u, z, variance in zip(asked.unknowns, asked.z, variances, strict=True):
+        rise = _rise_beside(near, len(forms), [name not in left_out for name in forms])
+        for u, z, variance in zip(near.unknowns[: -len(forms)], near.z, rise, strict=False):
             if u.name in names:
-                errors[u.name] = u.error(u.value(float(z)), float(np.sqrt(variance)))
+                more = u.error(u.value(float(z)), float(np.sqrt(variance)))
+                errors[u.name] = hypot(errors[u.name], more)
     return errors
 
 
-def _without(near: Estimate, names: Container[str]) -> Estimate:
-    """The least squares without these unknowns."""
-    kept = [k for k, u in enumerate(near.unknowns) if u.name not in names]
-    return replace(
-        near,
-        unknowns=tuple(near.unknowns[k] for k in kept),
-        z=near.z[kept],
-        jacobians=tuple(slopes[..., kept] for slopes in near.jacobians),
+def _rise_beside(near: Estimate, forms: int, asked: Sequence[bool]) -> Array:
+    """Rise of the variances of fitted unknowns beside some forms, on the scale of the estimation.
+
+    forms : number of coefficients, the last unknowns; asked : which of them are free
+    The gradient of the fitted unknowns is that of contact and of the end of the fit: it counts as
+    none.
+    """
+    gradient = sum(
+        np.einsum("cnj,cn->j", slopes, rows)
+        for slopes, rows in zip(near.jacobians, near.residuals, strict=True)
     )
+    curvature = near.information + np.diag([u.scaled_std**-2.0 for u in near.unknowns])
+    fitted, free = slice(-forms), len(near.z) - forms + np.flatnonzero(asked)
+    cross = curvature[fitted, free]
+    scale = np.sqrt(np.diag(curvature)[fitted])
+    scale = np.where(scale > 0.0, scale, 1.0)[:, None]
+    # An unknown that no sample shows has no curvature, and follows nothing.
+    follows, *_ = np.linalg.lstsq(curvature[fitted, fitted] / (scale * scale.T), -cross / scale)
+    follows /= scale
+    covariance = np.linalg.inv(curvature[np.ix_(free, free)] + cross.T @ follows)
+    change = covariance @ gradient[free]
+    spread = covariance + np.outer(change, change)
+    return np.asarray(np.einsum("ij,jk,ik->i", follows, spread, follows))
 
 
 def _coefficient(name: str) -> Unknown:

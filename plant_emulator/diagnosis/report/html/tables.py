@@ -121,7 +121,7 @@ def ranking(entries: Sequence[RankedEffect]) -> Markup:
     return table(
         "Evidence: fall of the penalised sum of squares, corrected for autocorrelation. Held-out "
         "gain: share of the gap that the effect alone closes on runs it was not fitted to. The "
-        "standard error includes the model-form error of the effect's law.",
+        "standard error includes the model-form errors of the effects' laws.",
         [
             "effect",
             "subsystem",

@@ -16,13 +16,13 @@ from plant_emulator.diagnosis.search.search import Search
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import SHAPES, TIME, Line, explained, noisy, runner
 
-# The cube's law may grow otherwise: x^3 (1 + c sqrt(3) x).
-FORM = "cube_size by x"
+# The cube's law may grow otherwise: x^3 (1 + c sqrt(3) x). That of the kink: |x| (1 + c |x|).
+FORM, KINK_FORM = "cube_size by x", "kink_size by x"
 BENT = np.sqrt(3.0) * TIME**4
 
 
 class Bent(Line):
-    """A line whose cube may follow another law."""
+    """A line whose cube may follow another law, and its kink where it has a form."""
 
     def __init__(self, measured: Sequence[Array], names: Sequence[str]) -> None:
         super().__init__(measured, names)
@@ -33,7 +33,9 @@ class Bent(Line):
         plain = super().residual(run, effects)
 
         def residual(v: Mapping[str, float]) -> Array:
-            return np.asarray(plain(v) - v.get(FORM, 0.0) * v.get("cube_size", 0.0) * BENT)
+            bent = v.get(FORM, 0.0) * v.get("cube_size", 0.0) * BENT
+            kink = v.get(KINK_FORM, 0.0) * v.get("kink_size", 0.0) * TIME**2
+            return np.asarray(plain(v) - bent - kink)
 
         return residual
 
@@ -64,27 +66,70 @@ def test_nothing_is_asked_where_no_other_law_has_a_form() -> None:
 
 
 @pytest.mark.parametrize("error", [0.0, 0.018])
-def test_error_of_a_size_by_hand(error: float) -> None:
-    """By hand: of the kink, the variance beside the form of the cube's law, and the change that the
-    form makes. The cube has no other law beside it, and keeps the error of the fit.
+def test_errors_by_hand(error: float) -> None:
+    """By hand, with cube and kink whose laws may both grow otherwise: the error of each size beside
+    the form of the other law, and that of the level beside both, are those of least squares with
+    these columns too, and of the change that they make.
     """
     law = 30.0 * (TIME**3 + error * BENT)
-    measured = law + 2.0 * np.abs(TIME) + np.random.default_rng(1).normal(size=2000)
+    measured = law + 4.0 * np.abs(TIME) + np.random.default_rng(1).normal(size=2000)
     model = Bent([measured], ("cube", "kink"))
+    kink = model.candidates["kink"]
+    sizes = (replace(kink.sizes[0], scale=2.0),)
+    model.candidates["kink"] = replace(kink, sizes=sizes, forms=(KINK_FORM,))
     found = fit(model, ("cube", "kink"), (0,), {"a": 0.0, "b": 0.0}, [{}])
-    fitted = [found.values[name] for name in ("a", "b", "cube_size", "kink_size")]
-    plain = np.stack([TIME**0, TIME, TIME**3, np.abs(TIME)], axis=-1)
-    columns = np.column_stack([plain, fitted[2] * BENT])
-    prior = np.diag([0.01, 0.01, 0.0, 0.0, 100.0])
-    covariance = np.linalg.inv(columns.T @ columns + prior)
-    size = (covariance @ columns.T @ measured)[3]
+    values = found.values
+    columns = {
+        "a": TIME**0,
+        "b": TIME,
+        "cube_size": TIME**3,
+        "kink_size": np.abs(TIME),
+        FORM: values["cube_size"] * BENT,
+        KINK_FORM: values["kink_size"] * TIME**2,
+    }
+    prior = {"a": 0.01, "b": 0.01, FORM: 100.0, KINK_FORM: 100.0}
+
+    def expected(name: str, left_out: str) -> float:
+        names = [n for n in columns if n != left_out]
+        matrix = np.stack([columns[n] for n in names], axis=-1)
+        precision = np.diag([prior.get(n, 0.0) for n in names])
+        covariance = np.linalg.inv(matrix.T @ matrix + precision)
+        k = names.index(name)
+        return float(
+            np.hypot(
+                np.sqrt(covariance[k, k]), (covariance @ matrix.T @ measured)[k] - values[name]
+            )
+        )
+
     errors = errors_beside_forms(model, Task(base=found, runs=(0,)))
-    expected = np.hypot(np.sqrt(covariance[3, 3]), size - fitted[3])
-    assert errors["kink_size"] == pytest.approx(expected, rel=0.03)
-    assert errors["cube_size"] == found.standard_errors["cube_size"]
-    wide = abs(fitted[3] - 2.0) > 2.0 * found.standard_errors["kink_size"]
-    assert wide == (error > 0.0)
-    assert abs(fitted[3] - 2.0) < 2.0 * errors["kink_size"]
+    assert errors["kink_size"] == pytest.approx(expected("kink_size", KINK_FORM), rel=0.03)
+    assert errors["cube_size"] == pytest.approx(expected("cube_size", FORM), rel=0.03)
+    assert errors["a"] == pytest.approx(expected("a", ""), rel=0.03)
+    far = abs(values["kink_size"] - 4.0)
+    assert (far > 2.0 * found.standard_errors["kink_size"]) == (error > 0.0)
+    assert far < 2.0 * errors["kink_size"]
+
+
+def test_error_beside_a_form_that_changes_nothing_is_that_of_the_fit() -> None:
+    """The wave is orthogonal to all else; its noise is correlated, which its error contains."""
+    noise = np.convolve(np.random.default_rng(2).normal(size=2040), np.ones(41), mode="valid")
+    measured = 30.0 * TIME**3 + 5.0 * np.sin(20.0 * TIME) + noise / np.sqrt(41.0)
+    model = Bent([measured], ("cube", "wave"))
+    found = fit(model, ("cube", "wave"), (0,), {"a": 0.0, "b": 0.0}, [{}])
+    errors = errors_beside_forms(model, Task(base=found, runs=(0,)))
+    assert errors["wave_size"] >= found.standard_errors["wave_size"]
+    assert errors["wave_size"] == pytest.approx(found.standard_errors["wave_size"], rel=0.05)
+
+
+def test_error_of_an_answer_contains_the_error_of_the_other_law() -> None:
+    """The kink of 4 beside a cube whose law is off by 0.018 is off by more than its fit tells."""
+    law = 30.0 * (TIME**3 + 0.018 * BENT)
+    measured = [noisy(law + 4.0 * np.abs(TIME), k) for k in range(2)]
+    final = explained(Bent(measured, ["cube", "kink"])).final
+    assert set(final.effects) == {"cube", "kink"}
+    assert abs(final.values["kink_size"] - 4.0) < 2.0 * final.standard_errors["kink_size"]
+    alone = explained(Line(measured, ["cube", "kink"])).final
+    assert abs(alone.values["kink_size"] - 4.0) > 2.0 * alone.standard_errors["kink_size"]
 
 
 @pytest.mark.parametrize(
