@@ -110,19 +110,29 @@ class Search(FittedSets):
         return True
 
     def _queue(self, most_effects: int) -> FitResult:
-        """The best set of at most so many effects."""
-        best = self.settled()
+        """The best set of at most so many effects.
+
+        Far from the noise, a set that leaves most of the gap is no base. Another noise may show the
+        cause beside no effect.
+        """
+        best = self._led_again(self.settled())
         while len(best.effects) < most_effects:
-            key = frozenset(best.effects)
-            if key in self.expanded or self._is_last(best):
+            base = self.null if self._is_foreign(best) else best
+            key = frozenset(base.effects)
+            if key in self.expanded or self._is_last(base):
                 break
             self.expanded.add(key)
-            self._expand(best)
+            self._expand(base)
             best = self.settled()
         return best
 
+    def _is_foreign(self, found: FitResult) -> bool:
+        """Whether a fit with effects is far from the noise, and leaves most of the gap."""
+        far = found.mean_square > SETTINGS.linear_mean_square
+        return bool(found.effects) and far and leaves_most(found, self.null)
+
     def _is_last(self, found: FitResult) -> bool:
-        """Whether no effect is worth adding: the cause is foreign, or what is left is random.
+        """Whether no effect is worth adding: what is left is random, or noise.
 
         Near the noise one of two causes may leave most of the gap: a regression tells the other.
         The noise of a random effect is that of few courses of its law. A gain within it means
@@ -133,10 +143,8 @@ class Search(FittedSets):
             return True
         if not found.effects:
             return False
-        far = found.mean_square > SETTINGS.linear_mean_square
-        foreign = far and leaves_most(found, self.null)
         if found.mean_square > NOISE_MEAN_SQUARE:
-            return foreign or (leaves_random(found) and not self.beside_random)
+            return leaves_random(found) and not self.beside_random
         return all(p.gain <= self._promising(found) for p in self._screen(found))
 
     def _screen(self, found: FitResult) -> list[Promise]:
@@ -185,11 +193,11 @@ class Search(FittedSets):
         return excess(found) <= SETTINGS.law_error**2 * excess(self.null)
 
     def _led_again(self, found: FitResult) -> FitResult:
-        """The fit, led along the measured speeds once more where it may be in a local minimum.
+        """The fit with effects, led along the measured speeds once more.
 
-        It explains half of the gap there, and leaves more than noise does.
+        It may be in a local minimum where it leaves more than noise does.
         """
-        if found.mean_square <= NOISE_MEAN_SQUARE or leaves_most(found, self.null):
+        if not found.effects or found.mean_square <= NOISE_MEAN_SQUARE:
             return found
         (again,) = self.runner.map(refit_led, [self.task(found)])
         self.keep(again)
