@@ -30,15 +30,8 @@ class Relaxed:
 
 def relax(near: Estimate) -> Relaxed:
     """Solve the linear least squares at a point; its unknowns without a prior are free."""
-    pairs = list(zip(near.unknowns, near.z, strict=True))
-    precision = np.array([u.scaled_std**-2.0 for u, _ in pairs])
-    gradient = np.array([0.0 if u.std is None else z - u.scaled(u.prior) for u, z in pairs])
-    gradient, information = precision * gradient, np.diag(precision)
-    for columns, residual in zip(near.jacobians, near.residuals, strict=True):
-        rows = columns.reshape(-1, len(precision))
-        information = information + rows.T @ rows
-        gradient = gradient + rows.T @ residual.ravel()
-    covariance = np.linalg.pinv(information, hermitian=True)
+    information, gradient = normal_equations(near)
+    covariance = np.asarray(np.linalg.pinv(information, hermitian=True))
     change = -covariance @ gradient
     left = tuple(
         r + columns @ change for r, columns in zip(near.residuals, near.jacobians, strict=True)
@@ -46,3 +39,16 @@ def relax(near: Estimate) -> Relaxed:
     square = sum(float(np.sum(r**2)) for r in left) / near.samples
     inflation = max(1.0, square) / effective_fraction(replace(near, residuals=left))
     return Relaxed(change=change, covariance=covariance, inflation=inflation)
+
+
+def normal_equations(near: Estimate) -> tuple[Array, Array]:
+    """Curvature and gradient of half the penalised sum of squares, by the slopes at a point."""
+    pairs = list(zip(near.unknowns, near.z, strict=True))
+    precision = np.array([u.scaled_std**-2.0 for u, _ in pairs])
+    gradient = np.array([0.0 if u.std is None else z - u.scaled(u.prior) for u, z in pairs])
+    gradient, curvature = precision * gradient, np.diag(precision)
+    for columns, residual in zip(near.jacobians, near.residuals, strict=True):
+        rows = columns.reshape(-1, len(precision))
+        curvature = curvature + rows.T @ rows
+        gradient = gradient + rows.T @ residual.ravel()
+    return curvature, gradient

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fitting.joint_fit import linearise
-from plant_emulator.diagnosis.fitting.relaxation import relax
+from plant_emulator.diagnosis.fitting.relaxation import normal_equations, relax
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.estimation.unknowns import Unknown
 
@@ -89,14 +89,10 @@ def _rise_beside(near: Estimate, forms: int, asked: Sequence[bool]) -> Array:
     """Rise of the variances of fitted unknowns beside some forms, on the scale of the estimation.
 
     forms : number of coefficients, the last unknowns; asked : which of them are free
-    The gradient of the fitted unknowns is that of contact and of the end of the fit: it counts as
-    none.
+    A fit is never quite at its least squares. What the fitted unknowns would follow still does not
+    move the coefficients, and counts as no change.
     """
-    gradient = sum(
-        np.einsum("cnj,cn->j", slopes, rows)
-        for slopes, rows in zip(near.jacobians, near.residuals, strict=True)
-    )
-    curvature = near.information + np.diag([u.scaled_std**-2.0 for u in near.unknowns])
+    curvature, gradient = normal_equations(near)
     fitted, free = slice(-forms), len(near.z) - forms + np.flatnonzero(asked)
     cross = curvature[fitted, free]
     scale = np.sqrt(np.diag(curvature)[fitted])
@@ -105,7 +101,7 @@ def _rise_beside(near: Estimate, forms: int, asked: Sequence[bool]) -> Array:
     follows, *_ = np.linalg.lstsq(curvature[fitted, fitted] / (scale * scale.T), -cross / scale)
     follows /= scale
     covariance = np.linalg.inv(curvature[np.ix_(free, free)] + cross.T @ follows)
-    change = covariance @ gradient[free]
+    change = covariance @ (gradient[free] + gradient[fitted] @ follows)
     spread = covariance + np.outer(change, change)
     return np.asarray(np.einsum("ij,jk,ik->i", follows, spread, follows))
 

@@ -121,6 +121,17 @@ def test_error_beside_a_form_that_changes_nothing_is_that_of_the_fit() -> None:
     assert errors["wave_size"] == pytest.approx(found.standard_errors["wave_size"], rel=0.05)
 
 
+def test_fit_that_ended_early_has_the_same_errors() -> None:
+    """The level is ten of its errors off its least squares, and the cube's form is like a level."""
+    measured = noisy(30.0 * (TIME**3 + 0.018 * BENT) + 4.0 * np.abs(TIME))
+    model = Bent([measured], ("cube", "kink"))
+    found = fit(model, ("cube", "kink"), (0,), {"a": 0.0, "b": 0.0}, [{}])
+    off = found.values["a"] + 10.0 * found.standard_errors["a"]
+    early = replace(found, values={**found.values, "a": off})
+    ended, begun = (errors_beside_forms(model, Task(base=f, runs=(0,))) for f in (found, early))
+    assert begun["kink_size"] == pytest.approx(ended["kink_size"], rel=0.05)
+
+
 def test_error_of_an_answer_contains_the_error_of_the_other_law() -> None:
     """The kink of 4 beside a cube whose law is off by 0.018 is off by more than its fit tells."""
     law = 30.0 * (TIME**3 + 0.018 * BENT)
