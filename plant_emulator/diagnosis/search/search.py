@@ -107,6 +107,7 @@ class Search(FittedSets):
         self.fits(refit, kept)
         self.null = self.sets[frozenset()]
         self.trace.append(search_step(self.null, "noise estimated", where))
+        self._led_again(min(self.sets.values(), key=self.value))
         return True
 
     def _queue(self, most_effects: int) -> FitResult:
@@ -115,7 +116,7 @@ class Search(FittedSets):
         Far from the noise, a set that leaves most of the gap is no base. Another noise may show the
         cause beside no effect.
         """
-        best = self._led_again(self.settled())
+        best = self.settled()
         while len(best.effects) < most_effects:
             base = self.null if self._is_foreign(best) else best
             key = frozenset(base.effects)
@@ -266,8 +267,9 @@ class Search(FittedSets):
         return self._without_needless(self._queue(SETTINGS.most_effects))
 
     def _explanation(self, final: FitResult) -> Explanation:
-        (shown,) = self.runner.map(visibilities, [self.task(self.null)])
+        asked = self.runner.map(visibilities, [self.task(self.null)])
         (errors,) = self.runner.map(errors_beside_forms, [self.task(final)])
+        (shown,) = asked
         final = replace(final, standard_errors=errors)
         key, sets = frozenset(final.effects), self.unrefuted
         larger = {
