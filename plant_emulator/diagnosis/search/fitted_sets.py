@@ -90,6 +90,8 @@ class FittedSets:
         effects are led along the measured outputs first. The one that gains most there is fitted
         freely, and of the others those that gain half of that there, or half of what the first one
         reached, or whose simulation promises that: what is slow adds up in a free simulation only.
+        So are those of which any regression promises more than the first one reached: a led fit may
+        be in a local minimum as well.
         """
         trials = [trial_of(p, base, self.runner.runs, SETTINGS.leader_iterations) for p in new]
         gains = np.full(len(trials), np.inf)
@@ -99,17 +101,22 @@ class FittedSets:
             trials = [trial for trial, _ in pairs]
             gains = np.array([0.5 * (own.cost - led.cost) for _, led in pairs])
             self.trace += [search_step(own, "led", led, trial.promised) for trial, led in pairs]
-        order = np.argsort(-gains, kind="stable")
-        found = self.confirm([trials[k] for k in order[:1]])
-        reached = max((0.5 * (base.cost - one.cost) for one in found), default=0.0)
+        first, *order = np.argsort(-gains, kind="stable").tolist() or [0]
+        found = self.confirm(trials[first : first + 1])
+        promised = [max(trial.promised.values(), default=0.0) for trial in trials]
+        for k in sorted(order, key=lambda k: -promised[k]):
+            if np.isfinite(gains[k]) and promised[k] > _gain(base, found):
+                found += self.confirm([trials[k]])
+                order.remove(k)
+        reached = _gain(base, found)
         least_led = SETTINGS.rival_share * min(gains.max(initial=0.0), reached)
         least = max(least, SETTINGS.rival_share * reached)
-        others = [
+        rivals = [
             replace(trials[k], iterations=SETTINGS.iterations)
-            for k in order[1:]
+            for k in order
             if gains[k] >= max(0.0, least_led) or trials[k].promised.get(SIMULATION, 0.0) > least
         ]
-        return [*found, *self.confirm(others)]
+        return [*found, *self.confirm(rivals)]
 
     def confirm(self, trials: Sequence[Trial]) -> list[FitResult]:
         """Fit these trials, and keep what they reach."""
@@ -210,3 +217,8 @@ class FittedSets:
             action = f"refuted by other forms of a law (gain {gain:.1f})"
             self.trace.append(search_step(self.null, action, found))
         return gain >= SETTINGS.needed_again
+
+
+def _gain(base: FitResult, found: Sequence[FitResult]) -> float:
+    """Largest gain of fits over another one."""
+    return max((0.5 * (base.cost - one.cost) for one in found), default=0.0)

@@ -34,11 +34,16 @@ from plant_emulator.estimation.unknowns import Unknown
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from plant_emulator.diagnosis.fitting.task import Task
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.diagnosis.search.confirmation import Reduction
     from plant_emulator.estimation.unknowns import Estimate
     from plant_emulator.signals.log import Array
+
+# Share of the distance of its bounds within which an unknown is at one: a fit stays off them.
+AT_BOUND = 1e-4
 
 
 def gain_beside_forms(model: Model, asked: Reduction) -> float:
@@ -89,21 +94,35 @@ def _rise_beside(near: Estimate, forms: int, asked: Sequence[bool]) -> Array:
     """Rise of the variances of fitted unknowns beside some forms, on the scale of the estimation.
 
     forms : number of coefficients, the last unknowns; asked : which of them are free
-    A fit is never quite at its least squares. What the fitted unknowns would follow still does not
-    move the coefficients, and counts as no change.
+    What is left of the gradient at a fit is that of contact, which is not smooth. What the fitted
+    unknowns would follow does not move the coefficients, and counts as no change. An unknown that
+    its bound stops follows nothing.
     """
     curvature, gradient = normal_equations(near)
-    fitted, free = slice(-forms), len(near.z) - forms + np.flatnonzero(asked)
-    cross = curvature[fitted, free]
+    free = len(near.z) - forms + np.flatnonzero(asked)
+    fitted = np.flatnonzero(~_stopped(near, gradient)[:-forms])
+    cross = curvature[np.ix_(fitted, free)]
     scale = np.sqrt(np.diag(curvature)[fitted])
     scale = np.where(scale > 0.0, scale, 1.0)[:, None]
+    own = curvature[np.ix_(fitted, fitted)] / (scale * scale.T)
     # An unknown that no sample shows has no curvature, and follows nothing.
-    follows, *_ = np.linalg.lstsq(curvature[fitted, fitted] / (scale * scale.T), -cross / scale)
+    follows, *_ = np.linalg.lstsq(own, -cross / scale)
     follows /= scale
     covariance = np.linalg.inv(curvature[np.ix_(free, free)] + cross.T @ follows)
     change = covariance @ (gradient[free] + gradient[fitted] @ follows)
     spread = covariance + np.outer(change, change)
-    return np.asarray(np.einsum("ij,jk,ik->i", follows, spread, follows))
+    rise = np.zeros(len(near.z) - forms)
+    rise[fitted] = np.einsum("ij,jk,ik->i", follows, spread, follows)
+    return rise
+
+
+def _stopped(near: Estimate, gradient: Array) -> NDArray[np.bool_]:
+    """Unknowns at a bound beyond which the sum of squares falls, shape (unknowns,)."""
+    lower = np.array([u.scaled(u.lower) for u in near.unknowns])
+    upper = np.array([u.scaled(u.upper) for u in near.unknowns])
+    margin = AT_BOUND * (upper - lower)
+    at_lower, at_upper = near.z <= lower + margin, near.z >= upper - margin
+    return np.asarray((at_lower & (gradient > 0.0)) | (at_upper & (gradient < 0.0)))
 
 
 def _coefficient(name: str) -> Unknown:

@@ -68,9 +68,9 @@ class Search(FittedSets):
     def explain(self) -> Explanation:
         """Go through the queue in the logs' own noise.
 
-        The noise is estimated around the fit without effects where that is near the noise, and
-        around the best set that explains half of the gap. Where that shows another noise, the queue
-        starts again.
+        The noise is estimated around the fit without effects where that is near the noise, or else
+        around the best single effect, and then around the best set if it explains half of the gap.
+        Where that shows another noise, the queue starts again.
         """
         self.sets[frozenset()] = self.null
         far = self.null.mean_square > SETTINGS.linear_mean_square
@@ -106,34 +106,24 @@ class Search(FittedSets):
         self.sets = {}
         self.fits(refit, kept)
         self.null = self.sets[frozenset()]
-        self.trace.append(search_step(self.null, "noise estimated", where))
-        self._led_again(min(self.sets.values(), key=self.value))
+        there = self.sets[frozenset(where.effects)]
+        self.trace.append(search_step(self.null, "noise estimated", there))
         return True
 
     def _queue(self, most_effects: int) -> FitResult:
-        """The best set of at most so many effects.
-
-        Far from the noise, a set that leaves most of the gap is no base. Another noise may show the
-        cause beside no effect.
-        """
+        """The best set of at most so many effects."""
         best = self.settled()
         while len(best.effects) < most_effects:
-            base = self.null if self._is_foreign(best) else best
-            key = frozenset(base.effects)
-            if key in self.expanded or self._is_last(base):
+            key = frozenset(best.effects)
+            if key in self.expanded or self._is_last(best):
                 break
             self.expanded.add(key)
-            self._expand(base)
+            self._expand(best)
             best = self.settled()
         return best
 
-    def _is_foreign(self, found: FitResult) -> bool:
-        """Whether a fit with effects is far from the noise, and leaves most of the gap."""
-        far = found.mean_square > SETTINGS.linear_mean_square
-        return bool(found.effects) and far and leaves_most(found, self.null)
-
     def _is_last(self, found: FitResult) -> bool:
-        """Whether no effect is worth adding: what is left is random, or noise.
+        """Whether no effect is worth adding: the cause is foreign, or what is left is random.
 
         Near the noise one of two causes may leave most of the gap: a regression tells the other.
         The noise of a random effect is that of few courses of its law. A gain within it means
@@ -144,8 +134,10 @@ class Search(FittedSets):
             return True
         if not found.effects:
             return False
+        far = found.mean_square > SETTINGS.linear_mean_square
+        foreign = far and leaves_most(found, self.null)
         if found.mean_square > NOISE_MEAN_SQUARE:
-            return leaves_random(found) and not self.beside_random
+            return foreign or (leaves_random(found) and not self.beside_random)
         return all(p.gain <= self._promising(found) for p in self._screen(found))
 
     def _screen(self, found: FitResult) -> list[Promise]:
@@ -194,11 +186,11 @@ class Search(FittedSets):
         return excess(found) <= SETTINGS.law_error**2 * excess(self.null)
 
     def _led_again(self, found: FitResult) -> FitResult:
-        """The fit with effects, led along the measured speeds once more.
+        """The fit, led along the measured speeds once more where it may be in a local minimum.
 
-        It may be in a local minimum where it leaves more than noise does.
+        It explains half of the gap there, and leaves more than noise does.
         """
-        if not found.effects or found.mean_square <= NOISE_MEAN_SQUARE:
+        if found.mean_square <= NOISE_MEAN_SQUARE or leaves_most(found, self.null):
             return found
         (again,) = self.runner.map(refit_led, [self.task(found)])
         self.keep(again)
@@ -267,9 +259,9 @@ class Search(FittedSets):
         return self._without_needless(self._queue(SETTINGS.most_effects))
 
     def _explanation(self, final: FitResult) -> Explanation:
-        asked = self.runner.map(visibilities, [self.task(self.null)])
-        (errors,) = self.runner.map(errors_beside_forms, [self.task(final)])
-        (shown,) = asked
+        later = self.runner.map(errors_beside_forms, [self.task(final)])
+        (shown,) = self.runner.map(visibilities, [self.task(self.null)])
+        (errors,) = later
         final = replace(final, standard_errors=errors)
         key, sets = frozenset(final.effects), self.unrefuted
         larger = {

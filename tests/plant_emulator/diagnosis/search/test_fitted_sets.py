@@ -49,6 +49,34 @@ def test_effect_whose_simulation_promises_half_of_what_was_reached_is_fitted_too
         assert [one.effects for one in sets.fit_on_top(null, supposed, 5.0)] == fitted
 
 
+@pytest.mark.parametrize(
+    ("promised", "fitted"), [(1900.0, [("kink",)]), (2300.0, [("kink",), ("wave",)])]
+)
+def test_effect_of_which_a_regression_promises_more_than_was_reached_is_fitted_too(
+    promised: float, fitted: list[tuple[str, ...]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By hand: 5 |t| gains 2083. The wave gains nothing along the measured outputs.
+
+    It is fitted for as many iterations as the leader.
+    """
+    model = Line([noisy(2.0 + 3.0 * TIME + 5.0 * abs(TIME))], ("kink", "wave"))
+    null = fit_null(model, (0,))
+    supposed = [
+        replace(p, gains={"relations": promised}, starts={"relations": p.starts["simulation"]})
+        if p.effect == "wave"
+        else p
+        for p in promises(runner(model), null)
+    ]
+    sets = FittedSets(runner=runner(model), null=null)
+    asked: list[int | None] = []
+    confirm = sets.confirm
+    monkeypatch.setattr(
+        sets, "confirm", lambda some: (asked.extend(t.iterations for t in some), confirm(some))[1]
+    )
+    assert [one.effects for one in sets.fit_on_top(null, supposed, 5.0)] == fitted
+    assert asked == [10] * len(fitted)
+
+
 def test_all_effects_are_fitted_on_top_of_a_fit_that_leaves_noise() -> None:
     model = Line([noisy(2.0 + 3.0 * TIME + 0.3 * abs(TIME))], ("wave", "kink"))
     null = fit_null(model, (0,))

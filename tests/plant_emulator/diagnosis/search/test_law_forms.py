@@ -110,6 +110,26 @@ def test_errors_by_hand(error: float) -> None:
     assert far < 2.0 * errors["kink_size"]
 
 
+def test_value_at_its_bound_follows_no_form() -> None:
+    """By hand: the level is stopped at 0, and would be 3. Least squares have no column for it."""
+    measured = 3.0 + 30.0 * TIME**3 + 4.0 * np.abs(TIME)
+    model = Bent([measured + np.random.default_rng(1).normal(size=2000)], ("cube", "kink"))
+    level, slope = Line.parameters
+    model.parameters = (replace(level, upper=0.0), slope)
+    found = fit(model, ("cube", "kink"), (0,), {"a": 0.0, "b": 0.0}, [{}])
+    columns = [TIME, TIME**3, np.abs(TIME), found.values["cube_size"] * BENT]
+    matrix = np.stack(columns, axis=-1)
+    covariance = np.linalg.inv(matrix.T @ matrix + np.diag([0.01, 0.0, 0.0, 100.0]))
+    size = (covariance @ matrix.T @ model.measured[0])[2]
+    rise = (
+        covariance[2, 2] - np.linalg.inv(matrix.T @ matrix + np.diag([0.01, 0.0, 0.0, 1e12]))[2, 2]
+    )
+    expected = np.sqrt(rise + (size - found.values["kink_size"]) ** 2)
+    more = errors_beside_forms(model, Task(base=found, runs=(0,)))["kink_size"]
+    own = found.standard_errors["kink_size"]
+    assert np.sqrt(more**2 - own**2) == pytest.approx(expected, rel=0.05)
+
+
 def test_error_beside_a_form_that_changes_nothing_is_that_of_the_fit() -> None:
     """The wave is orthogonal to all else; its noise is correlated, which its error contains."""
     noise = np.convolve(np.random.default_rng(2).normal(size=2040), np.ones(41), mode="valid")
