@@ -127,7 +127,8 @@ def fit_null(model: Model, runs: Sequence[int]) -> FitResult:
     A fit that ends far from the data may have taken contact at the wrong time once, where it did
     not along the measured outputs. It is led along them again, and the better fit counts. Of 80
     benches near the limit of their voltage 3 ended at 1.7 to 40 times the noise without this, and
-    none with it. A fit that is far from the data along the measured outputs lacks a cause.
+    none with it. A fit that is far from the data along the measured outputs too is taken to lack a
+    cause.
     """
     values, states = model.start_values(runs)
     start = FitValues(effects=(), values=values, states=tuple(states))

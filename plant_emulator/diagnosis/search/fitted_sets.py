@@ -12,8 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, excess
 from plant_emulator.diagnosis.fitting.fit_steps import refit, refit_along
 from plant_emulator.diagnosis.fitting.task import Task
@@ -88,33 +86,33 @@ class FittedSets:
 
         Where the base leaves more than noise, a regression may mislead, and a free fit is long. The
         effects are led along the measured outputs first. The one that gains most there is fitted
-        freely, and of the others those that gain half of that there, or half of what the first one
-        reached, or whose simulation promises that: what is slow adds up in a free simulation only.
-        So are those of which any regression promises more than the first one reached: a led fit may
-        be in a local minimum as well.
+        freely. So are others, as long as a regression promises more of one than any has reached: a
+        led fit may be in a local minimum as well. Of the rest those are fitted for less long that
+        gain half of the most there, or half of what was reached, or whose simulation promises that:
+        what is slow adds up in a free simulation only.
         """
         trials = [trial_of(p, base, self.runner.runs, SETTINGS.leader_iterations) for p in new]
-        gains = np.full(len(trials), np.inf)
-        if base.mean_square > NOISE_MEAN_SQUARE and len(trials) > 1:
-            (own,) = self.runner.map(refit_along, [self.task(base)])
-            pairs = list(self.runner.map(lead_start, trials))
-            trials = [trial for trial, _ in pairs]
-            gains = np.array([0.5 * (own.cost - led.cost) for _, led in pairs])
-            self.trace += [search_step(own, "led", led, trial.promised) for trial, led in pairs]
-        first, *order = np.argsort(-gains, kind="stable").tolist() or [0]
-        found = self.confirm(trials[first : first + 1])
+        if base.mean_square <= NOISE_MEAN_SQUARE or len(trials) < 2:
+            return self.confirm([*trials[:1], *(_shorter(trial) for trial in trials[1:])])
+        (own,) = self.runner.map(refit_along, [self.task(base)])
+        pairs = list(self.runner.map(lead_start, trials))
+        self.trace += [search_step(own, "led", led, trial.promised) for trial, led in pairs]
+        gains = [0.5 * (own.cost - led.cost) for _, led in pairs]
+        first, *rest = sorted(range(len(pairs)), key=lambda k: -gains[k])
+        trials = [trial for trial, _ in pairs]
         promised = [max(trial.promised.values(), default=0.0) for trial in trials]
-        for k in sorted(order, key=lambda k: -promised[k]):
-            if np.isfinite(gains[k]) and promised[k] > _gain(base, found):
+        found = self.confirm([trials[first]])
+        for k in sorted(rest, key=lambda k: -promised[k]):
+            if promised[k] > _gain(base, found):
                 found += self.confirm([trials[k]])
-                order.remove(k)
+                rest.remove(k)
         reached = _gain(base, found)
-        least_led = SETTINGS.rival_share * min(gains.max(initial=0.0), reached)
+        least_led = SETTINGS.rival_share * max(0.0, min(gains[first], reached))
         least = max(least, SETTINGS.rival_share * reached)
         rivals = [
-            replace(trials[k], iterations=SETTINGS.iterations)
-            for k in order
-            if gains[k] >= max(0.0, least_led) or trials[k].promised.get(SIMULATION, 0.0) > least
+            _shorter(trials[k])
+            for k in rest
+            if gains[k] >= least_led or trials[k].promised.get(SIMULATION, 0.0) > least
         ]
         return [*found, *self.confirm(rivals)]
 
@@ -217,6 +215,11 @@ class FittedSets:
             action = f"refuted by other forms of a law (gain {gain:.1f})"
             self.trace.append(search_step(self.null, action, found))
         return gain >= SETTINGS.needed_again
+
+
+def _shorter(trial: Trial) -> Trial:
+    """A trial with the iterations of a rival."""
+    return replace(trial, iterations=SETTINGS.iterations)
 
 
 def _gain(base: FitResult, found: Sequence[FitResult]) -> float:

@@ -42,8 +42,9 @@ if TYPE_CHECKING:
     from plant_emulator.estimation.unknowns import Estimate
     from plant_emulator.signals.log import Array
 
-# Share of the distance of its bounds within which an unknown is at one: a fit stays off them.
-AT_BOUND = 1e-4
+# Share of the distance of its bounds within which an unknown is at one: a fit starts a hundredth of
+# that from a bound, and may stay there.
+BOUND_MARGIN = 1e-4
 
 
 def gain_beside_forms(model: Model, asked: Reduction) -> float:
@@ -117,10 +118,13 @@ def _rise_beside(near: Estimate, forms: int, asked: Sequence[bool]) -> Array:
 
 
 def _stopped(near: Estimate, gradient: Array) -> NDArray[np.bool_]:
-    """Unknowns at a bound beyond which the sum of squares falls, shape (unknowns,)."""
+    """Unknowns at a bound beyond which the sum of squares falls, shape (unknowns,).
+
+    All bounds are finite.
+    """
     lower = np.array([u.scaled(u.lower) for u in near.unknowns])
     upper = np.array([u.scaled(u.upper) for u in near.unknowns])
-    margin = AT_BOUND * (upper - lower)
+    margin = BOUND_MARGIN * (upper - lower)
     at_lower, at_upper = near.z <= lower + margin, near.z >= upper - margin
     return np.asarray((at_lower & (gradient > 0.0)) | (at_upper & (gradient < 0.0)))
 

@@ -259,9 +259,9 @@ class Search(FittedSets):
         return self._without_needless(self._queue(SETTINGS.most_effects))
 
     def _explanation(self, final: FitResult) -> Explanation:
-        later = self.runner.map(errors_beside_forms, [self.task(final)])
+        asked = self.runner.map(errors_beside_forms, [self.task(final)])  # the longer one first
         (shown,) = self.runner.map(visibilities, [self.task(self.null)])
-        (errors,) = later
+        (errors,) = asked
         final = replace(final, standard_errors=errors)
         key, sets = frozenset(final.effects), self.unrefuted
         larger = {

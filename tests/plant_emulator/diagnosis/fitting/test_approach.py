@@ -1,8 +1,9 @@
 """Fits from far off on logs of the independent bench."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.fit_result import FitResult, FitValues
@@ -10,16 +11,19 @@ from plant_emulator.diagnosis.fitting import approach as approaching
 from plant_emulator.diagnosis.fitting.approach import (
     FIRST_ITERATIONS,
     approach,
+    fit_null,
     lead,
     lead_best,
     nearest,
 )
 from plant_emulator.diagnosis.fitting.joint_fit import fit
+from plant_emulator.diagnosis.machine import Model
 from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
+from tests.plant_emulator.diagnosis.line import TIME, Line, noisy
 
 Reader = Callable[[str], Log]
 RUNS = (0, 1, 2)
@@ -86,3 +90,27 @@ def test_start_near_the_noise_is_kept(model: BenchModel) -> None:
     reached = fit(model, (), RUNS, near.values, near.states)
     assert nearest(model, [nominal_start(model), reached], RUNS) is reached
     assert nearest(model, [nominal_start(model)], RUNS) is None
+
+
+class Contacting(Line):
+    """A line with a wave that no run along the measured outputs shows."""
+
+    def observer(self, interval: float) -> Line:
+        """See `Model`."""
+        return Line([noisy(2.0 + 3.0 * TIME)])
+
+
+@pytest.mark.parametrize(("machine", "again"), [(Line, 0), (Contacting, 1)])
+def test_far_fit_is_led_again_only_where_it_was_near_the_data_along_the_measured_outputs(
+    machine: type[Line], again: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By hand: a wave of 4 leaves 8 beside the noise of 1."""
+    led: list[float] = []
+
+    def approach_again(model: Model, found: FitResult, runs: Sequence[int]) -> FitValues:
+        led.append(found.mean_square)
+        return approach(model, found, runs)
+
+    monkeypatch.setattr(approaching, "approach", approach_again)
+    fit_null(machine([noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME))]), (0,))
+    assert led == pytest.approx([9.0] * again, rel=0.1)

@@ -1,12 +1,15 @@
 """Which of the effects that lead the regressions are fitted freely on top of a fit."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
+from plant_emulator.diagnosis.search.confirmation import Trial
 from plant_emulator.diagnosis.search.fitted_sets import FittedSets
 from plant_emulator.diagnosis.search.screening import promises
 from tests.plant_emulator.diagnosis.line import TIME, Line, noisy, runner
@@ -70,9 +73,12 @@ def test_effect_of_which_a_regression_promises_more_than_was_reached_is_fitted_t
     sets = FittedSets(runner=runner(model), null=null)
     asked: list[int | None] = []
     confirm = sets.confirm
-    monkeypatch.setattr(
-        sets, "confirm", lambda some: (asked.extend(t.iterations for t in some), confirm(some))[1]
-    )
+
+    def noting(trials: Sequence[Trial]) -> list[FitResult]:
+        asked.extend(trial.iterations for trial in trials)
+        return confirm(trials)
+
+    monkeypatch.setattr(sets, "confirm", noting)
     assert [one.effects for one in sets.fit_on_top(null, supposed, 5.0)] == fitted
     assert asked == [10] * len(fitted)
 

@@ -110,12 +110,13 @@ def test_errors_by_hand(error: float) -> None:
     assert far < 2.0 * errors["kink_size"]
 
 
-def test_value_at_its_bound_follows_no_form() -> None:
+@pytest.mark.parametrize(("level", "bound"), [(3.0, {"upper": 0.0}), (-3.0, {"lower": 0.0})])
+def test_value_at_its_bound_follows_no_form(level: float, bound: dict[str, float]) -> None:
     """By hand: the level is stopped at 0, and would be 3. Least squares have no column for it."""
-    measured = 3.0 + 30.0 * TIME**3 + 4.0 * np.abs(TIME)
+    measured = level + 30.0 * TIME**3 + 4.0 * np.abs(TIME)
     model = Bent([measured + np.random.default_rng(1).normal(size=2000)], ("cube", "kink"))
-    level, slope = Line.parameters
-    model.parameters = (replace(level, upper=0.0), slope)
+    stopped, slope = Line.parameters
+    model.parameters = (replace(stopped, **bound), slope)  # type: ignore[arg-type]
     found = fit(model, ("cube", "kink"), (0,), {"a": 0.0, "b": 0.0}, [{}])
     columns = [TIME, TIME**3, np.abs(TIME), found.values["cube_size"] * BENT]
     matrix = np.stack(columns, axis=-1)

@@ -1,5 +1,6 @@
 """The search on a machine so small that it can be checked by hand."""
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
@@ -240,6 +241,18 @@ def test_effect_that_leaves_most_of_what_the_others_leave_is_not_the_cause() -> 
     ).explain()
     assert found.final.effects == ("wave",)
     assert decide(model, found).kind == "unknown"
+
+
+def test_step_of_the_estimated_noise_tells_the_fit_in_that_noise() -> None:
+    """By hand: in noise of two equal neighbours the squares are twice the declared ones."""
+    noise = np.convolve(np.random.default_rng(2).normal(size=2001), np.ones(2), mode="valid")
+    found = explained(Line([2.0 + 3.0 * TIME + 40.0 * np.sin(20.0 * TIME) + noise], ["wave"]))
+    before, step = next(
+        pair for pair in itertools.pairwise(found.trace) if pair[1].action == "noise estimated"
+    )
+    assert (before.effects, step.effects) == (("wave",), ("wave",))
+    assert before.mean_square == pytest.approx(2.0, rel=0.1)
+    assert step.mean_square == pytest.approx(1.0, abs=0.1)
 
 
 def test_two_effects_lie_where_the_larger_share_is() -> None:
