@@ -92,25 +92,39 @@ def test_start_near_the_noise_is_kept(model: BenchModel) -> None:
     assert nearest(model, [nominal_start(model)], RUNS) is None
 
 
-class Contacting(Line):
-    """A line with a wave that no run along the measured outputs shows."""
+class Misled(Line):
+    """A line that is led along a wave of other sizes, one after the other."""
+
+    led_to: tuple[float, ...] = (4.0,)
 
     def observer(self, interval: float) -> Line:
         """See `Model`."""
-        return Line([noisy(2.0 + 3.0 * TIME)])
+        size, *rest = self.led_to
+        self.led_to = tuple(rest) or (size,)
+        return Line([noisy(2.0 + 3.0 * TIME + size * np.sin(20.0 * TIME))])
 
 
-@pytest.mark.parametrize(("machine", "again"), [(Line, 0), (Contacting, 1)])
-def test_far_fit_is_led_again_only_where_it_was_near_the_data_along_the_measured_outputs(
-    machine: type[Line], again: int, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("led_to", "let_go"),
+    [((4.0,), 1), ((0.0,), 2), ((4.0, 4.0, 4.0, 4.0, 4.0, 0.0), 2), ((4.0,) * 5 + (3.9,), 1)],
+)
+def test_far_fit_is_let_go_again_only_where_it_is_led_nearer(
+    led_to: tuple[float, ...], let_go: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By hand: a wave of 4 leaves 8 beside the noise of 1."""
-    led: list[float] = []
+    """By hand: a wave of 4 leaves 8 beside the noise of 1, and one of 3.9 leaves 7.6.
 
-    def approach_again(model: Model, found: FitResult, runs: Sequence[int]) -> FitValues:
-        led.append(found.mean_square)
-        return approach(model, found, runs)
+    The sixth fit along the measured outputs is the first one after the fit was let go.
+    """
+    far: list[float] = []
+    go = approaching.let_go
 
-    monkeypatch.setattr(approaching, "approach", approach_again)
-    fit_null(machine([noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME))]), (0,))
-    assert led == pytest.approx([9.0] * again, rel=0.1)
+    def noting(model: Model, led: FitResult, runs: Sequence[int]) -> FitValues:
+        far.append(led.mean_square)
+        return go(model, led, runs)
+
+    monkeypatch.setattr(approaching, "let_go", noting)
+    model = Misled([noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME))])
+    model.led_to = led_to
+    assert fit_null(model, (0,)).mean_square == pytest.approx(9.0, rel=0.1)
+    assert len(far) == let_go
+    assert far[0] == pytest.approx(1.0 + led_to[0] ** 2 / 2.0, rel=0.1)
