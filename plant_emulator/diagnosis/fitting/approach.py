@@ -129,9 +129,9 @@ def fit_null(model: Model, runs: Sequence[int]) -> FitResult:
     """Fit without effects from the model's own start values.
 
     A fit that ends far from the data may have taken contact at the wrong time once. It is led along
-    the measured outputs again, and let go if that leads nearer. Of 150 benches near the limit of
-    their voltage 3 ended at 26 to 41 times the noise without this, and none with it. A fit that is
-    led to where it was before lacks a cause.
+    the measured outputs again, and let go if that leads nearer: a bench near the limit of its
+    voltage had ended at 32 times the noise (see the tests). A fit that is led to where it was
+    before lacks a cause.
     """
     values, states = model.start_values(runs)
     start = FitValues(effects=(), values=values, states=tuple(states))

@@ -23,6 +23,9 @@ from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import Log
+from plant_emulator.simulation.run_inputs import inputs_of
+from plant_emulator.simulation.sensor_noise import add_noise
+from plant_emulator.simulation.simulate import simulate, values_of
 from tests.plant_emulator.diagnosis.line import TIME, Line, noisy
 
 Reader = Callable[[str], Log]
@@ -90,6 +93,19 @@ def test_start_near_the_noise_is_kept(model: BenchModel) -> None:
     reached = fit(model, (), RUNS, near.values, near.states)
     assert nearest(model, [nominal_start(model), reached], RUNS) is reached
     assert nearest(model, [nominal_start(model)], RUNS) is None
+
+
+def test_bench_near_the_limit_of_its_voltage_is_led_to_the_noise_again(
+    bench_log: Reader, nominal: ParameterSet
+) -> None:
+    """The first way to it takes contact at the wrong time, and ends at 32 times the noise."""
+    asked = replace(bench_log("bench_nominal/program1"), source="run")
+    values = values_of(nominal) | {"flux_constant_1": 410.03}
+    values["gear_viscous_friction"] *= 1.017
+    log = simulate(inputs_of(asked), values, gap_position=0.19, step=1e-3)
+    found = fit_null(BenchModel([recording(add_noise(log, 91))], nominal, {}), (0,))
+    assert found.mean_square == pytest.approx(1.0, abs=0.05)
+    assert found.values["flux_constant_1"] == pytest.approx(410.03, rel=0.005)
 
 
 class Misled(Line):
