@@ -140,8 +140,8 @@ class Model(Protocol):
         """Give the machine with residuals that are led along the measured outputs.
 
         A fault then shows where and when it acts, and does not move all that follows: the cost has
-        far fewer local minima than that of a free simulation. Its least value is above the noise,
-        because the noise of the measured outputs moves contact.
+        far fewer local minima than that of a free simulation. A right simulation stays within the
+        noise of the measured outputs, and is not led.
 
         interval : between two corrections [s]
         """

@@ -99,16 +99,22 @@ class Recording:
     def measured_speeds(self, interval: float) -> MeasuredSpeeds:
         """The speeds that count, to lead a simulation along.
 
-        They are medians of five, without spikes of up to two samples.
+        They are medians of five, without spikes of up to two samples. A mean of them may miss by
+        the noise of one sample: noise may be correlated, and the medians of a coarse channel stay
+        on one step.
         """
-        speeds = {}
-        for name in ("motor_speed", "drum_speed"):
+        names = ("motor_speed", "drum_speed")
+        speeds, dead_zones = {}, np.zeros(len(names))
+        for k, name in enumerate(names):
             speeds[name] = np.full(len(self.log.time), nan)
-            use = self.use[self.channels.index(name)] if name in self.channels else np.array(False)
+            if name not in self.channels:
+                continue
+            row = self.channels.index(name)
+            use, dead_zones[k] = self.use[row], self.noise[row]
             if use.any():
                 value = np.pad(self.log[name][use], 2, mode="edge")
                 speeds[name][use] = np.median(sliding_window_view(value, 5), axis=-1)
-        return MeasuredSpeeds(**speeds, interval=interval)
+        return MeasuredSpeeds(**speeds, interval=interval, dead_zones=dead_zones)
 
     def residual(
         self,

@@ -46,11 +46,13 @@ class MeasuredSpeeds:
 
     motor_speed, drum_speed : of the samples of the run; NaN: not measured [rad/s], shape (n,)
     interval : the speeds are corrected at the first sample of each such interval [s]
+    dead_zones : misses of motor and drum speed that correct nothing [rad/s], shape (2,)
     """
 
     motor_speed: Array
     drum_speed: Array
     interval: float
+    dead_zones: Array
 
 
 def simulate(
@@ -180,21 +182,21 @@ def _pieces(
 
 def _corrections(
     coarse: RunInputs, run: RunInputs, along: MeasuredSpeeds | None
-) -> tuple[Array, Array, Array]:
-    """Samples to correct the speeds at, and the measured speeds, as `stepper.Inputs` has them.
+) -> tuple[Array, Array, Array, Array]:
+    """Samples to correct the speeds at, the measured speeds and dead zones; see `stepper.Inputs`.
 
     coarse, run : inputs at the samples of the log, and at those that are simulated
     along : None: none, for a free run
     """
     if along is None:
-        return NEVER, NOT_MEASURED, NOT_MEASURED
+        return NEVER, NOT_MEASURED, NOT_MEASURED, NOT_MEASURED
     rows = np.arange(len(run.time)) if run.sensing is None else run.sensing.rows
     passed = np.floor((coarse.time - coarse.time[0]) / along.interval)
     due = rows[1:][np.diff(passed) > 0.0]
     motor, drum = np.full((2, len(run.time)), nan)
     motor[rows] = _without_lag(coarse, "motor_speed", along.motor_speed)
     drum[rows] = _without_lag(coarse, "drum_speed", along.drum_speed)
-    return np.append(due, len(run.time)), motor, drum
+    return np.append(due, len(run.time)), motor, drum, along.dead_zones
 
 
 def _without_lag(run: RunInputs, channel: str, measured: Array) -> Array:

@@ -80,6 +80,7 @@ class Inputs(NamedTuple):
     parked : 1 for an interval in which the truck is parked, else 0
     corrections : samples to correct the speeds at, ascending; then one past the last sample
     motor_speed, drum_speed : measured, for these corrections; NaN: not measured [rad/s]
+    dead_zones : misses of motor and drum speed that correct nothing [rad/s], shape (2,)
     steps : begin and length of the steps to follow [s], shape (steps, 2); empty: they are adapted
     """
 
@@ -92,6 +93,7 @@ class Inputs(NamedTuple):
     corrections: State = NEVER
     motor_speed: State = NOT_MEASURED
     drum_speed: State = NOT_MEASURED
+    dead_zones: State = NOT_MEASURED
     steps: State = NO_STEPS
 
 
@@ -122,7 +124,7 @@ def begin_or_go_on(
     They are those of the segment between samples, of the next corner, of the next correction and
     its last sample before, and of the step to follow.
     """
-    time, value, _, edges, _, _, corrections, _, _, given = inputs
+    time, value, _, edges, _, _, corrections, _, _, _, given = inputs
     if first == 0:
         begin(time[0], value[0], out, x, s, p)
         return 0, 0, 0, 0, 0
@@ -213,7 +215,7 @@ def run(
     taken : begin and length of the first steps [s], shape (some steps, 2); it is filled
     out : the channels at every sample, shape (samples, channels); it is filled
     """
-    time, value, slope, edges, wheel_torque, parked, corrections, motor, drum, given = inputs
+    time, value, slope, edges, wheel_torque, parked, corrections, motor, drum, zones, given = inputs
     tolerance, largest, first = settings
     s, p = private_copy(stage), private_copy(p)
     segment, edge, due, corrected, k = begin_or_go_on(first, inputs, out, x, s, p)
@@ -265,7 +267,7 @@ def run(
             row = landing + 1
         accept(length, x, w)
         if row > corrections[due]:
-            correct(corrected + 1, landing, (motor, drum), out, x, s, p)
+            correct(corrected + 1, landing, (motor, drum, zones), out, x, s, p)
             due, corrected = due + 1, landing
         t = end if pieces == 1 else t + length
     write_back(s, stage)
