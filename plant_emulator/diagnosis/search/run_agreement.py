@@ -52,7 +52,7 @@ def run_agreement(model: Model, asked: Reduction) -> float:
         index, neutral = names.index(unknown.name), unknown.scaled(candidate.neutral[unknown.name])
         widest = SHRINKAGE * abs(unknown.scaled(unknown.start) - neutral)
         split = _split(near, index, widest, halved)
-        if _showing(split, widest) < 2:
+        if not halved and _showing(split, widest) < 2:
             alone = int(np.argmin(np.diag(split.covariance)))
             split = _split(near, index, widest, (alone,))
         law = SETTINGS.law_error * (float(near.z[index]) - neutral)

@@ -147,6 +147,24 @@ def test_a_wave_with_an_angle_in_each_run_has_one_size_in_both_halves(
     assert (run_agreement(model, Reduction(found, (0, 1), "wave")) > 0.01) == agree
 
 
+def test_a_faint_wave_of_the_last_run_agrees_with_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By hand: a half tells the size with a variance of 1 / (500 0.03^2) = 2.2, its prior is 4."""
+    model = Line([noisy(0.0 * WAVE, k) for k in (0, 1)], ("wave",))
+    angle = replace(linear("wave_angle", 0.0, std=1.8), angle=True)
+    model.candidates = {"wave": replace(model.candidates["wave"], states=(angle,))}
+
+    def residual(run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        def of(v: Mapping[str, float]) -> Array:
+            wave = 0.03 * run * v["wave_size"] * np.sin(20.0 * TIME + v["wave_angle"])
+            return (model.measured[run] - v["a"] - v["b"] * TIME - wave)[None, :]
+
+        return of
+
+    monkeypatch.setattr(model, "residual", residual)
+    found = fit(model, ("wave",), (0, 1), {"a": 0.0, "b": 0.0}, [{"wave_angle": 0.1}] * 2)
+    assert run_agreement(model, Reduction(found, (0, 1), "wave")) > 0.01
+
+
 @pytest.mark.parametrize(
     ("sizes", "named"), [((1.5, 1.5), ("cube", "wave")), ((0.4, 2.6), ("cube",))]
 )
