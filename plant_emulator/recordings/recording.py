@@ -99,9 +99,9 @@ class Recording:
     def measured_speeds(self, interval: float) -> MeasuredSpeeds:
         """The speeds that count, to lead a simulation along.
 
-        They are medians of five, without spikes of up to two samples. A mean of them may miss by
-        the noise of one sample: noise may be correlated, and the medians of a coarse channel stay
-        on one step.
+        They are medians of five, without spikes of up to two samples. The dead zone is the noise of
+        one sample, because noise may be correlated. It is at least half of a step: the medians of a
+        coarse channel stay on one.
         """
         names = ("motor_speed", "drum_speed")
         speeds, dead_zones = {}, np.zeros(len(names))
@@ -110,9 +110,11 @@ class Recording:
             if name not in self.channels:
                 continue
             row = self.channels.index(name)
-            use, dead_zones[k] = self.use[row], self.noise[row]
+            use = self.use[row]
             if use.any():
-                value = np.pad(self.log[name][use], 2, mode="edge")
+                shown = self.log[name][use]
+                dead_zones[k] = max(self.noise[row], 0.5 * value_step(shown))
+                value = np.pad(shown, 2, mode="edge")
                 speeds[name][use] = np.median(sliding_window_view(value, 5), axis=-1)
         return MeasuredSpeeds(**speeds, interval=interval, dead_zones=dead_zones)
 

@@ -1,10 +1,10 @@
 """The observer: a run that is led along a measured one.
 
 At some samples the speeds are corrected by a share of what they have missed since the correction
-before (D. Luenberger, IEEE Trans. Autom. Control 16 (1971) 596), beyond a dead zone (B. Peterson,
-K. Narendra, IEEE Trans. Autom. Control 27 (1982) 1161). Without it the right simulation would
-follow the noise: a drum without losses crosses the backlash within seconds, and an error of a
-thousandth of its speed moves the next contact.
+before (D. Luenberger, IEEE Trans. Autom. Control 16 (1971) 596), beyond a dead zone for the noise,
+as in adaptive control (B. Peterson, K. Narendra, IEEE Trans. Autom. Control 27 (1982) 1161).
+Without the dead zone the right simulation would follow the noise: a drum without losses crosses the
+backlash within seconds, and an error of a thousandth of its speed moves the next contact.
 """
 
 from __future__ import annotations

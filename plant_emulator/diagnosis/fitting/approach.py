@@ -2,7 +2,8 @@
 
 Far from the data a free simulation has one local minimum for every way in which contact may come
 and go. A fit is led along the measured outputs first (`lead`), and then left to run freely for
-longer and longer times (`let_go`): a homotopy from prediction errors to simulation errors.
+longer and longer times (`let_go`): a homotopy from prediction errors to simulation errors. What the
+noise explains leads nothing, so that both are the same at the right values.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fit_result import FitResult, FitValues
+from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.joint_fit import (
     charged,
     fit,
@@ -86,8 +88,13 @@ def lead_best(
 def let_go(
     model: Model, led: FitValues, runs: Sequence[int], iterations: int = APPROACH_ITERATIONS
 ) -> FitValues:
-    """A fit along the measured outputs, left to run freely for longer and longer times."""
+    """A fit along the measured outputs, left to run freely for longer and longer times.
+
+    It ends where its values already leave nothing but noise when they run freely.
+    """
     for interval in CORRECTION_INTERVALS[1:]:
+        if _mean_square(model, led, runs) <= NOISE_MEAN_SQUARE:
+            break
         led = lead(model, led, runs, interval, iterations)
     return led
 

@@ -57,14 +57,37 @@ def test_contact_comes_in_time_at_wrong_friction(nominal: ParameterSet, bench_lo
     assert missed[1] < 0.5 * missed[0]
 
 
-def test_noise_of_the_speeds_moves_no_contact(nominal: ParameterSet, bench_log: ReadLog) -> None:
-    """Without a dead zone it does: led, this log leaves three squares of the noise a sample."""
-    run = recording(bench_log("bench_practice/practice_004/program2"))
+def coarse(log: Log, step: float) -> Log:
+    """The log with a quantised drum speed, of noise that hardly reaches the next step."""
+    noisy = log["drum_speed"] + np.random.default_rng(5).normal(0.0, 0.2 * step, len(log.time))
+    shown = step * np.round(noisy / step)
+    return Log(log.time, {**log.signals, "drum_speed": shown}, log.source)
+
+
+@pytest.mark.parametrize("step", [0.0, 0.05], ids=["fine", "coarse"])
+def test_noise_of_the_speeds_moves_no_contact(
+    nominal: ParameterSet, bench_log: ReadLog, step: float
+) -> None:
+    """Without a dead zone it does: led, these logs leave 3 and 11 squares of the noise a sample."""
+    log = bench_log("bench_practice/practice_004/program2")
+    if step:
+        log = coarse(bench_log("bench_nominal/program2"), step)
+    run = recording(log)
     free, led = (
         simulate(run.inputs, nominal.values(), along=along)
         for along in (None, run.measured_speeds(INTERVAL))
     )
     assert mean_square_residual(run.log, led) < 1.01 * mean_square_residual(run.log, free)
+
+
+def test_dead_zone_is_the_noise_or_half_a_step(bench_log: ReadLog) -> None:
+    """Motor speeds differ by less than their noise, and the drum's are 0.05 rad/s apart."""
+    run = recording(bench_log("bench_practice/practice_004/program2"))
+    names = ("motor_speed", "drum_speed")
+    noise = [run.noise[run.channels.index(name)] for name in names]
+    assert run.measured_speeds(INTERVAL).dead_zones == pytest.approx(noise)
+    steps = recording(coarse(run.log, 0.05)).measured_speeds(INTERVAL).dead_zones
+    assert steps == pytest.approx([noise[0], 0.025], rel=1e-6)
 
 
 @pytest.mark.parametrize("channel", ["motor_speed", "drum_speed"])

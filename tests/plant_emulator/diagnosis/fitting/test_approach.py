@@ -9,11 +9,13 @@ import pytest
 from plant_emulator.diagnosis.fit_result import FitResult, FitValues
 from plant_emulator.diagnosis.fitting import approach as approaching
 from plant_emulator.diagnosis.fitting.approach import (
+    CORRECTION_INTERVALS,
     FIRST_ITERATIONS,
     approach,
     fit_null,
     lead,
     lead_best,
+    let_go,
     nearest,
 )
 from plant_emulator.diagnosis.fitting.joint_fit import fit
@@ -93,6 +95,26 @@ def test_start_near_the_noise_is_kept(model: BenchModel) -> None:
     reached = fit(model, (), RUNS, near.values, near.states)
     assert nearest(model, [nominal_start(model), reached], RUNS) is reached
     assert nearest(model, [nominal_start(model)], RUNS) is None
+
+
+@pytest.mark.parametrize(("off", "led"), [(1.0, 0), (1.3, len(CORRECTION_INTERVALS) - 1)])
+def test_values_that_leave_noise_are_let_go_at_once(
+    model: BenchModel, monkeypatch: pytest.MonkeyPatch, off: float, led: int
+) -> None:
+    """The right values need no further fit along the measured speeds, and another friction does."""
+    near = approach(model, nominal_start(model), RUNS)
+    right = fit(model, (), RUNS, near.values, near.states)
+    friction = {"gear_coulomb_friction": off * right.values["gear_coulomb_friction"]}
+    start = replace(right, values={**right.values, **friction})
+    intervals = []
+
+    def kept(there: BenchModel, one: FitValues, runs: object, interval: float, most: int) -> object:
+        intervals.append(interval)
+        return one
+
+    monkeypatch.setattr(approaching, "lead", kept)
+    assert let_go(model, start, RUNS) is start
+    assert intervals == list(CORRECTION_INTERVALS[len(CORRECTION_INTERVALS) - led :])
 
 
 def test_bench_near_the_limit_of_its_voltage_is_led_to_the_noise_again(
