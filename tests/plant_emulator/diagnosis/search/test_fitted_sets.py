@@ -9,6 +9,7 @@ import pytest
 from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
+from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.search.confirmation import Trial
 from plant_emulator.diagnosis.search.fitted_sets import FittedSets
 from plant_emulator.diagnosis.search.screening import promises
@@ -90,3 +91,17 @@ def test_all_effects_are_fitted_on_top_of_a_fit_that_leaves_noise() -> None:
     sets = FittedSets(runner=runner(model), null=null)
     found = sets.fit_on_top(null, promises(runner(model), null), 5.0)
     assert {one.effects for one in found} == {("wave",), ("kink",)}
+
+
+@pytest.mark.parametrize(("kink", "kept"), [(0.0, ("wave",)), (5.0, ("kink", "wave"))])
+def test_first_effect_goes_if_the_next_one_makes_it_needless(
+    kink: float, kept: tuple[str, ...]
+) -> None:
+    """The wave was never fitted alone; by hand, a kink of 5 gains 2083 beside it, and needs 40."""
+    model = Line([noisy(kink * abs(TIME) + 3.0 * np.sin(20.0 * TIME))], ("kink", "wave"))
+    null = fit_null(model, (0,))
+    both = fit(model, ("kink", "wave"), (0,), {"a": 0.0, "b": 0.0}, [{}])
+    sets = FittedSets(runner=runner(model), null=null)
+    sets.sets = {frozenset(): null, frozenset(both.effects): both}
+    assert sets.settled().effects == kept
+    assert [step.effects for step in sets.trace if step.action == "reduced"] == [("wave",)]
