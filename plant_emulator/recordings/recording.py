@@ -100,8 +100,8 @@ class Recording:
         """The speeds that count, to lead a simulation along.
 
         They are medians of five, without spikes of up to two samples. The dead zone is the noise of
-        one sample, because noise may be correlated. It is at least half of a step: the medians of a
-        coarse channel stay on one.
+        one sample, several times that of a mean where the noise is white. It is at least half of a
+        step: the medians of a coarse channel stay on one.
         """
         names = ("motor_speed", "drum_speed")
         speeds, dead_zones = {}, np.zeros(len(names))

@@ -4,7 +4,7 @@ The log evidence of a set is half the fall of its penalised cost, less the gain 
 effects needs. A set is refuted where a further effect stands for the error of the others' laws: the
 runs do not agree on its size (`run_agreement`), or it gains little where these laws may have
 another form (`law_forms`). So is each set that holds it, and each last effect that gains no more
-beside the same others.
+beside the same others. What is left of it without an earlier effect is fitted then.
 """
 
 from __future__ import annotations
@@ -47,7 +47,6 @@ class FittedSets:
     beside_random : whether a random effect is part of that noise
     sets : the best fit of each set, at first of those that are known
     agreed : whether the runs and other forms of the laws agree on it, where they were asked
-    reduced : sets that were fitted without each of their effects
     promises : what one more effect promises on top of a set
     expanded : sets whose most promising effects were tried on top of them
     secants_fitted : whether the library was fitted by secants from this fit without effects; in
@@ -59,7 +58,6 @@ class FittedSets:
     beside_random: bool = False
     sets: dict[frozenset[str], FitResult] = field(default_factory=dict)
     agreed: dict[frozenset[str], bool] = field(default_factory=dict)
-    reduced: set[frozenset[str]] = field(default_factory=set)
     promises: dict[frozenset[str], list[Promise]] = field(default_factory=dict)
     expanded: set[frozenset[str]] = field(default_factory=set)
     secants_fitted: bool = False
@@ -183,34 +181,17 @@ class FittedSets:
                 and len(key) == max(1, len(best.effects))
                 and one.cost < best.cost + SETTINGS.near + (not one.converged) * excess(best)
             ]
-            if not near and not self._exceeds(best) and self._agrees(best):
+            if not near and self._agrees(best):
                 return best
             for one in self.fits(refit, near):
                 done.add(frozenset(one.effects))
                 self.trace.append(search_step(self.null, "converged", one))
 
-    def _exceeds(self, found: FitResult) -> bool:
-        """Whether one effect less is worth more than a set, begun where the set leads (once asked).
-
-        A first effect may be needless beside the next one, which is the cause, and makes its size
-        differ from run to run. It is the backward step of a floating search (P. Pudil and others,
-        Pattern Recognition Letters 15 (1994) 1119).
-        """
-        key = frozenset(found.effects)
-        if len(key) < 2 or key in self.reduced:
-            return False
-        self.reduced.add(key)
-        asked = [Reduction(found, self.runner.runs, name) for name in found.effects[:-1]]
-        for one in self.runner.map(reduce, asked):
-            self.keep(one)
-            self.trace.append(search_step(self.null, "reduced", one))
-        return min(self.unrefuted.values(), key=self.value).effects != found.effects
-
     def _agrees(self, found: FitResult) -> bool:
         """Whether each further effect of a set has one size, and gains beside other forms of laws.
 
         It is asked once. Where one has not, an effect that gains more may take the place of the
-        last one.
+        last one, or the last one that of the others.
         """
         key, base = frozenset(found.effects), frozenset(found.effects[:-1])
         if len(key) < 2 or key in self.agreed:
@@ -225,7 +206,19 @@ class FittedSets:
             self.agreed[key] = self.gain_beside_forms(found, found.effects[1:])
         if not self.agreed[key]:
             self.expanded.discard(base)
+            self._reduce(found)
         return self.agreed[key]
+
+    def _reduce(self, found: FitResult) -> None:
+        """Fit a refuted set without each of its earlier effects, from where it leads.
+
+        A wrong first effect bends the size of the cause from run to run. It is the backward step of
+        a floating search (P. Pudil and others, Pattern Recognition Letters 15 (1994) 1119).
+        """
+        asked = [Reduction(found, self.runner.runs, name) for name in found.effects[:-1]]
+        for one in self.runner.map(reduce, asked):
+            self.keep(one)
+            self.trace.append(search_step(self.null, "reduced", one))
 
     def gain_beside_forms(self, found: FitResult, effects: Sequence[str]) -> bool:
         """Whether each of these effects of a fit gains enough beside other forms of laws."""

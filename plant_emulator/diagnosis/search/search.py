@@ -103,7 +103,6 @@ class Search(FittedSets):
         self.promises.clear()
         self.expanded.clear()
         self.agreed.clear()
-        self.reduced.clear()
         self.sets = {}
         self.fits(refit, kept)
         self.null = self.sets[frozenset()]
