@@ -140,8 +140,8 @@ class Model(Protocol):
         """Give the machine with residuals that are led along the measured outputs.
 
         A fault then shows where and when it acts, and does not move all that follows: the cost has
-        far fewer local minima than that of a free simulation. What noise explains leads nothing: a
-        right simulation is the free one.
+        far fewer local minima than that of a free simulation. White noise leads nothing: a right
+        simulation is the free one.
 
         interval : between two corrections [s]
         """

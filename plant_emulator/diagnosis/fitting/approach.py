@@ -2,8 +2,8 @@
 
 Far from the data a free simulation has one local minimum for every way in which contact may come
 and go. A fit is led along the measured outputs first (`lead`), and then left to run freely for
-longer and longer times (`let_go`): a homotopy from prediction errors to simulation errors. What the
-noise explains leads nothing, so that both are the same at the right values.
+longer and longer times (`let_go`): a homotopy from prediction errors to simulation errors. White
+noise leads nothing, so that both are the same at the right values.
 """
 
 from __future__ import annotations
