@@ -45,8 +45,9 @@ SPEED_SMOOTHING, CONTACT_TIME = 0.2, 0.2
 # [rad/s^2]. The first is above the noise. The second is above what bearings do to a drum that
 # floats in the gap.
 DRIVEN_ACCELERATION, BRAKED_ACCELERATION = 0.25, 0.75
-# In contact, gear and drum differ by less than this [rad/s] plus this share of their speed.
-CONTACT_SPEED, CONTACT_SHARE = 0.03, 0.02
+# In contact, gear and drum differ by less than this [rad/s], plus this share of their speed, plus
+# what a lag of this time makes of their acceleration [s].
+CONTACT_SPEED, CONTACT_SHARE, CONTACT_LAG = 0.03, 0.02, 0.1
 # Time between the samples that are taken [s], and the least number of such samples.
 SPACING, LEAST_CONTACT_SAMPLES = 0.05, 20
 # Error of delta that smoothing leaves, beside the noise of the speeds [rad].
@@ -96,9 +97,8 @@ def speed_deficit_of(log: Log, values: Mapping[str, float]) -> SpeedDeficit | No
     faster = driven * np.sign(speed)
     flank = np.sign(driven) * ((faster > DRIVEN_ACCELERATION) | (faster < -BRAKED_ACCELERATION))
     apart = np.abs(smooth(log.time, gear_speed - drum_speed, SPEED_SMOOTHING))
-    counts = _steady(flank, CONTACT_TIME / period) & (
-        apart < CONTACT_SPEED + CONTACT_SHARE * np.abs(speed)
-    )
+    together = CONTACT_SPEED + CONTACT_SHARE * np.abs(speed) + CONTACT_LAG * np.abs(driven)
+    counts = _steady(flank, CONTACT_TIME / period) & (apart < together)
     index = np.flatnonzero(counts)[:: max(1, round(SPACING / period))]
     if len(index) < LEAST_CONTACT_SAMPLES:
         return None

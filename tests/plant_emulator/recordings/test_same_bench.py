@@ -78,6 +78,17 @@ def test_scale_of_the_nominal_bench_is_nothing(
         assert abs(found.share) < EQUATION_ERROR
 
 
+@pytest.mark.parametrize("lag", [0.07, 0.1])
+def test_lag_of_the_drums_sensor_hides_no_contact(
+    lag: float, nominal: ParameterSet, values: Mapping[str, float]
+) -> None:
+    effect = {"drum_speed_lag": {"time_constant": lag}}
+    log = simulate("program1", parameters=nominal, effects=effect, seed=1)
+    found = speed_deficit_of(log, values)
+    assert found is not None
+    assert abs(found.share) < EQUATION_ERROR
+
+
 def test_difference_of_a_sensors_scale_is_told_from_six_errors_on(
     bench_log: BenchLog, values: Mapping[str, float]
 ) -> None:
