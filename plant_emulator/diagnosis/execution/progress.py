@@ -28,6 +28,7 @@ LABELS = {
     "confirm": "first fits of effects",
     "lead_start": "fits along the measured speeds",
     "refit_along": "fits along the measured speeds",
+    "start_along": "fits along the measured speeds",
     "refit_led": "fits along the measured speeds",
     "fit_by_secants": "fits along the measured speeds",
     "refit": "fits to their end",

@@ -53,7 +53,7 @@ def nearest(
 
     far : mean square above which a start is far
     """
-    squares = [_mean_square(model, one, runs) for one in starts]
+    squares = [mean_square(model, one, runs) for one in starts]
     return starts[int(np.argmin(squares))] if min(squares) <= far else None
 
 
@@ -93,13 +93,13 @@ def let_go(
     It ends where its values already leave nothing but noise when they run freely.
     """
     for interval in CORRECTION_INTERVALS[1:]:
-        if _mean_square(model, led, runs) <= NOISE_MEAN_SQUARE:
+        if mean_square(model, led, runs) <= NOISE_MEAN_SQUARE:
             break
         led = lead(model, led, runs, interval, iterations)
     return led
 
 
-def _mean_square(model: Model, start: FitValues, runs: Sequence[int]) -> float:
+def mean_square(model: Model, start: FitValues, runs: Sequence[int]) -> float:
     """Mean square of the whitened residual at a start."""
     rows = [
         model.residual(k, start.effects)({**start.values, **own})
@@ -132,6 +132,12 @@ def lead(
     return to_result(start.effects, found, len(runs), charged(model, start.effects))
 
 
+def own_start(model: Model, runs: Sequence[int]) -> FitValues:
+    """The model's own start values and states, without effects."""
+    values, states = model.start_values(runs)
+    return FitValues(effects=(), values=values, states=tuple(states))
+
+
 def fit_null(model: Model, runs: Sequence[int]) -> FitResult:
     """Fit without effects from the model's own start values.
 
@@ -140,8 +146,7 @@ def fit_null(model: Model, runs: Sequence[int]) -> FitResult:
     voltage had ended at 32 times the noise (see the tests). A fit that is led to where it was
     before lacks a cause.
     """
-    values, states = model.start_values(runs)
-    start = FitValues(effects=(), values=values, states=tuple(states))
+    start = own_start(model, runs)
     near = nearest(model, [start], runs)
     if near is not None:
         return _fit_without_effects(model, near, runs)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.approach import approach, fit_null, lead
+from plant_emulator.diagnosis.fitting.approach import approach, fit_null, lead, own_start
 from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_from
 
 if TYPE_CHECKING:
@@ -41,3 +41,11 @@ def refit_along(model: Model, task: Task) -> FitResult:
     See `approach.lead`.
     """
     return lead(model, task.base, task.runs)
+
+
+def start_along(model: Model, runs: tuple[int, ...]) -> FitResult:
+    """The fit without effects, led along the measured outputs from the model's own start (a step).
+
+    See `approach.lead`.
+    """
+    return lead(model, own_start(model, runs), runs)

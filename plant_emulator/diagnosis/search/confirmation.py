@@ -10,8 +10,10 @@ import numpy as np
 from plant_emulator.diagnosis.fit_result import FitValues
 from plant_emulator.diagnosis.fitting.approach import (
     APPROACH_ITERATIONS,
+    CORRECTION_INTERVALS,
     lead_best,
     let_go,
+    mean_square,
     nearest,
 )
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
@@ -132,9 +134,15 @@ def _far(trial: Trial) -> float:
 
 
 def _lead(model: Model, trial: Trial) -> FitResult:
-    """The fit along the measured outputs from the best of all starts."""
-    plausible = (_plausible(model, trial, one) for one in trial.starts[:1])
-    starts = [_values(trial, one) for one in (*trial.starts, *trial.further, *plausible)]
+    """The fit along the measured outputs from the best start.
+
+    It is sought among those that leave least so as they are, and the plausible one.
+    """
+    observer = model.observer(CORRECTION_INTERVALS[0])
+    told = [_values(trial, one) for one in (*trial.starts, *trial.further)]
+    told.sort(key=lambda one: mean_square(observer, one, trial.runs))
+    plausible = [_values(trial, _plausible(model, trial, one)) for one in trial.starts[:1]]
+    starts = [*told[: SETTINGS.most_started], *plausible]
     iterations = trial.iterations or APPROACH_ITERATIONS
     return lead_best(model, starts, trial.runs, iterations, _far(trial))
 

@@ -4,7 +4,7 @@ The log evidence of a set is half the fall of its penalised cost, less the gain 
 effects needs. A set is refuted where a further effect stands for the error of the others' laws: the
 runs do not agree on its size (`run_agreement`), or it gains little where these laws may have
 another form (`law_forms`). So is each set that holds it, and each last effect that gains no more
-beside the same others. What is left of it without an earlier effect is fitted then.
+beside the same others. What is left of it without one effect is fitted then.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, excess
-from plant_emulator.diagnosis.fitting.fit_steps import refit, refit_along
+from plant_emulator.diagnosis.fitting.fit_steps import refit, refit_along, start_along
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.confirmation import (
     Reduction,
@@ -48,6 +48,7 @@ class FittedSets:
     sets : the best fit of each set, at first of those that are known
     agreed : whether the runs and other forms of the laws agree on it, where they were asked
     promises : what one more effect promises on top of a set
+    led_fits : along the measured outputs, of sets on top of which others were tried
     expanded : sets whose most promising effects were tried on top of them
     secants_fitted : whether the library was fitted by secants from this fit without effects; in
         another noise these fits choose hardly otherwise
@@ -59,6 +60,7 @@ class FittedSets:
     sets: dict[frozenset[str], FitResult] = field(default_factory=dict)
     agreed: dict[frozenset[str], bool] = field(default_factory=dict)
     promises: dict[frozenset[str], list[Promise]] = field(default_factory=dict)
+    led_fits: dict[frozenset[str], FitResult] = field(default_factory=dict)
     expanded: set[frozenset[str]] = field(default_factory=set)
     secants_fitted: bool = False
     trace: list[SearchStep] = field(default_factory=list)
@@ -75,11 +77,31 @@ class FittedSets:
         self.sets |= {frozenset(one.effects): one for one in found}
         return found
 
+    def is_far(self, found: FitResult) -> bool:
+        """Whether a fit leaves so much that slopes around it may mislead."""
+        return found.mean_square > SETTINGS.linear_mean_square
+
+    def led(self, base: FitResult) -> FitResult:
+        """The fit of a set along the measured outputs, begun at its free fit.
+
+        Far from the data the free fit without effects has bent the parameters, some up to their
+        bounds. The led one then begins at the model's own start.
+        """
+        key = frozenset(base.effects)
+        if key not in self.led_fits:
+            if key or not self.is_far(base):
+                (found,) = self.runner.map(refit_along, [self.task(base)])
+            else:
+                (found,) = self.runner.map(start_along, [self.runner.runs])
+            self.led_fits[key] = found
+        return self.led_fits[key]
+
     def take_null(self, null: FitResult) -> None:
         """Take a better fit without effects in the place of the known one."""
         self.trace.append(search_step(self.null, "fitted anew", null))
         self.null = self.sets[frozenset()] = null
         self.promises.pop(frozenset(), None)
+        self.led_fits.pop(frozenset(), None)
         self.secants_fitted = False
 
     def fit_on_top(self, base: FitResult, new: Sequence[Promise], least: float) -> list[FitResult]:
@@ -87,15 +109,15 @@ class FittedSets:
 
         Where the base leaves more than noise, a regression may mislead, and a free fit is long. The
         effects are led along the measured outputs first. The one that gains most there is fitted
-        freely. So are others, as long as a regression promises more of one than any has reached: a
-        led fit may be in a local minimum as well. Of the rest those are fitted for less long that
-        gain half of the most there, or half of what was reached, or whose simulation promises that:
-        what is slow adds up in a free simulation only.
+        freely. So are other first ones, as long as a regression promises more of one than any has
+        reached: a led fit may be in a local minimum as well. Of the rest those are fitted for less
+        long that gain half of the most there, or half of what was reached, or whose simulation
+        promises that: what is slow adds up in a free simulation only.
         """
         trials = [trial_of(p, base, self.runner.runs, SETTINGS.leader_iterations) for p in new]
         if base.mean_square <= NOISE_MEAN_SQUARE or len(trials) < 2:
             return self.confirm([*trials[:1], *(_shorter(trial) for trial in trials[1:])])
-        (own,) = self.runner.map(refit_along, [self.task(base)])
+        own = self.led(base)
         pairs = list(self.runner.map(lead_start, trials))
         self.trace += [search_step(own, "led", led, trial.promised) for trial, led in pairs]
         gains = [0.5 * (own.cost - led.cost) for _, led in pairs]
@@ -103,7 +125,7 @@ class FittedSets:
         trials = [trial for trial, _ in pairs]
         promised = [max(trial.promised.values(), default=0.0) for trial in trials]
         found = self.confirm([trials[first]])
-        for k in sorted(rest, key=lambda k: -promised[k]):
+        for k in sorted(rest if not base.effects else [], key=lambda k: -promised[k]):
             if promised[k] > _gain(base, found):
                 found += self.confirm([trials[k]])
                 rest.remove(k)
@@ -157,13 +179,19 @@ class FittedSets:
         same = key > set(refuted.effects[:-1])
         return same and one.converged and one.cost >= refuted.cost
 
-    def needed(self, others: int) -> float:
-        """Least gain of log evidence that an effect needs beside so many others."""
-        return SETTINGS.needed_again if others or self.beside_random else SETTINGS.needed
+    def needed(self, found: FitResult, others: int) -> float:
+        """Least gain of log evidence that an effect needs beside so many others.
+
+        found : fit of the set; the law of its first effect is off by a share of what that explains
+        """
+        if not others:
+            return SETTINGS.needed_again if self.beside_random else SETTINGS.needed
+        explained = 0.5 * (self.null.cost - found.cost)
+        return max(SETTINGS.needed_again, SETTINGS.law_error_along * explained)
 
     def value(self, found: FitResult) -> float:
         """Negative log evidence of a set, with the gain that each of its effects needs."""
-        return 0.5 * found.cost + sum(map(self.needed, range(len(found.effects))))
+        return 0.5 * found.cost + sum(self.needed(found, k) for k in range(len(found.effects)))
 
     def settled(self) -> FitResult:
         """Refit all sets near the best one until they converge; return the best.
@@ -210,12 +238,13 @@ class FittedSets:
         return self.agreed[key]
 
     def _reduce(self, found: FitResult) -> None:
-        """Fit a refuted set without each of its earlier effects, from where it leads.
+        """Fit a refuted set without each of its effects, from where it leads.
 
-        A wrong first effect bends the size of the cause from run to run. It is the backward step of
-        a floating search (P. Pudil and others, Pattern Recognition Letters 15 (1994) 1119).
+        A wrong first effect bends the size of the cause from run to run; a needless last one may
+        lead the others out of a local minimum. It is the backward step of a floating search
+        (P. Pudil and others, Pattern Recognition Letters 15 (1994) 1119).
         """
-        asked = [Reduction(found, self.runner.runs, name) for name in found.effects[:-1]]
+        asked = [Reduction(found, self.runner.runs, name) for name in found.effects]
         for one in self.runner.map(reduce, asked):
             self.keep(one)
             self.trace.append(search_step(self.null, "reduced", one))

@@ -62,16 +62,16 @@ def starts_of(promise: Promise, base: FitResult) -> tuple[tuple[Start, ...], tup
 
 
 def leading(
-    found: Sequence[Promise], most: int, least: float, tried: Sequence[str], share: float
+    found: Sequence[Promise], most: int, least: float, tried: Sequence[str]
 ) -> list[Promise]:
-    """So many effects of each score that gain this share of its most or more, score by score.
+    """So many effects of each score that gain half of its most or more, score by score.
 
     least : gain that an effect must promise; tried : effects to leave out
     """
     near: dict[str, Promise] = {}
     for score in dict.fromkeys(score for p in found for score in p.gains):
         order = sorted(found, key=lambda p: -p.gains.get(score, 0.0))
-        needed = max(least, share * order[0].gains.get(score, 0.0))
+        needed = max(least, SETTINGS.rival_share * order[0].gains.get(score, 0.0))
         rest = [p for p in order if p.effect not in tried][:most]
         near |= {p.effect: p for p in rest if p.gains.get(score, 0.0) > needed}
     return list(near.values())
@@ -83,12 +83,8 @@ def to_try(
     """Effects to try on top of a fit: the leading ones that were not tried.
 
     Without effects, where no more than noise is left, an effect is faint: its gain may be several
-    times the promised one, and a fit is cheap. All that promise something are tried there. Beside
-    effects that leave more than noise, a cause may promise less than half of what others do that
-    only follow parameters which are not nominal.
+    times the promised one, and a fit is cheap. All that promise something are tried there.
     """
-    noise = base.mean_square <= NOISE_MEAN_SQUARE
-    if noise and not base.effects:
+    if base.mean_square <= NOISE_MEAN_SQUARE and not base.effects:
         return [p for p in found if p.gain > least]
-    share = SETTINGS.rival_share if noise or not base.effects else 0.0
-    return leading(found, SETTINGS.leaders, least, tried, share)
+    return leading(found, SETTINGS.leaders, least, tried)

@@ -2,11 +2,12 @@
 
 A linear regression predicts it, in the relations and in the simulation's residual. What is local is
 clean in the first; what is slow and faint adds up in the second. A large gap bends the parameters
-of the fit without effects, and slopes there mislead. The relations are those at the nominal
-parameters then. Beside effects that leave a gap they are both: the fit may be near the truth, or
-bent as well. A sagging voltage beside a lag promised nothing at parameters that had made its limit
-inactive, and 85 000 at the nominal ones. On top of effects that leave noise the simulation is
-right, and tells all that the relations tell.
+of the fit without effects, some up to their bounds, and contact comes at the wrong time in its
+simulation. The relations are those at the nominal parameters then, and the simulation is led along
+the measured outputs. Beside effects that leave a gap the relations are both: the fit may be near
+the truth, or bent as well. A sagging voltage beside a lag promised nothing at parameters that had
+made its limit inactive, and 85 000 at the nominal ones. On top of effects that leave noise the
+simulation is right, and tells all that the relations tell.
 """
 
 from __future__ import annotations
@@ -92,16 +93,19 @@ class Screening:
     states: Mapping[str, Sequence[Mapping[str, float]]]
 
 
-def promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
-    """Predicted gains of all effects on top of a fit, the largest first."""
-    fidelities: tuple[str, ...] = (RELATIONS, SIMULATION)
+def promises(runner: TaskRunner, base: FitResult, led: FitResult | None) -> list[Promise]:
+    """Predicted gains of all effects on top of a fit, the largest first.
+
+    led : the fit along the measured outputs, if the base is far from the data
+    """
+    effects = tuple(visible(runner.model, base, runner.runs))
+    if led is not None:
+        beside = (RELATIONS,) if base.effects else ()
+        return regressions(runner, led, effects, (*beside, NOMINAL_RELATIONS, OBSERVER))
     if _leaves_noise(base):
-        fidelities = (SIMULATION,)
-    elif base.effects:
-        fidelities = (RELATIONS, NOMINAL_RELATIONS, SIMULATION)
-    elif base.mean_square > SETTINGS.linear_mean_square:
-        fidelities = (NOMINAL_RELATIONS, SIMULATION)
-    return regressions(runner, base, tuple(visible(runner.model, base, runner.runs)), fidelities)
+        return regressions(runner, base, effects, (SIMULATION,))
+    nominal = (NOMINAL_RELATIONS,) if base.effects else ()
+    return regressions(runner, base, effects, (RELATIONS, *nominal, SIMULATION))
 
 
 def regressions(

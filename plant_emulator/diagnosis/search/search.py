@@ -73,8 +73,7 @@ class Search(FittedSets):
         Where that shows another noise, the queue starts again.
         """
         self.sets[frozenset()] = self.null
-        far = self.null.mean_square > SETTINGS.linear_mean_square
-        self._estimate_noise(self._queue(1) if far else self.null)
+        self._estimate_noise(self._queue(1) if self.is_far(self.null) else self.null)
         best = self._queue(SETTINGS.most_effects)
         if best.effects and not leaves_most(best, self.null) and self._estimate_noise(best):
             best = self._queue(SETTINGS.most_effects)
@@ -101,6 +100,7 @@ class Search(FittedSets):
         self.runner = replace(self.declared, recipe=recipe, model=build_model(recipe))
         kept = not_told_apart(self.unrefuted)
         self.promises.clear()
+        self.led_fits.clear()
         self.expanded.clear()
         self.agreed.clear()
         self.sets = {}
@@ -126,6 +126,7 @@ class Search(FittedSets):
         """Whether no effect is worth adding: the cause is foreign, or what is left is random.
 
         Near the noise one of two causes may leave most of the gap: a regression tells the other.
+        A further effect that leaves most of what the others left is no base for another one.
         The noise of a random effect is that of few courses of its law. A gain within it means
         little.
         """
@@ -134,16 +135,21 @@ class Search(FittedSets):
             return True
         if not found.effects:
             return False
-        far = found.mean_square > SETTINGS.linear_mean_square
-        foreign = far and leaves_most(found, self.null)
+        smaller = self.sets.get(frozenset(found.effects[:-1]), self.null)
+        foreign = leaves_most(found, smaller) if found.effects[1:] else self._is_foreign(found)
         if found.mean_square > NOISE_MEAN_SQUARE:
             return foreign or (leaves_random(found) and not self.beside_random)
         return all(p.gain <= self._promising(found) for p in self._screen(found))
 
+    def _is_foreign(self, found: FitResult) -> bool:
+        """Whether a fit far from the data leaves most of the gap."""
+        return self.is_far(found) and leaves_most(found, self.null)
+
     def _screen(self, found: FitResult) -> list[Promise]:
         key = frozenset(found.effects)
         if key not in self.promises:
-            self.promises[key] = promises(self.runner, found)
+            led = self.led(found) if self.is_far(found) else None
+            self.promises[key] = promises(self.runner, found, led)
         return self.promises[key]
 
     def _promising(self, found: FitResult) -> float:
@@ -172,7 +178,7 @@ class Search(FittedSets):
             return
         self.secants_fitted = True
         reached = 0.0
-        for one in fitted_promises(self.runner, base)[: SETTINGS.most_followed]:
+        for one in fitted_promises(self.runner, self.led(base))[: SETTINGS.most_followed]:
             if one.gain <= max(least, SETTINGS.rival_share * reached):
                 break
             known = self.sets.get(frozenset([one.effect]), base)
@@ -265,7 +271,7 @@ class Search(FittedSets):
         final = replace(final, standard_errors=errors)
         key, sets = frozenset(final.effects), self.unrefuted
         larger = {
-            p.effect: self.needed(len(key)) - p.gains.get(SIMULATION, 0.0)
+            p.effect: self.needed(final, len(key)) - p.gains.get(SIMULATION, 0.0)
             for p in self.promises.get(key, [])
             if not self.refuted(key | {p.effect})
         }

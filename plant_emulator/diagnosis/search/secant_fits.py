@@ -17,10 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fitting.approach import CORRECTION_INTERVALS
-from plant_emulator.diagnosis.fitting.fit_steps import refit_along
 from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
 from plant_emulator.diagnosis.fitting.signature import signs, values_at_size
-from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.promise import Promise, Start
 from plant_emulator.diagnosis.search.screening import OBSERVER, regressions, visible
 from plant_emulator.diagnosis.search.settings import SETTINGS
@@ -60,9 +58,10 @@ def fitted_promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
     """Gains of effects over the fit without any, each fitted by secants, the largest first.
 
     All effects are fitted for some iterations, and the best for more.
+
+    base : the fit without effects along the measured outputs
     """
     fitted: list[Promise] = []
-    (base,) = runner.map(refit_along, [Task(base=base, runs=runner.runs)])
     library = visible(runner.model, base, runner.runs)
     names, with_states = tuple(library), [n for n, c in library.items() if c.states]
     found = regressions(runner, base, with_states, (OBSERVER,))

@@ -43,6 +43,10 @@ class Settings:
     # follow nearly all of an effect blur what its slopes tell.
     needed_again: float = 40.0
     promising_again: float = 15.0
+    # Share of what a set explains that one more effect must gain: the error of a law follows any
+    # other effect by chance, and adds up with what the law explains. Needless effects gained up to
+    # 9e-6 of it, effects that are there 1.2e-4 and more.
+    law_error_along: float = 3e-5
     # Most effects of a set: nobody has told more than three causes apart in one set of logs.
     most_effects: int = 3
     # Relative error of an approximate law: other laws of the same effect differed by up to this. It
@@ -55,6 +59,9 @@ class Settings:
     # effects that leave noise: contact and limits move with the fit, so that the order by promise
     # is not yet that by fit.
     leaders: int = 3
+    # Starts of an effect that are led along the measured outputs, beside nominal parameters: those
+    # that leave least so as they are.
+    most_started: int = 2
     # Effects that lead the fits by secants and are fitted freely, at most: a leader may not keep
     # what it promised.
     most_followed: int = 3

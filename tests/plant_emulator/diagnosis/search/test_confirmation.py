@@ -168,7 +168,7 @@ def test_states_of_the_effects_stay_at_the_nominal_parameters(
     monkeypatch.setattr(TurnedTone, "initial_states", lambda *_: {"angle": -1.0})
     values = {"a": 2.0, "b": 3.0, "amplitude": 4.0}
     base = fit(model, ("tone",), (0,), values, [{"angle": 0.7}])
-    promises(runner(model), base)
+    promises(runner(model), base, base)
     nominal = asked[1]
     assert nominal.values["a"] == 0.0
     assert nominal.values["amplitude"] == pytest.approx(4.0, abs=0.15)
@@ -252,8 +252,8 @@ def test_leader_that_gains_little_along_the_measured_outputs_is_not_fitted(
 ) -> None:
     """The relations, as the first score, stand for a cube where a wave acts."""
 
-    def with_relations(runner: TaskRunner, base: FitResult) -> list[Promise]:
-        found = promises(runner, base)
+    def with_relations(runner: TaskRunner, base: FitResult, led: FitResult | None) -> list[Promise]:
+        found = promises(runner, base, led)
         wrong = {"cube": 900.0, "wave": 90.0}
         return [replace(p, gains={"relations": wrong.get(p.effect, 0.0), **p.gains}) for p in found]
 

@@ -1,6 +1,6 @@
 """Which of the effects that lead the regressions are fitted freely on top of a fit."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.search.confirmation import Trial
 from plant_emulator.diagnosis.search.fitted_sets import FittedSets
 from plant_emulator.diagnosis.search.screening import promises
+from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import TIME, Line, noisy, runner
 
 
@@ -29,7 +30,7 @@ def test_effects_that_gain_half_of_the_most_along_the_measured_outputs_are_fitte
     null = fit_null(model, (0,))
     alike = [
         replace(p, gains={"relations": 60.0}, starts={"relations": p.starts["simulation"]})
-        for p in promises(runner(model), null)
+        for p in promises(runner(model), null, None)
     ]
     sets = FittedSets(runner=runner(model), null=null)
     found = sets.fit_on_top(null, alike, 5.0)
@@ -47,7 +48,7 @@ def test_effect_whose_simulation_promises_half_of_what_was_reached_is_fitted_too
     for promised, fitted in ((900.0, [("kink",)]), (1100.0, [("kink",), ("wave",)])):
         supposed = [
             replace(p, gains={"simulation": promised}) if p.effect == "wave" else p
-            for p in promises(runner(model), null)
+            for p in promises(runner(model), null, None)
         ]
         sets = FittedSets(runner=runner(model), null=null)
         assert [one.effects for one in sets.fit_on_top(null, supposed, 5.0)] == fitted
@@ -69,7 +70,7 @@ def test_effect_of_which_a_regression_promises_more_than_was_reached_is_fitted_t
         replace(p, gains={"relations": promised}, starts={"relations": p.starts["simulation"]})
         if p.effect == "wave"
         else p
-        for p in promises(runner(model), null)
+        for p in promises(runner(model), null, None)
     ]
     sets = FittedSets(runner=runner(model), null=null)
     asked: list[int | None] = []
@@ -89,7 +90,7 @@ def test_all_effects_are_fitted_on_top_of_a_fit_that_leaves_noise() -> None:
     null = fit_null(model, (0,))
     assert null.mean_square <= NOISE_MEAN_SQUARE
     sets = FittedSets(runner=runner(model), null=null)
-    found = sets.fit_on_top(null, promises(runner(model), null), 5.0)
+    found = sets.fit_on_top(null, promises(runner(model), null, None), 5.0)
     assert {one.effects for one in found} == {("wave",), ("kink",)}
 
 
@@ -106,4 +107,38 @@ def test_refuted_set_is_fitted_without_its_first_effect(
     sets.sets = {frozenset(): null, frozenset(both.effects): both}
     assert sets.settled().effects == kept
     reduced = [step.effects for step in sets.trace if step.action == "reduced"]
-    assert reduced == ([] if len(kept) > 1 else [("wave",)])
+    assert reduced == ([] if len(kept) > 1 else [("wave",), ("kink",)])
+
+
+class Folded(Line):
+    """A line whose offset has either sign: y = |a| + b x. Its own start is a = 1."""
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+        plain = super().residual(run, effects)
+        return lambda v: plain({**v, "a": abs(v["a"])})
+
+    def start_values(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
+        """See `Model`."""
+        return {"a": 1.0, "b": 0.0}, [{} for _ in runs]
+
+
+@pytest.mark.parametrize(("left", "offset"), [(0.0, -2.0), (5.0, 2.0)])
+def test_far_fit_without_effects_is_led_from_the_models_own_start(
+    left: float, offset: float
+) -> None:
+    """The free fit has bent a to -2. By hand: a cosine of 5 leaves 12.5 beside the noise of 1."""
+    model = Folded([noisy(2.0 + 3.0 * TIME + left * np.cos(37.0 * TIME))])
+    bent = fit(model, (), (0,), {"a": -2.0, "b": 3.0}, [{}])
+    led = FittedSets(runner=runner(model), null=bent).led(bent)
+    assert led.values["a"] == pytest.approx(offset, abs=0.3)
+
+
+def test_further_effect_must_gain_more_than_the_error_of_the_first_ones_law() -> None:
+    """By hand: 3e-5 of a gain of 1e8 are 3000; of a small one they are less than 40."""
+    null = fit_null(Line([noisy(2.0 + 3.0 * TIME)]), (0,))
+    sets = FittedSets(runner=runner(Line([noisy(TIME)])), null=null)
+    large, small = (replace(null, cost=null.cost - 2.0 * gain) for gain in (1e8, 1e3))
+    assert sets.needed(large, 1) == pytest.approx(3000.0)
+    assert sets.needed(small, 1) == 40.0
+    assert sets.needed(large, 0) == 15.0

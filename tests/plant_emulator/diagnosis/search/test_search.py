@@ -76,7 +76,7 @@ def test_gain_of_an_effect_whose_columns_bend_is_predicted(gap: float) -> None:
     """
     model = Touching(noisy(2.0 + 3.0 * TIME + 0.36 * np.sin(20.0 * TIME)), gap)
     base = fit(model, (), (0,), {"a": 2.0, "b": 3.0}, [{}])
-    (found,) = promises(runner(model), base)
+    (found,) = promises(runner(model), base, None)
     assert found.gain == pytest.approx(65.0, abs=22.0)
     start = found.starts["simulation"].values
     assert start["wave_size"] == pytest.approx(1.2, abs=0.15)
@@ -105,6 +105,21 @@ def test_rival_of_a_second_effect_is_fitted_where_little_of_the_gap_is_left() ->
     assert sorted(map(sorted, found.classes())) == [["kink", "near kink"], ["wave"]]
 
 
+@pytest.mark.parametrize(("left", "largest"), [(0.0, 3), (2.0, 2)])
+def test_further_effect_that_leaves_most_is_no_base_for_another_one(
+    left: float, largest: int
+) -> None:
+    """By hand: 2 |t| gains 333, and 3 t^3 206. A cosine of 2 has squares of 4000.
+
+    Beside a random effect the noise stays as it is, and the cosine does not pass for it.
+    """
+    y = 2.0 + 3.0 * TIME + 40.0 * np.sin(20.0 * TIME) + 2.0 * np.abs(TIME) + 3.0 * TIME**3
+    model = Line([noisy(y + left * np.cos(37.0 * TIME))], ["wave", "kink", "cube"])
+    there, null = runner(model), fit_null(model, (0,))
+    found = Search(declared=there, runner=there, null=null, beside_random=True).explain()
+    assert max(len(step.effects) for step in found.trace) == largest
+
+
 def test_search_goes_on_from_the_sets_that_are_known(monkeypatch: pytest.MonkeyPatch) -> None:
     """No regression shows the wave, as where the fit without effects is far off."""
     model = Line([noisy(2.0 + 3.0 * TIME + 40.0 * np.sin(20.0 * TIME))])
@@ -114,6 +129,13 @@ def test_search_goes_on_from_the_sets_that_are_known(monkeypatch: pytest.MonkeyP
     sets = {frozenset(known.effects): known}
     found = Search(declared=there, runner=there, null=null, sets=sets, beside_random=True).explain()
     assert found.final.effects == ("wave",)
+
+
+def test_far_gap_is_screened_along_the_measured_outputs() -> None:
+    model = Line([noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME))], ["wave"])
+    null = fit_null(model, (0,))
+    (near,), (far,) = promises(runner(model), null, None), promises(runner(model), null, null)
+    assert (set(near.starts), set(far.starts)) == ({"simulation"}, {"observer"})
 
 
 @pytest.mark.parametrize(("left", "asked"), [(0.0, []), (2.0, [2.0, 0.0])])
@@ -129,7 +151,7 @@ def test_relations_beside_effects_are_also_those_at_nominal_parameters(
     y = 2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME) + left * np.cos(37.0 * TIME)
     model = Line([noisy(y)])
     wave = fit(model, ("wave",), (0,), {**fit_null(model, (0,)).values, "wave_size": 4.0}, [{}])
-    promises(runner(model), wave)
+    promises(runner(model), wave, wave if left else None)
     assert offsets == pytest.approx(asked, abs=0.2)
 
 
@@ -138,9 +160,9 @@ def test_second_effect_is_fitted_where_a_part_of_its_gain_is_promised(
 ) -> None:
     """By hand: the kink gains 2000 1.2^2 / 24 = 120, and needs 40."""
 
-    def of_20(there: TaskRunner, base: FitResult) -> list[Promise]:
+    def of_20(there: TaskRunner, base: FitResult, led: FitResult | None) -> list[Promise]:
         most = 20.0 if base.effects else np.inf
-        found = promises(there, base)
+        found = promises(there, base, led)
         return [replace(p, gains={k: min(v, most) for k, v in p.gains.items()}) for p in found]
 
     monkeypatch.setattr(search, "promises", of_20)
@@ -159,9 +181,9 @@ def test_fit_without_effects_that_ended_far_off_is_fitted_anew(
     squares = float(np.sum(model.residual(0, ())(values) ** 2))
     wrong = replace(right, values=values, cost=squares, sum_of_squares=squares)
 
-    def promised(there: TaskRunner, base: FitResult) -> list[Promise]:
+    def promised(there: TaskRunner, base: FitResult, led: FitResult | None) -> list[Promise]:
         if base is not wrong:
-            return promises(there, base)
+            return promises(there, base, led)
         start = Start(values={**values, "cube_size": 1.0}, states=({},))
         return [Promise(effect="cube", gains={"relations": 100.0}, starts={"relations": start})]
 
