@@ -66,6 +66,7 @@ if TYPE_CHECKING:
 THRESHOLDS = {
     "gain of log evidence that an effect needs": f"{SETTINGS.needed:g}",
     "gain that one more effect needs": f"{SETTINGS.needed_again:g}",
+    "share of what a set explains that one more effect must gain": f"{SETTINGS.law_error_along:g}",
     "share of the gap that named effects may leave": f"{UNEXPLAINED_SHARE:g}",
     "share of the gap that an effect explains, beside which another one is sought": (
         f"{LARGER_SHARE:g}"

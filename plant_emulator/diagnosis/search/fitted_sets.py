@@ -74,8 +74,18 @@ class FittedSets:
     ) -> list[FitResult]:
         """Run a step on each fit, and keep each result under its set of effects."""
         found = list(self.runner.map(step, [self.task(base) for base in bases]))
-        self.sets |= {frozenset(one.effects): one for one in found}
+        for one in found:
+            self._store(one)
         return found
+
+    def _store(self, found: FitResult) -> None:
+        """Take a fit for that of its set. One that comes near the data is screened anew."""
+        key = frozenset(found.effects)
+        if key in self.sets and self.is_far(self.sets[key]) and not self.is_far(found):
+            self.promises.pop(key, None)
+            self.led_fits.pop(key, None)
+            self.expanded.discard(key)
+        self.sets[key] = found
 
     def is_far(self, found: FitResult) -> bool:
         """Whether a fit leaves so much that slopes around it may mislead."""
@@ -85,7 +95,8 @@ class FittedSets:
         """The fit of a set along the measured outputs, begun at its free fit.
 
         Far from the data the free fit without effects has bent the parameters, some up to their
-        bounds. The led one then begins at the model's own start.
+        bounds. The led one then begins at the model's own start, but for a fit without effects that
+        one with effects has led out of a local minimum.
         """
         key = frozenset(base.effects)
         if key not in self.led_fits:
@@ -101,7 +112,7 @@ class FittedSets:
         self.trace.append(search_step(self.null, "fitted anew", null))
         self.null = self.sets[frozenset()] = null
         self.promises.pop(frozenset(), None)
-        self.led_fits.pop(frozenset(), None)
+        (self.led_fits[frozenset()],) = self.runner.map(refit_along, [self.task(null)])
         self.secants_fitted = False
 
     def fit_on_top(self, base: FitResult, new: Sequence[Promise], least: float) -> list[FitResult]:
@@ -111,8 +122,8 @@ class FittedSets:
         effects are led along the measured outputs first. The one that gains most there is fitted
         freely. So are other first ones, as long as a regression promises more of one than any has
         reached: a led fit may be in a local minimum as well. Of the rest those are fitted for less
-        long that gain half of the most there, or half of what was reached, or whose simulation
-        promises that: what is slow adds up in a free simulation only.
+        long that gain half of the most there, or half of what was reached, or, near the data, whose
+        simulation promises that: what is slow adds up in a free simulation only.
         """
         trials = [trial_of(p, base, self.runner.runs, SETTINGS.leader_iterations) for p in new]
         if base.mean_square <= NOISE_MEAN_SQUARE or len(trials) < 2:
@@ -151,7 +162,7 @@ class FittedSets:
         """Keep a fit if it is the best one of its set."""
         key = frozenset(found.effects)
         if key not in self.sets or found.cost < self.sets[key].cost:
-            self.sets[key] = found
+            self._store(found)
             self.agreed.pop(key, None)
 
     @property
@@ -182,11 +193,14 @@ class FittedSets:
     def needed(self, found: FitResult, others: int) -> float:
         """Least gain of log evidence that an effect needs beside so many others.
 
-        found : fit of the set; the law of its first effect is off by a share of what that explains
+        found : fit of the set; an approximate law of the others is off by a share of what the set
+            explains
         """
-        if not others:
-            return SETTINGS.needed_again if self.beside_random else SETTINGS.needed
-        explained = 0.5 * (self.null.cost - found.cost)
+        if not others and not self.beside_random:
+            return SETTINGS.needed
+        library = self.runner.model.candidates
+        approximate = any(not library[name].exact_form for name in found.effects[:others])
+        explained = 0.5 * (self.null.cost - found.cost) if approximate else 0.0
         return max(SETTINGS.needed_again, SETTINGS.law_error_along * explained)
 
     def value(self, found: FitResult) -> float:

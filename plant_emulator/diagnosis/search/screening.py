@@ -212,7 +212,7 @@ def _scores(
     """
     first, *others = SETTINGS.sizes
     found = {name: _first_score(fidelity, candidate, asked) for name, candidate in library.items()}
-    if _leaves_noise(asked.base):
+    if asked.fidelity == SIMULATION and _leaves_noise(asked.base):
         return found
     silent = [name for name, score in found.items() if score is None]
     visible = [name for name, score in found.items() if score is not None]

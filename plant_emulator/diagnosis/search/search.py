@@ -125,8 +125,8 @@ class Search(FittedSets):
     def _is_last(self, found: FitResult) -> bool:
         """Whether no effect is worth adding: the cause is foreign, or what is left is random.
 
-        Near the noise one of two causes may leave most of the gap: a regression tells the other.
-        A further effect that leaves most of what the others left is no base for another one.
+        Near the noise the first of two causes may leave most of the gap: a regression tells the
+        other. A further effect that leaves most of what the others left is no base for another one.
         The noise of a random effect is that of few courses of its law. A gain within it means
         little.
         """
@@ -135,15 +135,18 @@ class Search(FittedSets):
             return True
         if not found.effects:
             return False
-        smaller = self.sets.get(frozenset(found.effects[:-1]), self.null)
-        foreign = leaves_most(found, smaller) if found.effects[1:] else self._is_foreign(found)
+        foreign = leaves_most(found, self._smaller(found))
+        if len(found.effects) == 1:
+            foreign = foreign and self.is_far(found)
         if found.mean_square > NOISE_MEAN_SQUARE:
             return foreign or (leaves_random(found) and not self.beside_random)
         return all(p.gain <= self._promising(found) for p in self._screen(found))
 
-    def _is_foreign(self, found: FitResult) -> bool:
-        """Whether a fit far from the data leaves most of the gap."""
-        return self.is_far(found) and leaves_most(found, self.null)
+    def _smaller(self, found: FitResult) -> FitResult:
+        """The best fit of a set without one of its effects; without effects where none is known."""
+        key = frozenset(found.effects)
+        known = [self.sets[key - {name}] for name in key if key - {name} in self.sets]
+        return min(known, key=lambda one: one.cost, default=self.null)
 
     def _screen(self, found: FitResult) -> list[Promise]:
         key = frozenset(found.effects)
@@ -271,7 +274,8 @@ class Search(FittedSets):
         final = replace(final, standard_errors=errors)
         key, sets = frozenset(final.effects), self.unrefuted
         larger = {
-            p.effect: self.needed(final, len(key)) - p.gains.get(SIMULATION, 0.0)
+            p.effect: (SETTINGS.needed_again if key or self.beside_random else SETTINGS.needed)
+            - p.gains.get(SIMULATION, p.gain)
             for p in self.promises.get(key, [])
             if not self.refuted(key | {p.effect})
         }

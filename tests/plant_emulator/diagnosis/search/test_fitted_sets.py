@@ -95,7 +95,7 @@ def test_all_effects_are_fitted_on_top_of_a_fit_that_leaves_noise() -> None:
 
 
 @pytest.mark.parametrize(("later", "kept"), [(4.0, ("kink", "wave")), (1.5, ("wave",))])
-def test_refuted_set_is_fitted_without_its_first_effect(
+def test_refuted_set_is_fitted_without_each_of_its_effects(
     later: float, kept: tuple[str, ...]
 ) -> None:
     """The wave was never fitted alone. Beside a kink the runs must agree on it, alone not."""
@@ -108,6 +108,9 @@ def test_refuted_set_is_fitted_without_its_first_effect(
     assert sets.settled().effects == kept
     reduced = [step.effects for step in sets.trace if step.action == "reduced"]
     assert reduced == ([] if len(kept) > 1 else [("wave",), ("kink",)])
+
+
+NULL = {"a": 0.0, "b": 0.0}
 
 
 class Folded(Line):
@@ -138,7 +141,38 @@ def test_further_effect_must_gain_more_than_the_error_of_the_first_ones_law() ->
     """By hand: 3e-5 of a gain of 1e8 are 3000; of a small one they are less than 40."""
     null = fit_null(Line([noisy(2.0 + 3.0 * TIME)]), (0,))
     sets = FittedSets(runner=runner(Line([noisy(TIME)])), null=null)
-    large, small = (replace(null, cost=null.cost - 2.0 * gain) for gain in (1e8, 1e3))
+    both = replace(null, effects=("kink", "wave"))
+    large, small = (replace(both, cost=null.cost - 2.0 * gain) for gain in (1e8, 1e3))
     assert sets.needed(large, 1) == pytest.approx(3000.0)
     assert sets.needed(small, 1) == 40.0
     assert sets.needed(large, 0) == 15.0
+    exact = replace(sets.runner.model.candidates["kink"], exact_form=True)
+    sets.runner.model.candidates["kink"] = exact
+    assert sets.needed(large, 1) == 40.0
+
+
+def test_set_that_comes_near_the_data_is_screened_anew() -> None:
+    """By hand: a cosine of 2 leaves squares of 2 beside the noise of 1, far from the data."""
+    y = 2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME)
+    far, near = (
+        fit(Line([noisy(y + left * np.cos(37.0 * TIME))]), ("wave",), (0,), NULL, [{}])
+        for left in (2.0, 0.0)
+    )
+    sets = FittedSets(runner=runner(Line([noisy(y)])), null=near)
+    key = frozenset({"wave"})
+    for found, kept in ((far, True), (replace(far, cost=far.cost - 1.0), True), (near, False)):
+        sets.promises[key], sets.led_fits[key] = [], far
+        sets.expanded.add(key)
+        sets.keep(found)
+        assert [key in known for known in (sets.promises, sets.led_fits, sets.expanded)] == [
+            kept
+        ] * 3
+
+
+def test_fit_without_effects_that_was_fitted_anew_is_led_from_there() -> None:
+    """The model's own start leads to the other sign."""
+    model = Folded([noisy(2.0 + 3.0 * TIME + 5.0 * np.cos(37.0 * TIME))])
+    anew = fit(model, (), (0,), {"a": -2.0, "b": 3.0}, [{}])
+    sets = FittedSets(runner=runner(model), null=anew)
+    sets.take_null(anew)
+    assert sets.led(anew).values["a"] == pytest.approx(-2.0, abs=0.3)

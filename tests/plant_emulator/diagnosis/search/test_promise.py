@@ -40,6 +40,8 @@ def test_all_that_promise_something_are_tried_where_only_noise_is_left() -> None
     assert {p.effect for p in to_try(found, gap, 5.0, [])} == {"a", "b"}
     beside = replace(noise, effects=("f",))
     assert {p.effect for p in to_try(found, beside, 5.0, ["a"])} == {"b"}
+    far = replace(gap, effects=("f",))
+    assert {p.effect for p in to_try(found, far, 5.0, ["a"])} == {"b"}
 
 
 def test_effect_also_starts_at_the_parameters_of_the_set() -> None:
