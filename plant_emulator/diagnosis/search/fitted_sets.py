@@ -190,18 +190,20 @@ class FittedSets:
         same = key > set(refuted.effects[:-1])
         return same and one.converged and one.cost >= refuted.cost
 
+    def least_gain(self, others: int) -> float:
+        """Least gain of log evidence of an effect beside so many others with exact laws."""
+        return SETTINGS.needed_again if others or self.beside_random else SETTINGS.needed
+
     def needed(self, found: FitResult, others: int) -> float:
         """Least gain of log evidence that an effect needs beside so many others.
 
         found : fit of the set; an approximate law of the others is off by a share of what the set
             explains
         """
-        if not others and not self.beside_random:
-            return SETTINGS.needed
         library = self.runner.model.candidates
         approximate = any(not library[name].exact_form for name in found.effects[:others])
         explained = 0.5 * (self.null.cost - found.cost) if approximate else 0.0
-        return max(SETTINGS.needed_again, SETTINGS.law_error_along * explained)
+        return max(self.least_gain(others), SETTINGS.law_error_along * explained)
 
     def value(self, found: FitResult) -> float:
         """Negative log evidence of a set, with the gain that each of its effects needs."""

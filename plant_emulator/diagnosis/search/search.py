@@ -274,8 +274,7 @@ class Search(FittedSets):
         final = replace(final, standard_errors=errors)
         key, sets = frozenset(final.effects), self.unrefuted
         larger = {
-            p.effect: (SETTINGS.needed_again if key or self.beside_random else SETTINGS.needed)
-            - p.gains.get(SIMULATION, p.gain)
+            p.effect: self.least_gain(len(key)) - p.gains.get(SIMULATION, p.gain)
             for p in self.promises.get(key, [])
             if not self.refuted(key | {p.effect})
         }
