@@ -70,6 +70,9 @@ COARSE_TOLERANCE = 2e-3
 # the library a run is as exact in these steps.
 LONGEST_STEP = 0.03
 
+# Gap and damping of the shaft: the one moves the next contact, the other the rebound.
+CONTACT = frozenset({"backlash_half_gap", "drum_shaft_damping"})
+
 
 class BenchModel:
     """The bench with its logs; see `Model`.
@@ -78,6 +81,8 @@ class BenchModel:
     has of its own is a state of every fit. The gap of such a bench is not located, because the
     parity relations know the nominal equations only.
     """
+
+    contact_parameters = CONTACT
 
     def __init__(
         self,

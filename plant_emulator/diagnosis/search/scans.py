@@ -1,4 +1,4 @@
-"""Scans of what an effect adds with many basins: the pause of a converter, a frequency, an angle.
+"""Scans of unknowns with many basins: the pause of a converter, a frequency, an angle, contact.
 
 Regressions tell little of such an unknown, because contact jumps with it, or a wave is out of
 phase. A scan with a robust loss finds its basin (`estimation.robust_scan`).
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.diagnosis.fitting.joint_fit import fit_from
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.search.promise import Start
 from plant_emulator.diagnosis.search.settings import SETTINGS
@@ -25,6 +26,10 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.machine import Candidate, Model
     from plant_emulator.estimation.unknowns import Residual, Unknown
     from plant_emulator.signals.log import Array
+
+# Changes of a contact parameter that are tried [standard errors]. A basin is some ten wide, and the
+# right one was 45 away.
+CONTACT_ERRORS = 4.0 * np.array([k for k in range(-16, 17) if k])
 
 
 def start_states(model: Model, asked: tuple[Task, Sequence[str]]) -> dict[str, dict[str, float]]:
@@ -55,6 +60,33 @@ def scan_states(model: Model, found: FitResult, runs: Sequence[int]) -> Start:
         for k, at in zip(runs, found.states, strict=True)
     )
     return Start(values=found.values, states=states)
+
+
+def refit_scanned(model: Model, task: Task) -> FitResult:
+    """The fit of `task.base`, begun anew where one contact parameter is moved (a step).
+
+    The drum may rock to and fro in the backlash at the wrong times and stay there. An error of less
+    than the noise of the speeds moves contact so, and no simulation that is led along them mends
+    it. A parameter that moves contact is scanned beside all other values as they are.
+    """
+    base = task.base
+
+    def loss(values: Mapping[str, float]) -> float:
+        pairs = zip(task.runs, base.states, strict=True)
+        rows = (model.residual(k, base.effects)({**values, **own}) for k, own in pairs)
+        return sum(cauchy_loss(row) for row in rows)
+
+    trials = [
+        {**base.values, u.name: float(np.clip(base.values[u.name] + change, u.lower, u.upper))}
+        for u in model.parameters
+        if u.name in model.contact_parameters
+        for change in base.standard_errors[u.name] * CONTACT_ERRORS
+    ]
+    best = min([base.values, *trials], key=loss)
+    if best is base.values:
+        return base
+    found = fit_from(model, base.effects, task.runs, replace(base, values=best))
+    return min(base, found, key=lambda one: one.cost)
 
 
 def scan_sizes(model: Model, effects: Sequence[str], runs: Sequence[int], start: Start) -> Start:
