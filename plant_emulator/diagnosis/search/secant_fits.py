@@ -92,8 +92,8 @@ def _promise(model: Model, asked: SecantFits, name: str, near: Estimate) -> Prom
         {**fitted, **{state: told[state] for state in own if state in told}}
         for fitted, told in zip(base.states, asked.states.get(name, base.states), strict=True)
     ]
-    starts = [{**base.values, **values_at_size(candidate, size)} for size in _sizes(candidate)]
-    starts += [_unbent(model, name, asked.runs, near, one, states) for one in starts[1:]]
+    sized = [{**base.values, **values_at_size(candidate, size)} for size in _sizes(candidate)]
+    starts = [_unbent(model, name, asked.runs, near, one, states) for one in sized]
     found = min(
         (
             fit(
