@@ -226,9 +226,10 @@ class Search(FittedSets):
         Each set is compared with smaller ones that begin where it leads: it may have left a local
         minimum of theirs. Where a set leaves something correlated, an effect that follows a little
         of it is needless: its evidence among what is left is that of chance. An effect is the cause
-        of what the others leave only if it leaves little of that, or no more of the gap than
-        approximate laws do. The first effect must gain beside other forms of the laws too, if it is
-        the one that closes least. No part of a set is the cause where the set is none.
+        of what the others leave only if it leaves little of that, or, where that is no more of the
+        gap than approximate laws leave, less than half. The first effect must gain beside other
+        forms of the laws too, if it is the one that closes least. No part of a set is the cause
+        where the set is none.
         """
         self.reduced_costs = {}
         if not best.effects or not adequate(best, self.null):
@@ -251,7 +252,7 @@ class Search(FittedSets):
         closes = (
             found.mean_square <= NOISE_MEAN_SQUARE
             or leaves_little(found, excess(found) + fall)
-            or (approximate and self._leaves_hundredth(found))
+            or (approximate and self._leaves_hundredth(found) and not leaves_most(found, least))
         )
         needed = closes and evidence_of(fall, found, self.null) >= EVIDENCE_THRESHOLD
         # The other effects have been asked as further ones.
