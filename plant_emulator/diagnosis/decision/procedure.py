@@ -157,7 +157,7 @@ class Procedure:
             runner=runner,
             null=sets[frozenset()],
             sets=sets,
-            beside_random=True,
+            random_subsystem=plain.model.candidates[name].subsystem,
             noise=noise,
         )
         explained = search.explain()

@@ -44,7 +44,7 @@ class FittedSets:
     """The fitted sets of effects; see the module's text.
 
     runner : in whose noise the costs count; null : fit without effects
-    beside_random : whether a random effect is part of that noise
+    random_subsystem : subsystem of the random effect that is part of that noise; empty: none is
     sets : the best fit of each set, at first of those that are known
     agreed : whether the runs and other forms of the laws agree on it, where they were asked
     promises : what one more effect promises on top of a set
@@ -56,7 +56,7 @@ class FittedSets:
 
     runner: TaskRunner
     null: FitResult
-    beside_random: bool = False
+    random_subsystem: str = ""
     sets: dict[frozenset[str], FitResult] = field(default_factory=dict)
     agreed: dict[frozenset[str], bool] = field(default_factory=dict)
     promises: dict[frozenset[str], list[Promise]] = field(default_factory=dict)
@@ -114,6 +114,15 @@ class FittedSets:
         self.promises.pop(frozenset(), None)
         (self.led_fits[frozenset()],) = self.runner.map(refit_along, [self.task(null)])
         self.secants_fitted = False
+
+    def _apart(self, found: Iterable[Promise]) -> list[Promise]:
+        """The promises of effects that are told apart from the random one.
+
+        One of the same subsystem stands for the error of its law: a filter of the reference follows
+        the mean of a dead time that varies.
+        """
+        library = self.runner.model.candidates
+        return [p for p in found if library[p.effect].subsystem != self.random_subsystem]
 
     def fit_on_top(self, base: FitResult, new: Sequence[Promise], least: float) -> list[FitResult]:
         """Fit effects on top of a fit; least : gain that one must promise.
@@ -192,7 +201,7 @@ class FittedSets:
 
     def least_gain(self, others: int) -> float:
         """Least gain of log evidence of an effect beside so many others with exact laws."""
-        return SETTINGS.needed_again if others or self.beside_random else SETTINGS.needed
+        return SETTINGS.needed_again if others or self.random_subsystem else SETTINGS.needed
 
     def needed(self, found: FitResult, others: int) -> float:
         """Least gain of log evidence that an effect needs beside so many others.
@@ -234,20 +243,22 @@ class FittedSets:
     def _agrees(self, found: FitResult) -> bool:
         """Whether each further effect of a set has one size, and gains beside other forms of laws.
 
-        It is asked once. Where one has not, an effect that gains more may take the place of the
-        last one, or the last one that of the others.
+        Beside a random effect all effects are further ones. It is asked once. Where one has not, an
+        effect that gains more may take the place of the last one, or the last one that of the
+        others.
         """
         key, base = frozenset(found.effects), frozenset(found.effects[:-1])
-        if len(key) < 2 or key in self.agreed:
+        further = found.effects if self.random_subsystem else found.effects[1:]
+        if not further or key in self.agreed:
             return self.agreed.get(key, True)
-        asked = [Reduction(found, self.runner.runs, name) for name in found.effects[1:]]
+        asked = [Reduction(found, self.runner.runs, name) for name in further]
         probability = min(self.runner.map(run_agreement, asked))
         if probability < SETTINGS.agreement:
             action = f"refuted by the runs (probability {probability:.1g})"
             self.trace.append(search_step(self.null, action, found))
             self.agreed[key] = False
         else:
-            self.agreed[key] = self.gain_beside_forms(found, found.effects[1:])
+            self.agreed[key] = self.gain_beside_forms(found, further)
         if not self.agreed[key]:
             self.expanded.discard(base)
             self._reduce(found)

@@ -89,7 +89,7 @@ class Search(FittedSets):
 
         The weights of a random effect fit the noise as it was declared.
         """
-        if self.noise_at == where.key or self.beside_random:
+        if self.noise_at == where.key or self.random_subsystem:
             return False
         self.noise_at = where.key
         (noise,) = self.declared.map(estimate_noise, [self.task(where)])
@@ -128,19 +128,14 @@ class Search(FittedSets):
 
         Near the noise the first of two causes may leave most of the gap: a regression tells the
         other. A further effect that leaves most of what the others left is no base for another one.
-        The noise of a random effect is that of few courses of its law. A gain within it means
-        little.
         """
-        if self.beside_random and found.mean_square <= NOISE_MEAN_SQUARE:
-            self._screen(found)  # for the odds against one more effect
-            return True
         if not found.effects:
             return False
         foreign = leaves_most(found, self._smaller(found))
         if len(found.effects) == 1:
             foreign = foreign and self.is_far(found)
         if found.mean_square > NOISE_MEAN_SQUARE:
-            return foreign or (leaves_random(found) and not self.beside_random)
+            return foreign or (leaves_random(found) and not self.random_subsystem)
         return all(p.gain <= self._promising(found) for p in self._screen(found))
 
     def _smaller(self, found: FitResult) -> FitResult:
@@ -153,7 +148,7 @@ class Search(FittedSets):
         key = frozenset(found.effects)
         if key not in self.promises:
             led = self.led(found) if self.is_far(found) else None
-            self.promises[key] = promises(self.runner, found, led)
+            self.promises[key] = self._apart(promises(self.runner, found, led))
         return self.promises[key]
 
     def _promising(self, found: FitResult) -> float:
@@ -182,7 +177,8 @@ class Search(FittedSets):
             return
         self.secants_fitted = True
         reached = 0.0
-        for one in fitted_promises(self.runner, self.led(base))[: SETTINGS.most_followed]:
+        fitted = self._apart(fitted_promises(self.runner, self.led(base)))
+        for one in fitted[: SETTINGS.most_followed]:
             if one.gain <= max(least, SETTINGS.rival_share * reached):
                 break
             known = self.sets.get(frozenset([one.effect]), base)
