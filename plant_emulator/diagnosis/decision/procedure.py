@@ -157,7 +157,7 @@ class Procedure:
             runner=runner,
             null=sets[frozenset()],
             sets=sets,
-            random_subsystem=plain.model.candidates[name].subsystem,
+            beside_random=True,
             noise=noise,
         )
         explained = search.explain()

@@ -21,6 +21,7 @@ from plant_emulator.diagnosis.search.confirmation import (
     lead_start,
     reduce,
     trial_of,
+    without_effects,
 )
 from plant_emulator.diagnosis.search.law_forms import gain_beside_forms
 from plant_emulator.diagnosis.search.run_agreement import run_agreement
@@ -44,7 +45,7 @@ class FittedSets:
     """The fitted sets of effects; see the module's text.
 
     runner : in whose noise the costs count; null : fit without effects
-    random_subsystem : subsystem of the random effect that is part of that noise; empty: none is
+    beside_random : whether a random effect is part of that noise
     sets : the best fit of each set, at first of those that are known
     agreed : whether the runs and other forms of the laws agree on it, where they were asked
     promises : what one more effect promises on top of a set
@@ -56,7 +57,7 @@ class FittedSets:
 
     runner: TaskRunner
     null: FitResult
-    random_subsystem: str = ""
+    beside_random: bool = False
     sets: dict[frozenset[str], FitResult] = field(default_factory=dict)
     agreed: dict[frozenset[str], bool] = field(default_factory=dict)
     promises: dict[frozenset[str], list[Promise]] = field(default_factory=dict)
@@ -114,15 +115,6 @@ class FittedSets:
         self.promises.pop(frozenset(), None)
         (self.led_fits[frozenset()],) = self.runner.map(refit_along, [self.task(null)])
         self.secants_fitted = False
-
-    def _apart(self, found: Iterable[Promise]) -> list[Promise]:
-        """The promises of effects that are told apart from the random one.
-
-        One of the same subsystem stands for the error of its law: a filter of the reference follows
-        the mean of a dead time that varies.
-        """
-        library = self.runner.model.candidates
-        return [p for p in found if library[p.effect].subsystem != self.random_subsystem]
 
     def fit_on_top(self, base: FitResult, new: Sequence[Promise], least: float) -> list[FitResult]:
         """Fit effects on top of a fit; least : gain that one must promise.
@@ -201,7 +193,7 @@ class FittedSets:
 
     def least_gain(self, others: int) -> float:
         """Least gain of log evidence of an effect beside so many others with exact laws."""
-        return SETTINGS.needed_again if others or self.random_subsystem else SETTINGS.needed
+        return SETTINGS.needed_again if others or self.beside_random else SETTINGS.needed
 
     def needed(self, found: FitResult, others: int) -> float:
         """Least gain of log evidence that an effect needs beside so many others.
@@ -248,7 +240,7 @@ class FittedSets:
         others.
         """
         key, base = frozenset(found.effects), frozenset(found.effects[:-1])
-        further = found.effects if self.random_subsystem else found.effects[1:]
+        further = found.effects if self.beside_random else found.effects[1:]
         if not further or key in self.agreed:
             return self.agreed.get(key, True)
         asked = [Reduction(found, self.runner.runs, name) for name in further]
@@ -267,11 +259,17 @@ class FittedSets:
     def _reduce(self, found: FitResult) -> None:
         """Fit a refuted set without each of its effects, from where it leads.
 
-        A wrong first effect bends the size of the cause from run to run; a needless last one may
-        lead the others out of a local minimum. It is the backward step of a floating search
-        (P. Pudil and others, Pattern Recognition Letters 15 (1994) 1119).
+        One effect leads the fit without any. A wrong first effect bends the size of the cause from
+        run to run; a needless last one may lead the others out of a local minimum. It is the
+        backward step of a floating search (P. Pudil and others, Pattern Recognition Letters 15
+        (1994) 1119).
         """
         asked = [Reduction(found, self.runner.runs, name) for name in found.effects]
+        if len(asked) == 1:
+            (null,) = self.runner.map(without_effects, [(self.null, asked[0])])
+            if null.cost < self.null.cost:
+                self.take_null(null)
+            return
         for one in self.runner.map(reduce, asked):
             self.keep(one)
             self.trace.append(search_step(self.null, "reduced", one))

@@ -89,7 +89,7 @@ class Search(FittedSets):
 
         The weights of a random effect fit the noise as it was declared.
         """
-        if self.noise_at == where.key or self.random_subsystem:
+        if self.noise_at == where.key or self.beside_random:
             return False
         self.noise_at = where.key
         (noise,) = self.declared.map(estimate_noise, [self.task(where)])
@@ -128,14 +128,19 @@ class Search(FittedSets):
 
         Near the noise the first of two causes may leave most of the gap: a regression tells the
         other. A further effect that leaves most of what the others left is no base for another one.
+        The noise of a random effect is that of few courses of its law. Beside it and another one, a
+        gain within the noise may be that of the errors of both laws.
         """
         if not found.effects:
             return False
+        if self.beside_random and found.mean_square <= NOISE_MEAN_SQUARE:
+            self._screen(found)  # for the odds against one more effect
+            return True
         foreign = leaves_most(found, self._smaller(found))
         if len(found.effects) == 1:
             foreign = foreign and self.is_far(found)
         if found.mean_square > NOISE_MEAN_SQUARE:
-            return foreign or (leaves_random(found) and not self.random_subsystem)
+            return foreign or (leaves_random(found) and not self.beside_random)
         return all(p.gain <= self._promising(found) for p in self._screen(found))
 
     def _smaller(self, found: FitResult) -> FitResult:
@@ -148,7 +153,7 @@ class Search(FittedSets):
         key = frozenset(found.effects)
         if key not in self.promises:
             led = self.led(found) if self.is_far(found) else None
-            self.promises[key] = self._apart(promises(self.runner, found, led))
+            self.promises[key] = promises(self.runner, found, led)
         return self.promises[key]
 
     def _promising(self, found: FitResult) -> float:
@@ -177,8 +182,7 @@ class Search(FittedSets):
             return
         self.secants_fitted = True
         reached = 0.0
-        fitted = self._apart(fitted_promises(self.runner, self.led(base)))
-        for one in fitted[: SETTINGS.most_followed]:
+        for one in fitted_promises(self.runner, self.led(base))[: SETTINGS.most_followed]:
             if one.gain <= max(least, SETTINGS.rival_share * reached):
                 break
             known = self.sets.get(frozenset([one.effect]), base)
@@ -222,10 +226,10 @@ class Search(FittedSets):
         Each set is compared with smaller ones that begin where it leads: it may have left a local
         minimum of theirs. Where a set leaves something correlated, an effect that follows a little
         of it is needless: its evidence among what is left is that of chance. An effect is the cause
-        of what the others leave only if it leaves little of that, or, where that is no more of the
-        gap than approximate laws leave, less than half. The first effect must gain beside other
-        forms of the laws too, if it is the one that closes least. No part of a set is the cause
-        where the set is none.
+        of what the others leave only if it leaves little of that, or, where the set leaves no more
+        of the gap than approximate laws do, less than half: any effect follows a part of their
+        errors. The first effect must gain beside other forms of the laws too, if it is the one that
+        closes least. No part of a set is the cause where the set is none.
         """
         self.reduced_costs = {}
         if not best.effects or not adequate(best, self.null):

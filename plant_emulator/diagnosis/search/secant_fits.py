@@ -124,6 +124,8 @@ def _unbent(
 ) -> dict[str, float]:
     """The values beside an effect with the parameter that follows it most at its least squares.
 
+    They stay as they are where the search finds nothing better.
+
     near : slopes at the parameters without the effect; values, states : with the effect
     """
     from scipy.optimize import minimize_scalar
@@ -153,7 +155,8 @@ def _unbent(
     bounds = (unknown.scaled(unknown.lower), unknown.scaled(unknown.upper))
     most = SETTINGS.unbending_iterations
     found = minimize_scalar(squares, bounds=bounds, method="bounded", options={"maxiter": most})
-    return moved(float(found.x))
+    there = float(near.z[j])
+    return moved(float(found.x if found.fun < squares(there) else there))
 
 
 def _sizes(candidate: Candidate) -> tuple[float, ...]:

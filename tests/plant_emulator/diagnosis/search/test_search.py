@@ -93,28 +93,26 @@ def test_leader_is_led_again_only_where_it_leaves_more_than_noise(left: float) -
 
 
 @pytest.mark.parametrize(
-    ("random_subsystem", "sizes", "names"),
+    ("beside_random", "sizes", "names"),
     [
-        ("", (0.8, 0.0), {"wave"}),
-        ("drive", (0.8, 0.8), {"wave"}),
-        ("drive", (0.8, 0.0), set()),
-        ("part of wave", (0.8, 0.8), set()),
+        (False, (0.8, 0.0), {"wave"}),
+        (True, (0.8, 0.8), {"wave"}),
+        (True, (0.8, 0.0), set()),
+        (True, (4.0, 0.0), set()),
     ],
 )
-def test_effect_beside_a_random_one_is_of_another_subsystem_and_has_one_size_in_all_runs(
-    random_subsystem: str, sizes: tuple[float, float], names: set[str]
+def test_effect_beside_a_random_one_has_one_size_in_all_runs(
+    beside_random: bool, sizes: tuple[float, float], names: set[str]
 ) -> None:
     """By hand: a wave of 0.8 gains 2000 0.8^2 / 4 = 320 a run, and leaves squares of 0.3 at most.
 
     The least gain of a first effect is 15, and 40 beside a random one. Sizes of 0.8 and 0 differ
-    by 18 standard errors; they refute no first effect.
+    by 18 standard errors; they refute no first effect. A wave of 4 leaves squares of 4, far off.
     """
     y = [2.0 + 3.0 * TIME + size * np.sin(20.0 * TIME) for size in sizes]
     model = Line([noisy(one, k) for k, one in enumerate(y)], ["wave"])
     there, null = runner(model), fit_null(model, (0, 1))
-    found = Search(
-        declared=there, runner=there, null=null, random_subsystem=random_subsystem
-    ).explain()
+    found = Search(declared=there, runner=there, null=null, beside_random=beside_random).explain()
     assert set(found.final.effects) == names
 
 
@@ -126,7 +124,7 @@ def test_rival_of_a_second_effect_is_fitted_where_little_of_the_gap_is_left() ->
     y = 2.0 + 3.0 * TIME + 40.0 * np.sin(20.0 * TIME) + 30.0 * np.abs(TIME)
     model = Line([noisy(y + 2.0 * np.cos(37.0 * TIME))], ["wave", "kink", "near kink"])
     there, null = runner(model), fit_null(model, (0,))
-    found = Search(declared=there, runner=there, null=null, random_subsystem="drive").explain()
+    found = Search(declared=there, runner=there, null=null, beside_random=True).explain()
     assert found.final.mean_square > NOISE_MEAN_SQUARE
     assert sorted(map(sorted, found.classes())) == [["kink", "near kink"], ["wave"]]
 
@@ -142,7 +140,7 @@ def test_further_effect_that_leaves_most_is_no_base_for_another_one(
     y = 2.0 + 3.0 * TIME + 40.0 * np.sin(20.0 * TIME) + 2.0 * np.abs(TIME) + 3.0 * TIME**3
     model = Line([noisy(y + left * np.cos(37.0 * TIME))], ["wave", "kink", "cube"])
     there, null = runner(model), fit_null(model, (0,))
-    found = Search(declared=there, runner=there, null=null, random_subsystem="drive").explain()
+    found = Search(declared=there, runner=there, null=null, beside_random=True).explain()
     assert max(len(step.effects) for step in found.trace) == largest
 
 
@@ -153,9 +151,7 @@ def test_search_goes_on_from_the_sets_that_are_known(monkeypatch: pytest.MonkeyP
     known = fit(model, ("wave",), (0,), {**null.values, "wave_size": 39.0}, [{}])
     monkeypatch.setattr(search, "promises", lambda *_: [])
     sets = {frozenset(known.effects): known}
-    found = Search(
-        declared=there, runner=there, null=null, sets=sets, random_subsystem="drive"
-    ).explain()
+    found = Search(declared=there, runner=there, null=null, sets=sets, beside_random=True).explain()
     assert found.final.effects == ("wave",)
 
 
