@@ -70,9 +70,6 @@ COARSE_TOLERANCE = 2e-3
 # the library a run is as exact in these steps.
 LONGEST_STEP = 0.03
 
-# Gap and damping of the shaft: the one moves the next contact, the other the rebound.
-CONTACT = frozenset({"backlash_half_gap", "drum_shaft_damping"})
-
 
 class BenchModel:
     """The bench with its logs; see `Model`.
@@ -82,7 +79,8 @@ class BenchModel:
     parity relations know the nominal equations only.
     """
 
-    contact_parameters = CONTACT
+    # The one moves the next contact, the other the rebound.
+    contact_parameters = frozenset({"backlash_half_gap", "drum_shaft_damping"})
 
     def __init__(
         self,

@@ -27,10 +27,6 @@ if TYPE_CHECKING:
     from plant_emulator.estimation.unknowns import Residual, Unknown
     from plant_emulator.signals.log import Array
 
-# Changes of a contact parameter that are tried [standard errors]. A basin is some ten wide, and the
-# right one was 45 away.
-CONTACT_ERRORS = 4.0 * np.array([k for k in range(-16, 17) if k])
-
 
 def start_states(model: Model, asked: tuple[Task, Sequence[str]]) -> dict[str, dict[str, float]]:
     """States of these effects in the run of the task that their columns are taken at (a step).
@@ -80,7 +76,8 @@ def refit_scanned(model: Model, task: Task) -> FitResult:
         {**base.values, u.name: float(np.clip(base.values[u.name] + change, u.lower, u.upper))}
         for u in model.parameters
         if u.name in model.contact_parameters
-        for change in base.standard_errors[u.name] * CONTACT_ERRORS
+        for errors in SETTINGS.contact_errors
+        for change in base.standard_errors[u.name] * np.array([-errors, errors])
     ]
     best = min([base.values, *trials], key=loss)
     if best is base.values:
