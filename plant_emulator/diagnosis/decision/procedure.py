@@ -18,7 +18,11 @@ import numpy as np
 
 from plant_emulator.diagnosis.decision import run_consistency
 from plant_emulator.diagnosis.decision.verdict import decide
-from plant_emulator.diagnosis.fitting.evidence import EVIDENCE_THRESHOLD, leaves_random
+from plant_emulator.diagnosis.fitting.evidence import (
+    EVIDENCE_THRESHOLD,
+    adequate,
+    leaves_random,
+)
 from plant_emulator.diagnosis.fitting.fit_steps import refit, start
 from plant_emulator.diagnosis.fitting.input_noise_model import whiten_inputs
 from plant_emulator.diagnosis.fitting.random_effects import WeightedRecipe, fit_random_effect
@@ -26,9 +30,10 @@ from plant_emulator.diagnosis.fitting.regularity import find_regularities
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, find_disturbances
 from plant_emulator.diagnosis.search.search import Search
+from plant_emulator.diagnosis.search.summary import not_told_apart
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from plant_emulator.diagnosis.decision.verdict import Decision
     from plant_emulator.diagnosis.execution.pool import TaskRunner
@@ -42,11 +47,19 @@ class _Tested:
     """The tested hypotheses, and the noise in which their costs count.
 
     runner : whose model has that noise; estimated : the noise, where the search estimated it
+    instead : sets that explain the gap in the place of the random effect that they were found
+        beside, where it shows no longer
     """
 
     explained: Explanation
     runner: TaskRunner
     estimated: LoggedNoise | None = None
+    instead: Sequence[FitResult] = ()
+
+    @property
+    def random(self) -> bool:
+        """Whether a random effect is part of what explains the gap."""
+        return bool(self.explained.random_effects)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,16 +93,17 @@ class Procedure:
         model, runs = self.runner.model, self.runner.runs
         (null,) = [self.null] if self.null else self.runner.map(start, [runs])
         found = self._test_random_gap(null)
-        if found is None or decide(model, found.explained).kind == "unknown":
-            plain = self._test_effects(null)
-            if found is None or decide(model, plain.explained).kind != "unknown":
+        if not (found and found.random) or decide(model, found.explained).kind == "unknown":
+            plain = self._test_effects(null, found.instead if found else ())
+            if not (found and found.random) or decide(model, plain.explained).kind != "unknown":
                 found = plain
         explained = found.explained
         left = decide(model, explained).kind == "unknown" or leaves_random(explained.final)
         if left and not explained.random_effects:
             beside = self._test_random_effects(explained.final, found)
             known = decide(model, explained).kind != "unknown"
-            if beside and not (known and decide(model, beside.explained).kind == "unknown"):
+            unknown = beside is None or decide(model, beside.explained).kind == "unknown"
+            if beside and beside.random and not (known and unknown):
                 found = beside
         explained, runner = found.explained, found.runner
         decision = decide(model, explained)
@@ -98,12 +112,19 @@ class Procedure:
             decision = self._check_consistency(explained, decision)
         return explained, decision, runner
 
-    def _test_effects(self, null: FitResult) -> _Tested:
-        """Search the library."""
+    def _test_effects(self, null: FitResult, known: Sequence[FitResult]) -> _Tested:
+        """Search the library; known : sets to begin with, as they are in another noise."""
         runner = self._cleared
         if self.disturbances is not None:
             (null,) = runner.map(refit, [Task(base=null, runs=runner.runs)])
-        search = Search(declared=self.runner, runner=runner, null=null, noise=self.disturbances)
+        fits = runner.map(refit, [Task(base=one, runs=runner.runs) for one in known])
+        search = Search(
+            declared=self.runner,
+            runner=runner,
+            null=null,
+            sets={frozenset(one.effects): one for one in fits},
+            noise=self.disturbances,
+        )
         explained = search.explain()
         return _Tested(
             explained=_with_regularities(explained, search.runner),
@@ -130,7 +151,8 @@ class Procedure:
 
         base : fit whose residual shows the random effect
         beside : hypotheses whose noise the random effect shows beside, where it was estimated
-        None: no random effect explains the residual
+        None: no random effect explains the residual. The one that does may show no longer beside
+        the effects that are found
         """
         estimated = None if beside is None else beside.estimated
         noise = estimated or self.disturbances
@@ -163,7 +185,9 @@ class Procedure:
         explained = search.explain()
         last = self._fit_random_effects(plain, explained.final, [name])
         if not last:
-            return None
+            enough = explained.final.effects and adequate(explained.final, explained.null)
+            instead = not_told_apart(search.unrefuted) if enough else ()
+            return _Tested(explained=explained, runner=runner, instead=instead)
         explained = replace(explained, random_effects=tuple(last))
         return _Tested(explained=_with_regularities(explained, runner), runner=runner)
 

@@ -25,6 +25,7 @@ LABELS = {
     "find_disturbances": "noise of the sensors",
     "start_states": "what each effect promises",
     "screen": "what each effect promises",
+    "compensate": "what each effect promises",
     "confirm": "first fits of effects",
     "lead_start": "fits along the measured speeds",
     "refit_along": "fits along the measured speeds",

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, excess
+from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, excess, leaves_little
 from plant_emulator.diagnosis.fitting.fit_steps import refit, refit_along, start_along
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.confirmation import (
@@ -121,10 +121,11 @@ class FittedSets:
 
         Where the base leaves more than noise, a regression may mislead, and a free fit is long. The
         effects are led along the measured outputs first. The one that gains most there is fitted
-        freely. So are other first ones, as long as a regression promises more of one than any has
-        reached: a led fit may be in a local minimum as well. Of the rest those are fitted for less
-        long that gain half of the most there, or half of what was reached, or, near the data, whose
-        simulation promises that: what is slow adds up in a free simulation only.
+        freely. Where it leaves much, it may be in a local minimum: other first ones are fitted as
+        long as a regression promises more of one than any has reached. Of the rest those are fitted
+        for less long that leave as little along the measured outputs, or gain half of the most
+        there or of what was reached, or, near the data, whose simulation promises that: what is
+        slow adds up in a free simulation only.
         """
         trials = [trial_of(p, base, self.runner.runs, SETTINGS.leader_iterations) for p in new]
         if base.mean_square <= NOISE_MEAN_SQUARE or len(trials) < 2:
@@ -135,9 +136,10 @@ class FittedSets:
         gains = [0.5 * (own.cost - led.cost) for _, led in pairs]
         first, *rest = sorted(range(len(pairs)), key=lambda k: -gains[k])
         trials = [trial for trial, _ in pairs]
-        promised = [max(trial.promised.values(), default=0.0) for trial in trials]
         found = self.confirm([trials[first]])
-        for k in sorted(rest if not base.effects else [], key=lambda k: -promised[k]):
+        explained = leaves_little(found[0], excess(base))
+        promised = [max(trial.promised.values(), default=0.0) for trial in trials]
+        for k in sorted([] if base.effects or explained else rest, key=lambda k: -promised[k]):
             if promised[k] > _gain(base, found):
                 found += self.confirm([trials[k]])
                 rest.remove(k)
@@ -147,7 +149,8 @@ class FittedSets:
         rivals = [
             _shorter(trials[k])
             for k in rest
-            if gains[k] >= least_led or trials[k].promised.get(SIMULATION, 0.0) > least
+            if (leaves_little(pairs[k][1], excess(own)) if explained else gains[k] >= least_led)
+            or trials[k].promised.get(SIMULATION, 0.0) > least
         ]
         return [*found, *self.confirm(rivals)]
 

@@ -22,6 +22,7 @@ from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.columns import best_score, onset_score
+from plant_emulator.diagnosis.search.compensation import Compensation, compensate, parted
 from plant_emulator.diagnosis.search.promise import Promise, Start
 from plant_emulator.diagnosis.search.scans import start_states
 from plant_emulator.diagnosis.search.settings import SETTINGS
@@ -96,22 +97,31 @@ class Screening:
 def promises(runner: TaskRunner, base: FitResult, led: FitResult | None) -> list[Promise]:
     """Predicted gains of all effects on top of a fit, the largest first.
 
-    led : the fit along the measured outputs, if the base is far from the data
+    led : the fit along the measured outputs, if the base leaves more than noise
     """
     effects = tuple(visible(runner.model, base, runner.runs))
-    if led is not None:
-        beside = (RELATIONS,) if base.effects else ()
-        return regressions(runner, led, effects, (*beside, NOMINAL_RELATIONS, OBSERVER))
-    if _leaves_noise(base):
-        return regressions(runner, base, effects, (SIMULATION,))
     nominal = (NOMINAL_RELATIONS,) if base.effects else ()
-    return regressions(runner, base, effects, (RELATIONS, *nominal, SIMULATION))
+    if led is None:
+        scores = (SIMULATION,) if base.effects else (RELATIONS, SIMULATION)
+        return regressions(runner, base, effects, scores)
+    if base.mean_square <= SETTINGS.linear_mean_square:
+        return regressions(runner, base, effects, (RELATIONS, *nominal, SIMULATION), led)
+    beside = (RELATIONS,) if base.effects else ()
+    return regressions(runner, led, effects, (*beside, NOMINAL_RELATIONS, OBSERVER), led)
 
 
 def regressions(
-    runner: TaskRunner, base: FitResult, effects: Sequence[str], fidelities: Sequence[str]
+    runner: TaskRunner,
+    base: FitResult,
+    effects: Sequence[str],
+    fidelities: Sequence[str],
+    led: FitResult | None = None,
 ) -> list[Promise]:
-    """Predicted gains of these effects on top of a fit, the largest first, by these regressions."""
+    """Predicted gains of these effects on top of a fit, the largest first, by these regressions.
+
+    led : the fit along the measured outputs, on top of which one parameter makes room for each
+        effect (`compensation`)
+    """
     alone = [
         (Task(base=base.of_runs([k]), runs=(run,)), tuple(effects))
         for k, run in enumerate(runner.runs)
@@ -121,8 +131,10 @@ def regressions(
     asked = [
         Screening(base, runner.runs, tuple(effects), fidelity, states) for fidelity in fidelities
     ]
+    parts = [] if led is None else parted(Compensation(led, runner.runs, tuple(effects), states))
+    tried = runner.map(compensate, parts)
     found: dict[str, Promise] = {}
-    for one in (one for some in runner.map(screen, asked) for one in some):
+    for one in (one for some in (*runner.map(screen, asked), *tried) for one in some):
         known = found.get(one.effect, Promise(effect=one.effect, gains={}, starts={}))
         found[one.effect] = Promise(
             effect=one.effect,

@@ -69,12 +69,13 @@ class Search(FittedSets):
     def explain(self) -> Explanation:
         """Go through the queue in the logs' own noise.
 
-        The noise is estimated around the fit without effects where that is near the noise, or else
-        around the best single effect, and then around the best set if it explains half of the gap.
-        Where that shows another noise, the queue starts again.
+        The noise is estimated around the fit without effects where that is near the noise and no
+        other set is known, or else around the best single effect, and then around the best set if
+        it explains half of the gap. Where that shows another noise, the queue starts again.
         """
+        known = any(self.sets)
         self.sets[frozenset()] = self.null
-        self._estimate_noise(self._queue(1) if self.is_far(self.null) else self.null)
+        self._estimate_noise(self._queue(1) if known or self.is_far(self.null) else self.null)
         best = self._queue(SETTINGS.most_effects)
         if best.effects and not leaves_most(best, self.null) and self._estimate_noise(best):
             best = self._queue(SETTINGS.most_effects)
@@ -152,7 +153,7 @@ class Search(FittedSets):
     def _screen(self, found: FitResult) -> list[Promise]:
         key = frozenset(found.effects)
         if key not in self.promises:
-            led = self.led(found) if self.is_far(found) else None
+            led = self.led(found) if found.mean_square > NOISE_MEAN_SQUARE else None
             self.promises[key] = promises(self.runner, found, led)
         return self.promises[key]
 
@@ -164,7 +165,7 @@ class Search(FittedSets):
         """Fit the effects of largest gain on top of a set.
 
         Regressions predict it, and fits along the measured outputs choose among their leaders.
-        Where there is no effect yet, and none of these is the cause, fits by secants tell.
+        Where there is no effect yet, and each of these leaves most, fits by secants tell.
         """
         least = self._promising(base)
         key = frozenset(base.effects)
@@ -178,7 +179,7 @@ class Search(FittedSets):
         if tells and self._renew_null(best):
             self._expand(self.null)
             return
-        if base.effects or self.secants_fitted or self._leaves_hundredth(best):
+        if base.effects or self.secants_fitted or not leaves_most(best, self.null):
             return
         self.secants_fitted = True
         reached = 0.0

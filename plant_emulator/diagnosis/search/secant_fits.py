@@ -2,8 +2,7 @@
 
 Where the first effect is sought and none of their leaders explains the gap, regressions mislead:
 without a cause, a fit has bent the parameters, and the slopes there hardly know the cause. Some
-iterations of a fit unbend them. A parameter that stands for the cause may be bent further than
-slopes reach, as a dead time that stands for a filter: a search along that parameter unbends it. The
+iterations of a fit unbend them, from where one of them has made room (`compensation`). The
 simulation is led along the measured outputs, so that contact comes in time meanwhile. The fits are
 cheap, because only the slopes of the effect itself are simulated anew (see
 `least_squares.estimate`).
@@ -14,24 +13,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from plant_emulator.diagnosis.fitting.approach import CORRECTION_INTERVALS
 from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
-from plant_emulator.diagnosis.fitting.signature import signs, values_at_size
+from plant_emulator.diagnosis.fitting.signature import values_at_size
+from plant_emulator.diagnosis.search.compensation import begun_sizes, compensated
 from plant_emulator.diagnosis.search.promise import Promise, Start
 from plant_emulator.diagnosis.search.screening import OBSERVER, regressions, visible
 from plant_emulator.diagnosis.search.settings import SETTINGS
-from plant_emulator.estimation.unknowns import column_lengths
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.machine import Candidate, Model
+    from plant_emulator.diagnosis.machine import Model
     from plant_emulator.estimation.unknowns import Estimate
-    from plant_emulator.signals.log import Array
 
 # Name of the score in the trace.
 SECANTS = "fit by secants"
@@ -92,8 +88,8 @@ def _promise(model: Model, asked: SecantFits, name: str, near: Estimate) -> Prom
         {**fitted, **{state: told[state] for state in own if state in told}}
         for fitted, told in zip(base.states, asked.states.get(name, base.states), strict=True)
     ]
-    sized = [{**base.values, **values_at_size(candidate, size)} for size in _sizes(candidate)]
-    starts = [_unbent(model, name, asked.runs, near, one, states) for one in sized]
+    sized = [{**base.values, **values_at_size(candidate, size)} for size in begun_sizes(candidate)]
+    starts = [compensated(model, (name,), asked.runs, near, one, states)[1] for one in sized]
     found = min(
         (
             fit(
@@ -112,54 +108,3 @@ def _promise(model: Model, asked: SecantFits, name: str, near: Estimate) -> Prom
     start = Start(values=found.values, states=found.states)
     gain = 0.5 * (base.cost - found.cost)
     return Promise(effect=name, gains={SECANTS: gain}, starts={SECANTS: start})
-
-
-def _unbent(
-    model: Model,
-    name: str,
-    runs: Sequence[int],
-    near: Estimate,
-    values: Mapping[str, float],
-    states: Sequence[Mapping[str, float]],
-) -> dict[str, float]:
-    """The values beside an effect with the parameter that follows it most at its least squares.
-
-    They stay as they are where the search finds nothing better.
-
-    near : slopes at the parameters without the effect; values, states : with the effect
-    """
-    from scipy.optimize import minimize_scalar
-
-    def rows(found: Mapping[str, float]) -> list[Array]:
-        pairs = zip(runs, states, strict=True)
-        return [model.residual(k, (name,))({**found, **own}) for k, own in pairs]
-
-    along = np.sum(
-        [
-            np.einsum("cnj,cn->j", slopes, now - then)
-            for slopes, now, then in zip(near.jacobians, rows(values), near.residuals, strict=True)
-        ],
-        axis=0,
-    )
-    lengths = column_lengths(near.jacobians)
-    shared = np.array([u.run is None for u in near.unknowns])
-    j = int(np.argmax(np.where(shared, np.abs(along) / lengths, -1.0)))
-    unknown = near.unknowns[j]
-
-    def moved(to: float) -> dict[str, float]:
-        return {**values, unknown.name: unknown.value(to)}
-
-    def squares(to: float) -> float:
-        return sum(float(np.sum(r**2)) for r in rows(moved(to)))
-
-    bounds = (unknown.scaled(unknown.lower), unknown.scaled(unknown.upper))
-    most = SETTINGS.unbending_iterations
-    found = minimize_scalar(squares, bounds=bounds, method="bounded", options={"maxiter": most})
-    there = float(near.z[j])
-    return moved(float(found.x if found.fun < squares(there) else there))
-
-
-def _sizes(candidate: Candidate) -> tuple[float, ...]:
-    """Sizes to begin at; a size that may have either sign finds its own by crossing neutral."""
-    two_sided = len(signs(candidate.sizes)) > 1
-    return SETTINGS.secant_sizes[:1] if two_sided else SETTINGS.secant_sizes

@@ -17,12 +17,14 @@ class Settings:
     # bend from a tenth of a plausible size on (a contact comes or stays away). Simulations
     # still tell such a slope within some hundredths.
     slope_share: float = 0.01
-    # Sizes that a fit by secants begins at: most laws bend less at the first, and a limit does not
-    # act there.
-    secant_sizes: tuple[float, ...] = (0.3, 1.0)
-    # Iterations of the search along the one parameter that follows an effect most, within its
-    # bounds: they tell it to some percent, and a start needs no more.
-    unbending_iterations: int = 12
+    # Sizes that a fit begins at where regressions mislead: most laws bend less at the first, and a
+    # limit does not act there.
+    begun_sizes: tuple[float, ...] = (0.3, 1.0)
+    # Iterations of the search along the one parameter that follows an effect most, and how far it
+    # goes to either side, as a share of the distance of its bounds: a dead time that stood for a
+    # filter was twice too long. They tell it to some percent, and a start needs no more.
+    compensating_iterations: int = 8
+    compensating_reach: float = 0.25
     # Iterations of fits by secants: of all effects, and of the best `tried_further`.
     secant_iterations: tuple[int, ...] = (2, 5)
     # Prior standard deviation of a size in the rich model that noise is estimated beside.

@@ -17,6 +17,7 @@ from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, adequat
 from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.report.ranking import undetectable
 from plant_emulator.diagnosis.search import search
+from plant_emulator.diagnosis.search.compensation import COMPENSATED
 from plant_emulator.diagnosis.search.promise import Promise, Start
 from plant_emulator.diagnosis.search.screening import promises
 from plant_emulator.diagnosis.search.search import Search
@@ -161,7 +162,7 @@ def test_far_gap_is_screened_along_the_measured_outputs(size: float, score: str)
     found = explained(Line([noisy(2.0 + 3.0 * TIME + size * np.sin(20.0 * TIME))], ["wave"]))
     first = found.trace[0]
     assert first.action == "confirmed"
-    assert set(first.promised) == {score}
+    assert set(first.promised) == {score, COMPENSATED}
 
 
 @pytest.mark.parametrize(("left", "asked"), [(0.0, []), (2.0, [2.0, 0.0])])

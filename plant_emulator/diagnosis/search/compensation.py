@@ -1,0 +1,136 @@
+"""Gains of effects for which one parameter makes room.
+
+Without its cause a fit bends the parameters. One of them may stand for the cause and be bent
+further than slopes reach, as a dead time that stands for a filter: regressions around the fit know
+nothing of the cause then. Each effect is simulated at a size, and the parameter that follows it
+most is moved to its least squares. The simulation is led along the measured outputs, so that
+contact comes in time meanwhile.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant_emulator.diagnosis.fitting.approach import CORRECTION_INTERVALS
+from plant_emulator.diagnosis.fitting.joint_fit import linearise
+from plant_emulator.diagnosis.fitting.signature import signs, values_at_size
+from plant_emulator.diagnosis.search.promise import Promise, Start
+from plant_emulator.diagnosis.search.settings import SETTINGS
+from plant_emulator.estimation.unknowns import column_lengths
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.machine import Candidate, Model
+    from plant_emulator.estimation.unknowns import Estimate
+    from plant_emulator.signals.log import Array
+
+    States = Sequence[Mapping[str, float]]
+
+# Name of the score in the trace.
+COMPENSATED = "one parameter moved"
+# Parts of the library that are tried at once: each needs the slopes of the base once.
+PARTS = 2
+
+
+@dataclass(frozen=True)
+class Compensation:
+    """Effects to try on top of a fit.
+
+    base : fit along the measured outputs; states : of each effect in each run, by effect
+    """
+
+    base: FitResult
+    runs: tuple[int, ...]
+    effects: tuple[str, ...]
+    states: Mapping[str, States]
+
+
+def parted(asked: Compensation) -> list[Compensation]:
+    """The same in parts that are tried at once."""
+    return [replace(asked, effects=asked.effects[k::PARTS]) for k in range(PARTS)]
+
+
+def compensate(model: Model, asked: Compensation) -> list[Promise]:
+    """Gain of each of these effects at the best of its sizes, and where that is (a step)."""
+    observer = model.observer(CORRECTION_INTERVALS[0])
+    near = linearise(observer, asked.base, asked.runs)
+    return [_promise(observer, asked, name, near) for name in asked.effects]
+
+
+def _promise(model: Model, asked: Compensation, name: str, near: Estimate) -> Promise:
+    base, candidate = asked.base, model.candidates[name]
+    effects, pairs = (*base.effects, name), zip(asked.states[name], base.states, strict=True)
+    states = tuple({**own, **fit} for own, fit in pairs)
+    found = [
+        compensated(model, effects, asked.runs, near, {**base.values, **sizes}, states)
+        for sizes in (values_at_size(candidate, one) for one in _tried_sizes(candidate))
+    ]
+    squares, values = min(found, key=lambda one: one[0])
+    return Promise(
+        effect=name,
+        gains={COMPENSATED: 0.5 * (base.sum_of_squares - squares)},
+        starts={COMPENSATED: Start(values=values, states=states)},
+    )
+
+
+def begun_sizes(candidate: Candidate) -> tuple[float, ...]:
+    """Sizes that a fit begins at; one of either sign finds its own by crossing neutral."""
+    two_sided = len(signs(candidate.sizes)) > 1
+    return SETTINGS.begun_sizes[:1] if two_sided else SETTINGS.begun_sizes
+
+
+def _tried_sizes(candidate: Candidate) -> list[float]:
+    """Sizes that are tried: of either sign, where it may have both, or several."""
+    return [sign * size for sign in signs(candidate.sizes) for size in begun_sizes(candidate)]
+
+
+def compensated(
+    model: Model,
+    effects: Sequence[str],
+    runs: Sequence[int],
+    near: Estimate,
+    values: Mapping[str, float],
+    states: States,
+) -> tuple[float, dict[str, float]]:
+    """Least sum of squares along the parameter that follows the last effect most, and the values.
+
+    near : slopes at the parameters without the last effect; values, states : with it
+    """
+    from scipy.optimize import minimize_scalar
+
+    def rows(found: Mapping[str, float]) -> list[Array]:
+        pairs = zip(runs, states, strict=True)
+        return [model.residual(k, effects)({**found, **own}) for k, own in pairs]
+
+    def moved(to: float) -> dict[str, float]:
+        return {**values, unknown.name: unknown.value(to)}
+
+    def squares(to: float) -> float:
+        return _squares(rows(moved(to)))
+
+    plain = rows(values)
+    change = [one - then for one, then in zip(plain, near.residuals, strict=True)]
+    along = sum(np.einsum("cnj,cn->j", *pair) for pair in zip(near.jacobians, change, strict=True))
+    shared = np.array([u.run is None for u in near.unknowns])
+    follows = np.abs(along) / column_lengths(near.jacobians)
+    j = int(np.argmax(np.where(shared, follows, -1.0)))
+    unknown, there = near.unknowns[j], float(near.z[j])
+    lower, upper = unknown.scaled(unknown.lower), unknown.scaled(unknown.upper)
+    reach = SETTINGS.compensating_reach * (upper - lower)
+    bounds = (max(lower, there - reach), min(upper, there + reach))
+    most = SETTINGS.compensating_iterations
+    found = minimize_scalar(squares, bounds=bounds, method="bounded", options={"maxiter": most})
+    return min(
+        (_squares(plain), dict(values)),
+        (float(found.fun), moved(float(found.x))),
+        key=lambda one: one[0],
+    )
+
+
+def _squares(rows: Sequence[Array]) -> float:
+    return sum(float(np.vdot(one, one)) for one in rows)
