@@ -117,11 +117,12 @@ class Procedure:
         runner = self._cleared
         if self.disturbances is not None:
             (null,) = runner.map(refit, [Task(base=null, runs=runner.runs)])
-        fits = runner.map(refit, [Task(base=one, runs=runner.runs) for one in known])
+        fits = list(runner.map(refit, [Task(base=one, runs=runner.runs) for one in known]))
+        nulls = [null, *(one for one in fits if not one.effects)]
         search = Search(
             declared=self.runner,
             runner=runner,
-            null=null,
+            null=min(nulls, key=lambda one: one.cost),
             sets={frozenset(one.effects): one for one in fits},
             noise=self.disturbances,
         )

@@ -39,9 +39,10 @@ PARTS = 2
 
 @dataclass(frozen=True)
 class Compensation:
-    """Effects to try on top of a fit.
+    """Effects to try, each alone.
 
-    base : fit along the measured outputs; states : of each effect in each run, by effect
+    base : fit without effects along the measured outputs
+    states : of each effect in each run, by effect
     """
 
     base: FitResult
@@ -52,7 +53,8 @@ class Compensation:
 
 def parted(asked: Compensation) -> list[Compensation]:
     """The same in parts that are tried at once."""
-    return [replace(asked, effects=asked.effects[k::PARTS]) for k in range(PARTS)]
+    parts = min(PARTS, len(asked.effects))
+    return [replace(asked, effects=asked.effects[k::parts]) for k in range(parts)]
 
 
 def compensate(model: Model, asked: Compensation) -> list[Promise]:
@@ -64,16 +66,16 @@ def compensate(model: Model, asked: Compensation) -> list[Promise]:
 
 def _promise(model: Model, asked: Compensation, name: str, near: Estimate) -> Promise:
     base, candidate = asked.base, model.candidates[name]
-    effects, pairs = (*base.effects, name), zip(asked.states[name], base.states, strict=True)
+    pairs = zip(asked.states[name], base.states, strict=True)
     states = tuple({**own, **fit} for own, fit in pairs)
     found = [
-        compensated(model, effects, asked.runs, near, {**base.values, **sizes}, states)
+        compensated(model, name, asked.runs, near, {**base.values, **sizes}, states)
         for sizes in (values_at_size(candidate, one) for one in _tried_sizes(candidate))
     ]
-    squares, values = min(found, key=lambda one: one[0])
+    fall, values = max(found, key=lambda one: one[0])
     return Promise(
         effect=name,
-        gains={COMPENSATED: 0.5 * (base.sum_of_squares - squares)},
+        gains={COMPENSATED: 0.5 * fall},
         starts={COMPENSATED: Start(values=values, states=states)},
     )
 
@@ -91,27 +93,35 @@ def _tried_sizes(candidate: Candidate) -> list[float]:
 
 def compensated(
     model: Model,
-    effects: Sequence[str],
+    effect: str,
     runs: Sequence[int],
     near: Estimate,
     values: Mapping[str, float],
     states: States,
 ) -> tuple[float, dict[str, float]]:
-    """Least sum of squares along the parameter that follows the last effect most, and the values.
+    """Fall of the cost where the parameter that follows an effect most is moved, and the values.
 
-    near : slopes at the parameters without the last effect; values, states : with it
+    The fall is negative where no place that was tried leaves less than the fit without the effect.
+
+    near : slopes at the parameters without the effect; values, states : with it
     """
     from scipy.optimize import minimize_scalar
 
     def rows(found: Mapping[str, float]) -> list[Array]:
         pairs = zip(runs, states, strict=True)
-        return [model.residual(k, effects)({**found, **own}) for k, own in pairs]
+        return [model.residual(k, (effect,))({**found, **own}) for k, own in pairs]
 
     def moved(to: float) -> dict[str, float]:
         return {**values, unknown.name: unknown.value(to)}
 
-    def squares(to: float) -> float:
-        return _squares(rows(moved(to)))
+    def cost(rows: Sequence[Array], z: float) -> float:
+        found = sum(float(np.vdot(one, one)) for one in rows) + penalty(z)
+        return found if np.isfinite(found) else np.inf
+
+    def penalty(z: float) -> float:
+        if unknown.std is None:
+            return 0.0
+        return float(((z - unknown.scaled(unknown.prior)) / unknown.scaled_std) ** 2)
 
     plain = rows(values)
     change = [one - then for one, then in zip(plain, near.residuals, strict=True)]
@@ -122,15 +132,13 @@ def compensated(
     unknown, there = near.unknowns[j], float(near.z[j])
     lower, upper = unknown.scaled(unknown.lower), unknown.scaled(unknown.upper)
     reach = SETTINGS.compensating_reach * (upper - lower)
-    bounds = (max(lower, there - reach), min(upper, there + reach))
-    most = SETTINGS.compensating_iterations
-    found = minimize_scalar(squares, bounds=bounds, method="bounded", options={"maxiter": most})
-    return min(
-        (_squares(plain), dict(values)),
-        (float(found.fun), moved(float(found.x))),
-        key=lambda one: one[0],
+    found = minimize_scalar(
+        lambda z: cost(rows(moved(z)), z),
+        bounds=(max(lower, there - reach), min(upper, there + reach)),
+        method="bounded",
+        options={"maxiter": SETTINGS.compensating_iterations},
     )
-
-
-def _squares(rows: Sequence[Array]) -> float:
-    return sum(float(np.vdot(one, one)) for one in rows)
+    without, stays = near.cost + penalty(there), cost(plain, there)
+    if found.fun < stays:
+        return without - float(found.fun), moved(float(found.x))
+    return without - stays, dict(values)

@@ -12,7 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, excess, leaves_little
+from plant_emulator.diagnosis.fitting import evidence
+from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, excess
 from plant_emulator.diagnosis.fitting.fit_steps import refit, refit_along, start_along
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.confirmation import (
@@ -122,10 +123,9 @@ class FittedSets:
         Where the base leaves more than noise, a regression may mislead, and a free fit is long. The
         effects are led along the measured outputs first. The one that gains most there is fitted
         freely. Where it leaves much, it may be in a local minimum: other first ones are fitted as
-        long as a regression promises more of one than any has reached. Of the rest those are fitted
-        for less long that leave as little along the measured outputs, or gain half of the most
-        there or of what was reached, or, near the data, whose simulation promises that: what is
-        slow adds up in a free simulation only.
+        long as a score promises more of one than any has reached. Of the rest those are fitted for
+        less long that gain half of the most there, or of what was reached (nine tenths where the
+        first leaves little), or whose free simulation promises half, near the data: slow effects.
         """
         trials = [trial_of(p, base, self.runner.runs, SETTINGS.leader_iterations) for p in new]
         if base.mean_square <= NOISE_MEAN_SQUARE or len(trials) < 2:
@@ -137,7 +137,7 @@ class FittedSets:
         first, *rest = sorted(range(len(pairs)), key=lambda k: -gains[k])
         trials = [trial for trial, _ in pairs]
         found = self.confirm([trials[first]])
-        explained = leaves_little(found[0], excess(base))
+        explained = evidence.leaves_little(found[0], excess(base))
         promised = [max(trial.promised.values(), default=0.0) for trial in trials]
         for k in sorted([] if base.effects or explained else rest, key=lambda k: -promised[k]):
             if promised[k] > _gain(base, found):
@@ -145,12 +145,12 @@ class FittedSets:
                 rest.remove(k)
         reached = _gain(base, found)
         least_led = SETTINGS.rival_share * max(0.0, min(gains[first], reached))
+        least_led = (1.0 - evidence.UNEXPLAINED_SHARE) * gains[first] if explained else least_led
         least = max(least, SETTINGS.rival_share * reached)
         rivals = [
             _shorter(trials[k])
             for k in rest
-            if (leaves_little(pairs[k][1], excess(own)) if explained else gains[k] >= least_led)
-            or trials[k].promised.get(SIMULATION, 0.0) > least
+            if gains[k] >= least_led or trials[k].promised.get(SIMULATION, 0.0) > least
         ]
         return [*found, *self.confirm(rivals)]
 

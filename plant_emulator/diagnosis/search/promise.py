@@ -26,7 +26,7 @@ class Start:
 class Promise:
     """Gain of log evidence of one more effect, by each score: predicted, or reached by a fit.
 
-    starts : of a fit, by score; none where the effect shows nothing
+    starts : of a fit, by score; none of a regression where the effect shows nothing
     """
 
     effect: str

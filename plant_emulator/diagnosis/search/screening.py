@@ -7,7 +7,8 @@ simulation. The relations are those at the nominal parameters then, and the simu
 the measured outputs. Beside effects that leave a gap the relations are both: the fit may be near
 the truth, or bent as well. A sagging voltage beside a lag promised nothing at parameters that had
 made its limit inactive, and 85 000 at the nominal ones. On top of effects that leave noise the
-simulation is right, and tells all that the relations tell.
+simulation is right, and tells all that the relations tell. Without effects one more score needs no
+slopes of the effect: one parameter makes room for it (`compensation`).
 """
 
 from __future__ import annotations
@@ -100,14 +101,16 @@ def promises(runner: TaskRunner, base: FitResult, led: FitResult | None) -> list
     led : the fit along the measured outputs, if the base leaves more than noise
     """
     effects = tuple(visible(runner.model, base, runner.runs))
-    nominal = (NOMINAL_RELATIONS,) if base.effects else ()
+    far = base.mean_square > SETTINGS.linear_mean_square
+    scores: tuple[str, ...]
     if led is None:
         scores = (SIMULATION,) if base.effects else (RELATIONS, SIMULATION)
-        return regressions(runner, base, effects, scores)
-    if base.mean_square <= SETTINGS.linear_mean_square:
-        return regressions(runner, base, effects, (RELATIONS, *nominal, SIMULATION), led)
-    beside = (RELATIONS,) if base.effects else ()
-    return regressions(runner, led, effects, (*beside, NOMINAL_RELATIONS, OBSERVER), led)
+    elif base.effects:
+        scores = (RELATIONS, NOMINAL_RELATIONS, OBSERVER if far else SIMULATION)
+    else:
+        scores = (NOMINAL_RELATIONS, OBSERVER) if far else (RELATIONS, SIMULATION)
+    where = led if led is not None and far else base
+    return regressions(runner, where, effects, scores, None if base.effects else led)
 
 
 def regressions(
@@ -119,8 +122,8 @@ def regressions(
 ) -> list[Promise]:
     """Predicted gains of these effects on top of a fit, the largest first, by these regressions.
 
-    led : the fit along the measured outputs, on top of which one parameter makes room for each
-        effect (`compensation`)
+    led : the fit along the measured outputs, at which one parameter makes room for each effect
+        (`compensation`); None: that is not asked
     """
     alone = [
         (Task(base=base.of_runs([k]), runs=(run,)), tuple(effects))

@@ -70,11 +70,14 @@ class Search(FittedSets):
         """Go through the queue in the logs' own noise.
 
         The noise is estimated around the fit without effects where that is near the noise and no
-        other set is known, or else around the best single effect, and then around the best set if
-        it explains half of the gap. Where that shows another noise, the queue starts again.
+        other set is known, or else around the best set of one effect or known one, and then around
+        the best set if it explains half of the gap. Where that shows another noise, the queue
+        starts again. Beside known sets the single effects are tried as well.
         """
-        known = any(self.sets)
+        known = any(self.sets) and not self.beside_random
         self.sets[frozenset()] = self.null
+        if known:
+            self._expand(self.null)
         self._estimate_noise(self._queue(1) if known or self.is_far(self.null) else self.null)
         best = self._queue(SETTINGS.most_effects)
         if best.effects and not leaves_most(best, self.null) and self._estimate_noise(best):
@@ -172,7 +175,8 @@ class Search(FittedSets):
         found = [p for p in self._screen(base) if not self.refuted(key | {p.effect})]
         tried = [p.effect for p in found if key and key | {p.effect} in self.sets]
         new = to_try(found, base, least, tried)
-        best = min((base, *self.fit_on_top(base, new, least)), key=lambda fit: fit.cost)
+        fits = [base, *self.fit_on_top(base, new, least)]
+        best = min(fits if base.effects else self.sets.values(), key=lambda fit: fit.cost)
         if best is not base:
             best = self._led_again(best)
         tells = not base.effects and best is not base and not leaves_most(best, self.null)
@@ -191,10 +195,6 @@ class Search(FittedSets):
                 trial = trial_of(one, base, self.runner.runs, SETTINGS.leader_iterations)
                 (known,) = self.confirm([trial])
             reached = max(reached, 0.5 * (base.cost - known.cost))
-
-    def _leaves_hundredth(self, found: FitResult) -> bool:
-        """Whether a fit leaves noise, or at most the part of the gap that laws do."""
-        return excess(found) <= SETTINGS.law_error**2 * excess(self.null)
 
     def _led_again(self, found: FitResult) -> FitResult:
         """The fit, led along the measured speeds once more where it may be in a local minimum.
@@ -250,10 +250,11 @@ class Search(FittedSets):
         fall = least.cost - found.cost
         library = self.runner.model.candidates
         approximate = any(not library[e].exact_form for e in least.effects)
+        hundredth = excess(found) <= SETTINGS.law_error**2 * excess(self.null)
         closes = (
             found.mean_square <= NOISE_MEAN_SQUARE
             or leaves_little(found, excess(found) + fall)
-            or (approximate and self._leaves_hundredth(found) and not leaves_most(found, least))
+            or (approximate and hundredth and not leaves_most(found, least))
         )
         needed = closes and evidence_of(fall, found, self.null) >= EVIDENCE_THRESHOLD
         # The other effects have been asked as further ones.

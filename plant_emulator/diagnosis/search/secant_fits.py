@@ -89,7 +89,7 @@ def _promise(model: Model, asked: SecantFits, name: str, near: Estimate) -> Prom
         for fitted, told in zip(base.states, asked.states.get(name, base.states), strict=True)
     ]
     sized = [{**base.values, **values_at_size(candidate, size)} for size in begun_sizes(candidate)]
-    starts = [compensated(model, (name,), asked.runs, near, one, states)[1] for one in sized]
+    starts = [compensated(model, name, asked.runs, near, one, states)[1] for one in sized]
     found = min(
         (
             fit(

@@ -58,7 +58,7 @@ class Settings:
     # Probability below which no chance makes the runs differ on a size. Second effects that are
     # there had 0.4 or more, beside the error that a law may have, and needless ones 0.006 or less.
     agreement: float = 0.01
-    # Leading effects of each regression that are led along the measured outputs, or fitted beside
+    # Leading effects of each score that are led along the measured outputs, or fitted beside
     # effects that leave noise: contact and limits move with the fit, so that the order by promise
     # is not yet that by fit.
     leaders: int = 3

@@ -5,7 +5,7 @@ import pytest
 from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.search.compensation import COMPENSATED, Compensation, compensate
-from tests.plant_emulator.diagnosis.line import TIME, Line, noisy
+from tests.plant_emulator.diagnosis.line import TIME, Line, linear, noisy
 from tests.plant_emulator.diagnosis.search.late import Late, late_pulses
 
 
@@ -22,6 +22,15 @@ def test_gain_is_that_at_the_best_size_with_the_slope_moved() -> None:
     (start,) = found.starts.values()
     assert start.values["cube_size"] == pytest.approx(-0.3)
     assert start.values["b"] == pytest.approx(0.6 + 0.3 * 0.6, abs=0.1)
+
+
+def test_a_parameter_that_its_prior_holds_makes_no_room() -> None:
+    """By hand: at a slope of 4 for 0 with a deviation of 0.05 the cost has 80^2 for the prior."""
+    model = Line([noisy(4.0 * TIME)], ["wave"])
+    model.parameters = (linear("a", 0.0, std=10.0), linear("b", 0.0, std=0.05))
+    base = fit_null(model, (0,))
+    (found,) = compensate(model, Compensation(base, (0,), ("wave",), {"wave": [{}]}))
+    assert found.gain < 5.0
 
 
 @pytest.mark.parametrize("plausible", [0.1, 0.33])

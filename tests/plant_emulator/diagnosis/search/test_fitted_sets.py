@@ -14,7 +14,7 @@ from plant_emulator.diagnosis.search.confirmation import Trial
 from plant_emulator.diagnosis.search.fitted_sets import FittedSets
 from plant_emulator.diagnosis.search.screening import promises
 from plant_emulator.signals.log import Array
-from tests.plant_emulator.diagnosis.line import TIME, Line, noisy, runner
+from tests.plant_emulator.diagnosis.line import SHAPES, TIME, Line, noisy, runner
 
 
 @pytest.mark.parametrize(("wave", "fitted"), [(1.0, [("kink",)]), (1.6, [("kink",), ("wave",)])])
@@ -83,6 +83,25 @@ def test_effect_of_which_a_regression_promises_more_than_was_reached_is_fitted_t
     monkeypatch.setattr(sets, "confirm", noting)
     assert [one.effects for one in sets.fit_on_top(null, supposed, 5.0)] == fitted
     assert asked == [10] * len(fitted)
+
+
+@pytest.mark.parametrize(("cube", "fitted"), [(0.0, ["bowl"]), (10.0, ["bowl", "tub"])])
+def test_rivals_of_an_effect_that_leaves_little_gain_nine_tenths_of_its_gain(
+    cube: float, fitted: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By hand: of |t| beside a constant t^2 follows 15/16 of the variance, and t^4 3/4.
+
+    A cube, which is odd, leaves much beside all of them.
+    """
+    for name, power in (("bowl", 2), ("tub", 4)):
+        monkeypatch.setitem(SHAPES, name, lambda x, power=power: x**power)
+    y = 2.0 + 3.0 * TIME + 5.0 * abs(TIME) + cube * TIME**3
+    model = Line([noisy(y)], ("kink", "bowl", "tub"))
+    null = fit_null(model, (0,))
+    sets = FittedSets(runner=runner(model), null=null)
+    first, *rivals = sets.fit_on_top(null, promises(runner(model), null, null), 5.0)
+    assert first.effects == ("kink",)
+    assert sorted(one.effects[0] for one in rivals) == fitted
 
 
 def test_all_effects_are_fitted_on_top_of_a_fit_that_leaves_noise() -> None:

@@ -156,6 +156,34 @@ def test_search_goes_on_from_the_sets_that_are_known(monkeypatch: pytest.MonkeyP
     assert found.final.effects == ("wave",)
 
 
+def test_other_effects_are_tried_beside_known_sets() -> None:
+    """By hand: the known wave of 1.5 explains 1.1 of some 76; the kink explains the rest."""
+    model = Line([noisy(2.0 + 3.0 * TIME + 30.0 * abs(TIME) + 1.5 * np.sin(20.0 * TIME))])
+    there, null = runner(model), fit_null(model, (0,))
+    known = fit(model, ("wave",), (0,), {**null.values, "wave_size": 1.5}, [{}])
+    sets = {frozenset(known.effects): known}
+    found = Search(declared=there, runner=there, null=null, sets=sets).explain()
+    assert set(found.final.effects) == {"kink", "wave"}
+
+
+@pytest.mark.parametrize(("cube", "asked"), [(8.0, 0), (20.0, 1)])
+def test_fits_by_secants_follow_where_the_first_effects_leave_most(
+    cube: float, asked: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By hand: a wave of 3 has a mean square of 4.5, a cube of 8 beside a slope 1.5, of 20 9.1."""
+    calls: list[FitResult] = []
+
+    def noting(_: TaskRunner, base: FitResult) -> list[Promise]:
+        calls.append(base)
+        return []
+
+    monkeypatch.setattr(search, "fitted_promises", noting)
+    explained(
+        Line([noisy(2.0 + 3.0 * TIME + 3.0 * np.sin(20.0 * TIME) + cube * TIME**3)], ["wave"])
+    )
+    assert len(calls) == asked
+
+
 @pytest.mark.parametrize(("size", "score"), [(0.8, "simulation"), (4.0, "observer")])
 def test_far_gap_is_screened_along_the_measured_outputs(size: float, score: str) -> None:
     """By hand: a wave of 0.8 leaves squares of 0.3 beside the noise of 1, one of 4 leaves 8."""
