@@ -9,7 +9,7 @@ contact comes in time meanwhile.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,12 +18,14 @@ from plant_emulator.diagnosis.fitting.approach import CORRECTION_INTERVALS
 from plant_emulator.diagnosis.fitting.joint_fit import linearise
 from plant_emulator.diagnosis.fitting.signature import signs, values_at_size
 from plant_emulator.diagnosis.search.promise import Promise, Start
+from plant_emulator.diagnosis.search.screening import visible
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.estimation.unknowns import column_lengths
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Candidate, Model
     from plant_emulator.estimation.unknowns import Estimate
@@ -42,19 +44,19 @@ class Compensation:
     """Effects to try, each alone.
 
     base : fit without effects along the measured outputs
-    states : of each effect in each run, by effect
     """
 
     base: FitResult
     runs: tuple[int, ...]
     effects: tuple[str, ...]
-    states: Mapping[str, States]
 
 
-def parted(asked: Compensation) -> list[Compensation]:
-    """The same in parts that are tried at once."""
-    parts = min(PARTS, len(asked.effects))
-    return [replace(asked, effects=asked.effects[k::parts]) for k in range(parts)]
+def compensated_promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
+    """Gains of all effects over the fit without any, the largest first; base : see above."""
+    names = tuple(visible(runner.model, base, runner.runs))
+    parts = [Compensation(base, runner.runs, names[k::PARTS]) for k in range(PARTS)]
+    found = [one for some in runner.map(compensate, parts) for one in some]
+    return sorted(found, key=lambda p: -p.gain)
 
 
 def compensate(model: Model, asked: Compensation) -> list[Promise]:
@@ -66,8 +68,8 @@ def compensate(model: Model, asked: Compensation) -> list[Promise]:
 
 def _promise(model: Model, asked: Compensation, name: str, near: Estimate) -> Promise:
     base, candidate = asked.base, model.candidates[name]
-    pairs = zip(asked.states[name], base.states, strict=True)
-    states = tuple({**own, **fit} for own, fit in pairs)
+    plain = {u.name: u.start for u in candidate.states}
+    states = tuple({**plain, **own} for own in base.states)
     found = [
         compensated(model, name, asked.runs, near, {**base.values, **sizes}, states)
         for sizes in (values_at_size(candidate, one) for one in _tried_sizes(candidate))

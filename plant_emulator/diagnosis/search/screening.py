@@ -7,8 +7,7 @@ simulation. The relations are those at the nominal parameters then, and the simu
 the measured outputs. Beside effects that leave a gap the relations are both: the fit may be near
 the truth, or bent as well. A sagging voltage beside a lag promised nothing at parameters that had
 made its limit inactive, and 85 000 at the nominal ones. On top of effects that leave noise the
-simulation is right, and tells all that the relations tell. Without effects one more score needs no
-slopes of the effect: one parameter makes room for it (`compensation`).
+simulation is right, and tells all that the relations tell.
 """
 
 from __future__ import annotations
@@ -23,7 +22,6 @@ from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.columns import best_score, onset_score
-from plant_emulator.diagnosis.search.compensation import Compensation, compensate, parted
 from plant_emulator.diagnosis.search.promise import Promise, Start
 from plant_emulator.diagnosis.search.scans import start_states
 from plant_emulator.diagnosis.search.settings import SETTINGS
@@ -98,33 +96,22 @@ class Screening:
 def promises(runner: TaskRunner, base: FitResult, led: FitResult | None) -> list[Promise]:
     """Predicted gains of all effects on top of a fit, the largest first.
 
-    led : the fit along the measured outputs, if the base leaves more than noise
+    led : the fit along the measured outputs, if the base is far from the data
     """
     effects = tuple(visible(runner.model, base, runner.runs))
-    far = base.mean_square > SETTINGS.linear_mean_square
-    scores: tuple[str, ...]
-    if led is None:
-        scores = (SIMULATION,) if base.effects else (RELATIONS, SIMULATION)
-    elif base.effects:
-        scores = (RELATIONS, NOMINAL_RELATIONS, OBSERVER if far else SIMULATION)
-    else:
-        scores = (NOMINAL_RELATIONS, OBSERVER) if far else (RELATIONS, SIMULATION)
-    where = led if led is not None and far else base
-    return regressions(runner, where, effects, scores, None if base.effects else led)
+    if led is not None:
+        beside = (RELATIONS,) if base.effects else ()
+        return regressions(runner, led, effects, (*beside, NOMINAL_RELATIONS, OBSERVER))
+    if _leaves_noise(base):
+        return regressions(runner, base, effects, (SIMULATION,))
+    nominal = (NOMINAL_RELATIONS,) if base.effects else ()
+    return regressions(runner, base, effects, (RELATIONS, *nominal, SIMULATION))
 
 
 def regressions(
-    runner: TaskRunner,
-    base: FitResult,
-    effects: Sequence[str],
-    fidelities: Sequence[str],
-    led: FitResult | None = None,
+    runner: TaskRunner, base: FitResult, effects: Sequence[str], fidelities: Sequence[str]
 ) -> list[Promise]:
-    """Predicted gains of these effects on top of a fit, the largest first, by these regressions.
-
-    led : the fit along the measured outputs, at which one parameter makes room for each effect
-        (`compensation`); None: that is not asked
-    """
+    """Predicted gains of these effects on top of a fit, the largest first, by these regressions."""
     alone = [
         (Task(base=base.of_runs([k]), runs=(run,)), tuple(effects))
         for k, run in enumerate(runner.runs)
@@ -134,10 +121,8 @@ def regressions(
     asked = [
         Screening(base, runner.runs, tuple(effects), fidelity, states) for fidelity in fidelities
     ]
-    parts = [] if led is None else parted(Compensation(led, runner.runs, tuple(effects), states))
-    tried = runner.map(compensate, parts)
     found: dict[str, Promise] = {}
-    for one in (one for some in (*runner.map(screen, asked), *tried) for one in some):
+    for one in (one for some in runner.map(screen, asked) for one in some):
         known = found.get(one.effect, Promise(effect=one.effect, gains={}, starts={}))
         found[one.effect] = Promise(
             effect=one.effect,

@@ -22,6 +22,8 @@ from plant_emulator.diagnosis.fitting.evidence import (
 )
 from plant_emulator.diagnosis.fitting.explanation import Explanation
 from plant_emulator.diagnosis.fitting.fit_steps import refit, refit_led
+from plant_emulator.diagnosis.search import summary
+from plant_emulator.diagnosis.search.compensation import compensated_promises
 from plant_emulator.diagnosis.search.confirmation import (
     Reduction,
     reduce,
@@ -31,19 +33,12 @@ from plant_emulator.diagnosis.search.confirmation import (
 from plant_emulator.diagnosis.search.fitted_sets import FittedSets
 from plant_emulator.diagnosis.search.law_forms import errors_beside_forms
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
-from plant_emulator.diagnosis.search.promise import to_try
+from plant_emulator.diagnosis.search.promise import leading, to_try
 from plant_emulator.diagnosis.search.scans import refit_scanned
 from plant_emulator.diagnosis.search.screening import SIMULATION, promises, visibilities
 from plant_emulator.diagnosis.search.secant_fits import fitted_promises
 from plant_emulator.diagnosis.search.settings import SETTINGS
-from plant_emulator.diagnosis.search.summary import (
-    alternatives,
-    hypotheses,
-    log_odds,
-    not_told_apart,
-    search_step,
-    unconverged,
-)
+from plant_emulator.diagnosis.search.summary import not_told_apart, search_step
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.execution.pool import TaskRunner
@@ -56,8 +51,8 @@ if TYPE_CHECKING:
 class Search(FittedSets):
     """The search of one diagnosis; see the module's text.
 
-    declared : in the noise that the sensors declare; `runner` leaves the outliers out as well
-    noise : that of the logs, and the fit that it was estimated around
+    declared : in the noise that the sensors declare; `runner` leaves the outliers out too
+    noise : of the logs; noise_at : fit that it was estimated around
     reduced_costs : of the best set without each of its effects
     """
 
@@ -156,7 +151,7 @@ class Search(FittedSets):
     def _screen(self, found: FitResult) -> list[Promise]:
         key = frozenset(found.effects)
         if key not in self.promises:
-            led = self.led(found) if found.mean_square > NOISE_MEAN_SQUARE else None
+            led = self.led(found) if self.is_far(found) else None
             self.promises[key] = promises(self.runner, found, led)
         return self.promises[key]
 
@@ -168,7 +163,8 @@ class Search(FittedSets):
         """Fit the effects of largest gain on top of a set.
 
         Regressions predict it, and fits along the measured outputs choose among their leaders.
-        Where there is no effect yet, and each of these leaves most, fits by secants tell.
+        Where first effects leave much, those follow for which one parameter makes room, and where
+        these leave most, those that fits by secants tell.
         """
         least = self._promising(base)
         key = frozenset(base.effects)
@@ -177,15 +173,19 @@ class Search(FittedSets):
         new = to_try(found, base, least, tried)
         fits = [base, *self.fit_on_top(base, new, least)]
         best = min(fits if base.effects else self.sets.values(), key=lambda fit: fit.cost)
-        if best is not base:
-            best = self._led_again(best)
+        best = best if best is base else self._led_again(best)
         tells = not base.effects and best is not base and not leaves_most(best, self.null)
         if tells and self._renew_null(best):
             self._expand(self.null)
             return
-        if base.effects or self.secants_fitted or not leaves_most(best, self.null):
+        if base.effects or self.tried_further or adequate(best, self.null):
             return
-        self.secants_fitted = True
+        self.tried_further = True
+        moved = compensated_promises(self.runner, self.led(base))
+        new = leading(moved, SETTINGS.leaders, least, ())
+        best = min((best, *self.fit_on_top(base, new, least)), key=lambda fit: fit.cost)
+        if not leaves_most(best, self.null):
+            return
         reached = 0.0
         for one in fitted_promises(self.runner, self.led(base))[: SETTINGS.most_followed]:
             if one.gain <= max(least, SETTINGS.rival_share * reached):
@@ -288,10 +288,10 @@ class Search(FittedSets):
         return Explanation(
             null=self.null,
             final=final,
-            hypotheses=hypotheses(sets, shown),
-            alternatives={name: alternatives(sets, final, name) for name in final.effects},
-            unconverged=unconverged(final),
-            log_odds=log_odds(
+            hypotheses=summary.hypotheses(sets, shown),
+            alternatives={name: summary.alternatives(sets, final, name) for name in final.effects},
+            unconverged=summary.unconverged(final),
+            log_odds=summary.log_odds(
                 sets, {names: self.value(one) for names, one in sets.items()}, final, larger
             ),
             reduced_costs=self.reduced_costs,

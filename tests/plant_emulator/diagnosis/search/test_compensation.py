@@ -17,7 +17,7 @@ def test_gain_is_that_at_the_best_size_with_the_slope_moved() -> None:
     """
     model = Line([noisy(2.0 + 3.0 * TIME - 4.0 * TIME**3)], ["cube"])
     base = fit_null(model, (0,))
-    (found,) = compensate(model, Compensation(base, (0,), ("cube",), {"cube": [{}]}))
+    (found,) = compensate(model, Compensation(base, (0,), ("cube",)))
     assert found.gain == pytest.approx(1000.0 * (1 / 7 - 3 / 25) * (4.0**2 - 3.7**2), rel=0.2)
     (start,) = found.starts.values()
     assert start.values["cube_size"] == pytest.approx(-0.3)
@@ -29,7 +29,7 @@ def test_a_parameter_that_its_prior_holds_makes_no_room() -> None:
     model = Line([noisy(4.0 * TIME)], ["wave"])
     model.parameters = (linear("a", 0.0, std=10.0), linear("b", 0.0, std=0.05))
     base = fit_null(model, (0,))
-    (found,) = compensate(model, Compensation(base, (0,), ("wave",), {"wave": [{}]}))
+    (found,) = compensate(model, Compensation(base, (0,), ("wave",)))
     assert found.gain < 5.0
 
 
@@ -41,7 +41,7 @@ def test_a_delay_that_stood_for_a_filter_makes_room(plausible: float) -> None:
     """
     model = Late([noisy(late_pulses(0.05, 0.1))], plausible)
     base = fit(model, (), (0,), {"a": 0.0, "b": 0.15}, [{}])
-    (found,) = compensate(model, Compensation(base, (0,), ("lag",), {"lag": [{}]}))
+    (found,) = compensate(model, Compensation(base, (0,), ("lag",)))
     start = found.starts[COMPENSATED]
     assert start.values["lag_size"] == pytest.approx(0.1, abs=0.002)
     assert start.values["b"] == pytest.approx(0.05, abs=0.01)
