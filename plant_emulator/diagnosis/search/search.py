@@ -163,8 +163,8 @@ class Search(FittedSets):
         """Fit the effects of largest gain on top of a set.
 
         Regressions predict it, and fits along the measured outputs choose among their leaders.
-        Where first effects leave much, those follow for which one parameter makes room, and where
-        these leave most, those that fits by secants tell.
+        Where first effects leave most, those follow for which one parameter makes room, and where
+        these do so too, those that fits by secants tell.
         """
         least = self._promising(base)
         key = frozenset(base.effects)
@@ -178,7 +178,7 @@ class Search(FittedSets):
         if tells and self._renew_null(best):
             self._expand(self.null)
             return
-        if base.effects or self.tried_further or adequate(best, self.null):
+        if base.effects or self.tried_further or not leaves_most(best, self.null):
             return
         self.tried_further = True
         moved = compensated_promises(self.runner, self.led(base))
