@@ -3,7 +3,7 @@
 Without its cause a fit bends the parameters. One of them may stand for the cause and be bent
 further than slopes reach, as a dead time that stands for a filter: regressions around the fit know
 nothing of the cause then. Each effect is simulated at a size, and the parameter that follows it
-most is moved to its least squares. The simulation is led along the measured outputs, so that
+most is moved to where the cost is least. The simulation is led along the measured outputs, so that
 contact comes in time meanwhile.
 """
 
@@ -52,7 +52,10 @@ class Compensation:
 
 
 def compensated_promises(runner: TaskRunner, base: FitResult) -> list[Promise]:
-    """Gains of all effects over the fit without any, the largest first; base : see above."""
+    """Gains of all effects over the fit without any, the largest first.
+
+    base : the fit without effects along the measured outputs
+    """
     names = tuple(visible(runner.model, base, runner.runs))
     parts = [Compensation(base, runner.runs, names[k::PARTS]) for k in range(PARTS)]
     found = [one for some in runner.map(compensate, parts) for one in some]

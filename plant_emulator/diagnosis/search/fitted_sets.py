@@ -52,7 +52,7 @@ class FittedSets:
     promises : what one more effect promises on top of a set
     led_fits : along the measured outputs, of sets on top of which others were tried
     expanded : sets whose most promising effects were tried on top of them
-    tried_further : whether effects were tried from this fit without effects that no regression
+    unseen_tried : whether effects were tried from this fit without effects that no regression
         tells; in another noise these choose hardly otherwise
     """
 
@@ -64,7 +64,7 @@ class FittedSets:
     promises: dict[frozenset[str], list[Promise]] = field(default_factory=dict)
     led_fits: dict[frozenset[str], FitResult] = field(default_factory=dict)
     expanded: set[frozenset[str]] = field(default_factory=set)
-    tried_further: bool = False
+    unseen_tried: bool = False
     trace: list[SearchStep] = field(default_factory=list)
 
     def task(self, base: FitResult) -> Task:
@@ -115,7 +115,7 @@ class FittedSets:
         self.null = self.sets[frozenset()] = null
         self.promises.pop(frozenset(), None)
         (self.led_fits[frozenset()],) = self.runner.map(refit_along, [self.task(null)])
-        self.tried_further = False
+        self.unseen_tried = False
 
     def fit_on_top(self, base: FitResult, new: Sequence[Promise], least: float) -> list[FitResult]:
         """Fit effects on top of a fit; least : gain that one must promise.

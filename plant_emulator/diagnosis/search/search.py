@@ -178,9 +178,9 @@ class Search(FittedSets):
         if tells and self._renew_null(best):
             self._expand(self.null)
             return
-        if base.effects or self.tried_further or not leaves_most(best, self.null):
+        if base.effects or self.unseen_tried or not leaves_most(best, self.null):
             return
-        self.tried_further = True
+        self.unseen_tried = True
         moved = compensated_promises(self.runner, self.led(base))
         new = leading(moved, SETTINGS.leaders, least, ())
         best = min((best, *self.fit_on_top(base, new, least)), key=lambda fit: fit.cost)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from plant_emulator.diagnosis.fitting.approach import CORRECTION_INTERVALS
 from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
 from plant_emulator.diagnosis.fitting.signature import values_at_size
-from plant_emulator.diagnosis.search.compensation import begun_sizes, compensated
+from plant_emulator.diagnosis.search.compensation import PARTS, begun_sizes, compensated
 from plant_emulator.diagnosis.search.promise import Promise, Start
 from plant_emulator.diagnosis.search.screening import OBSERVER, regressions, visible
 from plant_emulator.diagnosis.search.settings import SETTINGS
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 # Name of the score in the trace.
 SECANTS = "fit by secants"
-# Parts of the library that are fitted at once: each needs the slopes of the base once.
-PARTS = 2
 
 
 @dataclass(frozen=True)
