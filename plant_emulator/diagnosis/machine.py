@@ -108,10 +108,6 @@ class Model(Protocol):
         """The nuisance parameters, with their priors; a prior's mean is the nominal value."""
 
     @property
-    def contact_parameters(self) -> frozenset[str]:
-        """The parameters that move the times of contact: a cost has many minima along them."""
-
-    @property
     def units(self) -> Mapping[str, str]:
         """Units of the parameters, by name."""
 

@@ -79,9 +79,6 @@ class BenchModel:
     parity relations know the nominal equations only.
     """
 
-    # The one moves the next contact, the other the rebound.
-    contact_parameters = frozenset({"backlash_half_gap", "drum_shaft_damping"})
-
     def __init__(
         self,
         recordings: Sequence[Recording],

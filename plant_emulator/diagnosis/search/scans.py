@@ -1,4 +1,4 @@
-"""Scans of unknowns with many basins: the pause of a converter, a frequency, an angle, contact.
+"""Scans of unknowns with many basins: the pause of a converter, a frequency, an angle.
 
 Regressions tell little of such an unknown, because contact jumps with it, or a wave is out of
 phase. A scan with a robust loss finds its basin (`estimation.robust_scan`).
@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.joint_fit import fit_from
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.search.promise import Start
 from plant_emulator.diagnosis.search.settings import SETTINGS
@@ -56,34 +55,6 @@ def scan_states(model: Model, found: FitResult, runs: Sequence[int]) -> Start:
         for k, at in zip(runs, found.states, strict=True)
     )
     return Start(values=found.values, states=states)
-
-
-def refit_scanned(model: Model, task: Task) -> FitResult:
-    """The fit of `task.base`, begun anew where one contact parameter is moved (a step).
-
-    The drum may rock to and fro in the backlash at the wrong times and stay there. An error of less
-    than the noise of the speeds moves contact so, and no simulation that is led along them mends
-    it. A parameter that moves contact is scanned beside all other values as they are.
-    """
-    base = task.base
-
-    def loss(values: Mapping[str, float]) -> float:
-        pairs = zip(task.runs, base.states, strict=True)
-        rows = (model.residual(k, base.effects)({**values, **own}) for k, own in pairs)
-        return sum(cauchy_loss(row) for row in rows)
-
-    trials = [
-        {**base.values, u.name: float(np.clip(base.values[u.name] + change, u.lower, u.upper))}
-        for u in model.parameters
-        if u.name in model.contact_parameters
-        for errors in SETTINGS.contact_errors
-        for change in base.standard_errors[u.name] * np.array([-errors, errors])
-    ]
-    best = min([base.values, *trials], key=loss)
-    if best is base.values:
-        return base
-    found = fit_from(model, base.effects, task.runs, replace(base, values=best))
-    return min(base, found, key=lambda one: one.cost)
 
 
 def scan_sizes(model: Model, effects: Sequence[str], runs: Sequence[int], start: Start) -> Start:

@@ -34,7 +34,6 @@ from plant_emulator.diagnosis.search.fitted_sets import FittedSets
 from plant_emulator.diagnosis.search.law_forms import errors_beside_forms
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
 from plant_emulator.diagnosis.search.promise import leading, to_try
-from plant_emulator.diagnosis.search.scans import refit_scanned
 from plant_emulator.diagnosis.search.screening import SIMULATION, promises, visibilities
 from plant_emulator.diagnosis.search.secant_fits import fitted_promises
 from plant_emulator.diagnosis.search.settings import SETTINGS
@@ -199,17 +198,14 @@ class Search(FittedSets):
     def _led_again(self, found: FitResult) -> FitResult:
         """The fit, led along the measured speeds once more where it may be in a local minimum.
 
-        It explains half of the gap there, and leaves more than noise does. Where it still does,
-        what moves contact is scanned.
+        It explains half of the gap there, and leaves more than noise does.
         """
-        for step, action in ((refit_led, "led again"), (refit_scanned, "contact scanned")):
-            if found.mean_square <= NOISE_MEAN_SQUARE or leaves_most(found, self.null):
-                break
-            (again,) = self.runner.map(step, [self.task(found)])
-            self.keep(again)
-            self.trace.append(search_step(self.null, action, again))
-            found = min(found, again, key=lambda one: one.cost)
-        return found
+        if found.mean_square <= NOISE_MEAN_SQUARE or leaves_most(found, self.null):
+            return found
+        (again,) = self.runner.map(refit_led, [self.task(found)])
+        self.keep(again)
+        self.trace.append(search_step(self.null, "led again", again))
+        return min(found, again, key=lambda one: one.cost)
 
     def _renew_null(self, found: FitResult) -> bool:
         """Fit without effects anew from one with some; give whether the two are rivals now."""

@@ -65,9 +65,6 @@ class Settings:
     # Starts of an effect that are led along the measured outputs, beside nominal parameters: those
     # that leave least so as they are.
     most_started: int = 2
-    # Changes of a contact parameter that are tried to either side [standard errors]. A basin was
-    # some ten wide, and the right one 44 away; that is one case.
-    contact_errors: tuple[float, ...] = tuple(4.0 * k for k in range(1, 17))
     # Effects that lead the fits by secants and are fitted freely, at most: a leader may not keep
     # what it promised.
     most_followed: int = 3

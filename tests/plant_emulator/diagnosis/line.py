@@ -53,7 +53,6 @@ class Line:
     units: Mapping[str, str] = {"a": "1", "b": "1"}
     subsystems: Mapping[str, str] = {"a": "level", "b": "slope"}
     states: tuple[Unknown, ...] = ()
-    contact_parameters: frozenset[str] = frozenset()
 
     def __init__(self, measured: Sequence[Array], names: Sequence[str] = tuple(SHAPES)) -> None:
         self.measured = list(measured)
