@@ -12,6 +12,7 @@ from plant_emulator.diagnosis.prediction.gap import (
     closed_fraction,
     measure_gap,
     predict,
+    promised_fraction,
     signature_norms,
     tells_share,
 )
@@ -117,7 +118,13 @@ class HeldOutRuns:
         runs = [self.runner.model.runs[run] for _, predicted in folds for run in predicted]
         lengths = block_lengths(predictions[()])
         by_effects = {key: measure_gap(runs, one, lengths) for key, one in predictions.items()}
-        told = not followed or tells_share(by_effects[()], by_effects[followed])
+        found = explained.final if followed else explained.null
+        fitted = self._fitted_gap(found, folds, lengths)
+        told = True
+        if followed:
+            without, null = self._fitted_gap(explained.null, folds, lengths), by_effects[()]
+            promised = promised_fraction(null, without, fitted) if without and fitted else None
+            told = tells_share(null, by_effects[followed], promised)
         return Gaps(
             runs=runs,
             predictions=predictions,
@@ -128,18 +135,16 @@ class HeldOutRuns:
                 *self.convergence_notes(folds, predictions),
                 *([] if told else [NO_SHARE]),
             ),
-            fitted=self._fitted_gap(explained, followed, folds, lengths),
+            fitted=fitted,
         )
 
     def _fitted_gap(
         self,
-        explained: Explanation,
-        followed: tuple[str, ...],
+        found: FitResult,
         folds: Folds,
         lengths: Sequence[int],
     ) -> Gap | None:
-        """Gap that the fit leaves on the predicted runs; None: it did not see all of them."""
-        found = explained.final if followed else explained.null
+        """Gap that a fit leaves on the predicted runs; None: it did not see all of them."""
         runs = [run for _, predicted in folds for run in predicted]
         if not set(runs) <= set(self.plan.fitted):
             return None

@@ -9,24 +9,19 @@ beside the same others. What is left of it without one effect is fitted then.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting import evidence
-from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, excess
-from plant_emulator.diagnosis.fitting.fit_steps import refit, refit_along, start_along
+from plant_emulator.diagnosis.fitting.evidence import excess
+from plant_emulator.diagnosis.fitting.fit_steps import refit, refit_along
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.confirmation import (
     Reduction,
-    confirm,
-    lead_start,
     reduce,
-    trial_of,
     without_effects,
 )
 from plant_emulator.diagnosis.search.law_forms import gain_beside_forms
 from plant_emulator.diagnosis.search.run_agreement import run_agreement
-from plant_emulator.diagnosis.search.screening import SIMULATION
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.summary import search_step
 
@@ -37,7 +32,6 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model
-    from plant_emulator.diagnosis.search.confirmation import Trial
     from plant_emulator.diagnosis.search.promise import Promise
 
 
@@ -93,22 +87,6 @@ class FittedSets:
         """Whether a fit leaves so much that slopes around it may mislead."""
         return found.mean_square > SETTINGS.linear_mean_square
 
-    def led(self, base: FitResult) -> FitResult:
-        """The fit of a set along the measured outputs, begun at its free fit.
-
-        Far from the data the free fit without effects has bent the parameters, some up to their
-        bounds. The led one then begins at the model's own start, but for a fit without effects that
-        one with effects has led out of a local minimum.
-        """
-        key = frozenset(base.effects)
-        if key not in self.led_fits:
-            if key or not self.is_far(base):
-                (found,) = self.runner.map(refit_along, [self.task(base)])
-            else:
-                (found,) = self.runner.map(start_along, [self.runner.runs])
-            self.led_fits[key] = found
-        return self.led_fits[key]
-
     def take_null(self, null: FitResult) -> None:
         """Take a better fit without effects in the place of the known one."""
         self.trace.append(search_step(self.null, "fitted anew", null))
@@ -116,51 +94,6 @@ class FittedSets:
         self.promises.pop(frozenset(), None)
         (self.led_fits[frozenset()],) = self.runner.map(refit_along, [self.task(null)])
         self.unseen_tried = False
-
-    def fit_on_top(self, base: FitResult, new: Sequence[Promise], least: float) -> list[FitResult]:
-        """Fit effects on top of a fit; least : gain that one must promise.
-
-        Where the base leaves more than noise, a regression may mislead, and a free fit is long. The
-        effects are led along the measured outputs first. The one that gains most there is fitted
-        freely. Where it leaves much, it may be in a local minimum: other first ones are fitted as
-        long as a score promises more of one than any has reached. Of the rest those are fitted for
-        less long that gain half of the most there, or of what was reached (nine tenths where the
-        first leaves little), or whose free simulation promises half, near the data: slow effects.
-        """
-        trials = [trial_of(p, base, self.runner.runs, SETTINGS.leader_iterations) for p in new]
-        if base.mean_square <= NOISE_MEAN_SQUARE or len(trials) < 2:
-            return self.confirm([*trials[:1], *(_shorter(trial) for trial in trials[1:])])
-        own = self.led(base)
-        pairs = list(self.runner.map(lead_start, trials))
-        self.trace += [search_step(own, "led", led, trial.promised) for trial, led in pairs]
-        gains = [0.5 * (own.cost - led.cost) for _, led in pairs]
-        first, *rest = sorted(range(len(pairs)), key=lambda k: -gains[k])
-        trials = [trial for trial, _ in pairs]
-        found = self.confirm([trials[first]])
-        explained = evidence.leaves_little(found[0], excess(base))
-        promised = [max(trial.promised.values(), default=0.0) for trial in trials]
-        for k in sorted([] if base.effects or explained else rest, key=lambda k: -promised[k]):
-            if promised[k] > _gain(base, found):
-                found += self.confirm([trials[k]])
-                rest.remove(k)
-        reached = _gain(base, found)
-        least_led = SETTINGS.rival_share * max(0.0, min(gains[first], reached))
-        least_led = (1.0 - evidence.UNEXPLAINED_SHARE) * gains[first] if explained else least_led
-        least = max(least, SETTINGS.rival_share * reached)
-        rivals = [
-            _shorter(trials[k])
-            for k in rest
-            if gains[k] >= least_led or trials[k].promised.get(SIMULATION, 0.0) > least
-        ]
-        return [*found, *self.confirm(rivals)]
-
-    def confirm(self, trials: Sequence[Trial]) -> list[FitResult]:
-        """Fit these trials, and keep what they reach."""
-        found = list(self.runner.map(confirm, trials))
-        for trial, one in zip(trials, found, strict=True):
-            self.keep(one)
-            self.trace.append(search_step(self.null, "confirmed", one, trial.promised))
-        return found
 
     def keep(self, found: FitResult) -> None:
         """Keep a fit if it is the best one of its set."""
@@ -285,13 +218,3 @@ class FittedSets:
             action = f"refuted by other forms of a law (gain {gain:.1f})"
             self.trace.append(search_step(self.null, action, found))
         return gain >= SETTINGS.needed_again
-
-
-def _shorter(trial: Trial) -> Trial:
-    """A trial with the iterations of a rival."""
-    return replace(trial, iterations=SETTINGS.iterations)
-
-
-def _gain(base: FitResult, found: Sequence[FitResult]) -> float:
-    """Largest gain of fits over another one."""
-    return max((0.5 * (base.cost - one.cost) for one in found), default=0.0)

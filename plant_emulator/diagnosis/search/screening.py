@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fidelity import Fidelity
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Candidate, Model
-    from plant_emulator.diagnosis.search.columns import Score
+    from plant_emulator.diagnosis.search.columns import Score, States
 
 
 # The residuals of a regression, and its name in the trace.
@@ -227,18 +227,24 @@ def _scores(
 
 
 def _first_score(fidelity: Fidelity, candidate: Candidate, asked: Screening) -> Score | None:
-    """Score of an effect at the first size; near the noise by slopes, or beside what follows it.
+    """Score of an effect at the first size, or near the noise; see `score_nearby`.
 
-    Relations hold between samples: nothing adds up in them, and their columns hardly bend. A slope
-    is right for effects that the parameters cannot follow far, a column beside them for contact
-    that they keep as it is.
+    Relations hold between samples: nothing adds up in them, and their columns hardly bend.
     """
-    sizes, states = SETTINGS.sizes[:1], asked.states[candidate.name]
-    near = asked.base.mean_square <= SETTINGS.linear_mean_square
-    if asked.fidelity != SIMULATION or not near:
-        return best_score(fidelity, candidate, sizes, states)
+    states = asked.states[candidate.name]
+    if asked.fidelity != SIMULATION or asked.base.mean_square > SETTINGS.linear_mean_square:
+        return best_score(fidelity, candidate, SETTINGS.sizes[:1], states)
+    return score_nearby(fidelity, candidate, states)
+
+
+def score_nearby(fidelity: Fidelity, candidate: Candidate, states: States) -> Score | None:
+    """Score of an effect in the simulation near the data; None: it shows nothing here.
+
+    A slope is right for effects that the parameters cannot follow far, a column beside them for
+    contact that they keep as it is.
+    """
     slopes = best_score(fidelity, candidate, (1.0,), states, SETTINGS.slope_share)
-    beside = best_score(fidelity, candidate, sizes, states, followed=True)
+    beside = best_score(fidelity, candidate, SETTINGS.sizes[:1], states, followed=True)
     return max((slopes, beside), key=_gain)
 
 

@@ -21,7 +21,7 @@ from plant_emulator.diagnosis.fitting.evidence import (
     leaves_random,
 )
 from plant_emulator.diagnosis.fitting.explanation import Explanation
-from plant_emulator.diagnosis.fitting.fit_steps import refit, refit_led
+from plant_emulator.diagnosis.fitting.fit_steps import refit
 from plant_emulator.diagnosis.search import summary
 from plant_emulator.diagnosis.search.compensation import compensated_promises
 from plant_emulator.diagnosis.search.confirmation import (
@@ -30,9 +30,9 @@ from plant_emulator.diagnosis.search.confirmation import (
     trial_of,
     without_effects,
 )
-from plant_emulator.diagnosis.search.fitted_sets import FittedSets
 from plant_emulator.diagnosis.search.law_forms import errors_beside_forms
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
+from plant_emulator.diagnosis.search.moves import Moves
 from plant_emulator.diagnosis.search.promise import leading, to_try
 from plant_emulator.diagnosis.search.screening import SIMULATION, promises, visibilities
 from plant_emulator.diagnosis.search.secant_fits import fitted_promises
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(kw_only=True)
-class Search(FittedSets):
+class Search(Moves):
     """The search of one diagnosis; see the module's text.
 
     declared : in the noise that the sensors declare; `runner` leaves the outliers out too
@@ -76,7 +76,7 @@ class Search(FittedSets):
         best = self._queue(SETTINGS.most_effects)
         if best.effects and not leaves_most(best, self.null) and self._estimate_noise(best):
             best = self._queue(SETTINGS.most_effects)
-        final = self._without_needless(best)
+        final = self._without_needless(self.swapped(best))
         if not final.converged:
             (final,) = self.fits(refit, [final])
             self.null = self.sets[frozenset()]
@@ -172,7 +172,8 @@ class Search(FittedSets):
         new = to_try(found, base, least, tried)
         fits = [base, *self.fit_on_top(base, new, least)]
         best = min(fits if base.effects else self.sets.values(), key=lambda fit: fit.cost)
-        best = best if best is base else self._led_again(best)
+        if all(best is not one for one in fits[:2]):  # the leader was led again
+            best = self.led_again(best)
         tells = not base.effects and best is not base and not leaves_most(best, self.null)
         if tells and self._renew_null(best):
             self._expand(self.null)
@@ -194,18 +195,6 @@ class Search(FittedSets):
                 trial = trial_of(one, base, self.runner.runs, SETTINGS.leader_iterations)
                 (known,) = self.confirm([trial])
             reached = max(reached, 0.5 * (base.cost - known.cost))
-
-    def _led_again(self, found: FitResult) -> FitResult:
-        """The fit, led along the measured speeds once more where it may be in a local minimum.
-
-        It explains half of the gap there, and leaves more than noise does.
-        """
-        if found.mean_square <= NOISE_MEAN_SQUARE or leaves_most(found, self.null):
-            return found
-        (again,) = self.runner.map(refit_led, [self.task(found)])
-        self.keep(again)
-        self.trace.append(search_step(self.null, "led again", again))
-        return min(found, again, key=lambda one: one.cost)
 
     def _renew_null(self, found: FitResult) -> bool:
         """Fit without effects anew from one with some; give whether the two are rivals now."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -18,17 +19,52 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fidelity import Values
     from plant_emulator.diagnosis.fit_result import FitValues
     from plant_emulator.diagnosis.machine import Model
-    from plant_emulator.estimation.unknowns import Unknown
+    from plant_emulator.estimation.unknowns import Estimate, Unknown
     from plant_emulator.signals.log import Array
 
 
 class SimulationColumns:
     """The residual of the simulation, free or led, and its tangents; see `Fidelity`."""
 
-    def __init__(self, model: Model, where: FitValues, runs: Sequence[int]) -> None:
+    def __init__(
+        self,
+        model: Model,
+        where: FitValues,
+        runs: Sequence[int],
+        found: Estimate | None = None,
+        change: Array | float = 0.0,
+    ) -> None:
+        """Linearise the residual at a fit.
+
+        found : the estimate there; None: it is made
+        change : of the residual that the data have beside what the fit leaves, shape (n,)
+        """
         self.model, self.where, self.runs = model, where, tuple(runs)
-        self.found = linearise(model, where, runs)
+        self.found = found or linearise(model, where, runs)
         self.base = np.concatenate([r.ravel() for r in self.found.residuals])
+        self.change = change
+
+    def without(self, effect: str) -> SimulationColumns:
+        """The same where one effect of the fit is absent, by the slopes of its sizes.
+
+        Its unknowns are no nuisance any more. The other columns are still those beside it, where
+        contact comes in time.
+        """
+        found, candidate = self.found, self.model.candidates[effect]
+        own = {u.name for u in (*candidate.sizes, *candidate.shapes, *candidate.states)}
+        kept = np.array([u.name not in own for u in found.unknowns])
+        neutral = candidate.neutral
+        away = [
+            u.scaled(neutral[u.name]) - z if u.name in neutral else 0.0
+            for u, z in zip(found.unknowns, found.z, strict=True)
+        ]
+        rest = replace(
+            found,
+            unknowns=tuple(u for u, keep in zip(found.unknowns, kept, strict=True) if keep),
+            z=found.z[kept],
+            jacobians=tuple(j[..., kept] for j in found.jacobians),
+        )
+        return SimulationColumns(self.model, self.where, self.runs, rest, self._slopes @ away)
 
     def _residual(
         self,
@@ -46,8 +82,15 @@ class SimulationColumns:
     @cached_property
     def data(self) -> Regression:
         """Data and nuisance; an unknown without a prior gets one of a deviation of 1."""
-        slopes = np.concatenate([j.reshape(-1, len(self.found.z)) for j in self.found.jacobians])
-        return Regression.of(self.base - slopes @ self._shift, -slopes * self.deviations)
+        slopes = self._slopes
+        return Regression.of(
+            self.base + self.change - slopes @ self._shift, -slopes * self.deviations
+        )
+
+    @cached_property
+    def _slopes(self) -> Array:
+        """Slopes of the residual, shape (n, unknowns)."""
+        return np.concatenate([j.reshape(-1, len(self.found.z)) for j in self.found.jacobians])
 
     @cached_property
     def _shift(self) -> Array:

@@ -14,6 +14,7 @@ from plant_emulator.diagnosis.prediction.gap import (
     closed_fraction_interval,
     combined_gap,
     measure_gap,
+    promised_fraction,
     shows_shrinkage,
     tells_share,
 )
@@ -65,6 +66,29 @@ def test_predictions_that_go_astray_in_some_blocks_leave_the_share_open() -> Non
     assert not shows_shrinkage(before, astray)
     assert tells_share(before, measure_gap(run, [constant(1.5)], [50]))
     assert tells_share(before, before)
+
+
+@pytest.mark.parametrize(("promised", "told"), [(0.05, False), (0.3, True), (None, True)])
+def test_effect_that_promises_less_than_the_error_of_the_prediction_tells_no_share(
+    promised: float | None, told: bool
+) -> None:
+    """By hand: of a gap of 8, draws of halves close (9 - 8.41) / 8 = 0.07, (9 - 9.61) / 8 or 0."""
+    run = [measured_run("a")]
+    before = measure_gap(run, [constant(3.0)], [50])
+    after = measure_gap(run, [prediction(np.repeat([2.9, 3.1], 50))], [50])
+    assert not shows_shrinkage(before, after)
+    assert tells_share(before, after, promised) is told
+    closing = measure_gap(run, [prediction(np.repeat([2.4, 2.6], 50))], [50])
+    assert tells_share(before, closing, promised)
+
+
+def test_promised_share_is_what_two_fits_to_all_runs_differ_by() -> None:
+    """By hand: squares of 9 are predicted, and fits leave 4 and 1: 3 / 8."""
+    predicted, without, fitted = (
+        measure_gap(NAMES, [constant(level, 1.0)], [10]) for level in (3.0, 2.0, 1.0)
+    )
+    assert promised_fraction(predicted, without, fitted) == pytest.approx(3.0 / 8.0)
+    assert promised_fraction(fitted, without, fitted) is None
 
 
 def test_channel_at_the_noise_before_does_not_count() -> None:

@@ -1,0 +1,129 @@
+"""The moves of a search: one more effect on top of a set, and one in the place of another.
+
+Effects on top of a set that leaves more than noise are led along the measured outputs first, which
+is short and takes contact in time, and the best of them are fitted freely.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from plant_emulator.diagnosis.fitting import evidence
+from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, excess
+from plant_emulator.diagnosis.fitting.fit_steps import refit, refit_along, refit_led, start_along
+from plant_emulator.diagnosis.search.confirmation import confirm, lead_start, trial_of
+from plant_emulator.diagnosis.search.fitted_sets import FittedSets
+from plant_emulator.diagnosis.search.screening import SIMULATION
+from plant_emulator.diagnosis.search.settings import SETTINGS
+from plant_emulator.diagnosis.search.summary import search_step
+from plant_emulator.diagnosis.search.swaps import swaps
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.search.confirmation import Trial
+    from plant_emulator.diagnosis.search.promise import Promise
+
+
+class Moves(FittedSets):
+    """The fitted sets of effects, and what leads from one set to another."""
+
+    def led(self, base: FitResult) -> FitResult:
+        """The fit of a set along the measured outputs, begun at its free fit.
+
+        Far from the data the free fit without effects has bent the parameters, some up to their
+        bounds. The led one then begins at the model's own start, but for a fit without effects that
+        one with effects has led out of a local minimum.
+        """
+        key = frozenset(base.effects)
+        if key not in self.led_fits:
+            if key or not self.is_far(base):
+                (found,) = self.runner.map(refit_along, [self.task(base)])
+            else:
+                (found,) = self.runner.map(start_along, [self.runner.runs])
+            self.led_fits[key] = found
+        return self.led_fits[key]
+
+    def fit_on_top(self, base: FitResult, new: Sequence[Promise], least: float) -> list[FitResult]:
+        """Fit effects on top of a fit; least : gain that one must promise.
+
+        Where the base leaves more than noise, a regression may mislead, and a free fit is long. The
+        effects are led along the measured outputs first. The one that gains most there is fitted
+        freely. Where it leaves much, it may be in a local minimum: other first ones are fitted as
+        long as a score promises more of one than any has reached. Of the rest those are fitted for
+        less long that gain half of the most there, or of what was reached (nine tenths where the
+        first leaves little), or whose free simulation promises half, near the data: slow effects.
+        """
+        trials = [trial_of(p, base, self.runner.runs, SETTINGS.leader_iterations) for p in new]
+        if base.mean_square <= NOISE_MEAN_SQUARE or len(trials) < 2:
+            found = self.confirm([*trials[:1], *(_shorter(trial) for trial in trials[1:])])
+            return [*(self.led_again(one) for one in found[:1]), *found[1:]]
+        own = self.led(base)
+        pairs = list(self.runner.map(lead_start, trials))
+        self.trace += [search_step(own, "led", led, trial.promised) for trial, led in pairs]
+        gains = [0.5 * (own.cost - led.cost) for _, led in pairs]
+        first, *rest = sorted(range(len(pairs)), key=lambda k: -gains[k])
+        trials = [trial for trial, _ in pairs]
+        found = [self.led_again(one) for one in self.confirm([trials[first]])]
+        explained = evidence.leaves_little(found[0], excess(base))
+        promised = [max(trial.promised.values(), default=0.0) for trial in trials]
+        for k in sorted([] if base.effects or explained else rest, key=lambda k: -promised[k]):
+            if promised[k] > _gain(base, found):
+                found += self.confirm([trials[k]])
+                rest.remove(k)
+        reached = _gain(base, found)
+        least_led = SETTINGS.rival_share * max(0.0, min(gains[first], reached))
+        least_led = (1.0 - evidence.UNEXPLAINED_SHARE) * gains[first] if explained else least_led
+        least = max(least, SETTINGS.rival_share * reached)
+        rivals = [
+            _shorter(trials[k])
+            for k in rest
+            if gains[k] >= least_led or trials[k].promised.get(SIMULATION, 0.0) > least
+        ]
+        return [*found, *self.confirm(rivals)]
+
+    def confirm(self, trials: Sequence[Trial]) -> list[FitResult]:
+        """Fit these trials, and keep what they reach."""
+        found = list(self.runner.map(confirm, trials))
+        for trial, one in zip(trials, found, strict=True):
+            self.keep(one)
+            self.trace.append(search_step(self.null, "confirmed", one, trial.promised))
+        return found
+
+    def led_again(self, found: FitResult) -> FitResult:
+        """The fit, led along the measured outputs once more where it may be in a local minimum.
+
+        It explains half of the gap there, and leaves more than noise does. The first time, the
+        other parameters were those without the effect.
+        """
+        if found.mean_square <= NOISE_MEAN_SQUARE or evidence.leaves_most(found, self.null):
+            return found
+        (again,) = self.runner.map(refit_led, [self.task(found)])
+        self.keep(again)
+        self.trace.append(search_step(self.null, "led again", again))
+        return min(found, again, key=lambda one: one.cost)
+
+    def swapped(self, best: FitResult) -> FitResult:
+        """The best set, with other effects tried in the place of each of its effects.
+
+        Their own fits may have ended in a local minimum. Each begins where the best set leads now.
+        """
+        if not best.effects or self.is_far(best):
+            return best
+        (starts,) = self.runner.map(swaps, [self.task(best)])
+        for one in self.runner.map(refit, [self.task(start) for start in starts]):
+            self.keep(one)
+            self.trace.append(search_step(self.null, "swapped", one))
+        return self.settled()
+
+
+def _shorter(trial: Trial) -> Trial:
+    """A trial with the iterations of a rival."""
+    return replace(trial, iterations=SETTINGS.iterations)
+
+
+def _gain(base: FitResult, found: Sequence[FitResult]) -> float:
+    """Largest gain of fits over another one."""
+    return max((0.5 * (base.cost - one.cost) for one in found), default=0.0)
