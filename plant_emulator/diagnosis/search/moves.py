@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fitting import evidence
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, excess
-from plant_emulator.diagnosis.fitting.fit_steps import refit, refit_along, refit_led, start_along
+from plant_emulator.diagnosis.fitting.fit_steps import refit_along, refit_led, start_along
 from plant_emulator.diagnosis.search.confirmation import confirm, lead_start, trial_of
 from plant_emulator.diagnosis.search.fitted_sets import FittedSets
 from plant_emulator.diagnosis.search.screening import SIMULATION
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.summary import search_step
-from plant_emulator.diagnosis.search.swaps import swaps
+from plant_emulator.diagnosis.search.swaps import fit_swap, swaps
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,10 +51,11 @@ class Moves(FittedSets):
 
         Where the base leaves more than noise, a regression may mislead, and a free fit is long. The
         effects are led along the measured outputs first. The one that gains most there is fitted
-        freely. Where it leaves much, it may be in a local minimum: other first ones are fitted as
-        long as a score promises more of one than any has reached. Of the rest those are fitted for
-        less long that gain half of the most there, or of what was reached (nine tenths where the
-        first leaves little), or whose free simulation promises half, near the data: slow effects.
+        freely. Where it comes near the data and leaves little, the others wait: they are tried in
+        its place in the end. Else it may be in a local minimum: other first ones are fitted as long
+        as a score promises more of one than any has reached. Of the rest those are fitted for less
+        long that gain half of the most there, or of what was reached, or whose free simulation
+        promises half, near the data: slow effects.
         """
         trials = [trial_of(p, base, self.runner.runs, SETTINGS.leader_iterations) for p in new]
         if base.mean_square <= NOISE_MEAN_SQUARE or len(trials) < 2:
@@ -67,15 +68,15 @@ class Moves(FittedSets):
         first, *rest = sorted(range(len(pairs)), key=lambda k: -gains[k])
         trials = [trial for trial, _ in pairs]
         found = [self.led_again(one) for one in self.confirm([trials[first]])]
-        explained = evidence.leaves_little(found[0], excess(base))
+        if not self.is_far(found[0]) and evidence.leaves_little(found[0], excess(base)):
+            return found
         promised = [max(trial.promised.values(), default=0.0) for trial in trials]
-        for k in sorted([] if base.effects or explained else rest, key=lambda k: -promised[k]):
+        for k in sorted([] if base.effects else rest, key=lambda k: -promised[k]):
             if promised[k] > _gain(base, found):
                 found += self.confirm([trials[k]])
                 rest.remove(k)
         reached = _gain(base, found)
         least_led = SETTINGS.rival_share * max(0.0, min(gains[first], reached))
-        least_led = (1.0 - evidence.UNEXPLAINED_SHARE) * gains[first] if explained else least_led
         least = max(least, SETTINGS.rival_share * reached)
         rivals = [
             _shorter(trials[k])
@@ -113,7 +114,7 @@ class Moves(FittedSets):
         if not best.effects or self.is_far(best):
             return best
         (starts,) = self.runner.map(swaps, [self.task(best)])
-        for one in self.runner.map(refit, [self.task(start) for start in starts]):
+        for one in self.runner.map(fit_swap, [self.task(start) for start in starts]):
             self.keep(one)
             self.trace.append(search_step(self.null, "swapped", one))
         return self.settled()

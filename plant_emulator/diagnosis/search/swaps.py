@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.diagnosis.fitting.joint_fit import fit_from
 from plant_emulator.diagnosis.search.screening import score_nearby, visible
 from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.simulation_columns import SimulationColumns
@@ -37,6 +38,11 @@ def swaps(model: Model, task: Task) -> list[FitResult]:
     with threadpool_limits(1):
         columns = SimulationColumns(model, task.base, task.runs)
         return [one for name in task.base.effects for one in _in_place_of(name, task.base, columns)]
+
+
+def fit_swap(model: Model, task: Task) -> FitResult:
+    """Fit `task.base` for as long as a rival (a step)."""
+    return fit_from(model, task.base.effects, task.runs, task.base, SETTINGS.iterations)
 
 
 def _in_place_of(effect: str, base: FitResult, columns: SimulationColumns) -> Iterator[FitResult]:

@@ -43,8 +43,11 @@ def test_effects_that_gain_half_of_the_most_along_the_measured_outputs_are_fitte
 
 
 def test_effect_whose_simulation_promises_half_of_what_was_reached_is_fitted_too() -> None:
-    """What is slow gains little along the measured outputs; this wave is none and gains nothing."""
-    y = noisy(2.0 + 3.0 * TIME + 5.0 * abs(TIME))
+    """What is slow gains little along the measured outputs; this wave is none and gains nothing.
+
+    By hand: 5 |t| gains 2083, and t^3 leaves much.
+    """
+    y = noisy(2.0 + 3.0 * TIME + 5.0 * abs(TIME) + 10.0 * TIME**3)
     model = Line([y], ("kink", "wave"))
     null = fit_null(model, (0,))
     for promised, fitted in ((900.0, [("kink",)]), (1100.0, [("kink",), ("wave",)])):
@@ -87,8 +90,8 @@ def test_effect_of_which_a_regression_promises_more_than_was_reached_is_fitted_t
     assert asked == [10] * len(fitted)
 
 
-@pytest.mark.parametrize(("cube", "fitted"), [(0.0, ["bowl"]), (10.0, ["bowl", "tub"])])
-def test_rivals_of_an_effect_that_leaves_little_gain_nine_tenths_of_its_gain(
+@pytest.mark.parametrize(("cube", "fitted"), [(0.0, []), (10.0, ["bowl", "tub"])])
+def test_rivals_of_an_effect_that_leaves_little_near_the_data_wait(
     cube: float, fitted: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By hand: of |t| beside a constant t^2 follows 15/16 of the variance, and t^4 3/4.
