@@ -114,6 +114,8 @@ class Moves(FittedSets):
         if not best.effects or self.is_far(best):
             return best
         (starts,) = self.runner.map(swaps, [self.task(best)])
+        if not starts:
+            return best
         for one in self.runner.map(fit_swap, [self.task(start) for start in starts]):
             self.keep(one)
             self.trace.append(search_step(self.null, "swapped", one))
