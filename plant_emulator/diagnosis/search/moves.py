@@ -55,7 +55,8 @@ class Moves(FittedSets):
         its place in the end. Else it may be in a local minimum: other first ones are fitted as long
         as a score promises more of one than any has reached. Of the rest those are fitted for less
         long that gain half of the most there, or of what was reached, or whose free simulation
-        promises half, near the data: slow effects.
+        promises half, near the data: slow effects. No further effect is fitted that cannot explain
+        half of what the others leave.
         """
         trials = [trial_of(p, base, self.runner.runs, SETTINGS.leader_iterations) for p in new]
         if base.mean_square <= NOISE_MEAN_SQUARE or len(trials) < 2:
@@ -64,6 +65,9 @@ class Moves(FittedSets):
         own = self.led(base)
         pairs = list(self.runner.map(lead_start, trials))
         self.trace += [search_step(own, "led", led, trial.promised) for trial, led in pairs]
+        pairs = [pair for pair in pairs if not base.effects or self._may_explain(base, *pair)]
+        if not pairs:
+            return []
         gains = [0.5 * (own.cost - led.cost) for _, led in pairs]
         first, *rest = sorted(range(len(pairs)), key=lambda k: -gains[k])
         trials = [trial for trial, _ in pairs]
@@ -84,6 +88,12 @@ class Moves(FittedSets):
             if gains[k] >= least_led or trials[k].promised.get(SIMULATION, 0.0) > least
         ]
         return [*found, *self.confirm(rivals)]
+
+    def _may_explain(self, base: FitResult, trial: Trial, led: FitResult) -> bool:
+        """Whether a further effect may explain half of what the base leaves, led or freely."""
+        half = 0.5 * evidence.LARGER_SHARE * excess(base)
+        slow = trial.promised.get(SIMULATION, 0.0) >= half
+        return slow or not evidence.leaves_most(led, self.led(base))
 
     def confirm(self, trials: Sequence[Trial]) -> list[FitResult]:
         """Fit these trials, and keep what they reach."""

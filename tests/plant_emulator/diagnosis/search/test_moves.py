@@ -109,6 +109,32 @@ def test_rivals_of_an_effect_that_leaves_little_near_the_data_wait(
     assert sorted(one.effects[0] for one in rivals) == fitted
 
 
+@pytest.mark.parametrize(
+    ("kink", "score", "fitted"),
+    [
+        (8.0, "relations", [("wave", "kink")]),
+        (4.0, "relations", []),
+        (4.0, "simulation", [("wave", "kink"), ("wave", "cube")]),
+    ],
+)
+def test_further_effect_that_cannot_explain_half_of_the_rest_is_not_fitted(
+    kink: float, score: str, fitted: list[tuple[str, ...]]
+) -> None:
+    """By hand: a cosine of 2 leaves 2, a kink of 8 64 / 12 = 5.3 and one of 4 1.3; a cube nothing.
+
+    A gain of 4000 is the 8000 chi squared of 4 a sample.
+    """
+    y = 2.0 + 4.0 * np.sin(20.0 * TIME) + 2.0 * np.cos(37.0 * TIME) + kink * abs(TIME)
+    model = Line([noisy(y)], ("wave", "kink", "cube"))
+    base = fit(model, ("wave",), (0,), {**NULL, "wave_size": 1.0}, [{}])
+    known = promises(runner(model), base, None)
+    supposed = [
+        replace(p, gains={score: 4000.0}, starts={score: p.starts["simulation"]}) for p in known
+    ]
+    sets = Moves(runner=runner(model), null=fit_null(model, (0,)))
+    assert [one.effects for one in sets.fit_on_top(base, supposed, 15.0)] == fitted
+
+
 class Astray(Line):
     """A line whose kink has a wave beside it where nothing leads the simulation."""
 
