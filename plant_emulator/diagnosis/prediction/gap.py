@@ -268,32 +268,20 @@ def shows_shrinkage(reference: Gap, explained: Gap) -> bool:
     return interval is None or interval[0] > 0.0
 
 
-def tells_share(reference: Gap, explained: Gap, promised: float | None = None) -> bool:
+def tells_share(reference: Gap, explained: Gap, *, faint: bool = False) -> bool:
     """Whether the 95 % interval of the closed fraction tells a share.
 
-    promised : closed fraction by what the effects change in the fit to all runs, these included [1]
+    faint : whether the fit to all runs without effects leaves nothing but noise
 
     Runs with much contact, or sizes that few runs show, are hard to predict from other runs: the
-    interval is wider than the gap. Beside that error a faint effect promises next to nothing: the
-    interval holds both what it promises and 0. That speaks neither for nor against an effect.
+    interval is wider than the gap. What the others mispredict of a run may also hide a faint
+    effect: the interval holds 0. That speaks neither for nor against an effect.
     """
     interval = closed_fraction_interval(reference, explained)
     if interval is None:
         return True
     low, high = interval
-    faint = promised is not None and low <= 0.0 and promised <= high
-    return high - low <= 1.0 and not faint
-
-
-def promised_fraction(reference: Gap, without: Gap, fitted: Gap) -> float | None:
-    """Share of a gap by which two fits that saw its runs differ [1]; None where there is no gap.
-
-    without, fitted : gap that the fits to all runs leave, without the effects and with them
-    """
-    counting = reference.by_channel >= OPEN_GAP
-    gap = float(np.sum(reference.mean_squares[counting] - 1.0))
-    differ = without.mean_squares[counting] - fitted.mean_squares[counting]
-    return float(np.sum(differ)) / gap if gap > 0.0 else None
+    return high - low <= 1.0 and not (faint and low <= 0.0 <= high)
 
 
 def combined_gap(found: Gap) -> tuple[float, float, float]:

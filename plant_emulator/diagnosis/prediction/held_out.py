@@ -5,14 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.evidence import DETECTABLE_NORM, EVIDENCE_THRESHOLD
+from plant_emulator.diagnosis.fitting.evidence import (
+    DETECTABLE_NORM,
+    EVIDENCE_THRESHOLD,
+    NOISE_MEAN_SQUARE,
+)
 from plant_emulator.diagnosis.prediction.gap import (
     Fold,
     block_lengths,
     closed_fraction,
     measure_gap,
     predict,
-    promised_fraction,
     signature_norms,
     tells_share,
 )
@@ -118,13 +121,8 @@ class HeldOutRuns:
         runs = [self.runner.model.runs[run] for _, predicted in folds for run in predicted]
         lengths = block_lengths(predictions[()])
         by_effects = {key: measure_gap(runs, one, lengths) for key, one in predictions.items()}
-        found = explained.final if followed else explained.null
-        fitted = self._fitted_gap(found, folds, lengths)
-        told = True
-        if followed:
-            without, null = self._fitted_gap(explained.null, folds, lengths), by_effects[()]
-            promised = promised_fraction(null, without, fitted) if without and fitted else None
-            told = tells_share(null, by_effects[followed], promised)
+        faint = explained.null.mean_square <= NOISE_MEAN_SQUARE
+        told = not followed or tells_share(by_effects[()], by_effects[followed], faint=faint)
         return Gaps(
             runs=runs,
             predictions=predictions,
@@ -135,16 +133,18 @@ class HeldOutRuns:
                 *self.convergence_notes(folds, predictions),
                 *([] if told else [NO_SHARE]),
             ),
-            fitted=fitted,
+            fitted=self._fitted_gap(explained, followed, folds, lengths),
         )
 
     def _fitted_gap(
         self,
-        found: FitResult,
+        explained: Explanation,
+        followed: tuple[str, ...],
         folds: Folds,
         lengths: Sequence[int],
     ) -> Gap | None:
-        """Gap that a fit leaves on the predicted runs; None: it did not see all of them."""
+        """Gap that the fit leaves on the predicted runs; None: it did not see all of them."""
+        found = explained.final if followed else explained.null
         runs = [run for _, predicted in folds for run in predicted]
         if not set(runs) <= set(self.plan.fitted):
             return None

@@ -6,13 +6,13 @@ is short and takes contact in time, and the best of them are fitted freely.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fitting import evidence
-from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, excess
+from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, adequate, excess
 from plant_emulator.diagnosis.fitting.fit_steps import refit_along, refit_led, start_along
-from plant_emulator.diagnosis.search.confirmation import confirm, lead_start, trial_of
+from plant_emulator.diagnosis.search.confirmation import Reduction, confirm, lead_start, trial_of
 from plant_emulator.diagnosis.search.fitted_sets import FittedSets
 from plant_emulator.diagnosis.search.screening import SIMULATION
 from plant_emulator.diagnosis.search.settings import SETTINGS
@@ -27,8 +27,14 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.search.promise import Promise
 
 
+@dataclass(kw_only=True)
 class Moves(FittedSets):
-    """The fitted sets of effects, and what leads from one set to another."""
+    """The fitted sets of effects, and what leads from one set to another.
+
+    swapped_from : sets in the place of whose effects others were tried
+    """
+
+    swapped_from: set[frozenset[str]] = field(default_factory=set)
 
     def led(self, base: FitResult) -> FitResult:
         """The fit of a set along the measured outputs, begun at its free fit.
@@ -55,8 +61,8 @@ class Moves(FittedSets):
         its place in the end. Else it may be in a local minimum: other first ones are fitted as long
         as a score promises more of one than any has reached. Of the rest those are fitted for less
         long that gain half of the most there, or of what was reached, or whose free simulation
-        promises half, near the data: slow effects. No further effect is fitted that cannot explain
-        half of what the others leave.
+        promises half, near the data: slow effects. Of several further effects near the data none is
+        fitted that cannot explain half of what the others leave.
         """
         trials = [trial_of(p, base, self.runner.runs, SETTINGS.leader_iterations) for p in new]
         if base.mean_square <= NOISE_MEAN_SQUARE or len(trials) < 2:
@@ -65,7 +71,8 @@ class Moves(FittedSets):
         own = self.led(base)
         pairs = list(self.runner.map(lead_start, trials))
         self.trace += [search_step(own, "led", led, trial.promised) for trial, led in pairs]
-        pairs = [pair for pair in pairs if not base.effects or self._may_explain(base, *pair)]
+        if base.effects and not self.is_far(base):
+            pairs = [pair for pair in pairs if self._may_explain(base, *pair)]
         if not pairs:
             return []
         gains = [0.5 * (own.cost - led.cost) for _, led in pairs]
@@ -117,13 +124,18 @@ class Moves(FittedSets):
         return min(found, again, key=lambda one: one.cost)
 
     def swapped(self, best: FitResult) -> FitResult:
-        """The best set, with other effects tried in the place of each of its effects.
+        """The best set, with other effects tried in the place of each of its effects, once.
 
         Their own fits may have ended in a local minimum. Each begins where the best set leads now.
         """
-        if not best.effects or self.is_far(best):
+        key = frozenset(best.effects)
+        done = not key or key in self.swapped_from
+        if done or self.is_far(best) or not adequate(best, self.null):
             return best
-        (starts,) = self.runner.map(swaps, [self.task(best)])
+        self.swapped_from.add(key)
+        asked = [Reduction(best, self.runner.runs, name) for name in best.effects]
+        starts = [one for some in self.runner.map(swaps, asked) for one in some]
+        starts = [one for one in starts if not self.refuted(frozenset(one.effects))]
         if not starts:
             return best
         for one in self.runner.map(fit_swap, [self.task(start) for start in starts]):

@@ -26,18 +26,18 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.task import Task
     from plant_emulator.diagnosis.machine import Model
+    from plant_emulator.diagnosis.search.confirmation import Reduction
 
 
-def swaps(model: Model, task: Task) -> list[FitResult]:
-    """Where fits begin with another effect in the place of each one of `task.base` (a step).
+def swaps(model: Model, asked: Reduction) -> list[FitResult]:
+    """Where fits begin with another effect in the place of one (a step).
 
-    Their costs are those of the base.
+    Their costs are those of the fit. States and sizes with many narrow basins are not scanned.
     """
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):
-        columns = SimulationColumns(model, task.base, task.runs)
-        return [one for name in task.base.effects for one in _in_place_of(name, task.base, columns)]
+        return list(_in_its_place(model, asked))
 
 
 def fit_swap(model: Model, task: Task) -> FitResult:
@@ -45,21 +45,23 @@ def fit_swap(model: Model, task: Task) -> FitResult:
     return fit_from(model, task.base.effects, task.runs, task.base, SETTINGS.iterations)
 
 
-def _in_place_of(effect: str, base: FitResult, columns: SimulationColumns) -> Iterator[FitResult]:
+def _in_its_place(model: Model, asked: Reduction) -> Iterator[FitResult]:
     """Where fits begin with another effect in the place of this one."""
-    model, absent = columns.model, columns.without(effect)
+    base, effect = asked.base, asked.effect
+    absent = SimulationColumns(model, base, asked.runs).without(effect)
     products = absent.data.products(np.reshape(absent.change, (-1, 1)))
     explained, _ = gain(products.gram, products.along)
+    least = max(SETTINGS.promising, SETTINGS.rival_share * explained)
     neutral = model.candidates[effect].neutral
-    for name, candidate in visible(model, base, columns.runs).items():
-        plain = [{u.name: u.start for u in candidate.states} for _ in columns.runs]
+    for name, candidate in visible(model, base, asked.runs).items():
+        plain = [{u.name: u.start for u in candidate.states} for _ in asked.runs]
         score = score_nearby(absent, candidate, plain)
-        if score is None or score.gain < SETTINGS.rival_share * explained:
+        if score is None or score.gain < least:
             continue
         values, states = absent.values_at(score.theta)
         yield replace(
             base,
-            effects=(*(e for e in base.effects if e != effect), name),
+            effects=tuple(name if one == effect else one for one in base.effects),
             values={**base.values, **neutral, **values, **score.values},
             states=tuple(
                 {**fit, **own, **more}
