@@ -45,10 +45,10 @@ class SimulationColumns:
         self.change = change
 
     def without(self, effect: str) -> SimulationColumns:
-        """The same where one effect of the fit is absent, by the slopes of its sizes.
+        """The columns of a fit without one of its effects: what that explains is data here.
 
-        Its unknowns are no nuisance any more. The other columns are still those beside it, where
-        contact comes in time.
+        The slopes of its sizes tell what it explains. Its unknowns are no nuisance any more. Other
+        effects are still simulated beside it, where contact comes in time.
         """
         found, candidate = self.found, self.model.candidates[effect]
         own = {u.name for u in (*candidate.sizes, *candidate.shapes, *candidate.states)}
