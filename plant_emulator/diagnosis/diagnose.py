@@ -40,7 +40,7 @@ from plant_emulator.diagnosis.report.ranking import (
 )
 from plant_emulator.diagnosis.report.shrinkage import held_out_gap, waterfall
 from plant_emulator.diagnosis.report.statement import statement, verdict
-from plant_emulator.diagnosis.search.settings import SETTINGS
+from plant_emulator.diagnosis.settings import SETTINGS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

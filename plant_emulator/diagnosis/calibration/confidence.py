@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.special import expit
 
-from plant_emulator.diagnosis.search.settings import SETTINGS
+from plant_emulator.diagnosis.settings import SETTINGS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -23,7 +23,7 @@ from plant_emulator.diagnosis.localisation.parity_relations import (
     relation_residuals,
 )
 from plant_emulator.diagnosis.machines.thinning import thin
-from plant_emulator.diagnosis.search.rich_model import rich_columns
+from plant_emulator.diagnosis.screening.rich_model import rich_columns
 from plant_emulator.errors import UnsettledError
 from plant_emulator.estimation.noise.channel_noise import LINE_PRIOR
 from plant_emulator.estimation.noise.estimate import estimate_channel_noise

@@ -1,1 +1,1 @@
-"""The search of the effects: noise of the logs, screening, confirmation, a queue of hypotheses."""
+"""The search of the effects: noise of the logs, confirmation, a queue of hypotheses."""

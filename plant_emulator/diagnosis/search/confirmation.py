@@ -19,9 +19,9 @@ from plant_emulator.diagnosis.fitting.approach import (
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
 from plant_emulator.diagnosis.fitting.signature import values_at_size
-from plant_emulator.diagnosis.search.promise import Start, starts_of
-from plant_emulator.diagnosis.search.scans import scan_sizes, scan_states
-from plant_emulator.diagnosis.search.settings import SETTINGS
+from plant_emulator.diagnosis.screening.promise import Start, starts_of
+from plant_emulator.diagnosis.screening.scans import scan_sizes, scan_states
+from plant_emulator.diagnosis.settings import SETTINGS
 from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model
-    from plant_emulator.diagnosis.search.promise import Promise
+    from plant_emulator.diagnosis.screening.promise import Promise
     from plant_emulator.estimation.unknowns import Lengths
 
 

@@ -22,8 +22,8 @@ from plant_emulator.diagnosis.search.confirmation import (
 )
 from plant_emulator.diagnosis.search.law_forms import gain_beside_forms
 from plant_emulator.diagnosis.search.run_agreement import run_agreement
-from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.summary import search_step
+from plant_emulator.diagnosis.settings import SETTINGS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Model
-    from plant_emulator.diagnosis.search.promise import Promise
+    from plant_emulator.diagnosis.screening.promise import Promise
 
 
 @dataclass(kw_only=True)

@@ -28,7 +28,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.fitting.joint_fit import linearise
 from plant_emulator.diagnosis.fitting.relaxation import normal_equations, relax
-from plant_emulator.diagnosis.search.settings import SETTINGS
+from plant_emulator.diagnosis.settings import SETTINGS
 from plant_emulator.estimation.unknowns import Unknown
 
 if TYPE_CHECKING:

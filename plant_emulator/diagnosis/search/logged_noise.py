@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from plant_emulator.diagnosis.search.rich_model import rich_columns
-from plant_emulator.diagnosis.search.simulation_columns import SimulationColumns
+from plant_emulator.diagnosis.screening.rich_model import rich_columns
+from plant_emulator.diagnosis.screening.simulation_columns import SimulationColumns
 from plant_emulator.estimation.nearby import Changed
 from plant_emulator.estimation.noise.disturbances import outlying
 from plant_emulator.estimation.noise.logged_noise import disturbances_of_runs, noise_of_runs

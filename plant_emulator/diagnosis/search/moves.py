@@ -12,19 +12,19 @@ from typing import TYPE_CHECKING
 from plant_emulator.diagnosis.fitting import evidence
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, adequate, excess
 from plant_emulator.diagnosis.fitting.fit_steps import refit_along, refit_led, start_along
+from plant_emulator.diagnosis.screening.screening import SIMULATION
 from plant_emulator.diagnosis.search.confirmation import Reduction, confirm, lead_start, trial_of
 from plant_emulator.diagnosis.search.fitted_sets import FittedSets
-from plant_emulator.diagnosis.search.screening import SIMULATION
-from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.summary import search_step
 from plant_emulator.diagnosis.search.swaps import fit_swap, swaps
+from plant_emulator.diagnosis.settings import SETTINGS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from plant_emulator.diagnosis.fit_result import FitResult
+    from plant_emulator.diagnosis.screening.promise import Promise
     from plant_emulator.diagnosis.search.confirmation import Trial
-    from plant_emulator.diagnosis.search.promise import Promise
 
 
 @dataclass(kw_only=True)

@@ -25,7 +25,7 @@ from scipy.special import chdtrc
 
 from plant_emulator.diagnosis.fitting.joint_fit import SHRINKAGE, linearise
 from plant_emulator.diagnosis.fitting.relaxation import Relaxed, relax
-from plant_emulator.diagnosis.search.settings import SETTINGS
+from plant_emulator.diagnosis.settings import SETTINGS
 from plant_emulator.estimation.unknowns import Unknown
 
 if TYPE_CHECKING:

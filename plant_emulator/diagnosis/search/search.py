@@ -23,8 +23,11 @@ from plant_emulator.diagnosis.fitting.evidence import (
 )
 from plant_emulator.diagnosis.fitting.explanation import Explanation
 from plant_emulator.diagnosis.fitting.fit_steps import refit
+from plant_emulator.diagnosis.screening.compensation import compensated_promises
+from plant_emulator.diagnosis.screening.promise import leading, to_try
+from plant_emulator.diagnosis.screening.screening import SIMULATION, promises, visibilities
+from plant_emulator.diagnosis.screening.secant_fits import fitted_promises
 from plant_emulator.diagnosis.search import summary
-from plant_emulator.diagnosis.search.compensation import compensated_promises
 from plant_emulator.diagnosis.search.confirmation import (
     Reduction,
     reduce,
@@ -34,16 +37,13 @@ from plant_emulator.diagnosis.search.confirmation import (
 from plant_emulator.diagnosis.search.law_forms import errors_beside_forms
 from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, estimate_noise
 from plant_emulator.diagnosis.search.moves import Moves
-from plant_emulator.diagnosis.search.promise import leading, to_try
-from plant_emulator.diagnosis.search.screening import SIMULATION, promises, visibilities
-from plant_emulator.diagnosis.search.secant_fits import fitted_promises
-from plant_emulator.diagnosis.search.settings import SETTINGS
 from plant_emulator.diagnosis.search.summary import not_told_apart, search_step
+from plant_emulator.diagnosis.settings import SETTINGS
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.execution.pool import TaskRunner
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.search.promise import Promise
+    from plant_emulator.diagnosis.screening.promise import Promise
     from plant_emulator.estimation.noise.logged_noise import LoggedNoise
 
 

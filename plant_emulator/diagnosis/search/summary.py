@@ -10,13 +10,13 @@ from plant_emulator.diagnosis.fitting.evidence import (
     evidence_of,
 )
 from plant_emulator.diagnosis.fitting.explanation import Hypothesis
-from plant_emulator.diagnosis.search.settings import SETTINGS
+from plant_emulator.diagnosis.settings import SETTINGS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.search.screening import Visibility
+    from plant_emulator.diagnosis.screening.screening import Visibility
 
     Sets = Mapping[frozenset[str], FitResult]
 

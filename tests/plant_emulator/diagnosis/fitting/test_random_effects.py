@@ -17,7 +17,7 @@ from plant_emulator.diagnosis.fitting.random_effects import WeightedRecipe, fit_
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.machine import Course
 from plant_emulator.diagnosis.prediction.held_out import Plan
-from plant_emulator.diagnosis.search.screening import screen
+from plant_emulator.diagnosis.screening.screening import screen
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import (
     TIME,

@@ -11,6 +11,8 @@ from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.machine import Candidate, Model
+from plant_emulator.diagnosis.screening.promise import Promise, Start
+from plant_emulator.diagnosis.screening.screening import promises
 from plant_emulator.diagnosis.search import confirmation, search
 from plant_emulator.diagnosis.search.confirmation import (
     Reduction,
@@ -21,8 +23,6 @@ from plant_emulator.diagnosis.search.confirmation import (
     reduce,
     without_effects,
 )
-from plant_emulator.diagnosis.search.promise import Promise, Start
-from plant_emulator.diagnosis.search.screening import promises
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import (

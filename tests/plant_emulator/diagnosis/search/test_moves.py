@@ -10,9 +10,9 @@ from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.joint_fit import fit
+from plant_emulator.diagnosis.screening.screening import promises
 from plant_emulator.diagnosis.search.confirmation import Trial
 from plant_emulator.diagnosis.search.moves import Moves
-from plant_emulator.diagnosis.search.screening import promises
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import SHAPES, TIME, Line, effect, noisy, runner
 

@@ -16,12 +16,12 @@ from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, adequate, excess
 from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.report.ranking import undetectable
+from plant_emulator.diagnosis.screening.compensation import COMPENSATED
+from plant_emulator.diagnosis.screening.promise import Promise, Start
+from plant_emulator.diagnosis.screening.screening import promises
+from plant_emulator.diagnosis.screening.secant_fits import SECANTS
 from plant_emulator.diagnosis.search import search
-from plant_emulator.diagnosis.search.compensation import COMPENSATED
-from plant_emulator.diagnosis.search.promise import Promise, Start
-from plant_emulator.diagnosis.search.screening import promises
 from plant_emulator.diagnosis.search.search import Search
-from plant_emulator.diagnosis.search.secant_fits import SECANTS
 from plant_emulator.diagnosis.search.summary import not_told_apart
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import (

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fitting.signature import values_at_size
-from plant_emulator.diagnosis.search.promise import Start
-from plant_emulator.diagnosis.search.settings import SETTINGS
+from plant_emulator.diagnosis.screening.promise import Start
+from plant_emulator.diagnosis.settings import SETTINGS
 from plant_emulator.estimation.nearby import Beside
 from plant_emulator.estimation.robust_scan import cauchy_loss, scan_unknowns
 

@@ -7,11 +7,11 @@ import pytest
 
 from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.joint_fit import fit
-from plant_emulator.diagnosis.search.promise import Promise
-from plant_emulator.diagnosis.search.secant_fits import SecantFits, fit_by_secants
+from plant_emulator.diagnosis.screening.promise import Promise
+from plant_emulator.diagnosis.screening.secant_fits import SecantFits, fit_by_secants
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import TIME, Line, noisy
-from tests.plant_emulator.diagnosis.search.late import Late, late_pulses
+from tests.plant_emulator.diagnosis.screening.late import Late, late_pulses
 
 
 def promised(model: Line) -> dict[str, Promise]:

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING
 from plant_emulator.diagnosis.fitting.approach import CORRECTION_INTERVALS
 from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
 from plant_emulator.diagnosis.fitting.signature import values_at_size
-from plant_emulator.diagnosis.search.compensation import PARTS, begun_sizes, compensated
-from plant_emulator.diagnosis.search.promise import Promise, Start
-from plant_emulator.diagnosis.search.screening import OBSERVER, regressions, visible
-from plant_emulator.diagnosis.search.settings import SETTINGS
+from plant_emulator.diagnosis.screening.compensation import PARTS, begun_sizes, compensated
+from plant_emulator.diagnosis.screening.promise import Promise, Start
+from plant_emulator.diagnosis.screening.screening import OBSERVER, regressions, visible
+from plant_emulator.diagnosis.settings import SETTINGS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from plant_emulator.diagnosis.fitting.approach import fit_null
-from plant_emulator.diagnosis.search.promise import Promise, Start, leading, starts_of, to_try
+from plant_emulator.diagnosis.screening.promise import Promise, Start, leading, starts_of, to_try
 from tests.plant_emulator.diagnosis.line import TIME, Line, noisy
 
 

@@ -21,11 +21,11 @@ from plant_emulator.diagnosis.fitting.approach import CORRECTION_INTERVALS
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.fitting.task import Task
-from plant_emulator.diagnosis.search.columns import best_score, onset_score
-from plant_emulator.diagnosis.search.promise import Promise, Start
-from plant_emulator.diagnosis.search.scans import start_states
-from plant_emulator.diagnosis.search.settings import SETTINGS
-from plant_emulator.diagnosis.search.simulation_columns import SimulationColumns
+from plant_emulator.diagnosis.screening.columns import best_score, onset_score
+from plant_emulator.diagnosis.screening.promise import Promise, Start
+from plant_emulator.diagnosis.screening.scans import start_states
+from plant_emulator.diagnosis.screening.simulation_columns import SimulationColumns
+from plant_emulator.diagnosis.settings import SETTINGS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fidelity import Fidelity
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Candidate, Model
-    from plant_emulator.diagnosis.search.columns import Score, States
+    from plant_emulator.diagnosis.screening.columns import Score, States
 
 
 # The residuals of a regression, and its name in the trace.

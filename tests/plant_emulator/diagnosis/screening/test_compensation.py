@@ -4,9 +4,9 @@ import pytest
 
 from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.joint_fit import fit
-from plant_emulator.diagnosis.search.compensation import COMPENSATED, Compensation, compensate
+from plant_emulator.diagnosis.screening.compensation import COMPENSATED, Compensation, compensate
 from tests.plant_emulator.diagnosis.line import TIME, Line, linear, noisy
-from tests.plant_emulator.diagnosis.search.late import Late, late_pulses
+from tests.plant_emulator.diagnosis.screening.late import Late, late_pulses
 
 
 def test_gain_is_that_at_the_best_size_with_the_slope_moved() -> None:
