@@ -1,9 +1,10 @@
 """Holes of a log, bridged so that the simulation goes on through them (pure).
 
 A hole gets regular rows. The rows do not count, but the simulation has to know there what the bench
-was asked to do. Each input is continued from both sides as straight lines. They meet at the corner
-that the hole hides. Where they do not meet within the hole, or the input beside it is curved or
-noisy, the input is straight, and the log tells how far it may be off (`INPUT_ERRORS`).
+was asked to do. An input that is curved on both sides goes on as a cubic spline. Any other one is
+continued from both sides as straight lines. They meet at the corner that the hole hides. Where they
+do not meet within the hole, or the input beside it is noisy, the input is straight. The log tells
+how far an input may be off (`INPUT_ERRORS`).
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial import Polynomial
+from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
 from plant_emulator.signals.log import INPUT_ERRORS, KNEE_TIME, KNEES
 
@@ -33,10 +35,9 @@ SHORTEST_HOLE, SHORTEST_WITH_KNEES = 1.75, 5.5
 # Intervals beside a hole that its lines are laid through.
 BESIDE = 10
 # Lines count that differ from the straight input in the hole by so many times what they miss
-# beside it. Beside a parabola that is 1.7 times in one lost row, and 4.2 times in five.
-STRAIGHT = 5.0
-# What a line misses of the sample across, over what it would miss of a parabola: more is no curve.
-CURVED = 1.5
+# beside it, and so does a curve, if a cubic misses so many times less than a line does there. What
+# a cubic misses of noise is 0.85 times what a line misses.
+CLEAR = 5.0
 # Rounding of an input over its range [1]: it tells of no bend.
 ROUNDING = 1e-6
 # Mean error of a straight input that kept its course to the end of the hole, or left it at once,
@@ -85,8 +86,11 @@ def _regular(first: float, last: float, interval: float) -> Array:
 def _continue_input(time: Array, values: Array, hole: int, at: Array) -> tuple[Array, float]:
     """An input in the hole behind a sample, at these times, and its standard deviation there.
 
-    Where the line from one side meets neither that of the other nor the sample there, the input may
-    have changed at any time in the hole. What changes and changes back in it stays hidden.
+    A curve is off by what two kinds of splines differ, as the slopes that they begin with do, and
+    by the remainder of a cubic, a 384th of the fourth derivative times the length of the hole to
+    the fourth. Where the line from one side
+    meets neither that of the other nor the sample there, the input may have changed at any time in
+    the hole. What changes and changes back in it stays hidden.
     """
     straight = np.interp(at, time, values)
     before = slice(max(0, hole - BESIDE), hole + 1)
@@ -95,42 +99,46 @@ def _continue_input(time: Array, values: Array, hole: int, at: Array) -> tuple[A
         return straight, HALF * abs(float(values[hole + 1] - values[hole]))
     first = _Line.beside(time, values, before, hole + 1)
     second = _Line.beside(time, values, after, hole)
+    rounding = ROUNDING * float(np.ptp(values))
     bend = max(first.bend, second.bend)
+    if bend > rounding and max(first.rough, second.rough) <= max(rounding, bend / CLEAR):
+        both = slice(before.start, after.stop)
+        curve = CubicSpline(time[both], values[both])(at)
+        other = Akima1DInterpolator(time[both], values[both])(at)
+        length = float(time[hole + 1] - time[hole])
+        remainder = abs(second.third - first.third) * length**3 / 384.0
+        return curve, float(np.abs(curve - other).max()) + remainder
     meet = (second.line - first.line).roots()
     for corner in meet[(time[hole] < meet) & (meet < time[hole + 1])]:
         bent = np.where(at < corner, first.line(at), second.line(at))
         away = float(np.abs(bent - straight).max())
-        if away > STRAIGHT * bend:
-            # A rounded corner lies between the two.
-            return bent, HALF * away if bend > ROUNDING * np.ptp(values) else 0.0
-    return straight, min(first.error, second.error)
+        if away > CLEAR * max(bend, rounding):
+            # Between noisy sides the corner may be a rounded one.
+            return bent, HALF * away if bend > rounding else 0.0
+    found = min(first.missed, second.missed)
+    return straight, found if found > max(bend, rounding) else 0.0
 
 
 @dataclass(frozen=True)
 class _Line:
     """The line through an input on one side of a hole.
 
-    bend : most that it misses there
-    error : standard deviation of a straight input in the hole, as far as this side tells
+    bend : most that it misses there; rough : most that a cubic misses there
+    third : third derivative of that cubic
+    missed : standard deviation of a straight input that left this line at any time in the hole
     """
 
     line: Polynomial
     bend: float
-    error: float
+    rough: float
+    third: float
+    missed: float
 
     @classmethod
     def beside(cls, time: Array, values: Array, side: slice, across: int) -> _Line:
-        """The line on this side; across : the sample on the other one.
-
-        A parabola misses 6 (1/2 + w)^2 - 1/2 bends of the sample across, and its chord 3/4 w^2
-        bends of the parabola, with w the hole over the length of the side.
-        """
+        """The line on this side; across : the sample on the other one."""
         line = Polynomial.fit(time[side], values[side], 1).convert()
-        bend = max(np.abs(line(time[side]) - values[side]).max(), ROUNDING * np.ptp(values))
-        missed = HALF * abs(line(time[across]) - values[across])
-        wide = np.abs(time[side] - time[across]).min() / np.ptp(time[side])
-        curved = HALF * CURVED * (6.0 * (0.5 + wide) ** 2 - 0.5) * bend
-        error = missed if missed > curved else min(missed, 0.75 * wide**2 * bend)
-        if bend <= ROUNDING * np.ptp(values) and missed <= curved:
-            error = 0.0
-        return cls(line, float(bend), float(error))
+        cubic = Polynomial.fit(time[side], values[side], min(3, len(time[side]) - 1))
+        bend, rough = (float(np.abs(p(time[side]) - values[side]).max()) for p in (line, cubic))
+        third = float(cubic.convert().deriv(3)(0.0))
+        return cls(line, bend, rough, third, HALF * abs(float(line(time[across]) - values[across])))
