@@ -19,7 +19,8 @@ import numpy as np
 
 from plant_emulator.diagnosis.fitting.approach import CORRECTION_INTERVALS
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
-from plant_emulator.diagnosis.fitting.signature import values_at_size
+from plant_emulator.diagnosis.fitting.joint_fit import fit
+from plant_emulator.diagnosis.fitting.signature import signs, values_at_size
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.screening.columns import best_score, onset_score
 from plant_emulator.diagnosis.screening.promise import Promise, Start
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Candidate, Model
     from plant_emulator.diagnosis.screening.columns import Score, States
+    from plant_emulator.estimation.unknowns import Unknown
 
 
 # The residuals of a regression, and its name in the trace.
@@ -144,14 +146,57 @@ def screen(model: Model, asked: Screening) -> list[Promise]:
         if fidelity is None:
             return []
         found = _scores(library, fidelity, asked)
-        return [
-            Promise(
+        promises = {
+            name: Promise(
                 effect=name,
                 gains={asked.fidelity: 0.0 if score is None else score.gain},
                 starts={} if score is None else {asked.fidelity: _start(fidelity, score, base)},
             )
             for name, score in found.items()
-        ]
+        }
+        if isinstance(fidelity, SimulationColumns):
+            scaled = {n: c for n, c in library.items() if any(map(_scales, c.states))}
+            for name, candidate in scaled.items():
+                fitted = _fitted(fidelity, candidate, asked)
+                promises[name] = max(promises[name], fitted, key=lambda p: p.gain)
+        return list(promises.values())
+
+
+def _scales(state: Unknown) -> bool:
+    """Whether a state of an effect scales with its size, as a temperature at the start does."""
+    return not state.angle and state.step is None
+
+
+def _fitted(fidelity: SimulationColumns, candidate: Candidate, asked: Screening) -> Promise:
+    """The gain of an effect whose states scale with its size, by a short fit.
+
+    At the start of such a state no slope shows what it does to the size, nor what the size does to
+    it. All else follows by secants: the fit takes little more than the columns do.
+    """
+    states = [
+        {**known, **own}
+        for known, own in zip(asked.base.states, asked.states[candidate.name], strict=True)
+    ]
+    found = min(
+        (
+            fit(
+                fidelity.model,
+                (*asked.base.effects, candidate.name),
+                asked.runs,
+                {**asked.base.values, **values_at_size(candidate, way * SETTINGS.sizes[1])},
+                states,
+                SETTINGS.secant_iterations[-1],
+                fidelity.found,
+            )
+            for way in signs(candidate.sizes)
+        ),
+        key=lambda one: one.cost,
+    )
+    return Promise(
+        effect=candidate.name,
+        gains={asked.fidelity: 0.5 * (asked.base.cost - found.cost)},
+        starts={asked.fidelity: Start(values=found.values, states=found.states)},
+    )
 
 
 def _at_nominal(model: Model, asked: Screening) -> FitResult:
