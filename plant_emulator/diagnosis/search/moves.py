@@ -40,17 +40,24 @@ class Moves(FittedSets):
         """The fit of a set along the measured outputs, begun at its free fit.
 
         Far from the data the free fit without effects has bent the parameters, some up to their
-        bounds. The led one then begins at the model's own start, but for a fit without effects that
-        one with effects has led out of a local minimum.
+        bounds, and the model's own start may lead to less. Either may end in a local minimum.
         """
         key = frozenset(base.effects)
         if key not in self.led_fits:
-            if key or not self.is_far(base):
-                (found,) = self.runner.map(refit_along, [self.task(base)])
-            else:
-                (found,) = self.runner.map(start_along, [self.runner.runs])
-            self.led_fits[key] = found
+            found = list(self.runner.map(refit_along, [self.task(base)]))
+            if not key and self.is_far(base):
+                found += self.runner.map(start_along, [self.runner.runs])
+            self.led_fits[key] = min(found, key=lambda one: one.cost)
         return self.led_fits[key]
+
+    def leaves_most(self, found: FitResult, base: FitResult) -> bool:
+        """Whether a fit leaves most of what another one leaves, also along the measured outputs.
+
+        Far from the data a free fit with one of two causes may take contact at the wrong time.
+        """
+        if not evidence.leaves_most(found, base):
+            return False
+        return not self.is_far(found) or evidence.leaves_most(self.led(found), self.led(base))
 
     def fit_on_top(self, base: FitResult, new: Sequence[Promise], least: float) -> list[FitResult]:
         """Fit effects on top of a fit; least : gain that one must promise.

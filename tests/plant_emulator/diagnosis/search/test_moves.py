@@ -246,15 +246,58 @@ class Folded(Line):
         return {"a": 1.0, "b": 0.0}, [{} for _ in runs]
 
 
-@pytest.mark.parametrize(("left", "offset"), [(0.0, -2.0), (5.0, 2.0)])
-def test_far_fit_without_effects_is_led_from_the_models_own_start(
-    left: float, offset: float
+class Waving(Folded):
+    """A folded line with a cosine of 5 where the offset is negative."""
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+        plain, wave = super().residual(run, effects), 5.0 * np.cos(37.0 * TIME)
+        return lambda v: plain(v) - (v["a"] < 0.0) * wave
+
+
+@pytest.mark.parametrize(("waves", "offset"), [(False, 2.0), (True, -2.0)])
+def test_far_fit_without_effects_is_led_from_where_that_leaves_less(
+    waves: bool, offset: float
 ) -> None:
-    """The free fit has bent a to -2. By hand: a cosine of 5 leaves 12.5 beside the noise of 1."""
-    model = Folded([noisy(2.0 + 3.0 * TIME + left * np.cos(37.0 * TIME))])
+    """The free fit has bent a to -2. A wave that nothing explains leaves 12.5 in any case."""
+    known = 5.0 * np.cos(37.0 * TIME) if waves else 0.0
+    model = Waving([noisy(2.0 + 3.0 * TIME + 5.0 * np.cos(23.0 * TIME) + known)])
     bent = fit(model, (), (0,), {"a": -2.0, "b": 3.0}, [{}])
     led = Moves(runner=runner(model), null=bent).led(bent)
     assert led.values["a"] == pytest.approx(offset, abs=0.3)
+
+
+class Caught(Line):
+    """A free simulation in which an offset of 5 hides four fifths of the effects.
+
+    Along the measured outputs nothing is hidden.
+    """
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+        plain = super().residual(run, effects)
+        return lambda v: plain({**v, **{f"{e}_size": 0.2 * v[f"{e}_size"] for e in effects}})
+
+    def observer(self, interval: float) -> Line:
+        """See `Model`."""
+        return Line(self.measured, list(self.candidates))
+
+
+@pytest.mark.parametrize(("other", "most"), [(1.0, False), (5.0, True)])
+def test_first_effect_leaves_little_where_that_is_so_along_the_measured_outputs(
+    other: float, most: bool
+) -> None:
+    """The fit stays at its start, a wave of 4; freely it shows a fifth of it."""
+    model = Caught([noisy(4.0 * np.sin(20.0 * TIME) + other * np.cos(37.0 * TIME))])
+    null = fit_null(model, (0,))
+    stuck = replace(
+        null,
+        effects=("wave",),
+        values={**null.values, "wave_size": 4.0},
+        cost=0.95 * null.cost,
+        sum_of_squares=0.95 * null.sum_of_squares,
+    )
+    assert Moves(runner=runner(model), null=null).leaves_most(stuck, null) == most
 
 
 def test_further_effect_must_gain_more_than_the_error_of_the_first_ones_law() -> None:
