@@ -28,6 +28,7 @@ LABELS = {
     "compensate": "what each effect promises",
     "confirm": "first fits of effects",
     "lead_start": "fits along the measured speeds",
+    "lead_others": "fits along the measured speeds",
     "refit_along": "fits along the measured speeds",
     "start_along": "fits along the measured speeds",
     "refit_led": "fits along the measured speeds",

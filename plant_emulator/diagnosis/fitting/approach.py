@@ -68,10 +68,11 @@ def lead_best(
     runs: Sequence[int],
     iterations: int,
     far: float = SUSPECT_MEAN_SQUARE,
-) -> FitResult:
+) -> list[FitResult]:
     """The fit along the measured outputs from the best start.
 
     That is the first one that a few iterations bring near the data, or else the one of least cost.
+    Behind it stands what these iterations made of the others, the best first.
 
     starts : all with the same effects, the most promising ones first
     iterations : at most so many; far : mean square above which a start is far from the data
@@ -81,8 +82,8 @@ def lead_best(
         first.append(lead(model, one, runs, iterations=FIRST_ITERATIONS))
         if first[-1].mean_square <= far:
             break
-    best = min(first, key=lambda one: one.cost)
-    return lead(model, best, runs, iterations=iterations)
+    best, *others = sorted(first, key=lambda one: one.cost)
+    return [lead(model, best, runs, iterations=iterations), *others]
 
 
 def let_go(

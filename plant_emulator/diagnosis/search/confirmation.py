@@ -11,6 +11,7 @@ from plant_emulator.diagnosis.fit_result import FitValues
 from plant_emulator.diagnosis.fitting.approach import (
     APPROACH_ITERATIONS,
     CORRECTION_INTERVALS,
+    lead,
     lead_best,
     let_go,
     mean_square,
@@ -42,6 +43,7 @@ class Trial:
     iterations : of each fit at most so many; None: until it converges
     promised : predicted gains of the last effect by score
     led : the fit along the measured outputs from the best start; None: not known
+    others : what a few iterations made of the other starts, the best first
     """
 
     effects: tuple[str, ...]
@@ -52,6 +54,7 @@ class Trial:
     iterations: int | None = None
     promised: Mapping[str, float] = field(default_factory=dict)
     led: FitResult | None = None
+    others: tuple[FitResult, ...] = ()
 
 
 def trial_of(
@@ -73,8 +76,20 @@ def trial_of(
 def lead_start(model: Model, trial: Trial) -> tuple[Trial, FitResult]:
     """The trial with its best start led along the measured outputs, and that fit (a step)."""
     scanned = _with_scanned_sizes(model, trial)
-    led = _lead(model, scanned)
-    return replace(scanned, led=led), led
+    led, *others = _lead(model, scanned)
+    return replace(scanned, led=led, others=tuple(others)), led
+
+
+def lead_others(model: Model, trial: Trial) -> tuple[Trial, FitResult]:
+    """The trial with its other starts led along the measured outputs, and the best fit (a step).
+
+    A few iterations tell the best start where the effect is nearly absent from some: such a start
+    leaves little more than the fit without the effect, and leads nowhere.
+    """
+    iterations = trial.iterations or APPROACH_ITERATIONS
+    found = [lead(model, one, trial.runs, iterations=iterations) for one in trial.others]
+    led = min(filter(None, (trial.led, *found)), key=lambda one: one.cost)
+    return replace(trial, led=led, others=()), led
 
 
 def confirm(model: Model, trial: Trial) -> FitResult:
@@ -110,7 +125,7 @@ def fit_from_best_start(model: Model, trial: Trial) -> FitResult:
     known = [*starts, trial.led] if trial.led else starts
     near = nearest(model, known, trial.runs, _far(trial))
     if near is None:
-        led = trial.led or _lead(model, trial)
+        led = trial.led or _lead(model, trial)[0]
         near = let_go(model, led, trial.runs, trial.iterations or APPROACH_ITERATIONS)
     own = starts[-1]
     found = [
@@ -133,8 +148,8 @@ def _far(trial: Trial) -> float:
     return NOISE_MEAN_SQUARE if len(trial.effects) > 1 else SUSPECT_MEAN_SQUARE
 
 
-def _lead(model: Model, trial: Trial) -> FitResult:
-    """The fit along the measured outputs from the best start.
+def _lead(model: Model, trial: Trial) -> list[FitResult]:
+    """The fit along the measured outputs from the best start, and the others; see `lead_best`.
 
     It is sought among those that leave least so as they are, and the plausible one.
     """

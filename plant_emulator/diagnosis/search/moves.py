@@ -12,8 +12,14 @@ from typing import TYPE_CHECKING
 from plant_emulator.diagnosis.fitting import evidence
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, adequate, excess
 from plant_emulator.diagnosis.fitting.fit_steps import refit_along, refit_led, start_along
-from plant_emulator.diagnosis.screening.screening import SIMULATION
-from plant_emulator.diagnosis.search.confirmation import Reduction, confirm, lead_start, trial_of
+from plant_emulator.diagnosis.screening.screening import OBSERVER, SIMULATION
+from plant_emulator.diagnosis.search.confirmation import (
+    Reduction,
+    confirm,
+    lead_others,
+    lead_start,
+    trial_of,
+)
 from plant_emulator.diagnosis.search.fitted_sets import FittedSets
 from plant_emulator.diagnosis.search.summary import search_step
 from plant_emulator.diagnosis.search.swaps import fit_swap, swaps
@@ -63,7 +69,8 @@ class Moves(FittedSets):
         """Fit effects on top of a fit; least : gain that one must promise.
 
         Where the base leaves more than noise, a regression may mislead, and a free fit is long. The
-        effects are led along the measured outputs first. The one that gains most there is fitted
+        effects are led along the measured outputs first, from their other starts too where they do
+        not keep half of what a regression promised there. The one that gains most there is fitted
         freely. Where it comes near the data and leaves little, the others wait: they are tried in
         its place in the end. Else it may be in a local minimum: other first ones are fitted as long
         as a score promises more of one than any has reached. Of the rest those are fitted for less
@@ -77,6 +84,10 @@ class Moves(FittedSets):
             return [*(self.led_again(one) for one in found[:1]), *found[1:]]
         own = self.led(base)
         pairs = list(self.runner.map(lead_start, trials))
+        short = [k for k, pair in enumerate(pairs) if _falls_short(own, *pair)]
+        further = self.runner.map(lead_others, [pairs[k][0] for k in short])
+        for k, pair in zip(short, further, strict=True):
+            pairs[k] = pair
         self.trace += [search_step(own, "led", led, trial.promised) for trial, led in pairs]
         if base.effects and not self.is_far(base):
             pairs = [pair for pair in pairs if self._may_explain(base, *pair)]
@@ -154,6 +165,12 @@ class Moves(FittedSets):
 def _shorter(trial: Trial) -> Trial:
     """A trial with the iterations of a rival."""
     return replace(trial, iterations=SETTINGS.iterations)
+
+
+def _falls_short(own: FitResult, trial: Trial, led: FitResult) -> bool:
+    """Whether a fit does not keep half of what a regression along the measured outputs promised."""
+    least = SETTINGS.rival_share * trial.promised.get(OBSERVER, 0.0)
+    return bool(trial.others) and 0.5 * (own.cost - led.cost) < least
 
 
 def _gain(base: FitResult, found: Sequence[FitResult]) -> float:

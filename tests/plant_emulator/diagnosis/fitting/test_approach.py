@@ -68,8 +68,9 @@ def test_best_of_the_starts_is_led_on(model: BenchModel) -> None:
     assert 2.0 * first[0].cost < first[1].cost
     on = lead(model, first[0], RUNS, iterations=5)
     for starts in ([wrong, start], [start, wrong]):
-        led = lead_best(model, starts, RUNS, 5)
+        led, other = lead_best(model, starts, RUNS, 5)
         assert led.values["drum_inertia"] == pytest.approx(on.values["drum_inertia"], rel=1e-6)
+        assert other.cost == pytest.approx(first[1].cost)
 
 
 def test_first_start_that_comes_near_the_data_is_led_on(

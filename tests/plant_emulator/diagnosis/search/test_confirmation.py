@@ -19,6 +19,7 @@ from plant_emulator.diagnosis.search.confirmation import (
     Trial,
     confirm,
     fit_from_best_start,
+    lead_others,
     lead_start,
     reduce,
     without_effects,
@@ -145,6 +146,19 @@ def test_led_start_far_from_the_noise_is_let_go_and_not_led_again(
     monkeypatch.setattr(confirmation, "lead_best", None)
     found = confirm(model, trial)
     assert found.values["wave_size"] == pytest.approx(4.0, abs=0.15)
+
+
+@pytest.mark.parametrize(("left", "size"), [(0.5, 0.0), (50.0, 4.0)])
+def test_other_starts_count_where_they_lead_to_less(left: float, size: float) -> None:
+    """The known fit has no wave, and leaves less or more than the noise."""
+    model = Line([noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME))])
+    start = Start(values={"a": 9.0, "b": -9.0, "wave_size": 0.0}, states=({},))
+    trial, led = lead_start(model, Trial(("wave",), (0,), (start,)))
+    known = replace(led, values={**led.values, "wave_size": 0.0}, cost=left * len(TIME))
+    asked = replace(trial, led=known, others=(replace(known, values=start.values),))
+    again, found = lead_others(model, asked)
+    assert found.values["wave_size"] == pytest.approx(size, abs=0.15)
+    assert (again.led, again.others) == (found, ())
 
 
 def test_fit_begins_at_a_led_start_that_is_near_the_noise(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,8 +10,9 @@ from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.joint_fit import fit
-from plant_emulator.diagnosis.screening.screening import promises
-from plant_emulator.diagnosis.search.confirmation import Trial
+from plant_emulator.diagnosis.screening.screening import OBSERVER, promises
+from plant_emulator.diagnosis.search import moves
+from plant_emulator.diagnosis.search.confirmation import Trial, lead_others
 from plant_emulator.diagnosis.search.moves import Moves
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import SHAPES, TIME, Line, effect, noisy, runner
@@ -57,6 +58,31 @@ def test_effect_whose_simulation_promises_half_of_what_was_reached_is_fitted_too
         ]
         sets = Moves(runner=runner(model), null=null)
         assert [one.effects for one in sets.fit_on_top(null, supposed, 5.0)] == fitted
+
+
+@pytest.mark.parametrize(("promised", "led"), [(900.0, []), (1100.0, [("wave",)])])
+def test_effect_that_keeps_less_than_half_of_its_promise_is_led_from_other_starts_too(
+    promised: float, led: list[tuple[str, ...]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By hand: a wave of 1 gains 2000 / 4 = 500 along the measured outputs. t^3 leaves much."""
+    y = noisy(2.0 + 3.0 * TIME + 5.0 * abs(TIME) + 10.0 * TIME**3 + np.sin(20.0 * TIME))
+    model = Line([y], ("kink", "wave"))
+    null = fit_null(model, (0,))
+    supposed = [
+        replace(p, gains={OBSERVER: promised}, starts={OBSERVER: p.starts["simulation"]})
+        if p.effect == "wave"
+        else p
+        for p in promises(runner(model), null, None)
+    ]
+    asked = []
+
+    def noting(model: Line, trial: Trial) -> tuple[Trial, FitResult]:
+        asked.append(trial.effects)
+        return lead_others(model, trial)
+
+    monkeypatch.setattr(moves, "lead_others", noting)
+    Moves(runner=runner(model), null=null).fit_on_top(null, supposed, 5.0)
+    assert asked == led
 
 
 @pytest.mark.parametrize(
