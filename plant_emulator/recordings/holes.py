@@ -1,10 +1,10 @@
 """Holes of a log, bridged so that the simulation goes on through them (pure).
 
 A hole gets regular rows. The rows do not count, but the simulation has to know there what the bench
-was asked to do. An input that is curved on both sides goes on as a cubic spline. Any other one is
-continued from both sides as straight lines. They meet at the corner that the hole hides. Where they
-do not meet within the hole, or the input beside it is noisy, the input is straight. The log tells
-how far an input may be off (`INPUT_ERRORS`).
+was asked to do. Each input is continued from both sides as straight lines. They meet at the corner
+that the hole hides. Where they do not meet within the hole, or the input beside it is noisy, the
+input is straight. An input that is curved goes on as a cubic spline, where that is less uncertain.
+The log tells how far an input may be off (`INPUT_ERRORS`).
 """
 
 from __future__ import annotations
@@ -86,59 +86,106 @@ def _regular(first: float, last: float, interval: float) -> Array:
 def _continue_input(time: Array, values: Array, hole: int, at: Array) -> tuple[Array, float]:
     """An input in the hole behind a sample, at these times, and its standard deviation there.
 
-    A curve is off by what two kinds of splines differ, as the slopes that they begin with do, and
-    by the remainder of a cubic, a 384th of the fourth derivative times the length of the hole to
-    the fourth. Where the line from one side
-    meets neither that of the other nor the sample there, the input may have changed at any time in
-    the hole. What changes and changes back in it stays hidden.
+    What changes and changes back in the hole stays hidden.
     """
-    straight = np.interp(at, time, values)
     before = slice(max(0, hole - BESIDE), hole + 1)
     after = slice(hole + 1, hole + 2 + BESIDE)
+    straight = np.interp(at, time, values)
     if min(len(time[before]), len(time[after])) < 2:
         return straight, HALF * abs(float(values[hole + 1] - values[hole]))
-    first = _Line.beside(time, values, before, hole + 1)
-    second = _Line.beside(time, values, after, hole)
+    first = _Side.of(time, values, before, hole + 1)
+    second = _Side.of(time, values, after, hole)
     rounding = ROUNDING * float(np.ptp(values))
+    found = _straight(first, second, at, straight, rounding)
     bend = max(first.bend, second.bend)
-    if bend > rounding and max(first.rough, second.rough) <= max(rounding, bend / CLEAR):
-        both = slice(before.start, after.stop)
-        curve = CubicSpline(time[both], values[both])(at)
-        other = Akima1DInterpolator(time[both], values[both])(at)
-        length = float(time[hole + 1] - time[hole])
-        remainder = abs(second.third - first.third) * length**3 / 384.0
-        return curve, float(np.abs(curve - other).max()) + remainder
-    meet = (second.line - first.line).roots()
-    for corner in meet[(time[hole] < meet) & (meet < time[hole + 1])]:
+    if bend <= rounding or max(first.rough, second.rough) > max(rounding, bend / CLEAR):
+        return found
+    curved = _curve(time, values, (before, after), at, abs(second.third - first.third))
+    error = max(curved[1], min(first.cubic_missed, second.cubic_missed))
+    return (curved[0], error) if error < found[1] else found
+
+
+def _straight(
+    first: _Side, second: _Side, at: Array, straight: Array, rounding: float
+) -> tuple[Array, float]:
+    """The corner of the lines from both sides, or else the straight input, and its deviation.
+
+    Where the line from one side meets neither that of the other nor the sample there, the input may
+    have changed at any time in the hole. The chord of a parabola misses 3/4 w^2 of what a line
+    misses beside the hole, with w the hole over the length of the side.
+    """
+    bend, (start, end) = max(first.bend, second.bend), (first.end, second.end)
+    for corner in map(float, np.real((second.line - first.line).roots())):
+        if not start < corner < end:
+            continue
         bent = np.where(at < corner, first.line(at), second.line(at))
         away = float(np.abs(bent - straight).max())
         if away > CLEAR * max(bend, rounding):
-            # Between noisy sides the corner may be a rounded one.
+            # Between sides that are not straight the corner may be a rounded one.
             return bent, HALF * away if bend > rounding else 0.0
-    found = min(first.missed, second.missed)
-    return straight, found if found > max(bend, rounding) else 0.0
+    missed = min(first.missed, second.missed)
+    if missed > max(bend, rounding) or bend <= rounding:
+        return straight, missed if missed > rounding else 0.0
+    wide = (end - start) / min(first.length, second.length)
+    return straight, min(missed, 0.75 * wide**2 * bend)
+
+
+def _curve(
+    time: Array, values: Array, sides: tuple[slice, slice], at: Array, change: float
+) -> tuple[Array, float]:
+    """The input as a cubic spline through both sides, and its standard deviation.
+
+    It is off by what two kinds of splines differ, as the slopes that they begin with do, and by the
+    remainder of a cubic, a 384th of the fourth derivative times the length of the hole to the
+    fourth.
+
+    change : of the third derivative over the hole
+    """
+    both = slice(sides[0].start, sides[1].stop)
+    curve = CubicSpline(time[both], values[both])(at)
+    other = Akima1DInterpolator(time[both], values[both])(at)
+    length = float(time[sides[1].start] - time[sides[0].stop - 1])
+    return curve, float(np.abs(curve - other).max()) + change * length**3 / 384.0
 
 
 @dataclass(frozen=True)
-class _Line:
-    """The line through an input on one side of a hole.
+class _Side:
+    """An input on one side of a hole, as a line and as a cubic.
 
-    bend : most that it misses there; rough : most that a cubic misses there
-    third : third derivative of that cubic
-    missed : standard deviation of a straight input that left this line at any time in the hole
+    end : last time before the hole, or first one behind it [s]; length : of the side [s]
+    bend, rough : most that the line and the cubic miss here
+    third : third derivative of the cubic
+    missed, cubic_missed : what an input misses in the mean that left the line, or the cubic, at any
+        time in the hole for the sample across
     """
 
     line: Polynomial
+    end: float
+    length: float
     bend: float
     rough: float
     third: float
     missed: float
+    cubic_missed: float
 
     @classmethod
-    def beside(cls, time: Array, values: Array, side: slice, across: int) -> _Line:
-        """The line on this side; across : the sample on the other one."""
-        line = Polynomial.fit(time[side], values[side], 1).convert()
-        cubic = Polynomial.fit(time[side], values[side], min(3, len(time[side]) - 1))
-        bend, rough = (float(np.abs(p(time[side]) - values[side]).max()) for p in (line, cubic))
-        third = float(cubic.convert().deriv(3)(0.0))
-        return cls(line, bend, rough, third, HALF * abs(float(line(time[across]) - values[across])))
+    def of(cls, time: Array, values: Array, side: slice, across: int) -> _Side:
+        """The input on this side; across : the sample on the other one."""
+        own = time[side]
+        line = Polynomial.fit(own, values[side], 1).convert()
+        # A cubic through four samples would tell nothing of their noise.
+        cubic = Polynomial.fit(own, values[side], 3 if len(own) > 4 else 1)
+        bend, rough = (float(np.abs(p(own) - values[side]).max()) for p in (line, cubic))
+        missed, cubic_missed = (
+            HALF * abs(float(p(time[across]) - values[across])) for p in (line, cubic)
+        )
+        return cls(
+            line=line,
+            end=float(own[np.argmin(np.abs(own - time[across]))]),
+            length=float(np.ptp(own)),
+            bend=bend,
+            rough=rough,
+            third=float(cubic.deriv(3)(own[0])),
+            missed=missed,
+            cubic_missed=cubic_missed,
+        )

@@ -1,13 +1,14 @@
 """Screens the effects: the gain of log evidence that each promises on top of a fit.
 
-A linear regression predicts it, in the relations and in the simulation's residual. What is local is
-clean in the first; what is slow and faint adds up in the second. A large gap bends the parameters
-of the fit without effects, some up to their bounds, and contact comes at the wrong time in its
-simulation. The relations are those at the nominal parameters then, and the simulation is led along
-the measured outputs. Beside effects that leave a gap the relations are both: the fit may be near
-the truth, or bent as well. A sagging voltage beside a lag promised nothing at parameters that had
-made its limit inactive, and 85 000 at the nominal ones. On top of effects that leave noise the
-simulation is right, and tells all that the relations tell.
+A linear regression predicts it, or a short fit where a state multiplies the size, in the relations
+and in the simulation's residual. What is local is clean in the first; what is slow and faint adds
+up in the second. A large gap bends the parameters of the fit without effects, some up to their
+bounds, and contact comes at the wrong time in its simulation. The relations are those at the
+nominal parameters then, and the simulation is led along the measured outputs. Beside effects that
+leave a gap the relations are both: the fit may be near the truth, or bent as well. A sagging
+voltage beside a lag promised nothing at parameters that had made its limit inactive, and 85 000 at
+the nominal ones. On top of effects that leave noise the simulation is right, and tells all that the
+relations tell.
 """
 
 from __future__ import annotations
@@ -135,7 +136,7 @@ def regressions(
 
 
 def screen(model: Model, asked: Screening) -> list[Promise]:
-    """Predicted gains of effects by one regression (a step)."""
+    """Predicted gains of effects by one regression, or by short fits beside it (a step)."""
     from threadpoolctl import threadpool_limits
 
     base, library = asked.base, {name: model.candidates[name] for name in asked.effects}
@@ -171,7 +172,7 @@ def _fitted(fidelity: SimulationColumns, candidate: Candidate, asked: Screening)
     """The gain of an effect whose states scale with its size, by a short fit.
 
     At the start of such a state no slope shows what it does to the size, nor what the size does to
-    it. All else follows by secants: the fit takes little more than the columns do.
+    it. All else follows by secants, so that the fit is short.
     """
     states = [
         {**known, **own}

@@ -92,7 +92,9 @@ class FittedSets:
         self.trace.append(search_step(self.null, "fitted anew", null))
         self.null = self.sets[frozenset()] = null
         self.promises.pop(frozenset(), None)
-        (self.led_fits[frozenset()],) = self.runner.map(refit_along, [self.task(null)])
+        (led,) = self.runner.map(refit_along, [self.task(null)])
+        known = self.led_fits.get(frozenset(), led)
+        self.led_fits[frozenset()] = min(led, known, key=lambda one: one.cost)
         self.unseen_tried = False
 
     def keep(self, found: FitResult) -> None:
@@ -101,6 +103,7 @@ class FittedSets:
         if key not in self.sets or found.cost < self.sets[key].cost:
             self._store(found)
             self.agreed.pop(key, None)
+            self.led_fits.pop(key, None)
 
     @property
     def unrefuted(self) -> dict[frozenset[str], FitResult]:

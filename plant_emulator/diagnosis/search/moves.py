@@ -50,9 +50,10 @@ class Moves(FittedSets):
         """
         key = frozenset(base.effects)
         if key not in self.led_fits:
-            found = list(self.runner.map(refit_along, [self.task(base)]))
+            leads = [self.runner.map(refit_along, [self.task(base)])]
             if not key and self.is_far(base):
-                found += self.runner.map(start_along, [self.runner.runs])
+                leads.append(self.runner.map(start_along, [self.runner.runs]))
+            found = [one for some in leads for one in some]
             self.led_fits[key] = min(found, key=lambda one: one.cost)
         return self.led_fits[key]
 
@@ -170,7 +171,7 @@ def _shorter(trial: Trial) -> Trial:
 def _falls_short(own: FitResult, trial: Trial, led: FitResult) -> bool:
     """Whether a fit does not keep half of what a regression along the measured outputs promised."""
     least = SETTINGS.rival_share * trial.promised.get(OBSERVER, 0.0)
-    return bool(trial.others) and 0.5 * (own.cost - led.cost) < least
+    return bool(trial.others) and least > 0.0 and 0.5 * (own.cost - led.cost) < least
 
 
 def _gain(base: FitResult, found: Sequence[FitResult]) -> float:

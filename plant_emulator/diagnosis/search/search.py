@@ -186,13 +186,13 @@ class Search(Moves):
         if tells and self._renew_null(best):
             self._expand(self.null)
             return
-        if base.effects or self.unseen_tried or not self.leaves_most(best, self.null):
+        if base.effects or self.unseen_tried or not leaves_most(best, self.null):
             return
         self.unseen_tried = True
         moved = compensated_promises(self.runner, self.led(base))
         new = leading(moved, SETTINGS.leaders, least, ())
         best = min((best, *self.fit_on_top(base, new, least)), key=lambda fit: fit.cost)
-        if not self.leaves_most(best, self.null):
+        if not leaves_most(best, self.null):
             return
         reached = 0.0
         for one in fitted_promises(self.runner, self.led(base))[: SETTINGS.most_followed]:

@@ -97,14 +97,40 @@ def test_input_that_moved_in_a_hole_is_uncertain_by_half_of_that() -> None:
     assert not log["wheel_torque_error"][~within].any()
 
 
-def test_curve_in_a_long_hole_is_as_uncertain_as_it_is_off() -> None:
+def test_curve_in_a_long_hole_is_as_uncertain_as_what_its_sides_miss() -> None:
     """20 sin(3 t) turns at 0.524 s, in a hole of 0.5 s. Its fourth derivative there is 1620."""
     kept = (TIME <= 0.28) | (TIME >= 0.78)
     curve = 20.0 * np.sin(3.0 * TIME)
     log, _ = bridge_holes(Log(TIME[kept], {"speed_reference": curve[kept]}), {})
     off = np.abs(log["speed_reference"] - curve).max()
     assert off < 5.0 / 384.0 * 1620.0 * 0.5**4
-    assert 0.5 * off < log["speed_reference_error"].max() < 3.0 * off
+    assert off < log["speed_reference_error"].max() < 0.5 * 5.2  # the chord is off by 5.2
+
+
+@pytest.mark.parametrize("length", [0.16, 0.5])
+def test_jump_between_curves_is_uncertain_by_half_of_it(length: float) -> None:
+    kept = (TIME <= 5.0) | (5.0 + length <= TIME)
+    curve = 20.0 * np.sin(TIME) + np.where(5.0 + 0.5 * length > TIME, 0.0, 10.0)
+    log, _ = bridge_holes(Log(TIME[kept], {"speed_reference": curve[kept]}), {})
+    assert log["speed_reference_error"].max() == pytest.approx(5.0, rel=0.3)
+
+
+@pytest.mark.parametrize("step", [0.05, 0.1])
+def test_rounded_curve_is_not_known_exactly(step: float) -> None:
+    """20 sin(3 t), rounded: the input cannot be told better than some tenths of a step."""
+    kept = (TIME <= 1.55) | (TIME >= 1.71)
+    curve = 20.0 * np.sin(3.0 * TIME)
+    rounded = step * np.round(curve / step)
+    log, _ = bridge_holes(Log(TIME[kept], {"speed_reference": rounded[kept]}), {})
+    off = np.abs(log["speed_reference"] - curve).max()
+    assert off < 4.0 * log["speed_reference_error"].max()
+
+
+def test_few_noisy_samples_are_no_curve() -> None:
+    noise = np.random.default_rng(4).standard_normal(8)
+    time = np.concatenate([np.arange(4), 10 + np.arange(4)]) * 0.01
+    log, _ = bridge_holes(Log(time, {"wheel_torque": noise}), {})
+    assert np.abs(log["wheel_torque"]).max() < 5.0
 
 
 def test_noise_of_an_input_is_no_move() -> None:

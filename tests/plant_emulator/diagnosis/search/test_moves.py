@@ -78,11 +78,15 @@ def test_effect_that_keeps_less_than_half_of_its_promise_is_led_from_other_start
 
     def noting(model: Line, trial: Trial) -> tuple[Trial, FitResult]:
         asked.append(trial.effects)
-        return lead_others(model, trial)
+        again, found = lead_others(model, trial)
+        return again, replace(found, cost=found.cost - 1000.0)
 
     monkeypatch.setattr(moves, "lead_others", noting)
-    Moves(runner=runner(model), null=null).fit_on_top(null, supposed, 5.0)
+    sets = Moves(runner=runner(model), null=null)
+    sets.fit_on_top(null, supposed, 5.0)
     assert asked == led
+    [gain] = [s.gain for s in sets.trace if (s.action, s.effects) == ("led", ("wave",))]
+    assert gain == pytest.approx(500.0 * (1.0 + len(led)), rel=0.1)
 
 
 @pytest.mark.parametrize(
@@ -350,12 +354,21 @@ def test_set_that_comes_near_the_data_is_screened_anew() -> None:
     sets = Moves(runner=runner(Line([noisy(y)])), null=near)
     key = frozenset({"wave"})
     for found, kept in ((far, True), (replace(far, cost=far.cost - 1.0), True), (near, False)):
-        sets.promises[key], sets.led_fits[key] = [], far
+        sets.promises[key] = []
         sets.expanded.add(key)
         sets.keep(found)
-        assert [key in known for known in (sets.promises, sets.led_fits, sets.expanded)] == [
-            kept
-        ] * 3
+        assert [key in known for known in (sets.promises, sets.expanded)] == [kept] * 2
+
+
+def test_set_that_finds_a_better_fit_is_led_from_there() -> None:
+    model = Folded([noisy(2.0 + 3.0 * TIME + 5.0 * np.cos(37.0 * TIME))], ["wave"])
+    values = {"a": -2.0, "b": 3.0, "wave_size": 0.0}
+    poor = fit(model, ("wave",), (0,), values, [{}])
+    sets = Moves(runner=runner(model), null=poor)
+    sets.keep(poor)
+    assert sets.led(poor).values["a"] < 0.0
+    sets.keep(replace(poor, values={**poor.values, "a": 2.0}, cost=poor.cost - 1.0))
+    assert sets.led(sets.sets[frozenset(["wave"])]).values["a"] > 0.0
 
 
 def test_fit_without_effects_that_was_fitted_anew_is_led_from_there() -> None:
