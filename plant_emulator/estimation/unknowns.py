@@ -42,6 +42,11 @@ class Unknown:
     step: float | None = None
     angle: bool = False
 
+    @property
+    def plain(self) -> bool:
+        """Whether it is neither an angle nor one with many narrow basins."""
+        return not self.angle and self.step is None
+
     def starts(self) -> list[float]:
         """Values of a state, evenly over its prior, or over its bounds without one [its unit]."""
         low, high = self.lower, self.upper

@@ -31,6 +31,8 @@ DEVIATION_ERRORS = 3.0
 # A deviation of so many standard errors is no chance, among some ten parameters in a hundred
 # diagnoses.
 SIGNIFICANT_DEVIATION_ERRORS = 4.0
+# A state is improbable from so many standard deviations of its prior on.
+IMPROBABLE_DEVIATIONS = 3.0
 # Mean square up to which a fit without effects leaves nothing but noise.
 NULL_MEAN_SQUARE = 1.1
 
@@ -97,7 +99,7 @@ def deviations(model: Model, found: FitResult) -> tuple[Deviation, ...]:
 
 def decide(model: Model, explained: Explanation) -> Decision:
     """Decide what the hypothesis tests say of the cause."""
-    reason = _reason_against(explained)
+    reason = _reason_against(explained) or _improbable(model, explained.final)
     if reason:
         moved = deviations(model, explained.final)
         return Decision(kind="unknown", effects=(), deviations=moved, reason=reason)
@@ -193,6 +195,20 @@ def _reason_against(explained: Explanation) -> str:
     if final.insignificant and not (len(final.effects) == 1 and significant(final, null)):
         name = final.insignificant[0]
         return f"it differs between the runs; {name} would do, but no size of it is certain"
+    return ""
+
+
+def _improbable(model: Model, final: FitResult) -> str:
+    """Why an effect stands for something that is the same in all runs; empty where none does.
+
+    A state that scales with the size, as a temperature at the start, lies far off its prior in
+    every run then: a motor that is as hot whenever a run begins has another resistance.
+    """
+    for name in final.effects:
+        for u in model.candidates[name].states:
+            reach = IMPROBABLE_DEVIATIONS * (u.std or inf)
+            if u.plain and all(abs(own[u.name] - u.prior) > reach for own in final.states):
+                return f"{name} would do, but only with an improbable {u.name} in every run"
     return ""
 
 

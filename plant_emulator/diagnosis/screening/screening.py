@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.machine import Candidate, Model
     from plant_emulator.diagnosis.screening.columns import Score, States
-    from plant_emulator.estimation.unknowns import Unknown
 
 
 # The residuals of a regression, and its name in the trace.
@@ -156,16 +155,11 @@ def screen(model: Model, asked: Screening) -> list[Promise]:
             for name, score in found.items()
         }
         if isinstance(fidelity, SimulationColumns):
-            scaled = {n: c for n, c in library.items() if any(map(_scales, c.states))}
+            scaled = {n: c for n, c in library.items() if any(u.plain for u in c.states)}
             for name, candidate in scaled.items():
                 fitted = _fitted(fidelity, candidate, asked)
                 promises[name] = max(promises[name], fitted, key=lambda p: p.gain)
         return list(promises.values())
-
-
-def _scales(state: Unknown) -> bool:
-    """Whether a state of an effect scales with its size, as a temperature at the start does."""
-    return not state.angle and state.step is None
 
 
 def _fitted(fidelity: SimulationColumns, candidate: Candidate, asked: Screening) -> Promise:

@@ -15,6 +15,7 @@ from plant_emulator.diagnosis.decision.verdict import (
 from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.explanation import Explanation
 from tests.plant_emulator.diagnosis.line import TIME, Line, explained, linear, noisy
+from tests.plant_emulator.diagnosis.screening.warm import START, Warm
 
 LINE = 2.0 + 3.0 * TIME
 SAMPLE = np.arange(len(TIME))
@@ -138,3 +139,18 @@ def test_effect_alone_with_a_size_within_its_error_is_no_cause(
     assert after.final == found.null
     # Its rival is better by as much as it was better than the next one.
     assert after.log_odds == -30.0
+
+
+@pytest.mark.parametrize(
+    ("off", "kind"), [((13.0, -13.0), "unknown"), ((13.0, 3.0), "effect"), ((3.0, 1.0), "effect")]
+)
+def test_effect_with_an_improbable_state_in_every_run_is_not_named(
+    off: tuple[float, float], kind: str
+) -> None:
+    """The prior of the state has a deviation of 4, so that 12 are three of them."""
+    model = Warm()
+    found = explained(model)
+    states = tuple({"warm_state": START + own} for own in off)
+    decision = decide(model, replace(found, final=replace(found.final, states=states)))
+    assert decision.kind == kind
+    assert ("warm_state" in decision.reason) == (kind == "unknown")
