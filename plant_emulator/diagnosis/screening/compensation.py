@@ -18,7 +18,7 @@ from plant_emulator.diagnosis.fitting.approach import CORRECTION_INTERVALS
 from plant_emulator.diagnosis.fitting.joint_fit import linearise
 from plant_emulator.diagnosis.fitting.signature import signs, values_at_size
 from plant_emulator.diagnosis.screening.promise import Promise, Start
-from plant_emulator.diagnosis.screening.screening import visible
+from plant_emulator.diagnosis.screening.visibility import visible
 from plant_emulator.diagnosis.settings import SETTINGS
 from plant_emulator.estimation.unknowns import column_lengths
 

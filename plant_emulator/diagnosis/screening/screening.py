@@ -16,8 +16,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from plant_emulator.diagnosis.fitting.approach import CORRECTION_INTERVALS
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.joint_fit import fit
@@ -27,6 +25,7 @@ from plant_emulator.diagnosis.screening.columns import best_score, onset_score
 from plant_emulator.diagnosis.screening.promise import Promise, Start
 from plant_emulator.diagnosis.screening.scans import start_states
 from plant_emulator.diagnosis.screening.simulation_columns import SimulationColumns
+from plant_emulator.diagnosis.screening.visibility import visible
 from plant_emulator.diagnosis.settings import SETTINGS
 
 if TYPE_CHECKING:
@@ -42,43 +41,6 @@ if TYPE_CHECKING:
 # The residuals of a regression, and its name in the trace.
 RELATIONS, SIMULATION, OBSERVER = "relations", "simulation", "observer"
 NOMINAL_RELATIONS = "relations at nominal parameters"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Visibility:
-    """The visibility of an effect of its plausible size in the runs of a fit.
-
-    total_norm : of the change of the simulation's residual
-    orthogonal_norm : of the part that no nuisance parameter can follow
-    confounded_with : nuisance parameter that follows the change most
-    """
-
-    orthogonal_norm: float = 0.0
-    total_norm: float = 0.0
-    confounded_with: str = ""
-
-
-def visibilities(model: Model, task: Task) -> dict[str, Visibility]:
-    """Compute the visibility of each effect in the runs of `task.base` (a task)."""
-    simulation = SimulationColumns(model, task.base, task.runs)
-    seen = visible(model, replace(task.base, effects=()), task.runs)
-    return {
-        name: _visibility(simulation, one) if name in seen else Visibility()
-        for name, one in model.candidates.items()
-    }
-
-
-def _visibility(simulation: SimulationColumns, candidate: Candidate) -> Visibility:
-    states = [{u.name: u.start for u in candidate.states} for _ in simulation.runs]
-    column = simulation.column(candidate.name, values_at_size(candidate, 1.0), states)
-    if column is None or not column.any():
-        return Visibility()
-    square = float(simulation.data.products(column[:, None]).gram[0, 0])
-    return Visibility(
-        orthogonal_norm=float(np.sqrt(max(0.0, square))),
-        total_norm=float(np.linalg.norm(column)),
-        confounded_with=simulation.confounded_with(column),
-    )
 
 
 @dataclass(frozen=True)
@@ -222,21 +184,6 @@ def _fidelity(model: Model, asked: Screening) -> Fidelity | None:
     return SimulationColumns(model, asked.base, asked.runs)
 
 
-def _library(model: Model, base: FitResult) -> dict[str, Candidate]:
-    """Effects that a fit lacks and that columns can show."""
-    return {
-        name: one
-        for name, one in model.candidates.items()
-        if name not in base.effects and not one.stochastic
-    }
-
-
-def visible(model: Model, base: FitResult, runs: Sequence[int]) -> dict[str, Candidate]:
-    """Effects that a fit lacks and that a run can show."""
-    hidden = frozenset.intersection(*(model.runs[k].hides for k in runs))
-    return {name: one for name, one in _library(model, base).items() if name not in hidden}
-
-
 def _leaves_noise(base: FitResult) -> bool:
     """Whether a fit with effects leaves nothing but noise."""
     return bool(base.effects) and base.mean_square <= NOISE_MEAN_SQUARE
@@ -255,8 +202,8 @@ def _scores(
     if asked.fidelity == SIMULATION and _leaves_noise(asked.base):
         return found
     silent = [name for name, score in found.items() if score is None]
-    visible = [name for name, score in found.items() if score is not None]
-    order = sorted(visible, key=lambda name: -_gain(found[name]))
+    shown = [name for name, score in found.items() if score is not None]
+    order = sorted(shown, key=lambda name: -_gain(found[name]))
     for name in order[: SETTINGS.tried_further]:
         more = best_score(fidelity, library[name], others, asked.states[name])
         found[name] = max((found[name], more), key=_gain)

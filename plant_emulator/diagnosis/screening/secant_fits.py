@@ -18,7 +18,8 @@ from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.screening.compensation import PARTS, begun_sizes, compensated
 from plant_emulator.diagnosis.screening.promise import Promise, Start
-from plant_emulator.diagnosis.screening.screening import OBSERVER, regressions, visible
+from plant_emulator.diagnosis.screening.screening import OBSERVER, regressions
+from plant_emulator.diagnosis.screening.visibility import visible
 from plant_emulator.diagnosis.settings import SETTINGS
 
 if TYPE_CHECKING:

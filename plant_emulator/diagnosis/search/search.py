@@ -25,8 +25,9 @@ from plant_emulator.diagnosis.fitting.explanation import Explanation
 from plant_emulator.diagnosis.fitting.fit_steps import refit
 from plant_emulator.diagnosis.screening.compensation import compensated_promises
 from plant_emulator.diagnosis.screening.promise import leading, to_try
-from plant_emulator.diagnosis.screening.screening import SIMULATION, promises, visibilities
+from plant_emulator.diagnosis.screening.screening import SIMULATION, promises
 from plant_emulator.diagnosis.screening.secant_fits import fitted_promises
+from plant_emulator.diagnosis.screening.visibility import visibilities
 from plant_emulator.diagnosis.search import summary
 from plant_emulator.diagnosis.search.confirmation import (
     Reduction,

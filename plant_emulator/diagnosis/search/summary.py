@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from plant_emulator.diagnosis.fit_result import FitResult
-    from plant_emulator.diagnosis.screening.screening import Visibility
+    from plant_emulator.diagnosis.screening.visibility import Visibility
 
     Sets = Mapping[frozenset[str], FitResult]
 

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fitting.joint_fit import fit_from
-from plant_emulator.diagnosis.screening.screening import score_nearby, visible
+from plant_emulator.diagnosis.screening.screening import score_nearby
 from plant_emulator.diagnosis.screening.simulation_columns import SimulationColumns
+from plant_emulator.diagnosis.screening.visibility import visible
 from plant_emulator.diagnosis.settings import SETTINGS
 from plant_emulator.estimation.regression import gain
 
