@@ -214,17 +214,17 @@ def _scores(
 
 
 def _first_score(fidelity: Fidelity, candidate: Candidate, asked: Screening) -> Score | None:
-    """Score of an effect at the first size, or near the noise; see `score_nearby`.
+    """Score of an effect at the first size, or near the noise; see `_score_nearby`.
 
     Relations hold between samples: nothing adds up in them, and their columns hardly bend.
     """
     states = asked.states[candidate.name]
     if asked.fidelity != SIMULATION or asked.base.mean_square > SETTINGS.linear_mean_square:
         return best_score(fidelity, candidate, SETTINGS.sizes[:1], states)
-    return score_nearby(fidelity, candidate, states)
+    return _score_nearby(fidelity, candidate, states)
 
 
-def score_nearby(fidelity: Fidelity, candidate: Candidate, states: States) -> Score | None:
+def _score_nearby(fidelity: Fidelity, candidate: Candidate, states: States) -> Score | None:
     """Score of an effect in the simulation near the data; None: it shows nothing here.
 
     A slope is right for effects that the parameters cannot follow far, a column beside them for

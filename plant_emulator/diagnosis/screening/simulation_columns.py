@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fidelity import Values
     from plant_emulator.diagnosis.fit_result import FitValues
     from plant_emulator.diagnosis.machine import Model
-    from plant_emulator.estimation.unknowns import Estimate, Unknown
+    from plant_emulator.estimation.unknowns import Unknown
     from plant_emulator.signals.log import Array
 
 
@@ -31,40 +30,11 @@ class SimulationColumns:
         model: Model,
         where: FitValues,
         runs: Sequence[int],
-        found: Estimate | None = None,
-        change: Array | float = 0.0,
     ) -> None:
-        """Linearise the residual at a fit.
-
-        found : the estimate there; None: it is made
-        change : of the residual that the data have beside what the fit leaves, shape (n,)
-        """
+        """Linearise the residual at a fit."""
         self.model, self.where, self.runs = model, where, tuple(runs)
-        self.found = found or linearise(model, where, runs)
+        self.found = linearise(model, where, runs)
         self.base = np.concatenate([r.ravel() for r in self.found.residuals])
-        self.change = change
-
-    def without(self, effect: str) -> SimulationColumns:
-        """The columns of a fit without one of its effects: what that explains is data here.
-
-        The slopes of its sizes tell what it explains. Its unknowns are no nuisance any more. Other
-        effects are still simulated beside it, where contact comes in time.
-        """
-        found, candidate = self.found, self.model.candidates[effect]
-        own = {u.name for u in (*candidate.sizes, *candidate.shapes, *candidate.states)}
-        kept = np.array([u.name not in own for u in found.unknowns])
-        neutral = candidate.neutral
-        away = [
-            u.scaled(neutral[u.name]) - z if u.name in neutral else 0.0
-            for u, z in zip(found.unknowns, found.z, strict=True)
-        ]
-        rest = replace(
-            found,
-            unknowns=tuple(u for u, keep in zip(found.unknowns, kept, strict=True) if keep),
-            z=found.z[kept],
-            jacobians=tuple(j[..., kept] for j in found.jacobians),
-        )
-        return SimulationColumns(self.model, self.where, self.runs, rest, self._slopes @ away)
 
     def _residual(
         self,
@@ -83,9 +53,7 @@ class SimulationColumns:
     def data(self) -> Regression:
         """Data and nuisance; an unknown without a prior gets one of a deviation of 1."""
         slopes = self._slopes
-        return Regression.of(
-            self.base + self.change - slopes @ self._shift, -slopes * self.deviations
-        )
+        return Regression.of(self.base - slopes @ self._shift, -slopes * self.deviations)
 
     @cached_property
     def _slopes(self) -> Array:

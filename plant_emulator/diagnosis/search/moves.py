@@ -1,4 +1,4 @@
-"""The moves of a search: one more effect on top of a set, and one in the place of another.
+"""The moves of a search: one more effect on top of a set, and a fit led once more.
 
 Effects on top of a set that leaves more than noise are led along the measured outputs first, which
 is short and takes contact in time, and the best of them are fitted freely.
@@ -6,15 +6,14 @@ is short and takes contact in time, and the best of them are fitted freely.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fitting import evidence
-from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, adequate, excess
+from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, excess
 from plant_emulator.diagnosis.fitting.fit_steps import refit_along, refit_led, start_along
 from plant_emulator.diagnosis.screening.screening import OBSERVER, SIMULATION
 from plant_emulator.diagnosis.search.confirmation import (
-    Reduction,
     confirm,
     lead_others,
     lead_start,
@@ -22,7 +21,6 @@ from plant_emulator.diagnosis.search.confirmation import (
 )
 from plant_emulator.diagnosis.search.fitted_sets import FittedSets
 from plant_emulator.diagnosis.search.summary import search_step
-from plant_emulator.diagnosis.search.swaps import fit_swap, swaps
 from plant_emulator.diagnosis.settings import SETTINGS
 
 if TYPE_CHECKING:
@@ -35,12 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(kw_only=True)
 class Moves(FittedSets):
-    """The fitted sets of effects, and what leads from one set to another.
-
-    swapped_from : sets in the place of whose effects others were tried
-    """
-
-    swapped_from: set[frozenset[str]] = field(default_factory=set)
+    """The fitted sets of effects, and what leads from one set to another."""
 
     def led(self, base: FitResult) -> FitResult:
         """The fit of a set along the measured outputs, begun at its free fit.
@@ -72,9 +65,9 @@ class Moves(FittedSets):
         Where the base leaves more than noise, a regression may mislead, and a free fit is long. The
         effects are led along the measured outputs first, from their other starts too where they do
         not keep half of what a regression promised there. The one that gains most there is fitted
-        freely. Where it comes near the data and leaves little, the others wait: they are tried in
-        its place in the end. Else it may be in a local minimum: other first ones are fitted as long
-        as a score promises more of one than any has reached. Of the rest those are fitted for less
+        freely. Where it comes near the data and leaves little, those may only look the same that
+        leave little too. Else it may be in a local minimum: other first ones are fitted as long as
+        a score promises more of one than any has reached. Of the rest those are fitted for less
         long that gain half of the most there, or of what was reached, or whose free simulation
         promises half, near the data: slow effects. Of several further effects near the data none is
         fitted that cannot explain half of what the others leave.
@@ -99,7 +92,8 @@ class Moves(FittedSets):
         trials = [trial for trial, _ in pairs]
         found = [self.led_again(one) for one in self.confirm([trials[first]])]
         if not self.is_far(found[0]) and evidence.leaves_little(found[0], excess(base)):
-            return found
+            alike = [k for k in rest if evidence.leaves_little(pairs[k][1], excess(own))]
+            return [*found, *self.confirm([_shorter(trials[k]) for k in alike])]
         promised = [max(trial.promised.values(), default=0.0) for trial in trials]
         for k in sorted([] if base.effects else rest, key=lambda k: -promised[k]):
             if promised[k] > _gain(base, found):
@@ -141,26 +135,6 @@ class Moves(FittedSets):
         self.keep(again)
         self.trace.append(search_step(self.null, "led again", again))
         return min(found, again, key=lambda one: one.cost)
-
-    def swapped(self, best: FitResult) -> FitResult:
-        """The best set, with other effects tried in the place of each of its effects, once.
-
-        Their own fits may have ended in a local minimum. Each begins where the best set leads now.
-        """
-        key = frozenset(best.effects)
-        done = not key or key in self.swapped_from
-        if done or self.is_far(best) or not adequate(best, self.null):
-            return best
-        self.swapped_from.add(key)
-        asked = [Reduction(best, self.runner.runs, name) for name in best.effects]
-        starts = [one for some in self.runner.map(swaps, asked) for one in some]
-        starts = [one for one in starts if not self.refuted(frozenset(one.effects))]
-        if not starts:
-            return best
-        for one in self.runner.map(fit_swap, [self.task(start) for start in starts]):
-            self.keep(one)
-            self.trace.append(search_step(self.null, "swapped", one))
-        return self.settled()
 
 
 def _shorter(trial: Trial) -> Trial:

@@ -1,8 +1,7 @@
-"""Searches the set of effects of largest log evidence: add, drop, and swap effects.
+"""Searches the set of effects of largest log evidence: add effects, and drop those without need.
 
 The best set (`fitted_sets`) is expanded by the effects of largest gain until it leaves only noise
-or what is random, none gains enough, or the cause is foreign. Then needless effects are dropped,
-and others are tried in the place of those that are left.
+or what is random, none gains enough, or the cause is foreign. Then needless effects are dropped.
 """
 
 from __future__ import annotations
@@ -78,7 +77,7 @@ class Search(Moves):
         best = self._queue(SETTINGS.most_effects)
         if best.effects and not leaves_most(best, self.null) and self._estimate_noise(best):
             best = self._queue(SETTINGS.most_effects)
-        final = self._undisplaced(self._without_needless(best))
+        final = self._without_needless(best)
         if not final.converged:
             (final,) = self.fits(refit, [final])
             self.null = self.sets[frozenset()]
@@ -142,13 +141,6 @@ class Search(Moves):
         if found.mean_square > NOISE_MEAN_SQUARE:
             return foreign or (leaves_random(found) and not self.beside_random)
         return all(p.gain <= self._promising(found) for p in self._screen(found))
-
-    def _undisplaced(self, final: FitResult) -> FitResult:
-        """The final set, or what the queue ends with where others displace its effects."""
-        found = self.swapped(final)
-        if found.effects == final.effects:
-            return found
-        return self._undisplaced(self._without_needless(self._queue(SETTINGS.most_effects)))
 
     def _smaller(self, found: FitResult) -> FitResult:
         """The best fit of a set without one of its effects; without effects where none is known."""

@@ -15,7 +15,7 @@ from plant_emulator.diagnosis.search import moves
 from plant_emulator.diagnosis.search.confirmation import Trial, lead_others
 from plant_emulator.diagnosis.search.moves import Moves
 from plant_emulator.signals.log import Array
-from tests.plant_emulator.diagnosis.line import SHAPES, TIME, Line, effect, noisy, runner
+from tests.plant_emulator.diagnosis.line import SHAPES, TIME, Line, noisy, runner
 
 NULL = {"a": 0.0, "b": 0.0}
 
@@ -120,8 +120,8 @@ def test_effect_of_which_a_regression_promises_more_than_was_reached_is_fitted_t
     assert asked == [10] * len(fitted)
 
 
-@pytest.mark.parametrize(("cube", "fitted"), [(0.0, []), (10.0, ["bowl", "tub"])])
-def test_rivals_of_an_effect_that_leaves_little_near_the_data_wait(
+@pytest.mark.parametrize(("cube", "fitted"), [(0.0, ["bowl"]), (10.0, ["bowl", "tub"])])
+def test_rivals_of_an_effect_that_leaves_little_are_those_that_leave_little_too(
     cube: float, fitted: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By hand: of |t| beside a constant t^2 follows 15/16 of the variance, and t^4 3/4.
@@ -199,43 +199,6 @@ def test_leader_is_led_again_where_another_effect_fits_better(
     assert (first.effects, other.effects) == (("kink",), ("curl",))
     assert other.cost < first.cost
     assert [one.effects for one in sets.trace if one.action == "led again"] == [("kink",)]
-
-
-@pytest.mark.parametrize(("left", "named"), [(0.0, "kink"), (1.5, "bowl")])
-def test_effect_takes_the_place_of_one_that_explains_less(
-    left: float, named: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """By hand: of 25 / 12 of a kink of 5 a bowl leaves 1 / 16. A cosine of 1.5 leaves 1.1 more.
-
-    The kink was fitted before and had ended far off.
-    """
-    monkeypatch.setitem(SHAPES, "bowl", np.square)
-    y = noisy(2.0 + 3.0 * TIME + 5.0 * abs(TIME) + left * np.cos(37.0 * TIME))
-    model = Line([y], ("kink", "bowl", "cube"))
-    null = fit_null(model, (0,))
-    best = fit(model, ("bowl",), (0,), {**NULL, "bowl_size": 1.0}, [{}])
-    astray = replace(best, effects=("kink",), cost=best.cost + 500.0)
-    sets = Moves(runner=runner(model), null=null)
-    sets.sets = {frozenset(one.effects): one for one in (null, best, astray)}
-    assert sets.swapped(best).effects == (named,)
-    swapped = [step.effects for step in sets.trace if step.action == "swapped"]
-    assert swapped == ([] if left else [("kink",)])
-
-
-def test_effect_in_the_place_of_the_first_one_may_differ_from_run_to_run(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """A further effect may not: a kink of 0.7 and 1.4 would be refuted as one."""
-    monkeypatch.setitem(SHAPES, "bowl", np.square)
-    plain = 2.0 + 3.0 * TIME + np.sin(20.0 * TIME)
-    model = Line([noisy(plain + k * abs(TIME), s) for s, k in enumerate((0.7, 1.4))])
-    model.candidates = {name: effect(name) for name in ("kink", "bowl", "wave")}
-    start = {**NULL, "bowl_size": 1.0, "wave_size": 1.0}
-    best = fit(model, ("bowl", "wave"), (0, 1), start, [{}, {}])
-    null = fit_null(model, (0, 1))
-    sets = Moves(runner=runner(model), null=null)
-    sets.sets = {frozenset(one.effects): one for one in (null, best)}
-    assert sets.swapped(best).effects == ("kink", "wave")
 
 
 def test_all_effects_are_fitted_on_top_of_a_fit_that_leaves_noise() -> None:

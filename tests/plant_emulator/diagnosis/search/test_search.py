@@ -93,33 +93,6 @@ def test_leader_is_led_again_only_where_it_leaves_more_than_noise(left: float) -
     assert led == ([("wave",)] if left else [])
 
 
-class Astray(Search):
-    """A search in which the first effect is always a bowl, and none is tried beside that one."""
-
-    def _expand(self, base: FitResult) -> None:
-        if base.effects == ("bowl",):
-            self._screen(base)
-        elif base.effects:
-            super()._expand(base)
-        else:
-            start = {"a": 0.0, "b": 0.0, "bowl_size": 1.0}
-            self.keep(fit(self.runner.model, ("bowl",), (0,), start, [{}]))
-
-
-def test_second_cause_is_sought_beside_an_effect_that_took_another_ones_place(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """By hand: of 25 / 12 of a kink of 5 a bowl leaves 1 / 16. A wave of 0.4 gains 80."""
-    monkeypatch.setitem(SHAPES, "bowl", np.square)
-    y = noisy(2.0 + 3.0 * TIME + 5.0 * abs(TIME) + 0.4 * np.sin(20.0 * TIME))
-    model = Line([y], ("kink", "bowl", "wave", "cube"))
-    there = runner(model)
-    found = Astray(declared=there, runner=there, null=fit_null(model, (0,))).explain()
-    assert found.final.effects == ("kink", "wave")
-    swapped = [step.effects for step in found.trace if step.action == "swapped"]
-    assert swapped[0] == ("kink",)
-
-
 @pytest.mark.parametrize(
     ("beside_random", "sizes", "names"),
     [
