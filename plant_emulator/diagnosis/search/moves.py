@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 from plant_emulator.diagnosis.fitting import evidence
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, excess
 from plant_emulator.diagnosis.fitting.fit_steps import refit_along, refit_led, start_along
-from plant_emulator.diagnosis.screening.screening import OBSERVER, SIMULATION
+from plant_emulator.diagnosis.screening.promise import Start
+from plant_emulator.diagnosis.screening.screening import SIMULATION
 from plant_emulator.diagnosis.search.confirmation import (
     confirm,
     lead_others,
@@ -64,13 +65,13 @@ class Moves(FittedSets):
 
         Where the base leaves more than noise, a regression may mislead, and a free fit is long. The
         effects are led along the measured outputs first, from their other starts too where they do
-        not keep half of what a regression promised there. The one that gains most there is fitted
-        freely. Where it comes near the data and leaves little, those may only look the same that
-        leave little too. Else it may be in a local minimum: other first ones are fitted as long as
-        a score promises more of one than any has reached. Of the rest those are fitted for less
-        long that gain half of the most there, or of what was reached, or whose free simulation
-        promises half, near the data: slow effects. Of several further effects near the data none is
-        fitted that cannot explain half of what the others leave.
+        not keep half of what a regression promised. The one that gains most there is fitted freely.
+        Where it comes near the data and leaves little, those may only look the same that leave
+        little too; they may begin where it ends. Else it may be in a local minimum: other first
+        ones are fitted as long as a score promises more of one than any has reached. Of the rest
+        those are fitted for less long that gain half of the most there, or of what was reached, or
+        whose free simulation promises half, near the data: slow effects. Of several further effects
+        near the data none is fitted that cannot explain half of what the others leave.
         """
         trials = [trial_of(p, base, self.runner.runs, SETTINGS.leader_iterations) for p in new]
         if base.mean_square <= NOISE_MEAN_SQUARE or len(trials) < 2:
@@ -93,7 +94,7 @@ class Moves(FittedSets):
         found = [self.led_again(one) for one in self.confirm([trials[first]])]
         if not self.is_far(found[0]) and evidence.leaves_little(found[0], excess(base)):
             alike = [k for k in rest if evidence.leaves_little(pairs[k][1], excess(own))]
-            return [*found, *self.confirm([_shorter(trials[k]) for k in alike])]
+            return [*found, *self.confirm([self._beginning_at(found[0], *pairs[k]) for k in alike])]
         promised = [max(trial.promised.values(), default=0.0) for trial in trials]
         for k in sorted([] if base.effects else rest, key=lambda k: -promised[k]):
             if promised[k] > _gain(base, found):
@@ -108,6 +109,18 @@ class Moves(FittedSets):
             if gains[k] >= least_led or trials[k].promised.get(SIMULATION, 0.0) > least
         ]
         return [*found, *self.confirm(rivals)]
+
+    def _beginning_at(self, other: FitResult, trial: Trial, led: FitResult) -> Trial:
+        """A rival's trial that may also begin where a fit with another last effect has come to.
+
+        The rival's own lead may end in a local minimum that the other one does not have.
+        """
+        neutral = self.runner.model.candidates[other.effects[-1]].neutral
+        there = Start(
+            values={**led.values, **other.values, **neutral},
+            states=tuple({**a, **b} for a, b in zip(led.states, other.states, strict=True)),
+        )
+        return _shorter(replace(trial, starts=(*trial.starts, there)))
 
     def _may_explain(self, base: FitResult, trial: Trial, led: FitResult) -> bool:
         """Whether a further effect may explain half of what the base leaves, led or freely."""
@@ -143,8 +156,8 @@ def _shorter(trial: Trial) -> Trial:
 
 
 def _falls_short(own: FitResult, trial: Trial, led: FitResult) -> bool:
-    """Whether a fit does not keep half of what a regression along the measured outputs promised."""
-    least = SETTINGS.rival_share * trial.promised.get(OBSERVER, 0.0)
+    """Whether a fit does not keep half of what a regression promised."""
+    least = SETTINGS.rival_share * max(trial.promised.values(), default=0.0)
     return bool(trial.others) and least > 0.0 and 0.5 * (own.cost - led.cost) < least
 
 

@@ -10,7 +10,7 @@ from plant_emulator.diagnosis.fit_result import FitResult
 from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.joint_fit import fit
-from plant_emulator.diagnosis.screening.screening import OBSERVER, promises
+from plant_emulator.diagnosis.screening.screening import promises
 from plant_emulator.diagnosis.search import moves
 from plant_emulator.diagnosis.search.confirmation import Trial, lead_others
 from plant_emulator.diagnosis.search.moves import Moves
@@ -60,16 +60,17 @@ def test_effect_whose_simulation_promises_half_of_what_was_reached_is_fitted_too
         assert [one.effects for one in sets.fit_on_top(null, supposed, 5.0)] == fitted
 
 
+@pytest.mark.parametrize("score", ["relations at nominal parameters", "observer"])
 @pytest.mark.parametrize(("promised", "led"), [(900.0, []), (1100.0, [("wave",)])])
 def test_effect_that_keeps_less_than_half_of_its_promise_is_led_from_other_starts_too(
-    promised: float, led: list[tuple[str, ...]], monkeypatch: pytest.MonkeyPatch
+    score: str, promised: float, led: list[tuple[str, ...]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By hand: a wave of 1 gains 2000 / 4 = 500 along the measured outputs. t^3 leaves much."""
     y = noisy(2.0 + 3.0 * TIME + 5.0 * abs(TIME) + 10.0 * TIME**3 + np.sin(20.0 * TIME))
     model = Line([y], ("kink", "wave"))
     null = fit_null(model, (0,))
     supposed = [
-        replace(p, gains={OBSERVER: promised}, starts={OBSERVER: p.starts["simulation"]})
+        replace(p, gains={score: promised}, starts={score: p.starts["simulation"]})
         if p.effect == "wave"
         else p
         for p in promises(runner(model), null, None)
@@ -137,6 +138,32 @@ def test_rivals_of_an_effect_that_leaves_little_are_those_that_leave_little_too(
     first, *rivals = sets.fit_on_top(null, promises(runner(model), null, null), 5.0)
     assert first.effects == ("kink",)
     assert sorted(one.effects[0] for one in rivals) == fitted
+
+
+def test_rival_of_an_effect_that_leaves_little_may_begin_where_that_one_ends(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A bowl leaves 1/16 of a kink. There the kink is absent, and the bowl as it was led."""
+    monkeypatch.setitem(SHAPES, "bowl", np.square)
+    model = Line([noisy(2.0 + 3.0 * TIME + 5.0 * abs(TIME))], ("kink", "bowl"))
+    null = fit_null(model, (0,))
+    sets = Moves(runner=runner(model), null=null)
+    plain, asked = sets.confirm, []
+
+    def noting(trials: Sequence[Trial]) -> list[FitResult]:
+        asked.extend(trials)
+        return plain(trials)
+
+    monkeypatch.setattr(sets, "confirm", noting)
+    first, _ = sets.fit_on_top(null, promises(runner(model), null, null), 5.0)
+    bowl = asked[1]
+    assert bowl.led is not None
+    assert bowl.starts[-1].values == {
+        "a": first.values["a"],
+        "b": first.values["b"],
+        "kink_size": 0.0,
+        "bowl_size": bowl.led.values["bowl_size"],
+    }
 
 
 @pytest.mark.parametrize(
