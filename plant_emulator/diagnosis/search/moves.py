@@ -79,7 +79,8 @@ class Moves(FittedSets):
             return [*(self.led_again(one) for one in found[:1]), *found[1:]]
         own = self.led(base)
         pairs = list(self.runner.map(lead_start, trials))
-        short = [k for k, pair in enumerate(pairs) if _falls_short(own, *pair)]
+        reached = _gain(own, [led for _, led in pairs])
+        short = [k for k, pair in enumerate(pairs) if _falls_short(own, *pair, reached)]
         further = self.runner.map(lead_others, [pairs[k][0] for k in short])
         for k, pair in zip(short, further, strict=True):
             pairs[k] = pair
@@ -155,10 +156,16 @@ def _shorter(trial: Trial) -> Trial:
     return replace(trial, iterations=SETTINGS.iterations)
 
 
-def _falls_short(own: FitResult, trial: Trial, led: FitResult) -> bool:
-    """Whether a fit does not keep half of what a regression promised."""
-    least = SETTINGS.rival_share * max(trial.promised.values(), default=0.0)
-    return bool(trial.others) and least > 0.0 and 0.5 * (own.cost - led.cost) < least
+def _falls_short(own: FitResult, trial: Trial, led: FitResult, reached: float) -> bool:
+    """Whether a fit keeps less than half of what a regression promised: of a rival's gain or more.
+
+    reached : largest gain of all
+    """
+    promised = max(trial.promised.values(), default=0.0)
+    share = SETTINGS.rival_share
+    return (
+        bool(trial.others) and promised > share * reached and _gain(own, [led]) < share * promised
+    )
 
 
 def _gain(base: FitResult, found: Sequence[FitResult]) -> float:

@@ -65,15 +65,15 @@ class Search(Moves):
         """Go through the queue in the logs' own noise.
 
         The noise is estimated around the fit without effects where that is near the noise and no
-        other set is known, or else around the best set of one effect or known one, and then around
-        the best set if it explains half of the gap. Where that shows another noise, the queue
-        starts again. Beside known sets the single effects are tried as well.
+        other set is known, or else around the best set (see `_first_site`), and then around the
+        best set if it explains half of the gap. Where that shows another noise, the queue starts
+        again. Beside known sets the single effects are tried as well.
         """
         known = any(self.sets) and not self.beside_random
         self.sets[frozenset()] = self.null
         if known:
             self._expand(self.null)
-        self._estimate_noise(self._queue(1) if known or self.is_far(self.null) else self.null)
+        self._estimate_noise(self._first_site() if known or self.is_far(self.null) else self.null)
         best = self._queue(SETTINGS.most_effects)
         if best.effects and not leaves_most(best, self.null) and self._estimate_noise(best):
             best = self._queue(SETTINGS.most_effects)
@@ -82,6 +82,16 @@ class Search(Moves):
             (final,) = self.fits(refit, [final])
             self.null = self.sets[frozenset()]
         return self._explanation(final)
+
+    def _first_site(self) -> FitResult:
+        """The fit that the noise is estimated around first: the best one of one effect or known.
+
+        Where that is far from the data and explains half of the gap but not all, it is the first of
+        several causes: what it leaves is no noise.
+        """
+        best = self._queue(1)
+        ends = leaves_most(best, self.null) or adequate(best, self.null)
+        return best if ends or not self.is_far(best) else self._queue(SETTINGS.most_effects)
 
     def _estimate_noise(self, where: FitResult) -> bool:
         """Take the noise around a fit for the logs' own; give whether it is another one now.

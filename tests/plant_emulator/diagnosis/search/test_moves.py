@@ -61,12 +61,21 @@ def test_effect_whose_simulation_promises_half_of_what_was_reached_is_fitted_too
 
 
 @pytest.mark.parametrize("score", ["relations at nominal parameters", "observer"])
-@pytest.mark.parametrize(("promised", "led"), [(900.0, []), (1100.0, [("wave",)])])
+@pytest.mark.parametrize(
+    ("kink", "promised", "led"), [(5.0, 900.0, []), (5.0, 1100.0, [("wave",)]), (6.0, 1100.0, [])]
+)
 def test_effect_that_keeps_less_than_half_of_its_promise_is_led_from_other_starts_too(
-    score: str, promised: float, led: list[tuple[str, ...]], monkeypatch: pytest.MonkeyPatch
+    score: str,
+    kink: float,
+    promised: float,
+    led: list[tuple[str, ...]],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """By hand: a wave of 1 gains 2000 / 4 = 500 along the measured outputs. t^3 leaves much."""
-    y = noisy(2.0 + 3.0 * TIME + 5.0 * abs(TIME) + 10.0 * TIME**3 + np.sin(20.0 * TIME))
+    """By hand: a wave of 1 gains 2000 / 4 = 500 along the measured outputs. t^3 leaves much.
+
+    The kink gains 2083 or 3000, of which a rival needs half.
+    """
+    y = noisy(2.0 + 3.0 * TIME + kink * abs(TIME) + 10.0 * TIME**3 + np.sin(20.0 * TIME))
     model = Line([y], ("kink", "wave"))
     null = fit_null(model, (0,))
     supposed = [

@@ -525,6 +525,17 @@ def test_second_cause_is_asked_for_where_the_first_leaves_most_near_the_noise(
     assert set(explained(model).final.effects) == effects
 
 
+def beside_a_line(squares: Mapping[str, float]) -> Array:
+    """A line, and shapes of these mean squares beside it; without noise."""
+    line = np.stack([np.ones_like(TIME), TIME], axis=1)
+    y = 2.0 + 3.0 * TIME
+    for name, square in squares.items():
+        shape = SHAPES[name](TIME)
+        beside = shape - line @ np.linalg.lstsq(line, shape, rcond=None)[0]
+        y = y + np.sqrt(square) * shape / beside.std()
+    return y
+
+
 @pytest.mark.parametrize(
     ("squares", "most"),
     [({"cube": 12.0, "wave": 8.0}, 2), ({"cube": 8.0, "wave": 6.0, "kink": 6.0}, 1)],
@@ -533,15 +544,33 @@ def test_second_cause_is_sought_beside_one_that_explains_half(
     squares: dict[str, float], most: int
 ) -> None:
     """Mean squares beside a line: the first one explains 60 % of two causes, 40 % of three."""
-    line = np.stack([np.ones_like(TIME), TIME], axis=1)
-    y = 2.0 + 3.0 * TIME
-    for name, square in squares.items():
-        shape = SHAPES[name](TIME)
-        beside = shape - line @ np.linalg.lstsq(line, shape, rcond=None)[0]
-        y = y + np.sqrt(square) * shape / beside.std()
+    y = beside_a_line(squares)
     found = explained(Line([noisy(y)], NAMES))
     assert max(len(one.effects) for one in found.trace) == most
     assert decide(Line([noisy(y)], NAMES), found).kind == ("effect" if most == 2 else "unknown")
+
+
+@pytest.mark.parametrize(
+    ("squares", "names"),
+    [
+        ({"cube": 12.0, "wave": 8.0}, {"cube", "wave"}),
+        ({"cube": 19.0, "wave": 1.0}, {"cube"}),
+        ({"cube": 8.0, "wave": 6.0, "kink": 6.0}, {"cube"}),
+    ],
+)
+def test_noise_is_estimated_beside_two_causes_where_the_first_leaves_much(
+    squares: dict[str, float], names: set[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Mean squares beside a line: the first one leaves 40 %, 5 % (little) or 60 % (most)."""
+    sites = []
+
+    def noting(_: Search, where: FitResult) -> bool:
+        sites.append(set(where.effects))
+        return False
+
+    monkeypatch.setattr(Search, "_estimate_noise", noting)
+    explained(Line([noisy(beside_a_line(squares))], NAMES))
+    assert sites[0] == names
 
 
 def test_set_that_leaves_what_is_random_is_not_expanded() -> None:
