@@ -25,8 +25,9 @@ class Settings:
     # filter was twice too long. They tell it to some percent, and a start needs no more.
     compensating_iterations: int = 8
     compensating_reach: float = 0.25
-    # Iterations of fits by secants: of all effects, and of the best `tried_further`.
-    secant_iterations: tuple[int, ...] = (2, 5)
+    # Iterations of the short fit of an effect whose state multiplies its size: all else follows by
+    # secants, so that they are cheap, and more tell no more.
+    secant_iterations: int = 5
     # Prior standard deviation of a size in the rich model that noise is estimated beside.
     largest_size: float = 3.0
     # So many effects of each score are tried at the other sizes; the true one was among three.
@@ -65,9 +66,6 @@ class Settings:
     # Starts of an effect that are led along the measured outputs, beside nominal parameters: those
     # that leave least so as they are.
     most_started: int = 2
-    # Effects that lead the fits by secants and are fitted freely, at most: a leader may not keep
-    # what it promised.
-    most_followed: int = 3
     # Gain over the largest one that a rival needs: promised, along the measured outputs, or
     # reached.
     rival_share: float = 0.5

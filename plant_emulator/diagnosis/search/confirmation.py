@@ -22,6 +22,7 @@ from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
 from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.screening.promise import Start, starts_of
 from plant_emulator.diagnosis.screening.scans import scan_sizes, scan_states
+from plant_emulator.diagnosis.search.compensation import start_with_room
 from plant_emulator.diagnosis.settings import SETTINGS
 from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE
 
@@ -80,14 +81,19 @@ def lead_start(model: Model, trial: Trial) -> tuple[Trial, FitResult]:
     return replace(scanned, led=led, others=tuple(others)), led
 
 
-def lead_others(model: Model, trial: Trial) -> tuple[Trial, FitResult]:
-    """The trial with its other starts led along the measured outputs, and the best fit (a step).
+def lead_others(model: Model, pair: tuple[Trial, FitResult]) -> tuple[Trial, FitResult]:
+    """The trial with more starts led along the measured outputs, and the best fit (a step).
 
-    A few iterations tell the best start where the effect is nearly absent from some: such a start
-    leaves little more than the fit without the effect, and leads nowhere.
+    One start makes room for the effect (`compensation`). The others were tried for a few iterations
+    only. These tell the best start where the effect is nearly absent from some: such a start leaves
+    little more than the fit without the effect, and leads nowhere.
+
+    pair : the trial, and the fit without effects along the measured outputs
     """
+    trial, base = pair
+    room = _values(trial, start_with_room(model, trial.effects[-1], trial.runs, base))
     iterations = trial.iterations or APPROACH_ITERATIONS
-    found = [lead(model, one, trial.runs, iterations=iterations) for one in trial.others]
+    found = [lead(model, one, trial.runs, iterations=iterations) for one in (room, *trial.others)]
     led = min(filter(None, (trial.led, *found)), key=lambda one: one.cost)
     return replace(trial, led=led, others=()), led
 

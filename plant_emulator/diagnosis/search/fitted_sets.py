@@ -46,8 +46,6 @@ class FittedSets:
     promises : what one more effect promises on top of a set
     led_fits : along the measured outputs, of sets on top of which others were tried
     expanded : sets whose most promising effects were tried on top of them
-    unseen_tried : whether effects were tried from this fit without effects that no regression
-        tells; in another noise these choose hardly otherwise
     """
 
     runner: TaskRunner
@@ -58,7 +56,6 @@ class FittedSets:
     promises: dict[frozenset[str], list[Promise]] = field(default_factory=dict)
     led_fits: dict[frozenset[str], FitResult] = field(default_factory=dict)
     expanded: set[frozenset[str]] = field(default_factory=set)
-    unseen_tried: bool = False
     trace: list[SearchStep] = field(default_factory=list)
 
     def task(self, base: FitResult) -> Task:
@@ -95,7 +92,6 @@ class FittedSets:
         (led,) = self.runner.map(refit_along, [self.task(null)])
         known = self.led_fits.get(frozenset(), led)
         self.led_fits[frozenset()] = min(led, known, key=lambda one: one.cost)
-        self.unseen_tried = False
 
     def keep(self, found: FitResult) -> None:
         """Keep a fit if it is the best one of its set."""

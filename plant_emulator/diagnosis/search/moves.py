@@ -64,26 +64,22 @@ class Moves(FittedSets):
         """Fit effects on top of a fit; least : gain that one must promise.
 
         Where the base leaves more than noise, a regression may mislead, and a free fit is long. The
-        effects are led along the measured outputs first, from their other starts too where they do
-        not keep half of what a regression promised. The one that gains most there is fitted freely.
-        Where it comes near the data and leaves little, those may only look the same that leave
-        little too; they may begin where it ends. Else it may be in a local minimum: other first
-        ones are fitted as long as a score promises more of one than any has reached. Of the rest
-        those are fitted for less long that gain half of the most there, or of what was reached, or
-        whose free simulation promises half, near the data: slow effects. Of several further effects
-        near the data none is fitted that cannot explain half of what the others leave.
+        effects are led along the measured outputs first. A first one that does not keep half of
+        what a regression promised is led from other starts too (`lead_others`). The one that gains
+        most there is fitted freely. Where it comes near the data and leaves little, those may only
+        look the same that leave little too; they may begin where it ends. Else it may be in a local
+        minimum: other first ones are fitted as long as a score promises more of one than any has
+        reached. Of the rest those are fitted for less long that gain half of the most there, or of
+        what was reached, or whose free simulation promises half, near the data: slow effects. Of
+        several further effects near the data none is fitted that cannot explain half of what the
+        others leave.
         """
         trials = [trial_of(p, base, self.runner.runs, SETTINGS.leader_iterations) for p in new]
         if base.mean_square <= NOISE_MEAN_SQUARE or len(trials) < 2:
             found = self.confirm([*trials[:1], *(_shorter(trial) for trial in trials[1:])])
             return [*(self.led_again(one) for one in found[:1]), *found[1:]]
         own = self.led(base)
-        pairs = list(self.runner.map(lead_start, trials))
-        reached = _gain(own, [led for _, led in pairs])
-        short = [k for k, pair in enumerate(pairs) if _falls_short(own, *pair, reached)]
-        further = self.runner.map(lead_others, [pairs[k][0] for k in short])
-        for k, pair in zip(short, further, strict=True):
-            pairs[k] = pair
+        pairs = self._led_starts(own, trials)
         self.trace += [search_step(own, "led", led, trial.promised) for trial, led in pairs]
         if base.effects and not self.is_far(base):
             pairs = [pair for pair in pairs if self._may_explain(base, *pair)]
@@ -110,6 +106,21 @@ class Moves(FittedSets):
             if gains[k] >= least_led or trials[k].promised.get(SIMULATION, 0.0) > least
         ]
         return [*found, *self.confirm(rivals)]
+
+    def _led_starts(self, own: FitResult, trials: Sequence[Trial]) -> list[tuple[Trial, FitResult]]:
+        """Each trial with its best start led along the measured outputs, and that fit.
+
+        own : the base of the trials, led as well
+        """
+        pairs = list(self.runner.map(lead_start, trials))
+        if own.effects:
+            return pairs
+        reached = _gain(own, [led for _, led in pairs])
+        short = [k for k, pair in enumerate(pairs) if _falls_short(own, *pair, reached)]
+        further = self.runner.map(lead_others, [(pairs[k][0], own) for k in short])
+        for k, pair in zip(short, further, strict=True):
+            pairs[k] = pair
+        return pairs
 
     def _beginning_at(self, other: FitResult, trial: Trial, led: FitResult) -> Trial:
         """A rival's trial that may also begin where a fit with another last effect has come to.
@@ -157,15 +168,13 @@ def _shorter(trial: Trial) -> Trial:
 
 
 def _falls_short(own: FitResult, trial: Trial, led: FitResult, reached: float) -> bool:
-    """Whether a fit keeps less than half of what a regression promised: of a rival's gain or more.
+    """Whether an effect keeps less than half of its promise, which is that of a rival or more.
 
     reached : largest gain of all
     """
     promised = max(trial.promised.values(), default=0.0)
     share = SETTINGS.rival_share
-    return (
-        bool(trial.others) and promised > share * reached and _gain(own, [led]) < share * promised
-    )
+    return promised > share * reached and _gain(own, [led]) < share * promised
 
 
 def _gain(base: FitResult, found: Sequence[FitResult]) -> float:

@@ -22,16 +22,13 @@ from plant_emulator.diagnosis.fitting.evidence import (
 )
 from plant_emulator.diagnosis.fitting.explanation import Explanation
 from plant_emulator.diagnosis.fitting.fit_steps import refit
-from plant_emulator.diagnosis.screening.compensation import compensated_promises
-from plant_emulator.diagnosis.screening.promise import leading, to_try
+from plant_emulator.diagnosis.screening.promise import to_try
 from plant_emulator.diagnosis.screening.screening import SIMULATION, promises
-from plant_emulator.diagnosis.screening.secant_fits import fitted_promises
 from plant_emulator.diagnosis.screening.visibility import visibilities
 from plant_emulator.diagnosis.search import summary
 from plant_emulator.diagnosis.search.confirmation import (
     Reduction,
     reduce,
-    trial_of,
     without_effects,
 )
 from plant_emulator.diagnosis.search.law_forms import errors_beside_forms
@@ -173,8 +170,6 @@ class Search(Moves):
         """Fit the effects of largest gain on top of a set.
 
         Regressions predict it, and fits along the measured outputs choose among their leaders.
-        Where first effects leave most, those follow for which one parameter makes room, and where
-        these do so too, those that fits by secants tell.
         """
         least = self._promising(base)
         key = frozenset(base.effects)
@@ -188,24 +183,6 @@ class Search(Moves):
         tells = not base.effects and best is not base and not leaves_most(best, self.null)
         if tells and self._renew_null(best):
             self._expand(self.null)
-            return
-        if base.effects or self.unseen_tried or not leaves_most(best, self.null):
-            return
-        self.unseen_tried = True
-        moved = compensated_promises(self.runner, self.led(base))
-        new = leading(moved, SETTINGS.leaders, least, ())
-        best = min((best, *self.fit_on_top(base, new, least)), key=lambda fit: fit.cost)
-        if not leaves_most(best, self.null):
-            return
-        reached = 0.0
-        for one in fitted_promises(self.runner, self.led(base))[: SETTINGS.most_followed]:
-            if one.gain <= max(least, SETTINGS.rival_share * reached):
-                break
-            known = self.sets.get(frozenset([one.effect]), base)
-            if one.gain > 0.5 * (base.cost - known.cost):
-                trial = trial_of(one, base, self.runner.runs, SETTINGS.leader_iterations)
-                (known,) = self.confirm([trial])
-            reached = max(reached, 0.5 * (base.cost - known.cost))
 
     def _renew_null(self, found: FitResult) -> bool:
         """Fit without effects anew from one with some; give whether the two are rivals now."""

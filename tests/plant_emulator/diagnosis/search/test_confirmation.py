@@ -35,6 +35,7 @@ from tests.plant_emulator.diagnosis.line import (
     noisy,
     runner,
 )
+from tests.plant_emulator.diagnosis.search.late import Late, late_pulses
 
 WAVE = noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME))
 
@@ -156,9 +157,20 @@ def test_other_starts_count_where_they_lead_to_less(left: float, size: float) ->
     trial, led = lead_start(model, Trial(("wave",), (0,), (start,)))
     known = replace(led, values={**led.values, "wave_size": 0.0}, cost=left * len(TIME))
     asked = replace(trial, led=known, others=(replace(known, values=start.values),))
-    again, found = lead_others(model, asked)
+    again, found = lead_others(model, (asked, fit_null(model, (0,))))
     assert found.values["wave_size"] == pytest.approx(size, abs=0.15)
     assert (again.led, again.others) == (found, ())
+
+
+def test_filter_is_led_from_where_the_delay_makes_room_for_it() -> None:
+    """The filter delays by 0.1 nearly. A delay of 0.15 stands for it where it is absent."""
+    model = Late([noisy(late_pulses(0.05, 0.1))], 0.1)
+    base = fit(model, (), (0,), {"a": 0.0, "b": 0.15}, [{}])
+    absent = replace(base, effects=("lag",), values={**base.values, "lag_size": 0.0})
+    trial = Trial(("lag",), (0,), (Start(values=absent.values, states=({},)),), led=absent)
+    _, found = lead_others(model, (trial, base))
+    assert found.values["lag_size"] == pytest.approx(0.1, abs=0.005)
+    assert found.values["b"] == pytest.approx(0.05, abs=0.005)
 
 
 def test_fit_begins_at_a_led_start_that_is_near_the_noise(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -86,9 +86,9 @@ def test_effect_that_keeps_less_than_half_of_its_promise_is_led_from_other_start
     ]
     asked = []
 
-    def noting(model: Line, trial: Trial) -> tuple[Trial, FitResult]:
-        asked.append(trial.effects)
-        again, found = lead_others(model, trial)
+    def noting(model: Line, pair: tuple[Trial, FitResult]) -> tuple[Trial, FitResult]:
+        asked.append(pair[0].effects)
+        again, found = lead_others(model, pair)
         return again, replace(found, cost=found.cost - 1000.0)
 
     monkeypatch.setattr(moves, "lead_others", noting)

@@ -16,10 +16,8 @@ from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, adequate, excess
 from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.report.ranking import undetectable
-from plant_emulator.diagnosis.screening.compensation import COMPENSATED
 from plant_emulator.diagnosis.screening.promise import Promise, Start
 from plant_emulator.diagnosis.screening.screening import promises
-from plant_emulator.diagnosis.screening.secant_fits import SECANTS
 from plant_emulator.diagnosis.search import search
 from plant_emulator.diagnosis.search.search import Search
 from plant_emulator.diagnosis.search.summary import not_told_apart
@@ -164,32 +162,6 @@ def test_other_effects_are_tried_beside_known_sets() -> None:
     sets = {frozenset(known.effects): known}
     found = Search(declared=there, runner=there, null=null, sets=sets).explain()
     assert set(found.final.effects) == {"kink", "wave"}
-
-
-@pytest.mark.parametrize(("cube", "asked"), [(8.0, []), (20.0, [1, 2])])
-def test_more_is_tried_where_the_first_effects_leave_most(
-    cube: float, asked: list[int], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """By hand: a wave of 3 has a mean square of 4.5, a cube of 8 beside a slope 1.5, of 20 9.1.
-
-    Where the wave leaves most, one parameter makes room (1), and fits by secants follow (2).
-    """
-    calls: list[int] = []
-    for k, name in ((1, "compensated_promises"), (2, "fitted_promises")):
-        monkeypatch.setattr(search, name, lambda *_, k=k: (calls.append(k), [])[1])
-    explained(
-        Line([noisy(2.0 + 3.0 * TIME + 3.0 * np.sin(20.0 * TIME) + cube * TIME**3)], ["wave"])
-    )
-    assert calls == asked
-
-
-def test_an_effect_that_no_regression_tells_is_found_where_one_parameter_makes_room(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(search, "promises", lambda *_: [])
-    found = explained(Line([noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME))]))
-    assert found.final.effects == ("wave",)
-    assert set(found.trace[0].promised) == {COMPENSATED}
 
 
 @pytest.mark.parametrize(("size", "score"), [(0.8, "simulation"), (4.0, "observer")])
@@ -470,47 +442,6 @@ def test_faint_second_effect_beside_an_exact_one_is_named() -> None:
     found = explained(model)
     assert set(found.final.effects) == {"cube", "kink"}
     assert found.final.mean_square <= NOISE_MEAN_SQUARE
-
-
-@pytest.mark.parametrize(
-    ("of_the_kink", "confirmed"), [(1e5, [["kink"], ["wave"]]), (100.0, [["wave"]])]
-)
-def test_effect_follows_a_leader_that_does_not_keep_what_it_promised(
-    monkeypatch: pytest.MonkeyPatch, of_the_kink: float, confirmed: list[list[str]]
-) -> None:
-    """Regressions see nothing. The wave promises 1000, and gains 9 n / 4, 4500 by hand."""
-    promised = [
-        Promise(
-            effect=name,
-            gains={SECANTS: gain},
-            starts={SECANTS: Start(values={"a": 0.0, "b": 0.0, f"{name}_size": 1.0}, states=({},))},
-        )
-        for name, gain in sorted((("kink", of_the_kink), ("wave", 1000.0)), key=lambda one: -one[1])
-    ]
-    monkeypatch.setattr(search, "promises", lambda *_: [])
-    monkeypatch.setattr(search, "compensated_promises", lambda *_: [])
-    monkeypatch.setattr(search, "fitted_promises", lambda *_: promised)
-    found = explained(Line([noisy(3.0 * np.sin(20.0 * TIME))], NAMES))
-    assert found.final.effects == ("wave",)
-    steps = [list(one.effects) for one in found.trace if one.action == "confirmed"]
-    assert steps[: len(confirmed)] == confirmed
-    assert ["kink"] not in steps[len(confirmed) :]
-
-
-def test_library_is_fitted_by_secants_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No effect explains a ripple of mean square 18. From a better fit they are fitted again."""
-    fitted: list[FitResult] = []
-    monkeypatch.setattr(search, "fitted_promises", lambda _, base: fitted.append(base) or [])
-    model = Line([noisy(6.0 * RIPPLE)], NAMES)
-    one = KnownNoise(declared=runner(model), runner=runner(model), null=fit_null(model, [0]))
-    one.explain()
-    one.expanded.clear()
-    one.explain()
-    assert len(fitted) == 1
-    one.take_null(one.null)
-    one.expanded.clear()
-    one.explain()
-    assert len(fitted) == 2
 
 
 @pytest.mark.parametrize(
