@@ -12,6 +12,10 @@ rest solved for at each value (variable projection); least absolute deviations, 
 of the backlash fit neither equation. Derivatives of noisy signals bias such a fit: it is a start,
 which a fit of the simulated channels needs, since a flux too high saturates the voltage and leaves
 that fit on a plateau.
+
+The priors of the parameter set take part. The other two parameters of the friction follow the
+Coulomb friction: without a prior it began several times too small, and fits from there ended in
+local minima.
 """
 
 from __future__ import annotations
@@ -25,6 +29,7 @@ from plant_emulator.signals.smoothing import fit_parabolas
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
+    from plant_emulator.model.parameters import ParameterSet
     from plant_emulator.signals.log import Array, Log
 
 # Smoothing before the derivative [s]; longer than the sensors' noise, shorter than a ramp.
@@ -36,6 +41,8 @@ WEAKENED = 0.95
 # Gear and drum that differ by more than this are in the gap [rad/s at the output].
 IN_CONTACT = 0.1
 EXPONENTS = np.linspace(0.1, 1.5, 29)
+# Time for which the errors of the equations last [s]: the smoothing and the contact that it blurs.
+ERROR_TIME = 1.0
 # Fewer samples than this determine nothing.
 LEAST_SAMPLES = 30
 REWEIGHTINGS = 30
@@ -48,17 +55,17 @@ MECHANICAL = ("drum_inertia", *FRICTION)
 
 
 def start_values(
-    logs: Sequence[Log], values: Mapping[str, float], free: Collection[str]
+    logs: Sequence[Log], parameters: ParameterSet, free: Collection[str]
 ) -> dict[str, float]:
     """Start values [SI] of the free parameters that the logs' equations determine, by name.
 
-    values : all parameters of the bench; those not free are believed
+    parameters : values, of which those not free are believed, and the priors of the others
     """
     tables = [_table(log) for log in logs]
     common = [name for name in tables[0] if all(name in t for t in tables)]
     table = {name: np.concatenate([t[name] for t in tables]) for name in common}
-    found = _flux(table, values, free) if "armature_current" in table else {}
-    return found | _mechanical(table, values, free)
+    found = _flux(table, parameters, free) if "armature_current" in table else {}
+    return found | _mechanical(table, parameters, free)
 
 
 def _table(log: Log) -> dict[str, Array]:
@@ -84,10 +91,10 @@ def _table(log: Log) -> dict[str, Array]:
 
 
 def _flux(
-    table: Mapping[str, Array], values: Mapping[str, float], free: Collection[str]
+    table: Mapping[str, Array], parameters: ParameterSet, free: Collection[str]
 ) -> dict[str, float]:
     """K_1 and K_2 from the field-weakened part."""
-    names = [name for name in FLUX if name in free]
+    names, values = [name for name in FLUX if name in free], parameters.values()
     speed, current = np.abs(table["motor_speed"]), table["armature_current"]
     torque = values["motor_inertia"] * table["motor_acceleration"] - table["shaft_torque"]
     part = np.abs(current) > LEAST_CURRENT
@@ -98,15 +105,16 @@ def _flux(
     y, i, omega = torque[part], current[part], speed[part]
     columns = {"flux_constant_1": i, "flux_constant_2": -y}
     known = sum((values[n] * columns[n] for n in FLUX if n not in names), np.zeros_like(y))
-    solution, _ = least_absolute(np.column_stack([columns[n] for n in names]), y * omega - known)
-    return _positive(names, solution, values)
+    matrix = np.column_stack([columns[n] for n in names])
+    solution, _ = least_absolute(matrix, y * omega - known, *_priors(names, parameters))
+    return _positive(names, solution)
 
 
 def _mechanical(
-    table: Mapping[str, Array], values: Mapping[str, float], free: Collection[str]
+    table: Mapping[str, Array], parameters: ParameterSet, free: Collection[str]
 ) -> dict[str, float]:
     """Drum inertia and friction from the samples in which the gear drives the drum."""
-    names = [name for name in MECHANICAL if name in free]
+    names, values = [name for name in MECHANICAL if name in free], parameters.values()
     gear_speed = table["motor_speed"] / values["gear_ratio"]
     speed = table["drum_speed"]
     part = (np.abs(speed) > LEAST_DRUM_SPEED) & (np.abs(gear_speed - speed) < IN_CONTACT)
@@ -114,50 +122,65 @@ def _mechanical(
         return {}
     direction, magnitude = np.sign(speed[part]), np.abs(speed[part])
     torque = -values["gear_ratio"] * table["shaft_torque"][part]
-    scanned = "gear_friction_exponent" in free
-    exponents = EXPONENTS if scanned else np.array([values["gear_friction_exponent"]])
-    linear = [name for name in names if name != "gear_friction_exponent"]
-    best = (np.inf, exponents[0], np.zeros(len(linear)))
-    for exponent in exponents:
+    scanned = [name for name in names if name == "gear_friction_exponent"]
+    linear = [name for name in names if name not in scanned]
+    means, precisions = _priors(scanned, parameters)
+    priors = _priors(linear, parameters)
+    best: tuple[float, dict[str, float]] = (np.inf, {})
+    for exponent in EXPONENTS if scanned else [values["gear_friction_exponent"]]:
         columns = {
             "drum_inertia": table["drum_acceleration"][part],
             "gear_coulomb_friction": direction,
             "gear_viscous_friction": direction * magnitude**exponent,
         }
         known = sum((values[n] * c for n, c in columns.items() if n not in linear), 0.0 * torque)
-        matrix = np.column_stack([columns[n] for n in linear]) if linear else None
-        solution, cost = least_absolute(matrix, torque - known)
-        if cost < best[0] and (solution > 0.0).all():
-            best = (cost, exponent, solution)
-    found = _positive(linear, best[2], values) if np.isfinite(best[0]) else {}
-    return found | ({"gear_friction_exponent": float(best[1])} if scanned and found else {})
+        matrix = np.reshape([columns[n] for n in linear], (len(linear), len(torque))).T
+        solution, cost = least_absolute(matrix, torque - known, *priors)
+        cost += 0.5 * float(np.sum((precisions * (exponent - means)) ** 2))
+        found = _positive(linear, solution)
+        if cost < best[0] and len(found) == len(linear):
+            best = (cost, found | dict.fromkeys(scanned, float(exponent)))
+    return best[1]
 
 
-def _positive(
-    names: Sequence[str], solution: Array, values: Mapping[str, float]
-) -> dict[str, float]:
+def _positive(names: Sequence[str], solution: Array) -> dict[str, float]:
     """The solution by name; empty if a value is not positive."""
     if not (solution > 0.0).all():
         return {}
-    return {n: float(s) for n, s in zip(names, solution, strict=True) if n in values}
+    return {n: float(s) for n, s in zip(names, solution, strict=True)}
 
 
-def least_absolute(matrix: Array | None, target: Array) -> tuple[Array, float]:
-    """Solution of smallest mean absolute deviation, and that deviation; reweighted least squares.
+def _priors(names: Sequence[str], parameters: ParameterSet) -> tuple[Array, Array]:
+    """Prior means of these parameters, and one over their deviations: zero where there is none."""
+    means = np.array([parameters.value(name) for name in names])
+    stds = [parameters[name].std for name in names]
+    return means, np.array([1.0 / std if std else 0.0 for std in stds])
+
+
+def least_absolute(
+    matrix: Array, target: Array, means: Array, precisions: Array
+) -> tuple[Array, float]:
+    """Most probable solution where deviations are Laplace's, and its negative log density.
+
+    It is found by reweighted least squares. The scale of the deviations is their mean, and those
+    within `ERROR_TIME` count as one.
 
     matrix : shape (samples, columns), target : shape (samples,)
+    means, precisions : of the solution, mean and one over the deviation of its prior, shape
+        (columns,)
     """
-    if matrix is None:
-        return np.zeros(0), float(np.mean(np.abs(target)))
-    weight = np.ones(len(target))
-    solution: Array = np.zeros(matrix.shape[1])
+    share = DERIVATIVE_WINDOW / 4.0 / ERROR_TIME
+    solution: Array = means
     for _ in range(REWEIGHTINGS):
-        columns = matrix * weight[:, None]
-        renewed = np.asarray(np.linalg.lstsq(columns, target * weight, rcond=None)[0], float)
-        deviation = np.abs(target - matrix @ renewed)
-        settled = bool(np.max(np.abs(renewed - solution) - SETTLED_CHANGE * np.abs(renewed)) <= 0.0)
-        solution = renewed
-        if settled:
+        deviation = np.abs(target - matrix @ solution)
+        scale = deviation.mean() + 1e-300
+        weight = np.sqrt(share / (scale * np.maximum(deviation, 1e-3 * scale)))
+        rows = np.concatenate([matrix * weight[:, None], np.diag(precisions)])
+        right = np.concatenate([target * weight, means * precisions])
+        before = solution
+        solution = np.asarray(np.linalg.lstsq(rows, right, rcond=None)[0], float)
+        if (np.abs(solution - before) <= SETTLED_CHANGE * np.abs(solution)).all():
             break
-        weight = 1.0 / np.sqrt(np.maximum(deviation, 1e-3 * deviation.mean() + 1e-300))
-    return solution, float(np.mean(np.abs(target - matrix @ solution)))
+    scale = float(np.abs(target - matrix @ solution).mean()) + 1e-300
+    prior = 0.5 * float(np.sum((precisions * (solution - means)) ** 2))
+    return solution, share * len(target) * float(np.log(scale)) + prior

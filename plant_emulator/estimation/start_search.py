@@ -40,8 +40,11 @@ SCANS: tuple[tuple[str, float, int], ...] = (
 FINE_SCANS = SCANS[-3:]
 # Accuracy of a scan: tolerance and largest step [s].
 SCAN_TOLERANCE, SCAN_STEP = 1e-3, 0.1
-# Relative difference of the loss that tells no value from another; the nearest of these is taken.
+# Relative difference of the loss that tells no value from another; the nearest of these is taken. A
+# flux for which the voltage suffices changes the loss by some percent where no current is measured,
+# and one for which it does not by more than half.
 SAME_LOSS = 1e-3
+SAME_LOSS_OF_FLUX = 0.05
 
 
 class StartSearch:
@@ -88,7 +91,8 @@ class StartSearch:
         nearest = [1.0, *sorted(factors, key=lambda factor: abs(np.log(factor)))]
         candidates = [{**self.values, name: self.values[name] * factor} for factor in nearest]
         losses = np.array([self.total(candidate) for candidate in candidates])
-        self.values = candidates[int(np.argmax(losses <= (1.0 + SAME_LOSS) * losses.min()))]
+        same = SAME_LOSS_OF_FLUX if name == "flux_constant_1" else SAME_LOSS
+        self.values = candidates[int(np.argmax(losses <= (1.0 + same) * losses.min()))]
 
     def scan_gaps(self, count: int) -> None:
         """Choose the gap position of every run among `count` positions and the present one."""

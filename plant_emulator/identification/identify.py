@@ -126,7 +126,7 @@ def identify(
     values = values_of(parameters, effects)
     search = StartSearch(recordings, values, free, progress)
     logs = [r.log for r in recordings]
-    search.values |= start_values(logs, values, free)
+    search.values |= start_values(logs, parameters, free)
     search.scan()
     best = fit_from(recordings, parameters, free, search, states, progress)
     for retry in range(RETRIES):

@@ -205,7 +205,7 @@ class BenchModel:
         """See `Model`."""
         recordings = [self._recordings[k] for k in runs]
         search = StartSearch(recordings, self._values, self._free)
-        search.values |= start_values([r.log for r in recordings], self._values, self._free)
+        search.values |= start_values([r.log for r in recordings], self.nominal_set, self._free)
         search.scan()
         found = {name: search.values[name] for name in self._free}
         if self._given:

@@ -203,7 +203,7 @@ def test_parameter_that_cannot_be_free_is_told(nominal: ParameterSet, name: str,
 
 def test_equations_alone_come_near(nominal: ParameterSet, bench_log: Reader) -> None:
     logs = [bench_log(f"bench_practice/practice_008/program{k}") for k in (1, 3)]
-    start = start_values(logs, off(nominal, 1).values(), FREE)
+    start = start_values(logs, off(nominal, 1), FREE)
     true = truth(nominal, "practice_008")
     assert start["drum_inertia"] == pytest.approx(true["drum_inertia"], rel=0.02)
     assert start["flux_constant_1"] == pytest.approx(true["flux_constant_1"], rel=0.01)
@@ -215,7 +215,7 @@ def test_what_is_not_free_is_believed_by_the_start(
     nominal: ParameterSet, bench_log: Reader
 ) -> None:
     logs = [bench_log("bench_practice/practice_004/program1")]
-    start = start_values(logs, nominal.values(), ("drum_inertia",))
+    start = start_values(logs, nominal, ("drum_inertia",))
     assert set(start) == {"drum_inertia"}
     assert start["drum_inertia"] == pytest.approx(312.69, rel=0.01)
 
@@ -301,6 +301,6 @@ def test_logs_with_and_without_a_current_start_a_fit_together(
     whole, other = (bench_log(f"bench_practice/practice_004/program{k}") for k in (1, 2))
     signals = {k: v for k, v in other.signals.items() if k != "armature_current"}
     logs = [whole, replace(other, signals=signals)]
-    found = start_values(logs, nominal.values(), FREE)
+    found = start_values(logs, nominal, FREE)
     assert found["drum_inertia"] == pytest.approx(312.69, rel=0.05)
     assert "flux_constant_1" not in found
