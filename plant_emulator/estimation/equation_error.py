@@ -40,14 +40,16 @@ LEAST_DRUM_SPEED = 0.2
 WEAKENED = 0.95
 # Gear and drum that differ by more than this are in the gap [rad/s at the output].
 IN_CONTACT = 0.1
-EXPONENTS = np.linspace(0.1, 1.5, 29)
+EXPONENTS = np.linspace(0.1, 1.5, 57)
 # Time for which the errors of the equations last [s]: the smoothing and the contact that it blurs.
 ERROR_TIME = 1.0
 # Fewer samples than this determine nothing.
 LEAST_SAMPLES = 30
 REWEIGHTINGS = 30
+# Scale of deviations that are all zero: its square is still a number.
+SMALLEST_SCALE = 1e-100
 # Relative change that ends the reweighting: a start needs no more.
-SETTLED_CHANGE = 1e-3
+SETTLED_CHANGE = 1e-4
 
 FLUX = ("flux_constant_1", "flux_constant_2")
 FRICTION = ("gear_coulomb_friction", "gear_viscous_friction", "gear_friction_exponent")
@@ -69,14 +71,19 @@ def start_values(
 
 
 def _table(log: Log) -> dict[str, Array]:
-    """Smoothed signals and derivatives of a log [SI], sampled four times per smoothing window."""
+    """Smoothed signals and derivatives of a log [SI], sampled four times per smoothing window.
+
+    share : independent samples over samples there [1]
+    """
     interval = float(np.median(np.diff(log.time)))
     length = max(5, 2 * round(DERIVATIVE_WINDOW / interval / 2) + 1)
     length = min(length, len(log.time) - (1 - len(log.time) % 2))
 
+    spacing = max(1, length // 4)
+
     def smooth(name: str, order: int = 0) -> Array:
         whole = fit_parabolas(log[name], length, interval, order)
-        return np.asarray(whole[length // 8 :: max(1, length // 4)])
+        return np.asarray(whole[length // 8 :: spacing])
 
     table = {
         "motor_speed": smooth("motor_speed"),
@@ -85,6 +92,8 @@ def _table(log: Log) -> dict[str, Array]:
         "drum_acceleration": smooth("drum_speed", 1),
         "shaft_torque": smooth("shaft_torque"),
     }
+    share = min(1.0, spacing * interval / ERROR_TIME)
+    table["share"] = np.full(len(table["drum_speed"]), share)
     if "armature_current" in log:
         table["armature_current"] = smooth("armature_current")
     return table
@@ -106,7 +115,8 @@ def _flux(
     columns = {"flux_constant_1": i, "flux_constant_2": -y}
     known = sum((values[n] * columns[n] for n in FLUX if n not in names), np.zeros_like(y))
     matrix = np.column_stack([columns[n] for n in names])
-    solution, _ = least_absolute(matrix, y * omega - known, *_priors(names, parameters))
+    share, priors = table["share"][part], _priors(names, parameters)
+    solution, _ = least_absolute(matrix, y * omega - known, *priors, share)
     return _positive(names, solution)
 
 
@@ -135,7 +145,7 @@ def _mechanical(
         }
         known = sum((values[n] * c for n, c in columns.items() if n not in linear), 0.0 * torque)
         matrix = np.reshape([columns[n] for n in linear], (len(linear), len(torque))).T
-        solution, cost = least_absolute(matrix, torque - known, *priors)
+        solution, cost = least_absolute(matrix, torque - known, *priors, table["share"][part])
         cost += 0.5 * float(np.sum((precisions * (exponent - means)) ** 2))
         found = _positive(linear, solution)
         if cost < best[0] and len(found) == len(linear):
@@ -158,29 +168,31 @@ def _priors(names: Sequence[str], parameters: ParameterSet) -> tuple[Array, Arra
 
 
 def least_absolute(
-    matrix: Array, target: Array, means: Array, precisions: Array
+    matrix: Array, target: Array, means: Array, precisions: Array, share: Array | float = 1.0
 ) -> tuple[Array, float]:
     """Most probable solution where deviations are Laplace's, and its negative log density.
 
-    It is found by reweighted least squares. The scale of the deviations is their mean, and those
-    within `ERROR_TIME` count as one.
+    It is found by reweighted least squares. The scale of the deviations is their mean. What neither
+    the equations nor the priors tell stays as near to the means as it can.
 
     matrix : shape (samples, columns), target : shape (samples,)
     means, precisions : of the solution, mean and one over the deviation of its prior, shape
         (columns,)
+    share : independent samples over samples, of each or of all [1]
     """
-    share = DERIVATIVE_WINDOW / 4.0 / ERROR_TIME
-    solution: Array = means
+    left: Array = target - matrix @ means
+    change: Array = np.zeros_like(means)
     for _ in range(REWEIGHTINGS):
-        deviation = np.abs(target - matrix @ solution)
-        scale = deviation.mean() + 1e-300
+        deviation = np.abs(left - matrix @ change)
+        scale = float(deviation.mean()) + SMALLEST_SCALE
         weight = np.sqrt(share / (scale * np.maximum(deviation, 1e-3 * scale)))
         rows = np.concatenate([matrix * weight[:, None], np.diag(precisions)])
-        right = np.concatenate([target * weight, means * precisions])
-        before = solution
-        solution = np.asarray(np.linalg.lstsq(rows, right, rcond=None)[0], float)
-        if (np.abs(solution - before) <= SETTLED_CHANGE * np.abs(solution)).all():
+        right = np.concatenate([left * weight, np.zeros_like(means)])
+        before = change
+        change = np.asarray(np.linalg.lstsq(rows, right, rcond=None)[0], float)
+        if (np.abs(change - before) <= SETTLED_CHANGE * np.abs(means + change)).all():
             break
-    scale = float(np.abs(target - matrix @ solution).mean()) + 1e-300
-    prior = 0.5 * float(np.sum((precisions * (solution - means)) ** 2))
-    return solution, share * len(target) * float(np.log(scale)) + prior
+    scale = float(np.abs(left - matrix @ change).mean()) + SMALLEST_SCALE
+    prior = 0.5 * float(np.sum((precisions * change) ** 2))
+    count = float(np.broadcast_to(share, target.shape).sum())
+    return means + change, count * float(np.log(scale)) + prior

@@ -25,12 +25,7 @@ if TYPE_CHECKING:
 class SimulationColumns:
     """The residual of the simulation, free or led, and its tangents; see `Fidelity`."""
 
-    def __init__(
-        self,
-        model: Model,
-        where: FitValues,
-        runs: Sequence[int],
-    ) -> None:
+    def __init__(self, model: Model, where: FitValues, runs: Sequence[int]) -> None:
         """Linearise the residual at a fit."""
         self.model, self.where, self.runs = model, where, tuple(runs)
         self.found = linearise(model, where, runs)

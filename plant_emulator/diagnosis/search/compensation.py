@@ -30,17 +30,18 @@ if TYPE_CHECKING:
     States = Sequence[Mapping[str, float]]
 
 
-def start_with_room(model: Model, effect: str, runs: Sequence[int], base: FitResult) -> Start:
+def start_with_room(model: Model, known: FitResult, runs: Sequence[int], base: FitResult) -> Start:
     """The best start of an effect at its begun sizes, with room made for it.
 
+    known : fit with the effect, whose states the start takes
     base : fit without effects along the measured outputs
     """
+    (effect,) = known.effects
     observer, candidate = model.observer(CORRECTION_INTERVALS[0]), model.candidates[effect]
     near = linearise(observer, base, runs)
-    plain = {u.name: u.start for u in candidate.states}
-    states = tuple({**plain, **own} for own in base.states)
+    states = tuple({**own, **fit} for own, fit in zip(known.states, base.states, strict=True))
     found = [
-        _moved(observer, effect, runs, near, {**base.values, **sizes}, states)
+        _moved(observer, effect, runs, near, {**known.values, **base.values, **sizes}, states)
         for sizes in (values_at_size(candidate, one) for one in _begun_sizes(candidate))
     ]
     _, values = min(found, key=lambda one: one[0])

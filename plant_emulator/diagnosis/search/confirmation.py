@@ -81,20 +81,23 @@ def lead_start(model: Model, trial: Trial) -> tuple[Trial, FitResult]:
     return replace(scanned, led=led, others=tuple(others)), led
 
 
-def lead_others(model: Model, pair: tuple[Trial, FitResult]) -> tuple[Trial, FitResult]:
-    """The trial with more starts led along the measured outputs, and the best fit (a step).
+def lead_others(
+    model: Model, pairs: tuple[tuple[Trial, FitResult], FitResult]
+) -> tuple[Trial, FitResult]:
+    """A trial of a first effect with more starts led along the measured outputs (a step).
 
     One start makes room for the effect (`compensation`). The others were tried for a few iterations
     only. These tell the best start where the effect is nearly absent from some: such a start leaves
     little more than the fit without the effect, and leads nowhere.
 
-    pair : the trial, and the fit without effects along the measured outputs
+    pairs : the trial and its led fit, and the fit without effects along the measured outputs
+    returns the trial, and the best fit
     """
-    trial, base = pair
-    room = _values(trial, start_with_room(model, trial.effects[-1], trial.runs, base))
+    (trial, known), base = pairs
+    room = _values(trial, start_with_room(model, known, trial.runs, base))
     iterations = trial.iterations or APPROACH_ITERATIONS
     found = [lead(model, one, trial.runs, iterations=iterations) for one in (room, *trial.others)]
-    led = min(filter(None, (trial.led, *found)), key=lambda one: one.cost)
+    led = min((known, *found), key=lambda one: one.cost)
     return replace(trial, led=led, others=()), led
 
 

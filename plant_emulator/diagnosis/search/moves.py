@@ -64,18 +64,14 @@ class Moves(FittedSets):
         """Fit effects on top of a fit; least : gain that one must promise.
 
         Where the base leaves more than noise, a regression may mislead, and a free fit is long. The
-        effects are led along the measured outputs first. A first one that does not keep half of
-        what a regression promised is led from other starts too (`lead_others`). The one that gains
-        most there is fitted freely. Where it comes near the data and leaves little, those may only
-        look the same that leave little too; they may begin where it ends. Else it may be in a local
-        minimum: other first ones are fitted as long as a score promises more of one than any has
-        reached. Of the rest those are fitted for less long that gain half of the most there, or of
-        what was reached, or whose free simulation promises half, near the data: slow effects. Of
-        several further effects near the data none is fitted that cannot explain half of what the
-        others leave.
+        effects are led along the measured outputs first. The one that gains most there is fitted
+        freely. Where it comes near the data and leaves little, those may only look the same that
+        leave little too; they may begin where it ends. Else it may be in a local minimum, and
+        others are fitted (`_others`). Of several further effects near the data none is fitted that
+        cannot explain half of what the others leave.
         """
         trials = [trial_of(p, base, self.runner.runs, SETTINGS.leader_iterations) for p in new]
-        if base.mean_square <= NOISE_MEAN_SQUARE or len(trials) < 2:
+        if base.mean_square <= NOISE_MEAN_SQUARE or len(trials) < (2 if base.effects else 1):
             found = self.confirm([*trials[:1], *(_shorter(trial) for trial in trials[1:])])
             return [*(self.led_again(one) for one in found[:1]), *found[1:]]
         own = self.led(base)
@@ -85,40 +81,62 @@ class Moves(FittedSets):
             pairs = [pair for pair in pairs if self._may_explain(base, *pair)]
         if not pairs:
             return []
-        gains = [0.5 * (own.cost - led.cost) for _, led in pairs]
-        first, *rest = sorted(range(len(pairs)), key=lambda k: -gains[k])
-        trials = [trial for trial, _ in pairs]
-        found = [self.led_again(one) for one in self.confirm([trials[first]])]
-        if not self.is_far(found[0]) and evidence.leaves_little(found[0], excess(base)):
-            alike = [k for k in rest if evidence.leaves_little(pairs[k][1], excess(own))]
-            return [*found, *self.confirm([self._beginning_at(found[0], *pairs[k]) for k in alike])]
-        promised = [max(trial.promised.values(), default=0.0) for trial in trials]
-        for k in sorted([] if base.effects else rest, key=lambda k: -promised[k]):
-            if promised[k] > _gain(base, found):
-                found += self.confirm([trials[k]])
-                rest.remove(k)
-        reached = _gain(base, found)
-        least_led = SETTINGS.rival_share * max(0.0, min(gains[first], reached))
+        first, *rest = sorted(pairs, key=lambda pair: pair[1].cost)
+        (confirmed,) = self.confirm([first[0]])
+        best = self.led_again(confirmed)
+        if not self.is_far(best) and evidence.leaves_little(best, excess(base)):
+            alike = [pair for pair in rest if evidence.leaves_little(pair[1], excess(own))]
+            return [best, *self.confirm([self._beginning_at(best, *pair) for pair in alike])]
+        return [best, *self._others(base, best, rest, _gain(own, [first[1]]), least)]
+
+    def _others(
+        self,
+        base: FitResult,
+        leader: FitResult,
+        rest: Sequence[tuple[Trial, FitResult]],
+        most_led: float,
+        least: float,
+    ) -> list[FitResult]:
+        """Fit others on top of a fit whose leader leaves much, or is far from the data.
+
+        First ones are fitted as long as a regression promises more of one than any has reached. Of
+        the rest those are fitted for less long that gain half of the most along the measured
+        outputs, or of what was reached, or whose free simulation promises half, near the data: slow
+        effects.
+
+        most_led : gain of the leader along the measured outputs
+        least : gain that an effect must promise
+        """
+        found, left = [leader], list(rest)
+        for pair in sorted([] if base.effects else rest, key=lambda pair: -_promised(pair[0])):
+            if _promised(pair[0]) > _gain(base, found):
+                found += self.confirm([pair[0]])
+                left = [one for one in left if one is not pair]
+        reached, own = _gain(base, found), self.led(base)
+        least_led = SETTINGS.rival_share * max(0.0, min(most_led, reached))
         least = max(least, SETTINGS.rival_share * reached)
         rivals = [
-            _shorter(trials[k])
-            for k in rest
-            if gains[k] >= least_led or trials[k].promised.get(SIMULATION, 0.0) > least
+            _shorter(trial)
+            for trial, led in left
+            if _gain(own, [led]) >= least_led or trial.promised.get(SIMULATION, 0.0) > least
         ]
-        return [*found, *self.confirm(rivals)]
+        return [*found[1:], *self.confirm(rivals)]
 
     def _led_starts(self, own: FitResult, trials: Sequence[Trial]) -> list[tuple[Trial, FitResult]]:
         """Each trial with its best start led along the measured outputs, and that fit.
 
+        Where each first effect leaves most there, those are led from other starts too of which a
+        regression promises what a rival must gain (`lead_others`).
+
         own : the base of the trials, led as well
         """
         pairs = list(self.runner.map(lead_start, trials))
-        if own.effects:
+        if own.effects or not all(evidence.leaves_most(led, own) for _, led in pairs):
             return pairs
-        reached = _gain(own, [led for _, led in pairs])
-        short = [k for k, pair in enumerate(pairs) if _falls_short(own, *pair, reached)]
-        further = self.runner.map(lead_others, [(pairs[k][0], own) for k in short])
-        for k, pair in zip(short, further, strict=True):
+        least = SETTINGS.rival_share * _gain(own, [led for _, led in pairs])
+        asked = [k for k, trial in enumerate(trials) if _promised(trial) > least]
+        further = self.runner.map(lead_others, [(pairs[k], own) for k in asked])
+        for k, pair in zip(asked, further, strict=True):
             pairs[k] = pair
         return pairs
 
@@ -132,7 +150,7 @@ class Moves(FittedSets):
             values={**led.values, **other.values, **neutral},
             states=tuple({**a, **b} for a, b in zip(led.states, other.states, strict=True)),
         )
-        return _shorter(replace(trial, starts=(*trial.starts, there)))
+        return _shorter(replace(trial, starts=(there, *trial.starts)))
 
     def _may_explain(self, base: FitResult, trial: Trial, led: FitResult) -> bool:
         """Whether a further effect may explain half of what the base leaves, led or freely."""
@@ -167,14 +185,9 @@ def _shorter(trial: Trial) -> Trial:
     return replace(trial, iterations=SETTINGS.iterations)
 
 
-def _falls_short(own: FitResult, trial: Trial, led: FitResult, reached: float) -> bool:
-    """Whether an effect keeps less than half of its promise, which is that of a rival or more.
-
-    reached : largest gain of all
-    """
-    promised = max(trial.promised.values(), default=0.0)
-    share = SETTINGS.rival_share
-    return promised > share * reached and _gain(own, [led]) < share * promised
+def _promised(trial: Trial) -> float:
+    """Largest gain that a regression promises."""
+    return max(trial.promised.values(), default=0.0)
 
 
 def _gain(base: FitResult, found: Sequence[FitResult]) -> float:

@@ -1,4 +1,4 @@
-"""Which effects are fitted on top of a fit, and which in the place of one that it has."""
+"""Which effects are fitted on top of a fit, and from where."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -60,35 +60,45 @@ def test_effect_whose_simulation_promises_half_of_what_was_reached_is_fitted_too
         assert [one.effects for one in sets.fit_on_top(null, supposed, 5.0)] == fitted
 
 
-@pytest.mark.parametrize("score", ["relations at nominal parameters", "observer"])
 @pytest.mark.parametrize(
-    ("kink", "promised", "led"), [(5.0, 900.0, []), (5.0, 1100.0, [("wave",)]), (6.0, 1100.0, [])]
+    ("left", "kinks", "promised", "led"),
+    [
+        (4.0, ("kink",), 1100.0, [("wave",)]),
+        (4.0, ("kink",), 900.0, []),
+        (1.0, ("kink",), 1100.0, []),
+        (4.0, (), 1100.0, [("wave",)]),
+    ],
 )
-def test_effect_that_keeps_less_than_half_of_its_promise_is_led_from_other_starts_too(
-    score: str,
-    kink: float,
+def test_effects_are_led_from_other_starts_where_each_leaves_most(
+    left: float,
+    kinks: tuple[str, ...],
     promised: float,
     led: list[tuple[str, ...]],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """By hand: a wave of 1 gains 2000 / 4 = 500 along the measured outputs. t^3 leaves much.
+    """By hand: a kink of 5 gains 2083, and a rival needs half of that. A wave of 1 gains up to 500,
+    and 500 more from the other starts.
 
-    The kink gains 2083 or 3000, of which a rival needs half.
+    Another wave of 4 leaves 8 of the mean square of 25 / 12 + 1 / 2 + 8, and one of 1 leaves 1 / 2.
     """
-    y = noisy(2.0 + 3.0 * TIME + kink * abs(TIME) + 10.0 * TIME**3 + np.sin(20.0 * TIME))
-    model = Line([y], ("kink", "wave"))
+    gap = 5.0 * abs(TIME) + np.sin(20.0 * TIME) + left * np.sin(37.0 * TIME)
+    y = noisy(2.0 + 3.0 * TIME + gap)
+    model = Line([y], (*kinks, "wave"))
     null = fit_null(model, (0,))
     supposed = [
-        replace(p, gains={score: promised}, starts={score: p.starts["simulation"]})
+        replace(p, gains={"relations": promised}, starts={"relations": p.starts["simulation"]})
         if p.effect == "wave"
-        else p
+        else replace(p, gains={"observer": 0.0}, starts={"observer": p.starts["simulation"]})
         for p in promises(runner(model), null, None)
     ]
     asked = []
 
-    def noting(model: Line, pair: tuple[Trial, FitResult]) -> tuple[Trial, FitResult]:
-        asked.append(pair[0].effects)
-        again, found = lead_others(model, pair)
+    def noting(
+        model: Line, pairs: tuple[tuple[Trial, FitResult], FitResult]
+    ) -> tuple[Trial, FitResult]:
+        (trial, _), _ = pairs
+        asked.append(trial.effects)
+        again, found = lead_others(model, pairs)
         return again, replace(found, cost=found.cost - 1000.0)
 
     monkeypatch.setattr(moves, "lead_others", noting)
@@ -96,7 +106,7 @@ def test_effect_that_keeps_less_than_half_of_its_promise_is_led_from_other_start
     sets.fit_on_top(null, supposed, 5.0)
     assert asked == led
     [gain] = [s.gain for s in sets.trace if (s.action, s.effects) == ("led", ("wave",))]
-    assert gain == pytest.approx(500.0 * (1.0 + len(led)), rel=0.1)
+    assert (gain > 600.0) == bool(led)
 
 
 @pytest.mark.parametrize(
@@ -167,7 +177,7 @@ def test_rival_of_an_effect_that_leaves_little_may_begin_where_that_one_ends(
     first, _ = sets.fit_on_top(null, promises(runner(model), null, null), 5.0)
     bowl = asked[1]
     assert bowl.led is not None
-    assert bowl.starts[-1].values == {
+    assert bowl.starts[0].values == {
         "a": first.values["a"],
         "b": first.values["b"],
         "kink_size": 0.0,

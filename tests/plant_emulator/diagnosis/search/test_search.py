@@ -168,8 +168,7 @@ def test_other_effects_are_tried_beside_known_sets() -> None:
 def test_far_gap_is_screened_along_the_measured_outputs(size: float, score: str) -> None:
     """By hand: a wave of 0.8 leaves squares of 0.3 beside the noise of 1, one of 4 leaves 8."""
     found = explained(Line([noisy(2.0 + 3.0 * TIME + size * np.sin(20.0 * TIME))], ["wave"]))
-    first = found.trace[0]
-    assert first.action == "confirmed"
+    first = next(step for step in found.trace if step.action == "confirmed")
     assert set(first.promised) == {score}
 
 
@@ -487,12 +486,16 @@ def test_second_cause_is_sought_beside_one_that_explains_half(
         ({"cube": 12.0, "wave": 8.0}, {"cube", "wave"}),
         ({"cube": 19.0, "wave": 1.0}, {"cube"}),
         ({"cube": 8.0, "wave": 6.0, "kink": 6.0}, {"cube"}),
+        ({"cube": 1.0, "wave": 0.35}, {"cube"}),
     ],
 )
 def test_noise_is_estimated_beside_two_causes_where_the_first_leaves_much(
     squares: dict[str, float], names: set[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Mean squares beside a line: the first one leaves 40 %, 5 % (little) or 60 % (most)."""
+    """Mean squares beside a line: the first one leaves 40 %, 5 % (little) or 60 % (most).
+
+    One of 35 % beside the noise of 1 is near the data.
+    """
     sites = []
 
     def noting(_: Search, where: FitResult) -> bool:
