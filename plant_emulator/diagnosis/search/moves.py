@@ -125,18 +125,22 @@ class Moves(FittedSets):
     def _led_starts(self, own: FitResult, trials: Sequence[Trial]) -> list[tuple[Trial, FitResult]]:
         """Each trial with its best start led along the measured outputs, and that fit.
 
-        Where each first effect leaves most there, those are led from other starts too of which a
-        regression promises what a rival must gain (`lead_others`).
+        A first effect that keeps less than a regression promises is led from other starts too
+        (`lead_others`), if it promises what a rival must gain.
 
         own : the base of the trials, led as well
         """
         pairs = list(self.runner.map(lead_start, trials))
-        if own.effects or not all(evidence.leaves_most(led, own) for _, led in pairs):
+        if own.effects:
             return pairs
         least = SETTINGS.rival_share * _gain(own, [led for _, led in pairs])
-        asked = [k for k, trial in enumerate(trials) if _promised(trial) > least]
-        further = self.runner.map(lead_others, [(pairs[k], own) for k in asked])
-        for k, pair in zip(asked, further, strict=True):
+        short = [
+            k
+            for k, (trial, led) in enumerate(pairs)
+            if _promised(trial) > max(least, _gain(own, [led]))
+        ]
+        further = self.runner.map(lead_others, [(pairs[k], own) for k in short])
+        for k, pair in zip(short, further, strict=True):
             pairs[k] = pair
         return pairs
 
