@@ -126,19 +126,14 @@ class Moves(FittedSets):
         """Each trial with its best start led along the measured outputs, and that fit.
 
         A first effect that keeps less than a regression promises is led from other starts too
-        (`lead_others`), if it promises what a rival must gain.
+        (`lead_others`).
 
         own : the base of the trials, led as well
         """
         pairs = list(self.runner.map(lead_start, trials))
         if own.effects:
             return pairs
-        least = SETTINGS.rival_share * _gain(own, [led for _, led in pairs])
-        short = [
-            k
-            for k, (trial, led) in enumerate(pairs)
-            if _promised(trial) > max(least, _gain(own, [led]))
-        ]
+        short = [k for k, (trial, led) in enumerate(pairs) if _gain(own, [led]) < _promised(trial)]
         further = self.runner.map(lead_others, [(pairs[k], own) for k in short])
         for k, pair in zip(short, further, strict=True):
             pairs[k] = pair
