@@ -53,6 +53,22 @@ def linearise_drop(s: Record, p: Record) -> None:
         s.converter_drop_offset, s.converter_drop_slope = drop - slope * current, slope
 
 
+def integrate_to_limit(full: float, held: float, above: float) -> float:
+    """The state of an integrator whose controller is limited, at the end of a stage.
+
+    While the controller is limited, an integrator with conditional integration stands still; below
+    the limit it takes in the error. Where it would leave the limit standing, and exceed it going
+    on, it does neither: it slides along the limit (A. F. Filippov, Differential Equations with
+    Discontinuous Righthand Sides, section 4). It takes in what brings the controller to its limit.
+
+    full, held : state with all of the error, and with the share that it takes in at the limit
+    above : what the controller exceeds its limit by with the full state, as a state
+    """
+    if full > held:
+        return max(held, full - above)
+    return min(held, full - above)
+
+
 def solve_speed_loop(base: State, a: float, s: Record, p: Record) -> None:
     """Write the current reference at s.motor_speed, and its slope with it (eq. 3.2, 3.5, 3.6).
 
@@ -70,13 +86,23 @@ def solve_speed_loop(base: State, a: float, s: Record, p: Record) -> None:
     s.wanted_current = wanted
     s.wanted_current_slope = -gain * s.tachometer_gain
     s.current_reference_slope = s.wanted_current_slope
-    share = 1.0
+    s.speed_integral = integral + a * error
+    s.speed_integral_slope = -a * s.tachometer_gain
+    s.current_at_hold = wanted
+    s.current_at_hold_slope = s.wanted_current_slope
     if s.current_reference != wanted:
         s.current_reference_slope = 0.0
         if error * wanted > 0.0:
-            share = s.integration_at_limit
-    s.speed_integral_slope = -a * share * s.tachometer_gain
-    s.speed_integral = integral + a * share * error
+            taken = a * s.integration_at_limit
+            per_integral = p.speed_gain / p.speed_integral_time
+            held = integral + taken * error
+            above = (wanted - s.current_reference) / per_integral
+            s.speed_integral = integrate_to_limit(s.speed_integral, held, above)
+            s.speed_integral_slope = -taken * s.tachometer_gain
+            if s.speed_integral != held:
+                s.speed_integral_slope = p.speed_integral_time * s.tachometer_gain
+            s.current_at_hold = wanted - per_integral * (a - taken) * error
+            s.current_at_hold_slope += per_integral * (a - taken) * s.tachometer_gain
 
 
 def solve_current_loop(base: State, a: float, s: Record, p: Record) -> None:
@@ -104,18 +130,30 @@ def solve_current_loop(base: State, a: float, s: Record, p: Record) -> None:
     voltage = clamp(wanted, s.voltage_limit)
     s.wanted_voltage = wanted
     s.wanted_voltage_slope = gain * (s.current_reference_slope - slope)
-    share = 1.0
     if voltage != wanted:
         divisor = 1.0 / (1.0 + b * resistance)
         current = (start + b * (voltage - back_emf)) * divisor
         slope = -b * back_emf_slope * divisor
-        if (s.current_reference - current) * voltage > 0.0:
-            share = s.integration_at_limit
+    error, error_slope = s.current_reference - current, s.current_reference_slope - slope
     s.armature_voltage = voltage
     s.armature_current = current
     s.current_slope = slope
-    s.current_integral_slope = a * share * (s.current_reference_slope - slope)
-    s.current_integral = integral + a * share * (s.current_reference - current)
+    s.current_integral = integral + a * error
+    s.current_integral_slope = a * error_slope
+    s.voltage_at_hold = wanted
+    s.voltage_at_hold_slope = s.wanted_voltage_slope
+    if voltage != wanted and error * voltage > 0.0:
+        taken = a * s.integration_at_limit
+        per_integral = p.current_gain / p.current_integral_time
+        held = integral + taken * error
+        above = (offset + gain * error - voltage) / per_integral
+        s.current_integral = integrate_to_limit(s.current_integral, held, above)
+        s.current_integral_slope = taken * error_slope
+        if s.current_integral != held:
+            s.current_integral_slope = -p.current_integral_time * error_slope
+        at_hold = gain - per_integral * (a - taken)
+        s.voltage_at_hold = offset + at_hold * error
+        s.voltage_at_hold_slope = at_hold * error_slope
 
 
 def solve_drive(base: State, a: float, s: Record, p: Record) -> None:
@@ -127,13 +165,22 @@ def solve_drive(base: State, a: float, s: Record, p: Record) -> None:
     solve_current_loop(base, a, s, p)
 
 
+def stays_limited(value: float, change: float, limit: float) -> bool:
+    """Whether a value stays within a limit, or beyond it, when it changes."""
+    return (abs(value + change) > limit) == (abs(value) > limit)
+
+
 def keeps_limits(change: float, s: Record) -> bool:
-    """Whether the drive keeps its limits when the motor speed changes by `change` [rad/s]."""
-    current = s.wanted_current + s.wanted_current_slope * change
-    voltage = s.wanted_voltage + s.wanted_voltage_slope * change
-    return (abs(current) > s.current_limit) == (abs(s.wanted_current) > s.current_limit) and (
-        abs(voltage) > s.voltage_limit
-    ) == (abs(s.wanted_voltage) > s.voltage_limit)
+    """Whether the drive keeps its limits when the motor speed changes by `change` [rad/s].
+
+    An integrator keeps to its limit if its controller exceeds the limit even while it is held.
+    """
+    return (
+        stays_limited(s.wanted_current, s.wanted_current_slope * change, s.current_limit)
+        and stays_limited(s.current_at_hold, s.current_at_hold_slope * change, s.current_limit)
+        and stays_limited(s.wanted_voltage, s.wanted_voltage_slope * change, s.voltage_limit)
+        and stays_limited(s.voltage_at_hold, s.voltage_at_hold_slope * change, s.voltage_limit)
+    )
 
 
 def move_drive(change: float, s: Record) -> None:

@@ -71,6 +71,47 @@ def test_limited_integrator_does_not_grow(p: SimpleNamespace) -> None:
     assert s.speed_integral == 3.0
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_integrator_slides_along_the_limit(p: SimpleNamespace, sign: float) -> None:
+    """By hand: at an error of 1 rad/s, 15 + 15 I is 72 A at I = 3.8 rad.
+
+    Held at 3.799 it would leave the limit, and taking in 0.01 s of the error it would exceed it.
+    """
+    s = stage(p, reference=sign * 101.0, motor_speed=sign * 100.0)
+    drive.solve_speed_loop(state(integral=sign * 3.799), 0.01, s, p)
+    assert s.current_reference == sign * 72.0
+    assert s.speed_integral == pytest.approx(sign * 3.8, rel=1e-12)
+    other = stage(p, reference=sign * 101.0, motor_speed=sign * 100.0 + 1e-4)
+    drive.solve_speed_loop(state(integral=sign * 3.799), 0.01, other, p)
+    slope = (other.speed_integral - s.speed_integral) / 1e-4
+    assert s.speed_integral_slope == pytest.approx(slope, rel=1e-6)
+    assert drive.keeps_limits(0.0, s)
+    assert not drive.keeps_limits(sign * -0.01, s), "the integrator would be held"
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_voltage_integrator_slides_along_the_limit(p: SimpleNamespace, sign: float) -> None:
+    """At 400 V the current is known; of 10 ms of its error the integrator takes in one half.
+
+    30 e + 10 I is then 400 V at the end of the stage, 5 a e less with I held, and more with all.
+    """
+    s = stage(p, reference=sign * 260.0, motor_speed=sign * 250.0)
+    a, start = 0.01, sign * 20.0
+    b = a / 0.004
+    current = (start + b * (sign * 400.0 - s.flux * s.motor_speed)) / (1.0 + b * 0.424)
+    error = sign * 72.0 - current
+    base = state(current_integral=sign * 40.0 - 3.0 * error - 0.5 * a * error, current=start)
+    drive.solve_drive(base, a, s, p)
+    assert s.armature_voltage == sign * 400.0
+    assert s.armature_current == pytest.approx(current)
+    assert s.current_integral == pytest.approx(base[1] + 0.5 * a * error, rel=1e-12)
+    other = stage(p, reference=sign * 260.0, motor_speed=sign * 250.0 + 1e-4)
+    other.flux = laws.flux(other, p)
+    drive.solve_drive(base, a, other, p)
+    slope = (other.current_integral - s.current_integral) / 1e-4
+    assert s.current_integral_slope == pytest.approx(slope, rel=1e-4)
+
+
 def test_limited_integrator_takes_in_what_leads_back(p: SimpleNamespace) -> None:
     s = stage(p, reference=99.0, motor_speed=100.0)
     drive.solve_speed_loop(state(integral=20.0), A, s, p)  # wants 15 * 20 - 15 = 285 A

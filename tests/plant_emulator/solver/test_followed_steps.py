@@ -15,6 +15,7 @@ from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.recording import recording
 from plant_emulator.signals.log import COMPARED, Log
 from plant_emulator.simulation import simulate as simulation
+from plant_emulator.simulation.programs import program
 from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.sensor_noise import SENSORS, add_noise
 from plant_emulator.simulation.simulate import (
@@ -148,3 +149,25 @@ def test_step_to_a_sample_may_be_a_twentieth_longer_than_the_longest(
     for longest, steps in ((0.0096, 100), (0.0094, 200)):
         settings = Settings(0.0, FIT_TOLERANCE, longest)
         assert len(simulate_with_steps(rest, nominal.values(), settings)[1]) == steps
+
+
+def test_integrator_that_slides_along_its_limit_has_a_slope(nominal: ParameterSet) -> None:
+    """The drive lacks voltage, and the speed's integrator keeps the wanted current at its limit.
+
+    Where it was held and let go in turn, the last digits decided which, and the quotients were
+    34, 124 094, 47 and 1 153 rad/s.
+    """
+    run = inputs_of(program("program3").inputs())
+    field = {"flux_constant_1": 401.0, "flux_constant_2": 5.2, "gear_viscous_friction": 315.0}
+    values = {**nominal.values(), **field, "drum_inertia": 262.0}
+    settings = Settings(0.0, FIT_TOLERANCE, None)
+    log, steps = simulate_with_steps(run, values, settings)
+
+    def quotient(change: float) -> float:
+        friction = values["gear_coulomb_friction"] * (1.0 + change)
+        near = {**values, "gear_coulomb_friction": friction}
+        other, _ = simulate_with_steps(run, near, settings._replace(follow=steps))
+        return float(np.max(np.abs(other["motor_speed"] - log["motor_speed"]))) / change
+
+    quotients = [quotient(change) for change in (1e-8, 1e-7, 1e-6, 1e-5)]
+    np.testing.assert_allclose(quotients, quotients[0], rtol=0.05)
