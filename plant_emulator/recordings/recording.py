@@ -10,6 +10,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from plant_emulator.errors import IdentificationError, UnsettledError
+from plant_emulator.recordings.stamps import TELLING_SLOPE
 from plant_emulator.recordings.wheel_torque import is_estimated
 from plant_emulator.signals.log import (
     INPUT_ERRORS,
@@ -70,9 +71,23 @@ class Recording:
 
     @property
     def uncertain_inputs(self) -> bool:
-        """Whether an input is a measurement with noise of its own, or not known in a hole."""
-        unknown = (e for e in INPUT_ERRORS.values() if e in self.log)
-        return self.inputs.truck or any(bool(self.log[error].any()) for error in unknown)
+        """Whether an input has noise of its own, or is not known in a hole or where rows jitter."""
+        unknown = [self.log[error] for error in INPUT_ERRORS.values() if error in self.log]
+        return self.inputs.truck or any(off.any() for off in (*unknown, self.stamp_errors))
+
+    @property
+    def stamp_errors(self) -> Array:
+        """Deviation of the reference at rows whose time it does not tell [rad/s], shape (n,).
+
+        These are rows on ramps that are shorter than the windows of `stamps`; it is 0 elsewhere. A
+        log whose reference tells no time at all has none: it is a staircase.
+        """
+        if self.inputs.truck or TIMING_ERROR not in self.log:
+            return np.zeros_like(self.log.time)
+        errors = self.log[TIMING_ERROR]
+        rate = np.abs(np.gradient(self.log["speed_reference"], self.log.time))
+        moved = (errors == errors.max()) & (errors.min() < errors.max()) & (rate > TELLING_SLOPE)
+        return np.where(moved, errors * rate, 0.0)
 
     @property
     def noise_ratio(self) -> Array:

@@ -13,9 +13,12 @@ from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.recordings.holes import bridge_holes
 from plant_emulator.recordings.input_noise import NoiseDirections, noise_directions
 from plant_emulator.recordings.recording import Recording, recording
+from plant_emulator.recordings.stamps import restamp
 from plant_emulator.signals.log import Log, compared_channels
 from plant_emulator.simulation.programs import TravelProgram, program
+from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.sensor_noise import SENSORS, add_noise
+from plant_emulator.simulation.simulate import simulate
 from plant_emulator.simulation.travel_program import simulate_travel
 
 GAP = 0.3
@@ -110,6 +113,34 @@ def test_what_a_hole_hides_of_an_input_is_noise(true_log: Log, nominal: Paramete
     left = found.whiten(residual)
     assert np.sum(residual[:, contact] ** 2) > 500.0 + np.sum(left[:, contact] ** 2)
     assert np.mean(left[:, contact] ** 2) < 1.5
+
+
+def test_what_jitter_hides_of_a_short_ramp_is_noise(nominal: ParameterSet) -> None:
+    """A ramp of 625 rad/s^2 has seven rows: they tell no line, and 1 ms is 0.6 rad/s of it.
+
+    The long ramp tells the jitter, which the short ones need.
+    """
+    corners = [(0.0, 0.0), (1.0, 0.0), (5.0, 300.0)]
+    for begin in range(6, 16, 2):
+        ramps = ((0.0, 300.0), (0.08, 350.0), (1.0, 350.0), (1.08, 300.0))
+        corners += [(begin + after, speed) for after, speed in ramps]
+    fine = np.linspace(0.0, 17.0, 17001)
+    asked = np.interp(fine, *np.transpose(corners))
+    exact = simulate(inputs_of(Log(fine, {"speed_reference": asked})), nominal.values())
+    time = np.arange(0.0, 16.99, 0.01)
+    taken = time + np.random.default_rng(1).uniform(-1.5e-3, 1.5e-3, len(time))
+    signals = {name: np.interp(taken, fine, values) for name, values in exact.signals.items()}
+    log, jitter = restamp(add_noise(Log(time, signals), 1))
+    assert jitter is not None
+    run = recording(log)
+    found = noise_directions(run, nominal.values(), 0.0)
+    assert found is not None
+    residual = run.residual(nominal.values(), 0.0)
+    near = (log.time > 6.0) & (np.mod(log.time, 1.0) < 0.3)
+    left = found.whiten(residual)
+    current = run.channels.index("armature_current")
+    assert np.mean(residual[current, near] ** 2) > 5.0
+    assert np.mean(left[current, near] ** 2) < 1.5
 
 
 @pytest.mark.slow

@@ -1,6 +1,6 @@
 """Fits from far off on logs of the independent bench."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,11 +24,11 @@ from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import recording
-from plant_emulator.signals.log import Log
+from plant_emulator.signals.log import Array, Log
 from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.sensor_noise import add_noise
 from plant_emulator.simulation.simulate import simulate, values_of
-from tests.plant_emulator.diagnosis.line import TIME, Line, noisy
+from tests.plant_emulator.diagnosis.line import TIME, Line, linear, noisy
 
 Reader = Callable[[str], Log]
 RUNS = (0, 1, 2)
@@ -46,6 +46,38 @@ def nominal_start(model: BenchModel) -> FitValues:
     return FitValues(
         effects=(), values=model.nominal(RUNS), states=tuple({GAP_POSITION: 0.5} for _ in RUNS)
     )
+
+
+class Tone(Line):
+    """y = a + size sin(b x): a fit ends at the frequency that it begins near."""
+
+    parameters = (linear("a", 0.0, std=10.0), linear("b", 20.0, prior=20.0, std=10.0))
+
+    def __init__(self, size: float, begun: float) -> None:
+        super().__init__([noisy(size * np.sin(20.0 * TIME))], ())
+        self.size, self.begun = size, begun
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+
+        def residual(v: Mapping[str, float]) -> Array:
+            return (self.measured[run] - v["a"] - self.size * np.sin(v["b"] * TIME))[None, :]
+
+        return residual
+
+    def start_values(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
+        """See `Model`."""
+        return {"a": 0.0, "b": self.begun}, [{} for _ in runs]
+
+
+def test_fit_that_leaves_more_than_noise_begins_at_the_nominal_parameters_too() -> None:
+    """By hand: two tones of 0.6 differ by a mean square of 0.36 beside the noise of 1."""
+    model = Tone(0.6, 35.0)
+    alone = fit(model, (), (0,), {"a": 0.0, "b": 35.0}, [{}])
+    assert 1.2 < alone.mean_square < 1.45
+    found = fit_null(model, (0,))
+    assert found.mean_square == pytest.approx(1.0, abs=0.07)
+    assert found.values["b"] == pytest.approx(20.0, abs=0.2)
 
 
 def test_fit_along_the_measured_speeds_leads_to_the_noise(model: BenchModel) -> None:
