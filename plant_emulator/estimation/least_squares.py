@@ -89,13 +89,18 @@ def estimate(
     if free and not any(slopes.any() for slopes in problem.jacobian(start)):
         slopes = _slopes(problem, rough=rough, symmetric=symmetric)
         return _estimate(problem, start, slopes, False, "no unknown changes the residual", rough)
-    most, bounds = iterations or MAX_ITERATIONS, (lower, upper)
-    found = _minimise(problem, start, bounds, max(settled, settled_far), most)
+    left, bounds = iterations or MAX_ITERATIONS, (lower, upper)
+    found = _minimise(problem, start, bounds, max(settled, settled_far), left)
+    left -= found.nfev
+    if problem.bounded and left > 0:  # the weights of samples lead near the optimum, not to it
+        problem.bounding = False
+        found = _minimise(problem, found.x, bounds, max(settled, settled_far), left)
+        left -= found.nfev
     rows = problem.residual(found.x)
     samples = sum(np.count_nonzero(r) for r in rows)
     near = sum(float(np.sum(r**2)) for r in rows) <= SUSPECT_MEAN_SQUARE * samples
-    if near and settled < settled_far and found.nfev < most:
-        found = _minimise(problem, found.x, bounds, settled, most - found.nfev)
+    if near and settled < settled_far and left > 0:
+        found = _minimise(problem, found.x, bounds, settled, left)
     slopes = _slopes(problem, rough=rough, symmetric=symmetric)
     return _estimate(problem, found.x, slopes, bool(found.status > 0), str(found.message), rough)
 

@@ -32,7 +32,7 @@ FOLLOWED_NORM = 1.0
 # Norm of a slope that is made of last digits: its standard error would be a thousand on the scale
 # of the estimation. It counts as none.
 ROUNDING_SLOPE = 1e-3
-SMALLEST_DIFFERENCE, LARGEST_DIFFERENCE = 1e-6, 1e-3
+SMALLEST_DIFFERENCE, LARGEST_DIFFERENCE = 1e-8, 1e-3
 # Largest step of the slopes that standard errors come from. Over a thousandth, the slope of a weak
 # parameter was that of the one sample in which a contact fell: its standard error was wrong by
 # four, and which sample that was, the last bits of the linear algebra decided.
@@ -43,8 +43,17 @@ HIDDEN_NORM = 0.3
 # Change of the residual vector over which symmetric slopes are taken to each side [norm]: over one
 # standard deviation in all, because over less a slope may be that of a single contact.
 HALF_DEVIATION = 0.5
-# Step of the first differences, before any slope is known.
-FIRST_DIFFERENCE = 1e-5
+# Step of the first differences, before any slope is known. Over 1e-5 a contact passes samples.
+FIRST_DIFFERENCE = 1e-8
+# Norm of a change that is made of last digits.
+ROUNDING_NORM = 1e-8
+# Largest leverage of a sample in a step of a fit: its share of what is known in one direction. On
+# average it is the number of unknowns over that of samples, one of thousands. A sample of more has
+# a contact fall on it: it tells to a microsecond when, and nothing of any step that moves the
+# contact to another sample. A few of them held all parameters where they were.
+LARGEST_LEVERAGE = 0.1
+# Rounds of the weights that bound it, and how far above the bound they may leave it.
+LEVERAGE_ROUNDS, LEVERAGE_EXCEEDED = 8, 1.5
 # Share of the change of the residual vector that the slopes may miss in a step that they follow by
 # secants.
 MISSED_SHARE = 0.2
@@ -58,6 +67,8 @@ class SimulatedProblem:
     lengths : of the slopes, which tell the steps of the next ones, shape (unknowns,); NaN where
         they are not known yet
     difference : norm of the change of the residual vector that slopes are taken over
+    bounding : whether the leverage of samples is bounded; bounded : whether that changed the last
+        slopes
     """
 
     unknowns: tuple[Unknown, ...]
@@ -71,6 +82,8 @@ class SimulatedProblem:
     based: tuple[bytes, list[Array]] = (b"", [])
     slopes_known: tuple[bytes, list[Array]] = (b"", [])
     beside: tuple[bytes, Sequence[Residual]] = (b"", ())
+    bounding: bool = True
+    bounded: bool = False
 
     def residual(self, z: Array) -> list[Array]:
         """Residual of every run at z, shape (channels, samples) each."""
@@ -138,7 +151,8 @@ class SimulatedProblem:
             self.simulations += 1
             there = self._residuals_beside(z)[k](_values(self.unknowns, changed, k))
             column = (there - base[k]) / (changed[j] - z[j])
-            shown = np.linalg.norm(column) > ROUNDING_SLOPE
+            changed_by, length = np.linalg.norm(there - base[k]), np.linalg.norm(column)
+            shown = changed_by > ROUNDING_NORM and length > ROUNDING_SLOPE
             jacobians[k][..., j] = column if shown else 0.0
 
     def _residuals_beside(self, z: Array) -> Sequence[Residual]:
@@ -176,24 +190,37 @@ class SimulatedProblem:
         return np.concatenate([*(r.ravel() for r in self.residual(z)), self._prior(z)])
 
     def turned_rows(self, z: Array) -> Array:
-        """`rows`, turned so that all lies along the first axis, shape (1 + unknowns,)."""
-        turned = np.zeros(1 + len(z))
+        """`rows`, turned so that all lies along the first axis, shape (2 + unknowns,)."""
+        turned = np.zeros(2 + len(z))
         turned[0] = np.linalg.norm(self.rows(z))
         return turned
 
     def turned_slopes(self, z: Array) -> Array:
-        """Jacobian of `rows`, turned with them, shape (1 + unknowns, unknowns).
+        """Jacobian of `rows`, turned with them, shape (2 + unknowns, unknowns).
 
-        It is triangular: a rotation changes no product of rows and slopes, of which alone a step
-        of least squares is made, and all that it leaves of the samples is this factor.
+        It is triangular but for its last row: a rotation changes no product of rows and slopes, of
+        which alone a step of least squares is made, and all that it leaves of the samples is this
+        factor. Samples of large leverage have less weight in it, see `bounding_weights`.
         """
-        weight = np.diag([1.0 / u.scaled_std for u in self.unknowns])
-        parts = [np.column_stack([self._prior(z), weight])]
-        for residual, jacobian in zip(self.residual(z), self.jacobian(z), strict=True):
-            both = np.concatenate([residual[..., None], jacobian], axis=-1)
-            parts += list(np.linalg.qr(both, mode="r"))
-        factor = np.asarray(np.linalg.qr(np.concatenate(parts), mode="r"))
-        return np.asarray(factor[:, 1:] * np.where(factor[:, :1] < 0.0, -1.0, 1.0))
+        prior = np.diag([1.0 / u.scaled_std for u in self.unknowns])
+        parts = [
+            np.concatenate([residual[..., None], jacobian], axis=-1)
+            for residual, jacobian in zip(self.residual(z), self.jacobian(z), strict=True)
+        ]
+        if self.bounding:
+            slopes = [part[..., 1:].reshape(-1, len(z)) for part in parts]
+            weights = bounding_weights(slopes, prior)
+            self.bounded = any(bool(np.any(w < 1.0)) for w in weights)
+            parts = [
+                part * own.reshape(part.shape[:2])[..., None]
+                for part, own in zip(parts, weights, strict=True)
+            ]
+        factors = [
+            np.column_stack([self._prior(z), prior]),
+            *(f for part in parts for f in np.linalg.qr(part, mode="r")),
+        ]
+        factor = np.asarray(np.linalg.qr(np.concatenate(factors), mode="r"))
+        return _beside_residual(factor, float(np.linalg.norm(self.rows(z))))
 
     def _prior(self, z: Array) -> Array:
         return np.array(
@@ -202,6 +229,51 @@ class SimulatedProblem:
                 for j, u in enumerate(self.unknowns)
             ]
         )
+
+
+def bounding_weights(slopes: Sequence[Array], prior: Array) -> list[Array]:
+    """Weights of the samples that bound their leverage, one array a run; 1 where it is small.
+
+    They are those of a bounded-influence regression (C. L. Mallows; see P. J. Rousseeuw, A. M.
+    Leroy, Robust Regression and Outlier Detection, chapter 1), found by iteration: one sample may
+    hide another. Where samples are few the bound is what the ends of a polynomial of p coefficients
+    have, p^2 / n.
+
+    slopes : of each run, shape (samples, unknowns); prior : rows of the prior, which stay
+    """
+    scale = np.sqrt(sum(np.einsum("ni,ni->i", j, j) for j in (*slopes, prior)))
+    scale = np.where(scale > 0.0, scale, 1.0)
+    scaled = [j / scale for j in slopes]
+    weights = [np.ones(len(j)) for j in slopes]
+    few = len(prior) ** 2 / max(1, sum(len(j) for j in slopes))
+    bound = min(max(LARGEST_LEVERAGE, few), 1.0 - LARGEST_LEVERAGE)
+    for _ in range(LEVERAGE_ROUNDS):
+        rows = [j * w[:, None] for j, w in zip(scaled, weights, strict=True)]
+        gram = sum((j.T @ j for j in rows), (prior / scale).T @ (prior / scale))
+        values, vectors = np.linalg.eigh(gram)
+        turned = vectors / np.sqrt(np.maximum(values, np.finfo(float).eps * values[-1]))
+        leverages = [np.sum((j @ turned) ** 2, axis=1) for j in rows]
+        if max(float(h.max(initial=0.0)) for h in leverages) <= LEVERAGE_EXCEEDED * bound:
+            break
+        # Beside all others as they are, a sample of this weight has the bound.
+        odds = [h / np.maximum(1.0 - h, np.finfo(float).eps) for h in leverages]
+        weights = [
+            w * np.sqrt(bound / (1.0 - bound) / np.maximum(o, bound / (1.0 - bound)))
+            for w, o in zip(weights, odds, strict=True)
+        ]
+    return weights
+
+
+def _beside_residual(factor: Array, norm: float) -> Array:
+    """Slopes with the products of a factor, beside a residual that lies along the first axis.
+
+    factor : triangular, of weighted residuals and slopes side by side, shape (1 + n, 1 + n)
+    norm : of the residual without weights
+    returns shape (2 + n, n): what weights took from the residual is in the last row
+    """
+    along = factor[0, 1:]
+    share = float(np.clip(factor[0, 0] / norm, -1.0, 1.0)) if norm else 0.0
+    return np.stack([share * along, *factor[1:, 1:], np.sqrt(1.0 - share**2) * along])
 
 
 class SecantSlopes:

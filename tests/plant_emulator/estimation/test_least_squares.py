@@ -13,7 +13,11 @@ from plant_emulator.estimation.covariance import (
     structure,
 )
 from plant_emulator.estimation.least_squares import estimate, linearise_at
-from plant_emulator.estimation.simulated_problem import SecantSlopes, SimulatedProblem
+from plant_emulator.estimation.simulated_problem import (
+    SecantSlopes,
+    SimulatedProblem,
+    bounding_weights,
+)
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.signals.log import Array
 
@@ -180,6 +184,46 @@ def test_turned_rows_and_slopes_keep_all_products() -> None:
     assert slopes.T @ slopes == pytest.approx(by_hand.T @ by_hand + np.diag([0.0, 16.0]), abs=1e-4)
     gradient = by_hand.T @ residual({"a": 2.0, "b": 1.0}).ravel() + [0.0, 2.0 * 4.0]
     assert slopes.T @ rows == pytest.approx(gradient, abs=1e-4)
+
+
+def test_sample_on_a_contact_does_not_hold_the_fit() -> None:
+    """A line of slope 2 through 200 samples; one passes a contact within 1e-7 of the start.
+
+    Newton's step with all samples alike goes 5e-8, to where that one is zero. Anywhere else it is
+    off by 5.
+    """
+    x = np.linspace(-1.0, 1.0, 200)
+
+    def residual(v: Mapping[str, float]) -> Array:
+        misses = (2.0 - v["a"]) * x
+        misses[100] = 5.0 * np.tanh((v["a"] - 5.0) * 1e7 + 0.5)
+        return misses[None]
+
+    found = estimate([number("a", 5.0)], [residual])
+    assert found.parameters()["a"] == pytest.approx(2.0, abs=1e-6)
+    assert found.cost == pytest.approx(25.0)
+
+
+def test_bounded_leverage_does_not_move_the_optimum() -> None:
+    """One of 200 samples tells the slope of a line alone: the fit is plain least squares."""
+    x = np.append(np.linspace(-1.0, 1.0, 199), 400.0)
+    y = np.cos(40.0 * x)
+    line = [number("a", 5.0), number("b", -7.0)]
+    found = estimate(line, [lambda v: (y - v["a"] - v["b"] * x)[None]])
+    slope, level = np.polyfit(x, y, 1)
+    assert found.parameters() == pytest.approx({"a": level, "b": slope}, rel=1e-5)
+
+
+def test_weights_bound_the_leverage_and_spare_the_rest() -> None:
+    """By hand: beside 100 samples of slope 1 a weight w gives a slope of 1000 the leverage
+    (1000 w)^2 / (100 + (1000 w)^2), a tenth at w^2 = 100 / 9 / 1e6.
+    """
+    slopes = [np.ones((100, 1)), np.array([[1000.0]])]
+    many, one = bounding_weights(slopes, np.zeros((1, 1)))
+    assert np.all(many == 1.0)
+    assert one[0] ** 2 == pytest.approx(100.0 / 9.0 / 1e6, rel=1e-6)
+    told_by_prior, _ = bounding_weights(slopes, np.array([[1e6]]))
+    assert np.all(told_by_prior == 1.0)
 
 
 @pytest.mark.parametrize("start", [(500.0, 1e-4), (250.0, 5e-4)])  # NIST's two starts
