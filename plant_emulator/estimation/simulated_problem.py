@@ -50,8 +50,9 @@ ROUNDING_NORM = 1e-8
 # Largest leverage of a sample in a step of a fit: its share of what is known in one direction. On
 # average it is the number of unknowns over that of samples, one of thousands. A sample of more has
 # a contact fall on it: it tells to a microsecond when, and nothing of any step that moves the
-# contact to another sample. A few of them held all parameters where they were.
-LARGEST_LEVERAGE = 0.1
+# contact to another sample. A few of them held all parameters where they were. The first contact of
+# a run tells where in the gap it began: a bound of a tenth lost that.
+LARGEST_LEVERAGE = 0.3
 # Rounds of the weights that bound it, and how far above the bound they may leave it.
 LEVERAGE_ROUNDS, LEVERAGE_EXCEEDED = 8, 1.5
 # Share of the change of the residual vector that the slopes may miss in a step that they follow by
@@ -246,7 +247,7 @@ def bounding_weights(slopes: Sequence[Array], prior: Array) -> list[Array]:
     scaled = [j / scale for j in slopes]
     weights = [np.ones(len(j)) for j in slopes]
     few = len(prior) ** 2 / max(1, sum(len(j) for j in slopes))
-    bound = min(max(LARGEST_LEVERAGE, few), 1.0 - LARGEST_LEVERAGE)
+    bound = min(max(LARGEST_LEVERAGE, few), 0.5)
     for _ in range(LEVERAGE_ROUNDS):
         rows = [j * w[:, None] for j, w in zip(scaled, weights, strict=True)]
         gram = sum((j.T @ j for j in rows), (prior / scale).T @ (prior / scale))

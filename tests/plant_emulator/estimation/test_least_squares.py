@@ -216,12 +216,12 @@ def test_bounded_leverage_does_not_move_the_optimum() -> None:
 
 def test_weights_bound_the_leverage_and_spare_the_rest() -> None:
     """By hand: beside 100 samples of slope 1 a weight w gives a slope of 1000 the leverage
-    (1000 w)^2 / (100 + (1000 w)^2), a tenth at w^2 = 100 / 9 / 1e6.
+    (1000 w)^2 / (100 + (1000 w)^2), 0.3 at w^2 = 100 * 3 / 7 / 1e6.
     """
     slopes = [np.ones((100, 1)), np.array([[1000.0]])]
     many, one = bounding_weights(slopes, np.zeros((1, 1)))
     assert np.all(many == 1.0)
-    assert one[0] ** 2 == pytest.approx(100.0 / 9.0 / 1e6, rel=1e-6)
+    assert one[0] ** 2 == pytest.approx(300.0 / 7.0 / 1e6, rel=1e-6)
     told_by_prior, _ = bounding_weights(slopes, np.array([[1e6]]))
     assert np.all(told_by_prior == 1.0)
 
