@@ -43,8 +43,9 @@ HIDDEN_NORM = 0.3
 # Change of the residual vector over which symmetric slopes are taken to each side [norm]: over one
 # standard deviation in all, because over less a slope may be that of a single contact.
 HALF_DEVIATION = 0.5
-# Step of the first differences, before any slope is known. Over 1e-5 a contact passes samples.
-FIRST_DIFFERENCE = 1e-8
+# Steps of the first differences, before any slope is known: over the second one contacts pass
+# samples with a strong unknown, and over the first one a weak unknown shows nothing.
+FIRST_DIFFERENCE, SECOND_DIFFERENCE = 1e-8, 1e-5
 # Norm of a change that is made of last digits.
 ROUNDING_NORM = 1e-8
 # Largest leverage of a sample in a step of a fit: its share of what is known in one direction. On
@@ -68,8 +69,7 @@ class SimulatedProblem:
     lengths : of the slopes, which tell the steps of the next ones, shape (unknowns,); NaN where
         they are not known yet
     difference : norm of the change of the residual vector that slopes are taken over
-    bounding : whether the leverage of samples is bounded; bounded : whether that changed the last
-        slopes
+    bounding : whether the leverage of samples is bounded; bounded : whether that changed slopes
     """
 
     unknowns: tuple[Unknown, ...]
@@ -120,6 +120,7 @@ class SimulatedProblem:
         unknown = np.isnan(self.lengths)
         for j in np.flatnonzero(unknown):
             self._difference(z, int(j), FIRST_DIFFERENCE, first)
+        self._difference_again(z, unknown, first)
         self.lengths = np.where(unknown, column_lengths(first), self.lengths)
 
     def _jacobian(self, z: Array) -> list[Array]:
@@ -130,6 +131,7 @@ class SimulatedProblem:
         steps = self._steps(self.difference, LARGEST_DIFFERENCE)
         for j in np.flatnonzero(differenced):
             self._difference(z, int(j), steps[j], jacobians)
+        self._difference_again(z, differenced & np.isnan(self.lengths), jacobians)
         # Where no step was known, the slopes only tell the next steps, and are not followed.
         if np.isfinite(self.lengths).any() or self.secants.followed.any():
             self.secants.move(z, base, jacobians, ~differenced)
@@ -155,6 +157,13 @@ class SimulatedProblem:
             changed_by, length = np.linalg.norm(there - base[k]), np.linalg.norm(column)
             shown = changed_by > ROUNDING_NORM and length > ROUNDING_SLOPE
             jacobians[k][..., j] = column if shown else 0.0
+
+    def _difference_again(
+        self, z: Array, first: NDArray[np.bool_], jacobians: Sequence[Array]
+    ) -> None:
+        """Fill in those columns of first differences that showed nothing over a longer step."""
+        for j in np.flatnonzero(first & (column_lengths(jacobians) < ROUNDING_SLOPE)):
+            self._difference(z, int(j), SECOND_DIFFERENCE, jacobians)
 
     def _residuals_beside(self, z: Array) -> Sequence[Residual]:
         """The residual functions for values beside z."""
@@ -211,7 +220,7 @@ class SimulatedProblem:
         if self.bounding:
             slopes = [part[..., 1:].reshape(-1, len(z)) for part in parts]
             weights = bounding_weights(slopes, prior)
-            self.bounded = any(bool(np.any(w < 1.0)) for w in weights)
+            self.bounded |= any(bool(np.any(w < 1.0)) for w in weights)
             parts = [
                 part * own.reshape(part.shape[:2])[..., None]
                 for part, own in zip(parts, weights, strict=True)
@@ -252,6 +261,8 @@ def bounding_weights(slopes: Sequence[Array], prior: Array) -> list[Array]:
         rows = [j * w[:, None] for j, w in zip(scaled, weights, strict=True)]
         gram = sum((j.T @ j for j in rows), (prior / scale).T @ (prior / scale))
         values, vectors = np.linalg.eigh(gram)
+        if values[-1] <= 0.0:
+            break
         turned = vectors / np.sqrt(np.maximum(values, np.finfo(float).eps * values[-1]))
         leverages = [np.sum((j @ turned) ** 2, axis=1) for j in rows]
         if max(float(h.max(initial=0.0)) for h in leverages) <= LEVERAGE_EXCEEDED * bound:

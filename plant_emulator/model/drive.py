@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plant_emulator.model.laws import converter_voltage_drop
+from plant_emulator.model.laws import converter_voltage_drop, current_limit
 
 if TYPE_CHECKING:
     from plant_emulator.model.records import Record, State
@@ -62,18 +62,18 @@ def integrate_to_limit(full: float, held: float, above: float) -> float:
     Discontinuous Righthand Sides, section 4). It takes in what brings the controller to its limit.
 
     full, held : state with all of the error, and with the share that it takes in at the limit
-    above : what the controller exceeds its limit by with the full state, as a state
+    above : what the controller exceeds its limit by with the full state, as a state; its sign is
+        that of the error
     """
-    if full > held:
-        return max(held, full - above)
-    return min(held, full - above)
+    return max(held, full - above) if above > 0.0 else min(held, full - above)
 
 
 def solve_speed_loop(base: State, a: float, s: Record, p: Record) -> None:
     """Write the current reference at s.motor_speed, and its slope with it (eq. 3.2, 3.5, 3.6).
 
     Anti-windup by conditional integration: while the current reference is limited, the integrator
-    takes in only an error that leads away from the limit.
+    takes in only an error that leads away from the limit. A limit with a rounded corner sets in
+    below its value; an integrator that is held there stays held.
 
     base : states that the stage starts from; a : implicit step [s]
     """
@@ -96,13 +96,17 @@ def solve_speed_loop(base: State, a: float, s: Record, p: Record) -> None:
             taken = a * s.integration_at_limit
             per_integral = p.speed_gain / p.speed_integral_time
             held = integral + taken * error
+            s.current_at_hold = wanted - per_integral * (a - taken) * error
+            s.current_at_hold_slope += per_integral * (a - taken) * s.tachometer_gain
             above = (wanted - s.current_reference) / per_integral
             s.speed_integral = integrate_to_limit(s.speed_integral, held, above)
+            s.wanted_current = s.current_at_hold
+            if abs(s.current_at_hold) > current_limit(s, p):
+                s.speed_integral = held
+            s.wanted_current = wanted
             s.speed_integral_slope = -taken * s.tachometer_gain
             if s.speed_integral != held:
                 s.speed_integral_slope = p.speed_integral_time * s.tachometer_gain
-            s.current_at_hold = wanted - per_integral * (a - taken) * error
-            s.current_at_hold_slope += per_integral * (a - taken) * s.tachometer_gain
 
 
 def solve_current_loop(base: State, a: float, s: Record, p: Record) -> None:

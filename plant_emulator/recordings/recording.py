@@ -79,15 +79,16 @@ class Recording:
     def stamp_errors(self) -> Array:
         """Deviation of the reference at rows whose time it does not tell [rad/s], shape (n,).
 
-        These are rows on ramps that are shorter than the windows of `stamps`; it is 0 elsewhere. A
-        log whose reference tells no time at all has none: it is a staircase.
+        These are rows beside corners, and on ramps shorter than the windows of `stamps`; it is 0
+        elsewhere. A log whose reference tells no time at all has none: it is a staircase. Rows that
+        were inserted in a hole have its error.
         """
         if self.inputs.truck or TIMING_ERROR not in self.log:
             return np.zeros_like(self.log.time)
         errors = self.log[TIMING_ERROR]
         rate = np.abs(np.gradient(self.log["speed_reference"], self.log.time))
-        moved = (errors == errors.max()) & (errors.min() < errors.max()) & (rate > TELLING_SLOPE)
-        return np.where(moved, errors * rate, 0.0)
+        untold = (errors == errors.max()) & (errors.min() < errors.max()) & self.use.any(axis=0)
+        return np.where(untold & (rate > TELLING_SLOPE), errors * rate, 0.0)
 
     @property
     def noise_ratio(self) -> Array:

@@ -152,14 +152,16 @@ def fit_null(model: Model, runs: Sequence[int]) -> FitResult:
     One near the data that leaves more than noise may have taken contact at the wrong time once. It
     is fitted from the nominal parameters too.
     """
-    found = _fit_from_own_start(model, runs)
-    if not NOISE_MEAN_SQUARE < found.mean_square <= SUSPECT_MEAN_SQUARE:
+    start, nominal = own_start(model, runs), _nominal_start(model, runs)
+    found = _fit_from_own_start(model, start, runs)
+    near = NOISE_MEAN_SQUARE < found.mean_square <= SUSPECT_MEAN_SQUARE
+    if not near or nominal == start:
         return found
-    other = _fit_without_effects(model, _nominal_start(model, runs), runs)
+    other = _fit_without_effects(model, nominal, runs)
     return min(found, other, key=lambda one: one.cost)
 
 
-def _fit_from_own_start(model: Model, runs: Sequence[int]) -> FitResult:
+def _fit_from_own_start(model: Model, start: FitValues, runs: Sequence[int]) -> FitResult:
     """Fit without effects from the model's own start values.
 
     A fit that ends far from the data may have taken contact at the wrong time once. It is led along
@@ -167,7 +169,6 @@ def _fit_from_own_start(model: Model, runs: Sequence[int]) -> FitResult:
     voltage had ended at 32 times the noise (see the tests). A fit that is led to where it was
     before lacks a cause.
     """
-    start = own_start(model, runs)
     near = nearest(model, [start], runs)
     if near is not None:
         return _fit_without_effects(model, near, runs)

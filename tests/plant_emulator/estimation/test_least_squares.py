@@ -186,6 +186,15 @@ def test_turned_rows_and_slopes_keep_all_products() -> None:
     assert slopes.T @ rows == pytest.approx(gradient, abs=1e-4)
 
 
+def test_weak_unknown_leaves_its_start() -> None:
+    """By hand: 3 - a^2 changes by 2e-9 over a step of 1e-8 at 0.1, which last digits hide."""
+    found = estimate([number("a", 0.1)], [lambda v: np.full((1, 25), 3.0 - v["a"] ** 2)])
+    assert found.parameters()["a"] == pytest.approx(3.0**0.5, rel=1e-6)
+    prior = [number("b", 0.0, prior=0.0, std=100.0)]
+    shrunk = estimate(prior, [lambda v: np.full((1, 20), 1.0 - 0.1 * v["b"])])
+    assert shrunk.parameters()["b"] == pytest.approx(9.995, abs=0.01)
+
+
 def test_sample_on_a_contact_does_not_hold_the_fit() -> None:
     """A line of slope 2 through 200 samples; one passes a contact within 1e-7 of the start.
 
@@ -222,8 +231,10 @@ def test_weights_bound_the_leverage_and_spare_the_rest() -> None:
     many, one = bounding_weights(slopes, np.zeros((1, 1)))
     assert np.all(many == 1.0)
     assert one[0] ** 2 == pytest.approx(300.0 / 7.0 / 1e6, rel=1e-6)
-    told_by_prior, _ = bounding_weights(slopes, np.array([[1e6]]))
-    assert np.all(told_by_prior == 1.0)
+    _, beside_prior = bounding_weights(slopes, np.array([[1e6]]))
+    assert beside_prior[0] == 1.0
+    _, unseen = bounding_weights([np.zeros((3, 1)), np.zeros((1, 1))], np.zeros((1, 1)))
+    assert unseen[0] == 1.0
 
 
 @pytest.mark.parametrize("start", [(500.0, 1e-4), (250.0, 5e-4)])  # NIST's two starts

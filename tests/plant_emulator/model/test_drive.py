@@ -90,6 +90,21 @@ def test_integrator_slides_along_the_limit(p: SimpleNamespace, sign: float) -> N
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("a", "share", "taken"), [(0.0, 0.0, 0.0), (A, 1.0, 100.0 * A)])
+def test_integrator_with_nothing_to_hold_takes_in_its_error(
+    p: SimpleNamespace, sign: float, a: float, share: float, taken: float
+) -> None:
+    """A stage of no length, and an integrator without anti-windup, far beyond the limit."""
+    s = stage(p, reference=sign * 100.0, motor_speed=0.0)
+    s.integration_at_limit = share
+    drive.solve_drive(state(integral=sign * 3.0, current_integral=sign * 1.5), a, s, p)
+    assert s.current_reference == sign * 72.0
+    assert s.speed_integral == pytest.approx(sign * (3.0 + taken))
+    error = s.current_reference - s.armature_current
+    assert s.current_integral == pytest.approx(sign * 1.5 + a * share * error)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_voltage_integrator_slides_along_the_limit(p: SimpleNamespace, sign: float) -> None:
     """At 400 V the current is known; of 10 ms of its error the integrator takes in one half.
 
