@@ -69,10 +69,11 @@ class Settings:
     # Gain over the largest one that a rival needs: promised, along the measured outputs, or
     # reached.
     rival_share: float = 0.5
-    # Iterations of a first fit, enough to tell a basin from a slope: of a rival, and of a leader.
-    # Fits that may win go on.
+    # Iterations of a first fit: of a rival, enough to tell a basin from a slope, and of a leader,
+    # enough to come along the valley of the flux, which every voltage limit makes. Fits that may
+    # win go on.
     iterations: int = 5
-    leader_iterations: int = 10
+    leader_iterations: int = 25
     # Cost above the best one's up to which a fit may still win [chi squared]. Where the best one
     # leaves more than noise, one that has not ended may win from further off.
     near: float = 100.0

@@ -6,9 +6,11 @@ count. The unknowns are parameters, shared by all runs, and states, each of one 
 
     minimise  sum r^2 + sum ((z - z_prior) / std)^2        z = log(value), or the value itself
 
-by scipy's trust-region method; slopes: see `simulated_problem`.
+by scipy's trust-region method; slopes: see `simulated_problem`. The steps bound the leverage of a
+sample; the last ones, near the optimum, do not, so that it is that of least squares.
 
-Standard errors come from the residuals themselves, see `covariance`; not those of a rough fit.
+Standard errors come from the residuals themselves, with bounded leverage, see `covariance`; not
+those of a rough fit.
 """
 
 from __future__ import annotations
