@@ -6,8 +6,9 @@ count. The unknowns are parameters, shared by all runs, and states, each of one 
 
     minimise  sum r^2 + sum ((z - z_prior) / std)^2        z = log(value), or the value itself
 
-by scipy's trust-region method; slopes: see `simulated_problem`. The steps bound the leverage of a
-sample; the last ones, near the optimum, do not, so that it is that of least squares.
+by scipy's trust-region method; slopes: see `simulated_problem`. Where it stands still, steps go on
+that bound the leverage of a sample; the last ones do not, so that the optimum is that of least
+squares.
 
 Standard errors come from the residuals themselves, with bounded leverage, see `covariance`; not
 those of a rough fit.
@@ -40,6 +41,9 @@ if TYPE_CHECKING:
 MAX_ITERATIONS = 60
 # Mean square above which a fit may lie in a local minimum, so that other starts are tried.
 SUSPECT_MEAN_SQUARE = 1.5
+# Fall of the cost that steps with bounded leverage must promise, and keep, to be taken: a tenth of
+# the gain that an effect needs [chi squared].
+PROMISING_FALL = 3.0
 # Relative fall of the cost that ends a fit: some 1e-6 in units of chi squared.
 COST_SETTLED = 1e-10
 Z_SETTLED = 1e-9
@@ -92,13 +96,8 @@ def estimate(
     if free and not any(slopes.any() for slopes in problem.jacobian(start)):
         slopes = _slopes(problem, rough=rough, symmetric=symmetric)
         return _estimate(problem, start, slopes, False, "no unknown changes the residual", rough)
-    left, bounds = iterations or MAX_ITERATIONS, (lower, upper)
-    found = _minimise(problem, start, bounds, max(settled, settled_far), left)
-    left -= found.nfev
-    if problem.bounded and left > 0:  # the weights of samples lead near the optimum, not to it
-        problem.bounding = False
-        found = _minimise(problem, found.x, bounds, max(settled, settled_far), left)
-        left -= found.nfev
+    most, bounds = iterations or MAX_ITERATIONS, (lower, upper)
+    found, left = _descend(problem, start, bounds, max(settled, settled_far), most)
     rows = problem.residual(found.x)
     samples = sum(np.count_nonzero(r) for r in rows)
     near = sum(float(np.sum(r**2)) for r in rows) <= SUSPECT_MEAN_SQUARE * samples
@@ -120,6 +119,36 @@ def _start(unknowns: Sequence[Unknown]) -> tuple[Array, Array, Array]:
     margin = 1e-6 * (upper - lower)
     start = np.array([u.scaled(u.start) for u in unknowns])
     return np.clip(start, lower + margin, upper - margin), lower, upper
+
+
+def _descend(
+    problem: SimulatedProblem,
+    start: Array,
+    bounds: tuple[Array, Array],
+    settled: float,
+    iterations: int,
+) -> tuple[OptimizeResult, int]:
+    """Minimise, in turn with steps that bound the leverage of samples where the others stand still.
+
+    Plain steps end at the optimum, bounded ones only near it.
+
+    returns the result, and how many iterations are left
+    """
+    found = _minimise(problem, start, bounds, settled, iterations)
+    left = iterations - found.nfev
+    while left > 0 and problem.promise(found.x) > PROMISING_FALL:
+        problem.bounding = True
+        moved = _minimise(problem, found.x, bounds, settled, left)
+        problem.bounding = False
+        left -= moved.nfev
+        stands = 2.0 * (found.cost - moved.cost) < PROMISING_FALL
+        if not stands and left > 0:
+            moved = _minimise(problem, moved.x, bounds, settled, left)
+            left -= moved.nfev
+        found = min(found, moved, key=lambda one: one.cost)
+        if stands:
+            break
+    return found, left
 
 
 def _minimise(

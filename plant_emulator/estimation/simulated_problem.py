@@ -54,6 +54,8 @@ ROUNDING_NORM = 1e-8
 # contact to another sample. A few of them held all parameters where they were. The first contact of
 # a run tells where in the gap it began: a bound of a tenth lost that.
 LARGEST_LEVERAGE = 0.3
+# Share of the distance of its bounds within which an unknown is at one.
+AT_BOUND = 1e-5
 # Rounds of the weights that bound it, and how far above the bound they may leave it.
 LEVERAGE_ROUNDS, LEVERAGE_EXCEEDED = 8, 1.5
 # Share of the change of the residual vector that the slopes may miss in a step that they follow by
@@ -69,7 +71,7 @@ class SimulatedProblem:
     lengths : of the slopes, which tell the steps of the next ones, shape (unknowns,); NaN where
         they are not known yet
     difference : norm of the change of the residual vector that slopes are taken over
-    bounding : whether the leverage of samples is bounded; bounded : whether that changed slopes
+    bounding : whether the leverage of samples is bounded
     """
 
     unknowns: tuple[Unknown, ...]
@@ -83,8 +85,7 @@ class SimulatedProblem:
     based: tuple[bytes, list[Array]] = (b"", [])
     slopes_known: tuple[bytes, list[Array]] = (b"", [])
     beside: tuple[bytes, Sequence[Residual]] = (b"", ())
-    bounding: bool = True
-    bounded: bool = False
+    bounding: bool = False
 
     def residual(self, z: Array) -> list[Array]:
         """Residual of every run at z, shape (channels, samples) each."""
@@ -210,7 +211,7 @@ class SimulatedProblem:
 
         It is triangular but for its last row: a rotation changes no product of rows and slopes, of
         which alone a step of least squares is made, and all that it leaves of the samples is this
-        factor. Samples of large leverage have less weight in it, see `bounding_weights`.
+        factor. Samples of large leverage may have less weight in it, see `bounding_weights`.
         """
         prior = np.diag([1.0 / u.scaled_std for u in self.unknowns])
         parts = [
@@ -220,7 +221,6 @@ class SimulatedProblem:
         if self.bounding:
             slopes = [part[..., 1:].reshape(-1, len(z)) for part in parts]
             weights = bounding_weights(slopes, prior)
-            self.bounded |= any(bool(np.any(w < 1.0)) for w in weights)
             parts = [
                 part * own.reshape(part.shape[:2])[..., None]
                 for part, own in zip(parts, weights, strict=True)
@@ -231,6 +231,22 @@ class SimulatedProblem:
         ]
         factor = np.asarray(np.linalg.qr(np.concatenate(factors), mode="r"))
         return _beside_residual(factor, float(np.linalg.norm(self.rows(z))))
+
+    def promise(self, z: Array) -> float:
+        """Fall of the cost that a linear step with bounded leverage promises [chi squared].
+
+        An unknown at its bound goes nowhere.
+        """
+        lower = np.array([u.scaled(u.lower) for u in self.unknowns])
+        upper = np.array([u.scaled(u.upper) for u in self.unknowns])
+        margin = AT_BOUND * (upper - lower)
+        free = (z > lower + margin) & (z < upper - margin)
+        known, self.bounding = self.bounding, True
+        slopes = self.turned_slopes(z)[:, free]
+        self.bounding = known
+        rows = self.turned_rows(z)
+        step, *_ = np.linalg.lstsq(slopes, rows)
+        return float(rows @ rows - np.sum((rows - slopes @ step) ** 2))
 
     def _prior(self, z: Array) -> Array:
         return np.array(

@@ -14,6 +14,7 @@ from plant_emulator.diagnosis.screening.screening import promises
 from plant_emulator.diagnosis.search import moves
 from plant_emulator.diagnosis.search.confirmation import Trial, lead_others
 from plant_emulator.diagnosis.search.moves import Moves
+from plant_emulator.diagnosis.settings import SETTINGS
 from plant_emulator.signals.log import Array
 from tests.plant_emulator.diagnosis.line import SHAPES, TIME, Line, noisy, runner
 
@@ -136,7 +137,7 @@ def test_effect_of_which_a_regression_promises_more_than_was_reached_is_fitted_t
 
     monkeypatch.setattr(sets, "confirm", noting)
     assert [one.effects for one in sets.fit_on_top(null, supposed, 5.0)] == fitted
-    assert asked == [10] * len(fitted)
+    assert asked == [SETTINGS.leader_iterations] * len(fitted)
 
 
 @pytest.mark.parametrize(("cube", "fitted"), [(0.0, ["bowl"]), (10.0, ["bowl", "tub"])])
