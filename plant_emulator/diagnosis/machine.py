@@ -69,7 +69,7 @@ class MeasuredRun:
     noise_ratio : deviation of each sample's noise over its channel's [1], shape (channels, n);
         (channels, 1) where all samples are alike
     uncertain_inputs : whether an input of the simulation is a measurement with noise of its own, or
-        is not known in a hole of the log
+        is not known in a hole of the log or at a row that was taken early or late
     hides : effects that an unknown input of the run explains, or that need an input it lacks
     """
 

@@ -22,11 +22,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.estimation.covariance import sandwich, white_covariance
+from plant_emulator.estimation.leverage import bounding_weights
 from plant_emulator.estimation.simulated_problem import (
     DIFFERENCE_NORM,
     SecantSlopes,
     SimulatedProblem,
-    bounding_weights,
 )
 from plant_emulator.estimation.unknowns import Estimate, Unknown
 

@@ -2,9 +2,8 @@
 
 An input that is measured brings its noise into the simulation, and so does one that a hole of the
 log hides, or whose rows were taken early or late. `recordings.input_noise` finds the directions of
-the residual that this noise disturbs.
-They are found once, at the fit without effects, and stay the same for every fit, because the costs
-of the fits are compared.
+the residual that this noise disturbs. They are found once, at the fit without effects, and stay the
+same for every fit, because the costs of the fits are compared.
 """
 
 from __future__ import annotations

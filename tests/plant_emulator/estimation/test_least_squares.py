@@ -13,10 +13,10 @@ from plant_emulator.estimation.covariance import (
     structure,
 )
 from plant_emulator.estimation.least_squares import estimate, linearise_at
+from plant_emulator.estimation.leverage import bounding_weights
 from plant_emulator.estimation.simulated_problem import (
     SecantSlopes,
     SimulatedProblem,
-    bounding_weights,
 )
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.signals.log import Array
