@@ -43,20 +43,6 @@ class Fidelity(Protocol):
     ) -> Array | None:
         """Change of the data with one more effect, shape (n,); None: it cannot be simulated."""
 
-    def followed(
-        self,
-        effect: str,
-        sizes: Mapping[str, float],
-        states: Sequence[Mapping[str, float]],
-        /,
-        *,
-        column: Array,
-    ) -> tuple[Array, Array] | None:
-        """The column where the nuisance makes up for the effect, and the coefficients of that.
-
-        Shapes (n,) and (k,); the coefficients are those that follow the effect, taken off.
-        """
-
     def unwhitened(
         self, effect: str, sizes: Mapping[str, float], states: Sequence[Mapping[str, float]]
     ) -> Array | None:

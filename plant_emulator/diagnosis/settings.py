@@ -13,10 +13,6 @@ class Settings:
     # effects are tried at the first size, and the best at the others too, but for those beside
     # effects that leave noise: they are faint.
     sizes: tuple[float, ...] = (0.3, 0.1, 1.0, 3.0)
-    # Share of a plausible size whose columns are slopes: a simulation adds up, so that columns may
-    # bend from a tenth of a plausible size on (a contact comes or stays away). Simulations
-    # still tell such a slope within some hundredths.
-    slope_share: float = 0.01
     # Sizes that a fit begins at where regressions mislead: most laws bend less at the first, and a
     # limit does not act there.
     begun_sizes: tuple[float, ...] = (0.3, 1.0)
@@ -38,14 +34,9 @@ class Settings:
     linear_mean_square: float = 1.5
     # Gain that an effect needs: odds of e^15, one of 30 effects by chance in 100 000 logs.
     needed: float = 15.0
-    # Predicted gain from which on a first effect is fitted: parameters that bend together make the
-    # gain of a weak effect several times the predicted one.
-    promising: float = 5.0
     # Gain that one more effect needs: needless ones that no run refutes came to 35, or to 38 beside
-    # other forms of the laws; true ones to 45 and 136. Less must be predicted: parameters that
-    # follow nearly all of an effect blur what its slopes tell.
+    # other forms of the laws; true ones to 45 and 136.
     needed_again: float = 40.0
-    promising_again: float = 15.0
     # Share of what a set explains that one more effect must gain beside an approximate law: its
     # error follows any other effect by chance, and grows with what the law explains. Needless
     # effects gained 3e-6 and 9e-6 of it (12 and 2 of seed 118). Of the 39 pairs of detectable
@@ -67,7 +58,7 @@ class Settings:
     # that leave least so as they are.
     most_started: int = 2
     # Gain over the largest one that a rival needs: promised, along the measured outputs, or
-    # reached.
+    # reached. So much of what an effect needs must be predicted before it is fitted.
     rival_share: float = 0.5
     # Iterations of a first fit: of a rival, enough to tell a basin from a slope, and of a leader,
     # enough to come along the valley of the flux, which every voltage limit makes. Fits that may

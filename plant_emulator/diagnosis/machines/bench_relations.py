@@ -224,10 +224,6 @@ class BenchRelations:
         rows = self.unwhitened(effect, sizes, states)
         return None if rows is None else self.white(rows)
 
-    def followed(self, *_: object, column: Array) -> tuple[Array, Array]:
-        """See `Fidelity`; between samples nothing adds up that could bend, and nothing follows."""
-        return column, np.zeros(self.data.nuisance.shape[1])
-
     def unwhitened(
         self, effect: str, sizes: Mapping[str, float], states: Sequence[Mapping[str, float]]
     ) -> Array | None:

@@ -16,14 +16,18 @@ from plant_emulator.diagnosis.fitting.signature import signs, values_at_size
 from plant_emulator.estimation.regression import gain
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from plant_emulator.diagnosis.fidelity import Fidelity
     from plant_emulator.diagnosis.machine import Candidate
+    from plant_emulator.diagnosis.screening.simulation_columns import SimulationColumns
     from plant_emulator.estimation.unknowns import Unknown
     from plant_emulator.signals.log import Array
 
     States = Sequence[Mapping[str, float]]
+    # Change of the data by a size parameter, or by all where there is one, at a size [plausible
+    # sizes] and in these states; None: it cannot be simulated.
+    Change = Callable[[str | None, float, States], Array | None]
 
 
 # Trials of a size that a limit begins to act at, and the share of it that is close enough.
@@ -37,13 +41,11 @@ class Column:
     """A column of an effect: change of the data at one size.
 
     size : the size parameter's name; run : of a column with an angle, else None
-    follows : nuisance coefficients that the change is taken beside, see `Fidelity.followed`
     """
 
     size: str
     run: int | None
     change: Array
-    follows: Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,22 +66,49 @@ class Score:
 
 
 def best_score(
-    fidelity: Fidelity,
-    candidate: Candidate,
-    sizes: Sequence[float],
-    states: States,
-    share: float = 1.0,
-    *,
-    followed: bool = False,
+    fidelity: Fidelity, candidate: Candidate, sizes: Sequence[float], states: States
 ) -> Score | None:
     """Score of an effect at the size that gains most; None: it shows nothing here.
 
     states : of the effect in each run, but for an angle
-    share : of each size that the columns are taken at; scaled up, those of a small share are slopes
-    followed : whether the columns are taken beside the parameters that follow the effect
     """
+    return _best(fidelity, candidate, sizes, states, _change(fidelity, candidate))
+
+
+def slope_score(
+    simulation: SimulationColumns, candidate: Candidate, states: States
+) -> Score | None:
+    """Score of an effect by its slopes where it is absent; None: they show nothing.
+
+    They are taken over as little as those of the parameters. A column over more is another one
+    where a contact falls on a sample, and the parameters do not follow it there.
+    """
+
+    def change(only: str | None, size: float, states: States) -> Array | None:
+        name = only or candidate.sizes[0].name
+        return size * simulation.slope(candidate.name, name, states)
+
+    return _best(simulation, candidate, (1.0,), states, change)
+
+
+def _change(fidelity: Fidelity, candidate: Candidate) -> Change:
+    """The change of the data by an effect at a size."""
+
+    def change(only: str | None, size: float, states: States) -> Array | None:
+        return fidelity.column(candidate.name, values_at_size(candidate, size, only), states)
+
+    return change
+
+
+def _best(
+    fidelity: Fidelity,
+    candidate: Candidate,
+    sizes: Sequence[float],
+    states: States,
+    change: Change,
+) -> Score | None:
     scores = (
-        _score(fidelity, candidate, way * size, states, share, followed=followed)[1]
+        _score(fidelity, candidate, way * size, states, change)[1]
         for way in signs(candidate.sizes)
         for size in sizes
     )
@@ -106,9 +135,9 @@ def _bisect(
     fidelity: Fidelity, candidate: Candidate, low: float, high: float, states: States
 ) -> Iterator[Score]:
     """Scores on the way to that size; low : a size without a score."""
-    size = high
+    size, change = high, _change(fidelity, candidate)
     for _ in range(TRIALS):
-        seen, score = _score(fidelity, candidate, size, states)
+        seen, score = _score(fidelity, candidate, size, states, change)
         if score is not None:
             # A size that is a little smaller may not act, and a fit would stay there.
             at, neutral = values_at_size(candidate, size), candidate.neutral
@@ -128,57 +157,46 @@ def _bisect(
 
 
 def _columns(
-    fidelity: Fidelity, candidate: Candidate, size: float, states: States, *, followed: bool
+    fidelity: Fidelity, candidate: Candidate, size: float, states: States, change: Change
 ) -> Iterator[Column | None]:
     """Columns of the size parameters that change the data visibly at this size.
 
-    None: the model cannot be simulated at it. No parameter follows an unknown angle of each run.
+    None: the model cannot be simulated at it
     """
     angle = next((u.name for u in candidate.states if u.angle), None)
     single = len(candidate.sizes) == 1
-    still = np.zeros_like(fidelity.data.mean)
     for u in candidate.sizes:
-        values = values_at_size(candidate, size, None if single else u.name)
-        change = fidelity.column(candidate.name, values, states)
-        if change is None:
+        only = None if single else u.name
+        found = change(only, size, states)
+        if found is None:
             yield None
             continue
-        if np.linalg.norm(change) < HIDDEN_NORM:
+        if np.linalg.norm(found) < HIDDEN_NORM:
             continue
         turned = None
         if angle is not None:
-            aside = [{**s, angle: pi / 2} for s in states]
-            turned = fidelity.column(candidate.name, values, aside)
-        if turned is None or np.allclose(turned, change):
-            found: tuple[Array, Array] | None = (change, still)
-            if followed:
-                found = fidelity.followed(candidate.name, values, states, column=change)
-            yield found and Column(size=u.name, run=None, change=found[0], follows=found[1])
+            turned = change(only, size, [{**s, angle: pi / 2} for s in states])
+        if turned is None or np.allclose(turned, found):
+            yield Column(size=u.name, run=None, change=found)
             continue
         for run in range(len(states)):
-            for one in (change, turned):
+            for one in (found, turned):
                 own = np.where(fidelity.owners == run, one, 0.0)
-                yield Column(size=u.name, run=run, change=own, follows=still)
+                yield Column(size=u.name, run=run, change=own)
 
 
 def _score(
-    fidelity: Fidelity,
-    candidate: Candidate,
-    size: float,
-    states: States,
-    share: float = 1.0,
-    *,
-    followed: bool = False,
+    fidelity: Fidelity, candidate: Candidate, size: float, states: States, change: Change
 ) -> tuple[bool, Score | None]:
     """Whether the columns show anything, and their gain with one-sided sizes kept on their side.
 
     None: they show nothing, cannot be simulated, or are all on the other side
     """
-    every = list(_columns(fidelity, candidate, share * size, states, followed=followed))
+    every = list(_columns(fidelity, candidate, size, states, change))
     columns = [one for one in every if one is not None]
     if not columns:
         return bool(every), None
-    products = fidelity.data.products(np.stack([c.change for c in columns]).T / share)
+    products = fidelity.data.products(np.stack([c.change for c in columns]).T)
     two_sided = np.array([c.run is not None for c in columns])
     keep = np.arange(len(columns))
     while len(keep):
@@ -197,8 +215,7 @@ def _score(
         abs(values[name] - neutral[name]) / abs(at[name] - neutral[name])
         for name in {c.size for c in columns}
     )
-    follows = np.stack([c.follows for c in columns]) / share
-    theta = fidelity.data.theta(products, beta) - beta @ follows
+    theta = fidelity.data.theta(products, beta)
     return True, Score(gain=value, factor=factor, values=values, states=own, theta=theta)
 
 

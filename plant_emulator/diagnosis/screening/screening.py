@@ -21,7 +21,7 @@ from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.fitting.signature import signs, values_at_size
 from plant_emulator.diagnosis.fitting.task import Task
-from plant_emulator.diagnosis.screening.columns import best_score, onset_score
+from plant_emulator.diagnosis.screening.columns import best_score, onset_score, slope_score
 from plant_emulator.diagnosis.screening.promise import Promise, Start
 from plant_emulator.diagnosis.screening.scans import start_states
 from plant_emulator.diagnosis.screening.simulation_columns import SimulationColumns
@@ -198,7 +198,10 @@ def _scores(
     noise another one is faint: the first size is enough.
     """
     first, *others = SETTINGS.sizes
-    found = {name: _first_score(fidelity, candidate, asked) for name, candidate in library.items()}
+    found = {
+        name: _first_score(fidelity, candidate, asked.states[name])
+        for name, candidate in library.items()
+    }
     if asked.fidelity == SIMULATION and _leaves_noise(asked.base):
         return found
     silent = [name for name, score in found.items() if score is None]
@@ -213,26 +216,15 @@ def _scores(
     return found
 
 
-def _first_score(fidelity: Fidelity, candidate: Candidate, asked: Screening) -> Score | None:
-    """Score of an effect at the first size, or near the noise; see `_score_nearby`.
+def _first_score(fidelity: Fidelity, candidate: Candidate, states: States) -> Score | None:
+    """Score of an effect by its slopes, or at the first size where these show nothing.
 
     Relations hold between samples: nothing adds up in them, and their columns hardly bend.
     """
-    states = asked.states[candidate.name]
-    if asked.fidelity != SIMULATION or asked.base.mean_square > SETTINGS.linear_mean_square:
-        return best_score(fidelity, candidate, SETTINGS.sizes[:1], states)
-    return _score_nearby(fidelity, candidate, states)
-
-
-def _score_nearby(fidelity: Fidelity, candidate: Candidate, states: States) -> Score | None:
-    """Score of an effect in the simulation near the data; None: it shows nothing here.
-
-    A slope is right for effects that the parameters cannot follow far, a column beside them for
-    contact that they keep as it is.
-    """
-    slopes = best_score(fidelity, candidate, (1.0,), states, SETTINGS.slope_share)
-    beside = best_score(fidelity, candidate, SETTINGS.sizes[:1], states, followed=True)
-    return max((slopes, beside), key=_gain)
+    slopes = None
+    if isinstance(fidelity, SimulationColumns):
+        slopes = slope_score(fidelity, candidate, states)
+    return slopes or best_score(fidelity, candidate, SETTINGS.sizes[:1], states)
 
 
 def _gain(score: Score | None) -> float:

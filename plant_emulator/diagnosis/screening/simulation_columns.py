@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from plant_emulator.diagnosis.fitting.joint_fit import linearise
+from plant_emulator.diagnosis.fitting.signature import values_at_size
+from plant_emulator.estimation.least_squares import linearise_at
+from plant_emulator.estimation.nearby import Beside
 from plant_emulator.estimation.regression import Regression
 
 if TYPE_CHECKING:
@@ -86,23 +90,22 @@ class SimulationColumns:
 
     unwhitened = column
 
-    def followed(
-        self,
-        effect: str,
-        sizes: Mapping[str, float],
-        states: Sequence[Mapping[str, float]],
-        /,
-        *,
-        column: Array,
-    ) -> tuple[Array, Array] | None:
-        """See `Fidelity`. Where an effect and what follows it both act, contact comes and goes as
-        beside the true cause; where one of them acts alone, columns bend.
+    def slope(self, effect: str, size: str, states: Sequence[Mapping[str, float]]) -> Array:
+        """Change of the data by a plausible size of an effect, as its slope at neutral tells.
+
+        size : name of the size parameter, the others are neutral; returns shape (n,)
         """
-        follows = self.data.follow(column)
-        values, moved = self.values_at(self._shift / self.deviations - follows)
-        there = [{**own, **more} for own, more in zip(moved, states, strict=True)]
-        beside = self.column(effect, {**values, **sizes}, there)
-        return None if beside is None else (beside, follows)
+        candidate = self.model.candidates[effect]
+        (unknown,) = (u for u in candidate.sizes if u.name == size)
+        neutral = candidate.neutral[size]
+        beside = {**self.where.values, **values_at_size(candidate, 0.0)}
+        residuals = [
+            Beside(self.model.residual(k, (*self.where.effects, effect)), {**beside, **own, **more})
+            for k, own, more in zip(self.runs, self.where.states, states, strict=True)
+        ]
+        found = linearise_at([replace(unknown, start=neutral)], residuals)
+        away = unknown.scaled(neutral) - unknown.scaled(unknown.start)
+        return away * np.concatenate([j.ravel() for j in found.jacobians])
 
     def values_at(self, theta: Array) -> Values:
         """See `Fidelity`."""
