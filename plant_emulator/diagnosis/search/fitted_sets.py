@@ -20,6 +20,7 @@ from plant_emulator.diagnosis.search.confirmation import (
     reduce,
     without_effects,
 )
+from plant_emulator.diagnosis.search.gain_spread import Pair, shared_gain
 from plant_emulator.diagnosis.search.law_forms import gain_beside_forms
 from plant_emulator.diagnosis.search.run_agreement import run_agreement
 from plant_emulator.diagnosis.search.summary import search_step
@@ -43,6 +44,7 @@ class FittedSets:
     beside_random : whether a random effect is part of that noise
     sets : the best fit of each set, at first of those that are known
     agreed : whether the runs and other forms of the laws agree on it, where they were asked
+    shared : whether enough samples share the gain of its last effect, where they were asked
     promises : what one more effect promises on top of a set
     led_fits : along the measured outputs, of sets on top of which others were tried
     expanded : sets whose most promising effects were tried on top of them
@@ -53,6 +55,7 @@ class FittedSets:
     beside_random: bool = False
     sets: dict[frozenset[str], FitResult] = field(default_factory=dict)
     agreed: dict[frozenset[str], bool] = field(default_factory=dict)
+    shared: dict[frozenset[str], bool] = field(default_factory=dict)
     promises: dict[frozenset[str], list[Promise]] = field(default_factory=dict)
     led_fits: dict[frozenset[str], FitResult] = field(default_factory=dict)
     expanded: set[frozenset[str]] = field(default_factory=set)
@@ -99,6 +102,7 @@ class FittedSets:
         if key not in self.sets or found.cost < self.sets[key].cost:
             self._store(found)
             self.agreed.pop(key, None)
+            self.shared.pop(key, None)
             self.led_fits.pop(key, None)
 
     @property
@@ -116,7 +120,7 @@ class FittedSets:
             other <= key or self._gains_no_more(key, other)
             for other, agreed in self.agreed.items()
             if not agreed
-        )
+        ) or any(other <= key for other, shared in self.shared.items() if not shared)
 
     def _gains_no_more(self, key: frozenset[str], other: frozenset[str]) -> bool:
         """Whether a fit that has ended gains no more than one more effect of the same others."""
@@ -161,11 +165,28 @@ class FittedSets:
                 and len(key) == max(1, len(best.effects))
                 and one.cost < best.cost + SETTINGS.near + (not one.converged) * excess(best)
             ]
-            if not near and self._agrees(best):
+            if not near and self._agrees(best) and self._is_shared(best):
                 return best
             for one in self.fits(refit, near):
                 done.add(frozenset(one.effects))
                 self.trace.append(search_step(self.null, "converged", one))
+
+    def _is_shared(self, found: FitResult) -> bool:
+        """Whether enough samples share the gain of the last effect of a set.
+
+        It is asked once, near the data: far off, most samples are off by more than their noise.
+        """
+        key, base = frozenset(found.effects), frozenset(found.effects[:-1])
+        if not key or key in self.shared or base not in self.sets or self.is_far(found):
+            return self.shared.get(key, True)
+        pair = Pair(found, self.sets[base], self.runner.runs)
+        (gain,) = self.runner.map(shared_gain, [pair])
+        self.shared[key] = gain >= self.least_gain(len(base))
+        if not self.shared[key]:
+            action = f"gains by few samples (as {gain:.1f} by many)"
+            self.trace.append(search_step(self.null, action, found))
+            self.expanded.discard(base)
+        return self.shared[key]
 
     def _agrees(self, found: FitResult) -> bool:
         """Whether each further effect of a set has one size, and gains beside other forms of laws.

@@ -110,6 +110,7 @@ class Search(Moves):
         self.led_fits.clear()
         self.expanded.clear()
         self.agreed.clear()
+        self.shared.clear()
         self.sets = {}
         self.fits(refit, kept)
         self.null = self.sets[frozenset()]
@@ -164,7 +165,7 @@ class Search(Moves):
 
     def _promising(self, found: FitResult) -> float:
         """Predicted gain from which on one more effect is fitted on top of a fit."""
-        return SETTINGS.promising_again if found.effects else SETTINGS.promising
+        return SETTINGS.rival_share * self.least_gain(len(found.effects))
 
     def _expand(self, base: FitResult) -> None:
         """Fit the effects of largest gain on top of a set.
