@@ -40,7 +40,7 @@ class Edge(Line):
 
 
 def test_parameter_that_follows_an_effect_at_a_contact_leaves_the_rest_of_its_gain() -> None:
-    """By hand: the wave of 0.4 gains 2000 * 0.4^2 / 4 = 80, less log(sqrt(1000)) = 3.5 for its size.
+    """By hand: a wave of 0.4 gains 2000 * 0.4^2 / 4 = 80, less log(sqrt(1000)) = 3.5 for its size.
 
     A column over 0.3 has the edge at other samples than the slopes of the parameter have.
     """
