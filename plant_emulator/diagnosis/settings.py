@@ -47,9 +47,12 @@ class Settings:
     # Relative error of an approximate law: other laws of the same effect differed by up to this. It
     # is the deviation of each form of the law.
     law_error: float = 0.1
-    # Probability below which no chance makes the runs differ on a size. Second effects that are
-    # there had 0.4 or more, beside the error that a law may have, and needless ones 0.006 or less.
+    # Probability below which no chance makes the runs differ on a size, and the relative error of a
+    # law in one run or half of one: where a slip or a presliding grows with the force, the halves
+    # of a run differ by this from their mean. True second effects had 0.1 or more so, and needless
+    # ones 2e-4 or less.
     agreement: float = 0.01
+    run_error: float = 0.3
     # Leading effects of each score that are led along the measured outputs, or fitted beside
     # effects that leave noise: contact and limits move with the fit, so that the order by promise
     # is not yet that by fit.

@@ -7,11 +7,12 @@ unknowns. The sizes s_k, with covariance C, agree where chance leaves their chi 
 
     (s_k - m)' V^-1 (s_k - m),   V = C + (e s)^2 I
 
-m is their weighted mean, e the relative error of a law. It is the test of homogeneity of effect
-sizes (W. Cochran, Biometrics 10 (1954) 101). Each run is a part. A run that alone shows the effect
-has nothing to agree with: it is two parts. So is each run of an effect with an angle of its own in
-each run: the amplitude of a wave is positive in all of them, whatever its angle follows. An error
-that is the same in all parts, as in logs of one program, is not found.
+m is their weighted mean, e the relative error of a law in one of them. It is the test of
+homogeneity of effect sizes (W. Cochran, Biometrics 10 (1954) 101). Each run is a part. A run that
+alone shows the effect has nothing to agree with: it is two parts. So is each run of an effect with
+an angle of its own in each run: the amplitude of a wave is positive in all of them, whatever its
+angle follows. An error that is the same in all parts, as in logs of one program, is not found. A
+size with many narrow basins is not asked: its slope tells nothing of another basin.
 """
 
 from __future__ import annotations
@@ -48,14 +49,14 @@ def run_agreement(model: Model, asked: Reduction) -> float:
     names = [u.name for u in near.unknowns]
     halved = range(len(asked.runs)) if any(u.angle for u in candidate.states) else ()
     probability = 1.0
-    for unknown in candidate.sizes:
+    for unknown in (u for u in candidate.sizes if u.step is None):
         index, neutral = names.index(unknown.name), unknown.scaled(candidate.neutral[unknown.name])
         widest = SHRINKAGE * abs(unknown.scaled(unknown.start) - neutral)
         split = _split(near, index, widest, halved)
         if not halved and _showing(split, widest) < 2:
             alone = int(np.argmin(np.diag(split.covariance)))
             split = _split(near, index, widest, (alone,))
-        law = SETTINGS.law_error * (float(near.z[index]) - neutral)
+        law = SETTINGS.run_error * (float(near.z[index]) - neutral)
         spread = _spread(
             split.change, split.inflation * split.covariance + law**2 * np.eye(len(split.change))
         )

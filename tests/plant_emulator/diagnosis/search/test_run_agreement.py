@@ -37,16 +37,16 @@ def agreement(sizes: list[float], names: tuple[str, ...] = ("wave",)) -> float:
 
 @pytest.mark.parametrize("sizes", [[3.0, 3.0], [2.0, 2.1, 1.9], [0.02, -0.02]])
 def test_equal_sizes_agree(sizes: list[float]) -> None:
-    """The law may be wrong by a tenth. Of the last two no size is certain."""
+    """The law may be wrong by three tenths. Of the last two no size is certain."""
     assert agreement(sizes) > 0.01
 
 
 @pytest.mark.parametrize("difference", [1.0, 2.0])
 def test_two_sizes_by_hand(difference: float) -> None:
     """By hand: each run tells its size with the variance 1 / sum(wave^2), beside level and slope,
-    which the runs share; the law's error is a tenth of the mean size, 5.
+    which the runs share; the law's error is three tenths of the mean size, 5.
     """
-    variance = 1.0 / float(WAVE @ WAVE) + (0.1 * 5.0) ** 2
+    variance = 1.0 / float(WAVE @ WAVE) + (0.3 * 5.0) ** 2
     spread = chi2.isf(agreement([5.0 - difference / 2, 5.0 + difference / 2]), 1)
     assert spread == pytest.approx(difference**2 / (2.0 * variance), rel=0.2)
 
@@ -60,7 +60,7 @@ def test_runs_that_do_not_show_an_effect_say_nothing(monkeypatch: pytest.MonkeyP
     assert run_agreement(model, Reduction(found, (0, 1, 2), "wave")) > 0.01
 
 
-@pytest.mark.parametrize("difference", [1.0, 4.0, 16.0])
+@pytest.mark.parametrize("difference", [1.5, 4.0, 16.0])
 def test_runs_that_differ_much_do_not_agree(difference: float) -> None:
     """What one common size leaves is no noise: it is the difference that is asked for."""
     sizes = (0.76 - difference / 2, 0.76 + difference / 2)
@@ -69,11 +69,20 @@ def test_runs_that_differ_much_do_not_agree(difference: float) -> None:
     assert run_agreement(model, Reduction(found, (0, 1), "wave")) < 1e-3
 
 
+def test_a_size_with_many_narrow_basins_is_not_asked() -> None:
+    """Its slope tells nothing of another basin."""
+    model = Line([noisy(size * WAVE, k) for k, size in enumerate((0.4, 3.6))], ("wave",))
+    (size,) = model.candidates["wave"].sizes
+    model.candidates["wave"] = replace(model.candidates["wave"], sizes=(replace(size, step=0.1),))
+    found = fit(model, ("wave",), (0, 1), {"a": 0.0, "b": 0.0}, [{}, {}])
+    assert run_agreement(model, Reduction(found, (0, 1), "wave")) == 1.0
+
+
 def test_runs_that_show_nothing_do_not_hide_two_that_differ(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """By hand: sizes of 1.4 and 2.6, a tenth of 2 and an error of 1 / sqrt(1000) each: 3e-5."""
-    sizes = [1.4, 2.6, *[0.0] * 8]
+    """By hand: sizes of 0.4 and 3.6, 0.3 times 2 and an error of 1 / sqrt(1000) each: 2e-4."""
+    sizes = [0.4, 3.6, *[0.0] * 8]
     model = Line([noisy(size * WAVE, k) for k, size in enumerate(sizes)], ("wave",))
     residual = model.residual
     monkeypatch.setattr(
@@ -124,7 +133,7 @@ def test_a_run_that_alone_shows_an_effect_has_two_halves(
     assert (run_agreement(model, Reduction(found, runs, "wave")) > 0.01) == agree
 
 
-@pytest.mark.parametrize(("later", "agree"), [(3.0, True), (1.0, False)])
+@pytest.mark.parametrize(("later", "agree"), [(3.0, True), (0.5, False)])
 def test_a_wave_with_an_angle_in_each_run_has_one_size_in_both_halves(
     monkeypatch: pytest.MonkeyPatch, later: float, agree: bool
 ) -> None:
