@@ -43,10 +43,13 @@ class Fidelity(Protocol):
     ) -> Array | None:
         """Change of the data with one more effect, shape (n,); None: it cannot be simulated."""
 
-    def unwhitened(
-        self, effect: str, sizes: Mapping[str, float], states: Sequence[Mapping[str, float]]
+    def faint(
+        self, effect: str, size: float, states: Sequence[Mapping[str, float]]
     ) -> Array | None:
-        """The column before the noise that the rows show themselves is whitened."""
+        """The change of a faint effect before the noise that the rows show is whitened.
+
+        size : [plausible sizes]; None: it cannot be simulated
+        """
 
     def values_at(self, theta: Array) -> Values:
         """Parameters and states of the runs that belong to these nuisance coefficients."""

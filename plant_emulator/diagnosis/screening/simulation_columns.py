@@ -88,7 +88,15 @@ class SimulationColumns:
         """See `Fidelity`."""
         return self.base - self._residual((*self.where.effects, effect), sizes, states)
 
-    unwhitened = column
+    def faint(
+        self, effect: str, size: float, states: Sequence[Mapping[str, float]]
+    ) -> Array | None:
+        """See `Fidelity`: by the slopes, or as a column where these show nothing."""
+        candidate = self.model.candidates[effect]
+        change = sum(size * self.slope(effect, u.name, states) for u in candidate.sizes)
+        if np.any(change):
+            return np.asarray(change)
+        return self.column(effect, values_at_size(candidate, size), states)
 
     def slope(self, effect: str, size: str, states: Sequence[Mapping[str, float]]) -> Array:
         """Change of the data by a plausible size of an effect, as its slope at neutral tells.

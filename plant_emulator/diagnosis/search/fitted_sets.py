@@ -4,7 +4,8 @@ The log evidence of a set is half the fall of its penalised cost, less the gain 
 effects needs. A set is refuted where a further effect stands for the error of the others' laws: the
 runs do not agree on its size (`run_agreement`), or it gains little where these laws may have
 another form (`law_forms`). So is each set that holds it, and each last effect that gains no more
-beside the same others. What is left of it without one effect is fitted then.
+beside the same others. What is left of it without one effect is fitted then. A set with an effect
+that gains by few samples only is refuted too (`gain_spread`).
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ class FittedSets:
     beside_random : whether a random effect is part of that noise
     sets : the best fit of each set, at first of those that are known
     agreed : whether the runs and other forms of the laws agree on it, where they were asked
-    shared : whether enough samples share the gain of its last effect, where they were asked
+    shared : whether enough samples share the gain of its effects, where they were asked
     promises : what one more effect promises on top of a set
     led_fits : along the measured outputs, of sets on top of which others were tried
     expanded : sets whose most promising effects were tried on top of them
@@ -114,13 +115,17 @@ class FittedSets:
         """Whether a set is refuted, or a part of it, or its last effect gains no more.
 
         Further effects may only hide what refuted it. An effect that gains no more than one that
-        stood for the error of the same laws may stand for it as well.
+        stood for the error of the same laws may stand for it as well. So may one beside others that
+        differs from run to run by its states, and none of whose sizes is certain.
         """
+        found = self.sets.get(key)
+        if found and len(key) > 1 and found.insignificant:
+            return True
         return any(
             other <= key or self._gains_no_more(key, other)
             for other, agreed in self.agreed.items()
             if not agreed
-        ) or any(other <= key for other, shared in self.shared.items() if not shared)
+        ) or not self.shared.get(key, True)
 
     def _gains_no_more(self, key: frozenset[str], other: frozenset[str]) -> bool:
         """Whether a fit that has ended gains no more than one more effect of the same others."""
@@ -137,13 +142,14 @@ class FittedSets:
     def needed(self, found: FitResult, others: int) -> float:
         """Least gain of log evidence that an effect needs beside so many others.
 
-        found : fit of the set; an approximate law of the others is off by a share of what the set
-            explains
+        found : fit of the set; a gain counts in the mean square that it leaves. An approximate law
+            of the others is off by a share of what the set explains
         """
         library = self.runner.model.candidates
         approximate = any(not library[name].exact_form for name in found.effects[:others])
         explained = 0.5 * (self.null.cost - found.cost) if approximate else 0.0
-        return max(self.least_gain(others), SETTINGS.law_error_along * explained)
+        least = self.least_gain(others) * max(1.0, found.mean_square)
+        return max(least, SETTINGS.law_error_along * explained)
 
     def value(self, found: FitResult) -> float:
         """Negative log evidence of a set, with the gain that each of its effects needs."""
@@ -165,27 +171,27 @@ class FittedSets:
                 and len(key) == max(1, len(best.effects))
                 and one.cost < best.cost + SETTINGS.near + (not one.converged) * excess(best)
             ]
-            if not near and self._agrees(best) and self._is_shared(best):
+            if not near and self._agrees(best):
                 return best
             for one in self.fits(refit, near):
                 done.add(frozenset(one.effects))
                 self.trace.append(search_step(self.null, "converged", one))
 
-    def _is_shared(self, found: FitResult) -> bool:
-        """Whether enough samples share the gain of the last effect of a set.
+    def is_shared(self, found: FitResult) -> bool:
+        """Whether enough samples share the gain of each effect of a set.
 
         It is asked once, near the data: far off, most samples are off by more than their noise.
         """
-        key, base = frozenset(found.effects), frozenset(found.effects[:-1])
-        if not key or key in self.shared or base not in self.sets or self.is_far(found):
+        key = frozenset(found.effects)
+        smaller = [self.sets[key - {name}] for name in key if key - {name} in self.sets]
+        if not smaller or key in self.shared or self.is_far(found):
             return self.shared.get(key, True)
-        pair = Pair(found, self.sets[base], self.runner.runs)
-        (gain,) = self.runner.map(shared_gain, [pair])
-        self.shared[key] = gain >= self.least_gain(len(base))
+        pairs = [Pair(found, one, self.runner.runs) for one in smaller]
+        gain = min(self.runner.map(shared_gain, pairs))
+        self.shared[key] = gain >= self.least_gain(len(key) - 1)
         if not self.shared[key]:
             action = f"gains by few samples (as {gain:.1f} by many)"
             self.trace.append(search_step(self.null, action, found))
-            self.expanded.discard(base)
         return self.shared[key]
 
     def _agrees(self, found: FitResult) -> bool:

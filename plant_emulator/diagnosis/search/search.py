@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from plant_emulator.diagnosis.execution.pool import build_model
 from plant_emulator.diagnosis.fitting.evidence import (
     EVIDENCE_THRESHOLD,
+    LARGER_SHARE,
     NOISE_MEAN_SQUARE,
     adequate,
     evidence_of,
@@ -62,15 +63,15 @@ class Search(Moves):
         """Go through the queue in the logs' own noise.
 
         The noise is estimated around the fit without effects where that is near the noise and no
-        other set is known, or else around the best set (see `_first_site`), and then around the
-        best set if it explains half of the gap. Where that shows another noise, the queue starts
-        again. Beside known sets the single effects are tried as well.
+        other set is known, or else around the best set of one effect, and then around the best set
+        if it explains half of the gap. Where that shows another noise, the queue starts again.
+        Beside known sets the single effects are tried as well.
         """
         known = any(self.sets) and not self.beside_random
         self.sets[frozenset()] = self.null
         if known:
             self._expand(self.null)
-        self._estimate_noise(self._first_site() if known or self.is_far(self.null) else self.null)
+        self._estimate_noise(self._queue(1) if known or self.is_far(self.null) else self.null)
         best = self._queue(SETTINGS.most_effects)
         if best.effects and not leaves_most(best, self.null) and self._estimate_noise(best):
             best = self._queue(SETTINGS.most_effects)
@@ -80,20 +81,12 @@ class Search(Moves):
             self.null = self.sets[frozenset()]
         return self._explanation(final)
 
-    def _first_site(self) -> FitResult:
-        """The fit that the noise is estimated around first: the best one of one effect or known.
-
-        Where that is far from the data and explains half of the gap but not all, it is the first of
-        several causes: what it leaves is no noise.
-        """
-        best = self._queue(1)
-        ends = leaves_most(best, self.null) or adequate(best, self.null)
-        return best if ends or not self.is_far(best) else self._queue(SETTINGS.most_effects)
-
     def _estimate_noise(self, where: FitResult) -> bool:
         """Take the noise around a fit for the logs' own; give whether it is another one now.
 
-        The weights of a random effect fit the noise as it was declared.
+        A set of effects that is far from the data and leaves more than noise in this noise too
+        lacks a cause, part of which passed for noise. The weights of a random effect fit the noise
+        as it was declared.
         """
         if self.noise_at == where.key or self.beside_random:
             return False
@@ -102,19 +95,22 @@ class Search(Moves):
         known = self.noise
         if (known is None and noise.plain) or (known is not None and noise.resembles(known)):
             return False
-        self.noise = noise
         recipe = WhitenedRecipe(self.declared.recipe, noise)
-        self.runner = replace(self.declared, recipe=recipe, model=build_model(recipe))
-        kept = not_told_apart(self.unrefuted)
+        runner = replace(self.declared, recipe=recipe, model=build_model(recipe))
+        (there,) = runner.map(refit, [self.task(where)])
+        lacks = self.is_far(where) and there.mean_square > NOISE_MEAN_SQUARE
+        if where.effects and lacks:
+            return False
+        self.noise, self.runner = noise, runner
+        kept = [one for one in not_told_apart(self.unrefuted) if one.key != where.key]
         self.promises.clear()
         self.led_fits.clear()
         self.expanded.clear()
         self.agreed.clear()
         self.shared.clear()
-        self.sets = {}
+        self.sets = {frozenset(there.effects): there}
         self.fits(refit, kept)
         self.null = self.sets[frozenset()]
-        there = self.sets[frozenset(where.effects)]
         self.trace.append(search_step(self.null, "noise estimated", there))
         return True
 
@@ -133,8 +129,8 @@ class Search(Moves):
     def _is_last(self, found: FitResult) -> bool:
         """Whether no effect is worth adding: the cause is foreign, or what is left is random.
 
-        Near the noise the first of two causes may leave most of the gap: a regression tells the
-        other. A further effect that leaves most of what the others left is no base for another one.
+        An effect that leaves most of what the others leave is no base for another one, unless a
+        regression promises half of that. Near the noise it always tells the other one of two.
         The noise of a random effect is that of few courses of its law. Beside it and another one, a
         gain within the noise may be that of the errors of both laws.
         """
@@ -147,8 +143,15 @@ class Search(Moves):
         if len(found.effects) == 1:
             foreign = foreign and self.is_far(found)
         if found.mean_square > NOISE_MEAN_SQUARE:
+            foreign = foreign and not self._promises_half(found)
             return foreign or (leaves_random(found) and not self.beside_random)
         return all(p.gain <= self._promising(found) for p in self._screen(found))
+
+    def _promises_half(self, found: FitResult) -> bool:
+        """Whether a regression promises half of what a fit leaves of one more effect."""
+        there = self.led(found) if self.is_far(found) else found
+        half = 0.5 * LARGER_SHARE * excess(there)
+        return any(p.gain >= half for p in self._screen(found))
 
     def _smaller(self, found: FitResult) -> FitResult:
         """The best fit of a set without one of its effects; without effects where none is known."""
@@ -196,7 +199,7 @@ class Search(Moves):
         return True
 
     def _without_needless(self, best: FitResult) -> FitResult:
-        """Drop the effect that closes least until each one closes enough; return the set.
+        """Drop the effect that closes least until each one closes enough, and by enough samples.
 
         Each set is compared with smaller ones that begin where it leads: it may have left a local
         minimum of theirs. Where a set leaves something correlated, an effect that follows a little
@@ -209,6 +212,8 @@ class Search(Moves):
         self.reduced_costs = {}
         if not best.effects or not adequate(best, self.null):
             return best
+        if not self.is_shared(best):
+            return self._without_needless(self.settled())
         asked = [Reduction(best, self.runner.runs, name) for name in best.effects]
         if len(asked) == 1:
             return self._beside_renewed_null(best, asked[0])
