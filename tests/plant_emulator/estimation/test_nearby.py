@@ -43,6 +43,30 @@ def test_slopes_are_taken_along_the_steps_at_the_point() -> None:
     assert found.jacobians[0][0, 0, 0] == pytest.approx(200.0, rel=1e-6)
 
 
+class Apart(Coarse):
+    """Along the steps of another one it is off by 0.5, whatever the value."""
+
+    def __call__(self, v: Mapping[str, float], /) -> np.ndarray:
+        return np.full((1, 50), 100.0 * v["a"])
+
+    def near(self, there: Mapping[str, float], /) -> "Coarse":
+        return Elsewhere()
+
+
+class Elsewhere(Coarse):
+    """The same, off by 0.5."""
+
+    def __call__(self, v: Mapping[str, float], /) -> np.ndarray:
+        return np.full((1, 50), 100.0 * v["a"] + 0.5)
+
+
+def test_slopes_are_not_those_of_what_following_the_steps_changes() -> None:
+    """0.5 over a step of 1e-8 is a slope of 5e7."""
+    found = linearise_at([A], [Apart()])
+    assert found.jacobians[0][0, 0, 0] == pytest.approx(100.0, rel=1e-6)
+    assert found.residuals[0][0, 0] == 200.0
+
+
 def test_function_without_steps_is_its_own_neighbour() -> None:
     def plain(v: Mapping[str, float]) -> np.ndarray:
         return np.full((1, 50), v["a"])
