@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fitting.signature import signs, values_at_size
+from plant_emulator.diagnosis.screening.simulation_columns import HIDDEN_NORM
 from plant_emulator.estimation.regression import gain
 
 if TYPE_CHECKING:
@@ -32,8 +33,6 @@ if TYPE_CHECKING:
 
 # Trials of a size that a limit begins to act at, and the share of it that is close enough.
 TRIALS, CLOSE = 6, 0.7
-# Norm of a change that the noise hides [1]: a limit that is only touched says nothing of its size.
-HIDDEN_NORM = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,18 +74,18 @@ def best_score(
     return _best(fidelity, candidate, sizes, states, _change(fidelity, candidate))
 
 
-def slope_score(
+def faint_score(
     simulation: SimulationColumns, candidate: Candidate, states: States
 ) -> Score | None:
-    """Score of an effect by its slopes where it is absent; None: they show nothing.
+    """Score of an effect by its slopes where it is absent; see `SimulationColumns.faint`.
 
-    They are taken over as little as those of the parameters. A column over more is another one
-    where a contact falls on a sample, and the parameters do not follow it there.
+    None: it shows nothing
     """
 
     def change(only: str | None, size: float, states: States) -> Array | None:
         name = only or candidate.sizes[0].name
-        return size * simulation.slope(candidate.name, name, states)
+        found = simulation.of_size(candidate.name, name, states)
+        return None if found is None else size * found
 
     return _best(simulation, candidate, (1.0,), states, change)
 

@@ -21,7 +21,7 @@ from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.fitting.signature import signs, values_at_size
 from plant_emulator.diagnosis.fitting.task import Task
-from plant_emulator.diagnosis.screening.columns import best_score, onset_score, slope_score
+from plant_emulator.diagnosis.screening.columns import best_score, faint_score, onset_score
 from plant_emulator.diagnosis.screening.promise import Promise, Start
 from plant_emulator.diagnosis.screening.scans import start_states
 from plant_emulator.diagnosis.screening.simulation_columns import SimulationColumns
@@ -217,14 +217,13 @@ def _scores(
 
 
 def _first_score(fidelity: Fidelity, candidate: Candidate, states: States) -> Score | None:
-    """Score of an effect by its slopes, or at the first size where these show nothing.
+    """Score of an effect as if it were faint; in the relations at the first size.
 
     Relations hold between samples: nothing adds up in them, and their columns hardly bend.
     """
-    slopes = None
     if isinstance(fidelity, SimulationColumns):
-        slopes = slope_score(fidelity, candidate, states)
-    return slopes or best_score(fidelity, candidate, SETTINGS.sizes[:1], states)
+        return faint_score(fidelity, candidate, states)
+    return best_score(fidelity, candidate, SETTINGS.sizes[:1], states)
 
 
 def _gain(score: Score | None) -> float:

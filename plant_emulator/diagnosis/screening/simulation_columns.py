@@ -10,6 +10,7 @@ import numpy as np
 
 from plant_emulator.diagnosis.fitting.joint_fit import linearise
 from plant_emulator.diagnosis.fitting.signature import values_at_size
+from plant_emulator.diagnosis.settings import SETTINGS
 from plant_emulator.estimation.least_squares import linearise_at
 from plant_emulator.estimation.nearby import Beside
 from plant_emulator.estimation.regression import Regression
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from plant_emulator.estimation.unknowns import Unknown
     from plant_emulator.signals.log import Array
 
+# Norm of a change that the noise hides [1].
+HIDDEN_NORM = 1.0
+
 
 class SimulationColumns:
     """The residual of the simulation, free or led, and its tangents; see `Fidelity`."""
@@ -32,6 +36,7 @@ class SimulationColumns:
     def __init__(self, model: Model, where: FitValues, runs: Sequence[int]) -> None:
         """Linearise the residual at a fit."""
         self.model, self.where, self.runs = model, where, tuple(runs)
+        self._known: dict[tuple[object, ...], Array | None] = {}
         self.found = linearise(model, where, runs)
         self.base = np.concatenate([r.ravel() for r in self.found.residuals])
 
@@ -91,21 +96,46 @@ class SimulationColumns:
     def faint(
         self, effect: str, size: float, states: Sequence[Mapping[str, float]]
     ) -> Array | None:
-        """See `Fidelity`: by the slopes, or as a column where these show nothing."""
-        candidate = self.model.candidates[effect]
-        change = sum(size * self.slope(effect, u.name, states) for u in candidate.sizes)
-        if np.any(change):
-            return np.asarray(change)
-        return self.column(effect, values_at_size(candidate, size), states)
+        """See `Fidelity`."""
+        sizes = self.model.candidates[effect].sizes
+        changes = [self.of_size(effect, u.name, states) for u in sizes]
+        shown = [one for one in changes if one is not None]
+        return np.asarray(size * sum(shown)) if len(shown) == len(changes) else None
 
-    def slope(self, effect: str, size: str, states: Sequence[Mapping[str, float]]) -> Array:
-        """Change of the data by a plausible size of an effect, as its slope at neutral tells.
+    def of_size(
+        self, effect: str, size: str, states: Sequence[Mapping[str, float]]
+    ) -> Array | None:
+        """Change of the data by a plausible size of an effect, as long as it is faint, shape (n,).
 
-        size : name of the size parameter, the others are neutral; returns shape (n,)
+        It is that of the slope at neutral, over as little as those of the parameters. A column over
+        more is another one where a contact falls on a sample, and no parameter follows it there. A
+        size whose slope shows nothing, or that has many narrow basins, is simulated at the first
+        size of the screening.
+
+        size : name of the size parameter, the others are neutral; None: it cannot be simulated
         """
+        key = (effect, size, *(tuple(sorted(own.items())) for own in states))
+        if key not in self._known:
+            self._known[key] = self._of_size(effect, size, states)
+        return self._known[key]
+
+    def _of_size(
+        self, effect: str, size: str, states: Sequence[Mapping[str, float]]
+    ) -> Array | None:
         candidate = self.model.candidates[effect]
         (unknown,) = (u for u in candidate.sizes if u.name == size)
-        neutral = candidate.neutral[size]
+        if unknown.step is None:
+            slope = self._slope(effect, unknown, states)
+            if np.linalg.norm(slope) >= HIDDEN_NORM:
+                return slope
+        share = SETTINGS.sizes[0]
+        found = self.column(effect, values_at_size(candidate, share, size), states)
+        return None if found is None else found / share
+
+    def _slope(self, effect: str, unknown: Unknown, states: Sequence[Mapping[str, float]]) -> Array:
+        """Change by a plausible size, as the slope at neutral tells."""
+        candidate = self.model.candidates[effect]
+        neutral = candidate.neutral[unknown.name]
         beside = {**self.where.values, **values_at_size(candidate, 0.0)}
         residuals = [
             Beside(self.model.residual(k, (*self.where.effects, effect)), {**beside, **own, **more})

@@ -92,6 +92,7 @@ class FittedSets:
         """Take a better fit without effects in the place of the known one."""
         self.trace.append(search_step(self.null, "fitted anew", null))
         self.null = self.sets[frozenset()] = null
+        self._forget_shared(frozenset())
         self.promises.pop(frozenset(), None)
         (led,) = self.runner.map(refit_along, [self.task(null)])
         known = self.led_fits.get(frozenset(), led)
@@ -103,8 +104,12 @@ class FittedSets:
         if key not in self.sets or found.cost < self.sets[key].cost:
             self._store(found)
             self.agreed.pop(key, None)
-            self.shared.pop(key, None)
             self.led_fits.pop(key, None)
+            self._forget_shared(key)
+
+    def _forget_shared(self, smaller: frozenset[str]) -> None:
+        """Forget whether samples share the gains over a set that is fitted better now."""
+        self.shared = {key: one for key, one in self.shared.items() if not key >= smaller}
 
     @property
     def unrefuted(self) -> dict[frozenset[str], FitResult]:
@@ -119,7 +124,8 @@ class FittedSets:
         differs from run to run by its states, and none of whose sizes is certain.
         """
         found = self.sets.get(key)
-        if found and len(key) > 1 and found.insignificant:
+        further = len(key) > 1 or self.beside_random
+        if found and found.converged and found.insignificant and further:
             return True
         return any(
             other <= key or self._gains_no_more(key, other)

@@ -50,7 +50,7 @@ class Search(Moves):
     """The search of one diagnosis; see the module's text.
 
     declared : in the noise that the sensors declare; `runner` leaves the outliers out too
-    noise : of the logs; noise_at : fit that it was estimated around
+    noise : of the logs; noise_at : the last fit that noise was estimated around
     reduced_costs : of the best set without each of its effects
     """
 
@@ -212,8 +212,6 @@ class Search(Moves):
         self.reduced_costs = {}
         if not best.effects or not adequate(best, self.null):
             return best
-        if not self.is_shared(best):
-            return self._without_needless(self.settled())
         asked = [Reduction(best, self.runner.runs, name) for name in best.effects]
         if len(asked) == 1:
             return self._beside_renewed_null(best, asked[0])
@@ -238,19 +236,25 @@ class Search(Moves):
         needed = closes and evidence_of(fall, found, self.null) >= EVIDENCE_THRESHOLD
         # The other effects have been asked as further ones.
         if needed and (cheapest != found.effects[0] or self.gain_beside_forms(found, [cheapest])):
-            return found
+            return self._if_shared(found)
         self.sets = {k: one for k, one in self.sets.items() if len(k) < len(best.effects)}
         return self._without_needless(self.settled())
 
     def _beside_renewed_null(self, best: FitResult, asked: Reduction) -> FitResult:
         """The one effect; what the queue finds where a better fit without it takes its gain."""
         (null,) = self.runner.map(without_effects, [(self.null, asked)])
-        if null.cost >= self.null.cost:
-            return best
-        self.take_null(null)
+        if null.cost < self.null.cost:
+            self.take_null(null)
         if min(self.unrefuted.values(), key=self.value).effects == best.effects:
-            return best
+            return self._if_shared(best)
         self.expanded.discard(frozenset())
+        return self._without_needless(self._queue(SETTINGS.most_effects))
+
+    def _if_shared(self, best: FitResult) -> FitResult:
+        """The set where enough samples share its gains; else what the queue finds without it."""
+        if self.is_shared(best):
+            return best
+        self.expanded.discard(frozenset(best.effects[:-1]))
         return self._without_needless(self._queue(SETTINGS.most_effects))
 
     def _explanation(self, final: FitResult) -> Explanation:
@@ -260,7 +264,7 @@ class Search(Moves):
         final = replace(final, standard_errors=errors)
         key, sets = frozenset(final.effects), self.unrefuted
         larger = {
-            p.effect: self.least_gain(len(key)) - p.gains.get(SIMULATION, p.gain)
+            p.effect: self.needed(final, len(key)) - p.gains.get(SIMULATION, p.gain)
             for p in self.promises.get(key, [])
             if not self.refuted(key | {p.effect})
         }
