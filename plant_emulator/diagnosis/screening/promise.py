@@ -82,8 +82,8 @@ def to_try(
 ) -> list[Promise]:
     """Effects to try on top of a fit: the leading ones that were not tried.
 
-    Without effects, where no more than noise is left, an effect is faint: its gain may be several
-    times the promised one, and a fit is cheap. All that promise something are tried there.
+    Without effects, where no more than noise is left, an effect is faint, and a fit is cheap. All
+    that promise enough are tried there.
     """
     if base.mean_square <= NOISE_MEAN_SQUARE and not base.effects:
         return [p for p in found if p.gain > least]

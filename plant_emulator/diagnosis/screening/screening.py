@@ -192,10 +192,10 @@ def _leaves_noise(base: FitResult) -> bool:
 def _scores(
     library: Mapping[str, Candidate], fidelity: Fidelity, asked: Screening
 ) -> dict[str, Score | None]:
-    """Scores of all effects at the first size, and of the best effects at the other sizes.
+    """Scores of all effects as if they were faint, and of the best effects at the other sizes.
 
     An effect that has none there may be a limit; see `onset_score`. On top of effects that leave
-    noise another one is faint: the first size is enough.
+    noise another one is faint.
     """
     first, *others = SETTINGS.sizes
     found = {

@@ -1,13 +1,13 @@
 """The gain of an effect as far as enough samples share it.
 
 A sample that a contact falls on may be off by several times its noise, and an effect that repairs a
-few of them gains as much as one that is there. A sample of what an effect gains tells by how much
-chance moves the whole: samples gain g_i, and their sum has the variance sum g_i^2 (Q. Vuong,
-Econometrica 57 (1989) 307). An effect that is there gains G by small shares, whose variance is 2 G.
-The gain that counts is therefore
+few of them gains as much as one that is there. What each sample gains, g_i, tells by how much chance
+moves the whole: their sum G has the variance sum g_i^2. An effect that is there gains by small
+shares, whose variance is 2 G. The gain that counts is therefore
 
     2 G |G| / sum g_i^2
 
+twice the square of the statistic of a likelihood ratio test (Q. Vuong, Econometrica 57 (1989) 307).
 A large residual is no spread of chance. The samples' gains are those of a noise with heavy tails,
 Student's t of four degrees of freedom and variance 1.
 """
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.machine import Model
     from plant_emulator.signals.log import Array
 
-# Degrees of freedom of the noise: the fewest whole ones with a variance and a kurtosis near none.
+# Degrees of freedom of the noise: so few that a residual of six deviations is no wonder.
 DEGREES = 4.0
 
 
