@@ -26,8 +26,8 @@ DETECTABLE_NORM = 7.0
 # effects have shapes (0.17 before). Without the true effect the best one left 0.14 and more.
 UNEXPLAINED_SHARE = 0.1
 # Share of the gap that the larger one of two causes explains at least, unless they counteract. A
-# fit that explains less is no reason to fit anew, and no base for a second cause unless a regression
-# promises half of what it leaves.
+# fit that explains less is no reason to fit anew, and no base for a second cause unless a
+# regression promises half of what it leaves.
 LARGER_SHARE = 0.5
 # Mean square up to which a fit leaves nothing but noise: its variance is uncertain by 2 % (one
 # standard deviation), and the noise of real logs is no exact model of theirs.

@@ -1,9 +1,9 @@
 """The gain of an effect as far as enough samples share it.
 
 A sample that a contact falls on may be off by several times its noise, and an effect that repairs a
-few of them gains as much as one that is there. What each sample gains, g_i, tells by how much chance
-moves the whole: their sum G has the variance sum g_i^2. An effect that is there gains by small
-shares, whose variance is 2 G. The gain that counts is therefore
+few of them gains as much as one that is there. What each sample gains, g_i, tells by how much
+chance moves the whole: their sum G has the variance sum g_i^2. An effect that is there gains by
+small shares, whose variance is 2 G. The gain that counts is therefore
 
     2 G |G| / sum g_i^2
 
