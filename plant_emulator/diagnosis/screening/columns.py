@@ -77,7 +77,7 @@ def best_score(
 def faint_score(
     simulation: SimulationColumns, candidate: Candidate, states: States
 ) -> Score | None:
-    """Score of an effect by its slopes where it is absent; see `SimulationColumns.faint`.
+    """Score of an effect by its slopes where it is absent; see `SimulationColumns.of_size`.
 
     None: it shows nothing
     """
