@@ -43,13 +43,10 @@ class Fidelity(Protocol):
     ) -> Array | None:
         """Change of the data with one more effect, shape (n,); None: it cannot be simulated."""
 
-    def faint(
-        self, effect: str, size: float, states: Sequence[Mapping[str, float]]
+    def unwhitened(
+        self, effect: str, sizes: Mapping[str, float], states: Sequence[Mapping[str, float]]
     ) -> Array | None:
-        """The change of a faint effect before the noise that the rows show is whitened.
-
-        size : [plausible sizes]; None: it cannot be simulated
-        """
+        """The column before the noise that the rows show themselves is whitened."""
 
     def values_at(self, theta: Array) -> Values:
         """Parameters and states of the runs that belong to these nuisance coefficients."""

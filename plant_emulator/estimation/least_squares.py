@@ -23,11 +23,8 @@ import numpy as np
 
 from plant_emulator.estimation.covariance import sandwich, white_covariance
 from plant_emulator.estimation.leverage import bounding_weights
-from plant_emulator.estimation.simulated_problem import (
-    DIFFERENCE_NORM,
-    SecantSlopes,
-    SimulatedProblem,
-)
+from plant_emulator.estimation.secant_slopes import SecantSlopes
+from plant_emulator.estimation.simulated_problem import DIFFERENCE_NORM, SimulatedProblem
 from plant_emulator.estimation.unknowns import Estimate, Unknown
 
 if TYPE_CHECKING:

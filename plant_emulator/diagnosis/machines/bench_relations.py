@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.localisation.block_regression import BlockRegression
 from plant_emulator.diagnosis.localisation.drum_subsystem import prior_means
 from plant_emulator.diagnosis.localisation.measured_signals import NOISES
@@ -222,19 +221,13 @@ class BenchRelations:
         self, effect: str, sizes: Mapping[str, float], states: Sequence[Mapping[str, float]]
     ) -> Array | None:
         """See `Fidelity`."""
-        rows = self._change(effect, sizes, states)
+        rows = self.unwhitened(effect, sizes, states)
         return None if rows is None else self.white(rows)
 
-    def faint(
-        self, effect: str, size: float, states: Sequence[Mapping[str, float]]
-    ) -> Array | None:
-        """See `Fidelity`."""
-        return self._change(effect, values_at_size(self.model.candidates[effect], size), states)
-
-    def _change(
+    def unwhitened(
         self, effect: str, sizes: Mapping[str, float], states: Sequence[Mapping[str, float]]
     ) -> Array | None:
-        """Change of the rows with one more effect, before they are whitened."""
+        """See `Fidelity`."""
         trial = [{**more, **sizes} for more in states]
         key = (effect, *(tuple(sorted(own.items())) for own in trial))
         if key not in self._known:

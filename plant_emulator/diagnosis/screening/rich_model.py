@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.settings import SETTINGS
 
 if TYPE_CHECKING:
@@ -29,8 +30,9 @@ def rich_columns(candidates: Mapping[str, Candidate], fidelity: Fidelity) -> Ite
     for name, candidate in candidates.items():
         if candidate.stochastic or name in fidelity.where.effects:
             continue
+        values = values_at_size(candidate, size)
         plain = [{u.name: u.start for u in candidate.states} for _ in fidelity.where.states]
-        change = fidelity.faint(name, size, plain)
+        change = fidelity.unwhitened(name, values, plain)
         if change is None or not change.any():
             continue
         columns, owners = [change], [np.ones(len(change))]
@@ -38,7 +40,7 @@ def rich_columns(candidates: Mapping[str, Candidate], fidelity: Fidelity) -> Ite
             owners = [fidelity.owners == run for run in range(len(plain))]
         for u in candidate.states:
             moved = [{**own, u.name: u.start + (u.std or 0.0)} for own in plain]
-            beside = fidelity.faint(name, size, moved) if u.step is None else None
+            beside = fidelity.unwhitened(name, values, moved) if u.step is None else None
             if beside is not None:
                 columns.append(beside - change)
         for column in (own * column for own in owners for column in columns):

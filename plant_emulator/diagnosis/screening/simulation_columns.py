@@ -93,13 +93,9 @@ class SimulationColumns:
         """See `Fidelity`."""
         return self.base - self._residual((*self.where.effects, effect), sizes, states)
 
-    def faint(
-        self, effect: str, size: float, states: Sequence[Mapping[str, float]]
-    ) -> Array | None:
-        """See `Fidelity`. Slopes of all effects together follow the noise: a seventh of it in
-        recordings of the gateway.
-        """
-        return self.column(effect, values_at_size(self.model.candidates[effect], size), states)
+    # No slopes: those of all effects together follow a seventh of the noise in recordings of the
+    # gateway.
+    unwhitened = column
 
     def of_size(
         self, effect: str, size: str, states: Sequence[Mapping[str, float]]

@@ -14,10 +14,8 @@ from plant_emulator.estimation.covariance import (
 )
 from plant_emulator.estimation.least_squares import estimate, linearise_at
 from plant_emulator.estimation.leverage import bounding_weights
-from plant_emulator.estimation.simulated_problem import (
-    SecantSlopes,
-    SimulatedProblem,
-)
+from plant_emulator.estimation.secant_slopes import SecantSlopes
+from plant_emulator.estimation.simulated_problem import SimulatedProblem
 from plant_emulator.estimation.unknowns import Unknown
 from plant_emulator.signals.log import Array
 
