@@ -14,14 +14,6 @@ class Settings:
     # slope shows nothing, and the best at the others too, but for those beside effects that leave
     # noise: they are faint.
     sizes: tuple[float, ...] = (0.3, 0.1, 1.0, 3.0)
-    # Sizes that a fit begins at where regressions mislead: most laws bend less at the first, and a
-    # limit does not act there.
-    begun_sizes: tuple[float, ...] = (0.3, 1.0)
-    # Iterations of the search along the one parameter that follows an effect most, and how far it
-    # goes to either side, as a share of the distance of its bounds: a dead time that stood for a
-    # filter was twice too long. They tell it to some percent, and a start needs no more.
-    compensating_iterations: int = 8
-    compensating_reach: float = 0.25
     # Iterations of the short fit of an effect whose state multiplies its size: all else follows by
     # secants, so that they are cheap, and more tell no more.
     secant_iterations: int = 5
@@ -58,9 +50,6 @@ class Settings:
     # effects that leave noise: contact and limits move with the fit, so that the order by promise
     # is not yet that by fit.
     leaders: int = 3
-    # Starts of an effect that are led along the measured outputs, beside nominal parameters: those
-    # that leave least so as they are.
-    most_started: int = 2
     # Gain over the largest one that a rival needs: promised, along the measured outputs, or
     # reached. So much of what an effect needs must be predicted before it is fitted.
     rival_share: float = 0.5

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.machine import Model
 
-# Iterations of a fit along the measured outputs that tell the best start, and at most so many more.
-FIRST_ITERATIONS, APPROACH_ITERATIONS = 3, 25
+# Most iterations of a fit along the measured outputs.
+APPROACH_ITERATIONS = 25
 # Relative fall of the cost that ends a fit along the measured outputs: it is a start only.
 LED_COST_TOLERANCE = 1e-3
 # Share of what a fit along the measured outputs left before, up to which another one leads nearer
@@ -60,30 +60,6 @@ def nearest(
 def approach(model: Model, start: FitValues, runs: Sequence[int]) -> FitValues:
     """Values and states near the data, from which a fit of these effects may begin."""
     return let_go(model, lead(model, start, runs), runs)
-
-
-def lead_best(
-    model: Model,
-    starts: Sequence[FitValues],
-    runs: Sequence[int],
-    iterations: int,
-    far: float = SUSPECT_MEAN_SQUARE,
-) -> list[FitResult]:
-    """The fit along the measured outputs from the best start.
-
-    That is the first one that a few iterations bring near the data, or else the one of least cost.
-    Behind it stands what these iterations made of the others, the best first.
-
-    starts : all with the same effects, the most promising ones first
-    iterations : at most so many; far : mean square above which a start is far from the data
-    """
-    first: list[FitResult] = []
-    for one in starts:
-        first.append(lead(model, one, runs, iterations=FIRST_ITERATIONS))
-        if first[-1].mean_square <= far:
-            break
-    best, *others = sorted(first, key=lambda one: one.cost)
-    return [lead(model, best, runs, iterations=iterations), *others]
 
 
 def let_go(
@@ -139,29 +115,7 @@ def own_start(model: Model, runs: Sequence[int]) -> FitValues:
     return FitValues(effects=(), values=values, states=tuple(states))
 
 
-def _nominal_start(model: Model, runs: Sequence[int]) -> FitValues:
-    """The nominal parameters, and the states that suit them, without effects."""
-    values = model.nominal(runs)
-    states = tuple(model.initial_states(k, (), values) for k in runs)
-    return FitValues(effects=(), values=values, states=states)
-
-
 def fit_null(model: Model, runs: Sequence[int]) -> FitResult:
-    """Fit without effects from the model's own start values.
-
-    One near the data that leaves more than noise may have taken contact at the wrong time once. It
-    is fitted from the nominal parameters too.
-    """
-    start, nominal = own_start(model, runs), _nominal_start(model, runs)
-    found = _fit_from_own_start(model, start, runs)
-    near = NOISE_MEAN_SQUARE < found.mean_square <= SUSPECT_MEAN_SQUARE
-    if not near or nominal == start:
-        return found
-    other = _fit_without_effects(model, nominal, runs)
-    return min(found, other, key=lambda one: one.cost)
-
-
-def _fit_from_own_start(model: Model, start: FitValues, runs: Sequence[int]) -> FitResult:
     """Fit without effects from the model's own start values.
 
     A fit that ends far from the data may have taken contact at the wrong time once. It is led along
@@ -169,6 +123,7 @@ def _fit_from_own_start(model: Model, start: FitValues, runs: Sequence[int]) -> 
     voltage had ended at 32 times the noise (see the tests). A fit that is led to where it was
     before lacks a cause.
     """
+    start = own_start(model, runs)
     near = nearest(model, [start], runs)
     if near is not None:
         return _fit_without_effects(model, near, runs)

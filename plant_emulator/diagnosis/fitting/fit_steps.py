@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.approach import approach, fit_null, lead, own_start
-from plant_emulator.diagnosis.fitting.joint_fit import fit, fit_from
+from plant_emulator.diagnosis.fitting.approach import fit_null, lead, own_start
+from plant_emulator.diagnosis.fitting.joint_fit import fit_from
 
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
@@ -27,12 +27,6 @@ def start(model: Model, runs: tuple[int, ...]) -> FitResult:
 def refit(model: Model, task: Task) -> FitResult:
     """The fit of `task.base` with the effects named there, from its values (a step)."""
     return fit_from(model, task.base.effects, task.runs, task.base)
-
-
-def refit_led(model: Model, task: Task) -> FitResult:
-    """The fit of `task.base` with its effects, approached anew from its values (a step)."""
-    near = approach(model, task.base, task.runs)
-    return fit(model, near.effects, task.runs, near.values, near.states, lengths=near.lengths)
 
 
 def refit_along(model: Model, task: Task) -> FitResult:

@@ -40,25 +40,21 @@ class Promise:
 
 
 def starts_of(promise: Promise, base: FitResult) -> tuple[tuple[Start, ...], tuple[Start, ...]]:
-    """Starts of an effect on top of a fit, and further ones for the case that these are far off.
+    """Starts of an effect on top of a fit: those that regressions tell, and its sizes alone.
 
-    An estimate moves all unknowns at once, and may miss contact by that: each is also a start with
-    the parameters and states of the fit, of those near the data the best one as the last. A score
-    that promises far less than another may tell a size at which a limit does not act, and near the
-    data a fit would stay there.
+    An estimate moves all unknowns at once, and may miss contact by that near the data. The others
+    have the parameters and states of the fit. The best ones stand first.
     """
     order = sorted(promise.starts, key=lambda score: -promise.gains[score])
-    least = SETTINGS.rival_share * promise.gain
-    leaders = max(1, sum(promise.gains[score] > least for score in order))
-    told = [promise.starts[score] for score in order]
-    kept = [
+    told = tuple(promise.starts[score] for score in order)
+    kept = tuple(
         Start(
             values={**one.values, **base.values},
             states=tuple({**own, **fit} for own, fit in zip(one.states, base.states, strict=True)),
         )
         for one in told
-    ]
-    return (*told[:leaders], *kept[:1]), (*told[leaders:], *kept[1:])
+    )
+    return told, kept
 
 
 def leading(

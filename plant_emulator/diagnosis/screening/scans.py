@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fitting.signature import values_at_size
-from plant_emulator.diagnosis.screening.promise import Start
 from plant_emulator.diagnosis.settings import SETTINGS
 from plant_emulator.estimation.nearby import Beside
 from plant_emulator.estimation.robust_scan import cauchy_loss, scan_unknowns
@@ -20,9 +19,9 @@ from plant_emulator.estimation.robust_scan import cauchy_loss, scan_unknowns
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.task import Task
     from plant_emulator.diagnosis.machine import Candidate, Model
+    from plant_emulator.diagnosis.screening.promise import Start
     from plant_emulator.estimation.unknowns import Residual, Unknown
     from plant_emulator.signals.log import Array
 
@@ -45,16 +44,6 @@ def _start_states(model: Model, candidate: Candidate, task: Task) -> dict[str, f
     values = {**where.values, **fit, **values_at_size(candidate, SETTINGS.sizes[0])}
     residual = model.residual(run, (candidate.name,))
     return scan_unknowns(Beside(residual, values), plain, candidate.states)
-
-
-def scan_states(model: Model, found: FitResult, runs: Sequence[int]) -> Start:
-    """A fit with those states of its last effect scanned that have many basins, or are angles."""
-    own = model.candidates[found.effects[-1]].states
-    states = tuple(
-        _best(Beside(model.residual(k, found.effects), found.values), at, own)
-        for k, at in zip(runs, found.states, strict=True)
-    )
-    return Start(values=found.values, states=states)
 
 
 def scan_sizes(model: Model, effects: Sequence[str], runs: Sequence[int], start: Start) -> Start:

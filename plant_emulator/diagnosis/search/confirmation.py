@@ -10,19 +10,14 @@ import numpy as np
 from plant_emulator.diagnosis.fit_result import FitValues
 from plant_emulator.diagnosis.fitting.approach import (
     APPROACH_ITERATIONS,
-    CORRECTION_INTERVALS,
     lead,
-    lead_best,
     let_go,
-    mean_square,
     nearest,
 )
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
-from plant_emulator.diagnosis.fitting.signature import values_at_size
 from plant_emulator.diagnosis.screening.promise import Start, starts_of
-from plant_emulator.diagnosis.screening.scans import scan_sizes, scan_states
-from plant_emulator.diagnosis.search.compensation import start_with_room
+from plant_emulator.diagnosis.screening.scans import scan_sizes
 from plant_emulator.diagnosis.settings import SETTINGS
 from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE
 
@@ -39,35 +34,34 @@ if TYPE_CHECKING:
 class Trial:
     """A hypothesis to fit: its effects, the runs, and where the fit may begin.
 
-    further : starts for the case that all others are far from the data
+    told : starts that regressions tell, the most promising one first
+    kept : starts beside the values and states of the fit that the last effect comes on top of
     lengths : of slopes nearby, see `Estimate.lengths`
     iterations : of each fit at most so many; None: until it converges
     promised : predicted gains of the last effect by score
     led : the fit along the measured outputs from the best start; None: not known
-    others : what a few iterations made of the other starts, the best first
     """
 
     effects: tuple[str, ...]
     runs: tuple[int, ...]
-    starts: tuple[Start, ...]
-    further: tuple[Start, ...] = ()
+    told: tuple[Start, ...]
+    kept: tuple[Start, ...] = ()
     lengths: Lengths = field(default_factory=dict)
     iterations: int | None = None
     promised: Mapping[str, float] = field(default_factory=dict)
     led: FitResult | None = None
-    others: tuple[FitResult, ...] = ()
 
 
 def trial_of(
     promise: Promise, base: FitResult, runs: tuple[int, ...], iterations: int | None
 ) -> Trial:
     """The trial of one more effect on top of a fit."""
-    starts, further = starts_of(promise, base)
+    told, kept = starts_of(promise, base)
     return Trial(
         effects=(*base.effects, promise.effect),
         runs=runs,
-        starts=starts,
-        further=further,
+        told=told,
+        kept=kept,
         lengths=base.lengths,
         iterations=iterations,
         promised=promise.gains,
@@ -75,109 +69,64 @@ def trial_of(
 
 
 def lead_start(model: Model, trial: Trial) -> tuple[Trial, FitResult]:
-    """The trial with its best start led along the measured outputs, and that fit (a step)."""
+    """The trial led along the measured outputs from its best start, and that fit (a step)."""
     scanned = _with_scanned_sizes(model, trial)
-    led, *others = _lead(model, scanned)
-    return replace(scanned, led=led, others=tuple(others)), led
-
-
-def lead_others(
-    model: Model, pairs: tuple[tuple[Trial, FitResult], FitResult]
-) -> tuple[Trial, FitResult]:
-    """A trial of a first effect with more starts led along the measured outputs (a step).
-
-    One start makes room for the effect (`compensation`). The others were tried for a few iterations
-    only. These tell the best start where the effect is nearly absent from some: such a start leaves
-    little more than the fit without the effect, and leads nowhere.
-
-    pairs : the trial and its led fit, and the fit without effects along the measured outputs
-    returns the trial, and the best fit
-    """
-    (trial, known), base = pairs
-    room = _values(trial, start_with_room(model, known, trial.runs, base))
-    iterations = trial.iterations or APPROACH_ITERATIONS
-    found = [lead(model, one, trial.runs, iterations=iterations) for one in (room, *trial.others)]
-    led = min((known, *found), key=lambda one: one.cost)
-    return replace(trial, led=led, others=()), led
+    led = _lead(model, scanned)
+    return replace(scanned, led=led), led
 
 
 def confirm(model: Model, trial: Trial) -> FitResult:
     """Fit a hypothesis from its best start (a step).
 
     Where it is not led yet, sizes of the last effect with many narrow basins are scanned at its
-    starts. Such states, and the angle of each run, are scanned once more where the fit leaves more
-    than noise: until then the effect was missing.
+    starts.
     """
     if trial.led is None:
         trial = _with_scanned_sizes(model, trial)
-    found = fit_from_best_start(model, trial)
-    own = model.candidates[trial.effects[-1]].states
-    scanned = any(u.step is not None or u.angle for u in own)
-    if found.mean_square <= NOISE_MEAN_SQUARE or not scanned:
-        return found
-    start = scan_states(model, found, trial.runs)
-    if start.states == found.states:
-        return found
-    again = replace(trial, starts=(start,), further=(), lengths=found.lengths, led=None)
-    return min(found, fit_from_best_start(model, again), key=lambda one: one.cost)
+    return fit_from_best_start(model, trial)
 
 
 def fit_from_best_start(model: Model, trial: Trial) -> FitResult:
-    """Fit a hypothesis from its best start.
-
-    Where all starts are far from the data, the linear estimate of a size says little, and the
-    nominal parameters with the plausible size are one more start. A set of effects is also fitted
-    from its starts as they are, which are hardly worse than the smaller set.
-    """
-    starts = [_values(trial, one) for one in trial.starts]
-    several = len(trial.effects) > 1
+    """Fit a hypothesis from the start that leaves least, or led where all are far from the data."""
+    starts = [_values(trial, one) for one in (*trial.told, *trial.kept)]
     known = [*starts, trial.led] if trial.led else starts
-    near = nearest(model, known, trial.runs, _far(trial))
+    several = len(trial.effects) > 1
+    far = NOISE_MEAN_SQUARE if several else SUSPECT_MEAN_SQUARE
+    near = nearest(model, known, trial.runs, far)
     if near is None:
-        led = trial.led or _lead(model, trial)[0]
+        led = trial.led or _lead(model, trial)
         near = let_go(model, led, trial.runs, trial.iterations or APPROACH_ITERATIONS)
-    own = starts[-1]
+    return fit(
+        model,
+        trial.effects,
+        trial.runs,
+        near.values,
+        near.states,
+        trial.iterations,
+        lengths=near.lengths,
+    )
+
+
+def _lead(model: Model, trial: Trial) -> FitResult:
+    """The best fit along the measured outputs from the starts that regressions tell.
+
+    What a start leaves before its fit, or after few iterations, does not tell how far it leads: a
+    filter whose dead time is right may leave more than none with a dead time that stands for it.
+    """
+    iterations = trial.iterations or APPROACH_ITERATIONS
     found = [
-        fit(
-            model,
-            trial.effects,
-            trial.runs,
-            one.values,
-            one.states,
-            trial.iterations,
-            lengths=one.lengths,
-        )
-        for one in ([near, own] if several and near is not own else [near])
+        lead(model, _values(trial, one), trial.runs, iterations=iterations) for one in trial.told
     ]
     return min(found, key=lambda one: one.cost)
 
 
-def _far(trial: Trial) -> float:
-    """Mean square above which a start is far from the data."""
-    return NOISE_MEAN_SQUARE if len(trial.effects) > 1 else SUSPECT_MEAN_SQUARE
-
-
-def _lead(model: Model, trial: Trial) -> list[FitResult]:
-    """The fit along the measured outputs from the best start, and the others; see `lead_best`.
-
-    It is sought among those that leave least so as they are, and the plausible one.
-    """
-    observer = model.observer(CORRECTION_INTERVALS[0])
-    told = [_values(trial, one) for one in (*trial.starts, *trial.further)]
-    told.sort(key=lambda one: mean_square(observer, one, trial.runs))
-    plausible = [_values(trial, _plausible(model, trial, one)) for one in trial.starts[:1]]
-    starts = [*told[: SETTINGS.most_started], *plausible]
-    iterations = trial.iterations or APPROACH_ITERATIONS
-    return lead_best(model, starts, trial.runs, iterations, _far(trial))
-
-
 def _with_scanned_sizes(model: Model, trial: Trial) -> Trial:
     """The trial with those sizes of the last effect scanned that have many narrow basins."""
-    starts, further = (
+    told, kept = (
         tuple(scan_sizes(model, trial.effects, trial.runs, one) for one in some)
-        for some in (trial.starts, trial.further)
+        for some in (trial.told, trial.kept)
     )
-    return replace(trial, starts=starts, further=further)
+    return replace(trial, told=told, kept=kept)
 
 
 @dataclass(frozen=True)
@@ -200,8 +149,14 @@ def reduce(model: Model, asked: Reduction) -> FitResult:
     # A size that is not neutral would keep the effect in the simulation of a start.
     values = {**base.values, **model.candidates[asked.effect].neutral}
     starts = (_absent(model, asked), Start(values=values, states=base.states))
-    iterations = SETTINGS.leader_iterations
-    return fit_from_best_start(model, Trial(rest, asked.runs, starts, (), base.lengths, iterations))
+    trial = Trial(
+        effects=rest,
+        runs=asked.runs,
+        told=starts,
+        lengths=base.lengths,
+        iterations=SETTINGS.leader_iterations,
+    )
+    return fit_from_best_start(model, trial)
 
 
 def _absent(model: Model, asked: Reduction) -> Start:
@@ -256,19 +211,3 @@ def _values(trial: Trial, start: Start) -> FitValues:
     return FitValues(
         effects=trial.effects, values=start.values, states=start.states, lengths=trial.lengths
     )
-
-
-def _plausible(model: Model, trial: Trial, start: Start) -> Start:
-    """The nominal parameters with the plausible size of the last effect, in the start's states.
-
-    The size is on the start's side of neutral.
-    """
-    candidate = model.candidates[trial.effects[-1]]
-    neutral = candidate.neutral
-    sides = [
-        (start.values[u.name] - neutral[u.name]) * (u.start - neutral[u.name])
-        for u in candidate.sizes
-    ]
-    size = -1.0 if sum(sides) < 0.0 else 1.0
-    values = {**start.values, **model.nominal(trial.runs), **values_at_size(candidate, size)}
-    return replace(start, values=values)

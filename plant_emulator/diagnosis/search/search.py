@@ -180,10 +180,8 @@ class Search(Moves):
         found = [p for p in self._screen(base) if not self.refuted(key | {p.effect})]
         tried = [p.effect for p in found if key and key | {p.effect} in self.sets]
         new = to_try(found, base, least, tried)
-        fits = [base, *self.fit_on_top(base, new, least)]
+        fits = [base, *self.fit_on_top(base, new)]
         best = min(fits if base.effects else self.sets.values(), key=lambda fit: fit.cost)
-        if all(best is not one for one in fits[:2]):  # the leader was led again
-            best = self.led_again(best)
         tells = not base.effects and best is not base and not leaves_most(best, self.null)
         if tells and self._renew_null(best):
             self._expand(self.null)

@@ -1,6 +1,6 @@
 """Fits from far off on logs of the independent bench."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +10,8 @@ from plant_emulator.diagnosis.fit_result import FitResult, FitValues
 from plant_emulator.diagnosis.fitting import approach as approaching
 from plant_emulator.diagnosis.fitting.approach import (
     CORRECTION_INTERVALS,
-    FIRST_ITERATIONS,
     approach,
     fit_null,
-    lead,
-    lead_best,
     let_go,
     nearest,
 )
@@ -24,11 +21,11 @@ from plant_emulator.diagnosis.machines.bench import BenchModel
 from plant_emulator.model.parameters import ParameterSet
 from plant_emulator.model.stage import GAP_POSITION
 from plant_emulator.recordings.recording import recording
-from plant_emulator.signals.log import Array, Log
+from plant_emulator.signals.log import Log
 from plant_emulator.simulation.run_inputs import inputs_of
 from plant_emulator.simulation.sensor_noise import add_noise
 from plant_emulator.simulation.simulate import simulate, values_of
-from tests.plant_emulator.diagnosis.line import TIME, Line, linear, noisy
+from tests.plant_emulator.diagnosis.line import TIME, Line, noisy
 
 Reader = Callable[[str], Log]
 RUNS = (0, 1, 2)
@@ -48,38 +45,6 @@ def nominal_start(model: BenchModel) -> FitValues:
     )
 
 
-class Tone(Line):
-    """y = a + size sin(b x): a fit ends at the frequency that it begins near."""
-
-    parameters = (linear("a", 0.0, std=10.0), linear("b", 20.0, prior=20.0, std=10.0))
-
-    def __init__(self, size: float, begun: float) -> None:
-        super().__init__([noisy(size * np.sin(20.0 * TIME))], ())
-        self.size, self.begun = size, begun
-
-    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
-        """See `Model`."""
-
-        def residual(v: Mapping[str, float]) -> Array:
-            return (self.measured[run] - v["a"] - self.size * np.sin(v["b"] * TIME))[None, :]
-
-        return residual
-
-    def start_values(self, runs: Sequence[int]) -> tuple[dict[str, float], list[dict[str, float]]]:
-        """See `Model`."""
-        return {"a": 0.0, "b": self.begun}, [{} for _ in runs]
-
-
-def test_fit_that_leaves_more_than_noise_begins_at_the_nominal_parameters_too() -> None:
-    """By hand: two tones of 0.6 differ by a mean square of 0.36 beside the noise of 1."""
-    model = Tone(0.6, 35.0)
-    alone = fit(model, (), (0,), {"a": 0.0, "b": 35.0}, [{}])
-    assert 1.2 < alone.mean_square < 1.45
-    found = fit_null(model, (0,))
-    assert found.mean_square == pytest.approx(1.0, abs=0.07)
-    assert found.values["b"] == pytest.approx(20.0, abs=0.2)
-
-
 def test_fit_along_the_measured_speeds_leads_to_the_noise(model: BenchModel) -> None:
     near = approach(model, nominal_start(model), RUNS)
     found = fit(model, (), RUNS, near.values, near.states)
@@ -89,38 +54,6 @@ def test_fit_along_the_measured_speeds_leads_to_the_noise(model: BenchModel) -> 
     assert found.values["backlash_half_gap"] == pytest.approx(
         1.010622 * model.nominal_set.value("backlash_half_gap"), rel=0.003
     )
-
-
-def test_best_of_the_starts_is_led_on(model: BenchModel) -> None:
-    """The gap of the other start is half of the true one, which no few iterations mend."""
-    start = nominal_start(model)
-    values = {**start.values, "backlash_half_gap": 0.5 * start.values["backlash_half_gap"]}
-    wrong = FitValues(effects=(), values=values, states=start.states)
-    first = [lead(model, one, RUNS, iterations=FIRST_ITERATIONS) for one in (start, wrong)]
-    assert 2.0 * first[0].cost < first[1].cost
-    on = lead(model, first[0], RUNS, iterations=5)
-    for starts in ([wrong, start], [start, wrong]):
-        led, other = lead_best(model, starts, RUNS, 5)
-        assert led.values["drum_inertia"] == pytest.approx(on.values["drum_inertia"], rel=1e-6)
-        assert other.cost == pytest.approx(first[1].cost)
-
-
-def test_first_start_that_comes_near_the_data_is_led_on(
-    model: BenchModel, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """No iteration is spent on a start behind one that a few iterations bring to the noise."""
-    start, led = nominal_start(model), []
-    right = approach(model, start, RUNS)
-    wrong = replace(start, values={**start.values, "drum_inertia": 150.0})
-
-    def listed(there: BenchModel, one: FitValues, *args: object, **more: object) -> FitResult:
-        led.append(one.values)
-        return lead(there, one, *args, **more)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(approaching, "lead", listed)
-    lead_best(model, [wrong, right, start], RUNS, FIRST_ITERATIONS)
-    assert led[:2] == [wrong.values, right.values]
-    assert start.values not in led
 
 
 def test_start_near_the_noise_is_kept(model: BenchModel) -> None:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.execution.pool import TaskRunner
-from plant_emulator.diagnosis.fit_result import FitResult
-from plant_emulator.diagnosis.fitting.approach import fit_null
+from plant_emulator.diagnosis.fit_result import FitResult, FitValues
+from plant_emulator.diagnosis.fitting.approach import fit_null, nearest
 from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.machine import Candidate, Model
 from plant_emulator.diagnosis.screening.promise import Promise, Start
@@ -19,7 +19,6 @@ from plant_emulator.diagnosis.search.confirmation import (
     Trial,
     confirm,
     fit_from_best_start,
-    lead_others,
     lead_start,
     reduce,
     without_effects,
@@ -40,35 +39,11 @@ from tests.plant_emulator.diagnosis.search.late import Late, late_pulses
 WAVE = noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME))
 
 
-class Counting(Line):
-    """A line that counts how often it is asked for its nominal parameters."""
-
-    asked = 0
-
-    def nominal(self, runs: Sequence[int]) -> dict[str, float]:
-        """See `Model`."""
-        self.asked += 1
-        return super().nominal(runs)
-
-
-@pytest.mark.parametrize(("size", "asked"), [(4.1, 0), (-20.0, 1)])
-def test_plausible_size_is_a_start_only_where_all_starts_are_far(size: float, asked: int) -> None:
-    model = Counting([WAVE])
-    start = Start(values={"a": 2.0, "b": 3.0, "wave_size": size}, states=({},))
-    found = confirm(model, Trial(("wave",), (0,), (start,)))
-    assert model.asked == asked
-    assert found.values["wave_size"] == pytest.approx(4.0, abs=0.1)
-
-
-def tone(frequency: Unknown, *, narrow: str) -> Candidate:
-    """A wave of unknown amplitude; its frequency, in basins of 3, is a size or a state."""
+def tone(frequency: Unknown) -> Candidate:
+    """A wave of unknown amplitude and frequency, with basins of 3."""
     amplitude = replace(linear("amplitude", 1.0), lower=0.1)
-    return replace(
-        effect("tone"),
-        sizes=(amplitude, frequency) if narrow == "size" else (amplitude,),
-        states=() if narrow == "size" else (frequency,),
-        neutral={"amplitude": 0.0, "frequency": 0.0} if narrow == "size" else {"amplitude": 0.0},
-    )
+    neutral = {"amplitude": 0.0, "frequency": 0.0}
+    return replace(effect("tone"), sizes=(amplitude, frequency), neutral=neutral)
 
 
 class Tone(Line):
@@ -88,25 +63,20 @@ class Tone(Line):
         return residual
 
 
-@pytest.mark.parametrize(("narrow", "side"), [("size", 1.0), ("size", -1.0), ("state", 1.0)])
-def test_frequency_far_from_its_start_is_found_by_a_scan(narrow: str, side: float) -> None:
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_frequency_far_from_its_start_is_found_by_a_scan(side: float) -> None:
     """A descent from 20 ends at a side lobe, an amplitude of 0.6 in place of 4."""
     lower, upper = sorted((side, 50.0 * side))
     frequency = replace(linear("frequency", 20.0 * side), lower=lower, upper=upper, step=1.0)
     measured = noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(side * 37.3 * TIME))
-    model = Tone(measured, tone(frequency, narrow=narrow))
-    values = {"a": 2.0, "b": 3.0, "amplitude": 4.0}
-    given, state = {"frequency": frequency.start}, {}
-    if narrow == "state":
-        given, state = state, given
-    start = Start(values={**values, **given}, states=(state,))
-    trial = Trial(("tone",), (0,), (start,))
+    model = Tone(measured, tone(frequency))
+    values = {"a": 2.0, "b": 3.0, "amplitude": 4.0, "frequency": frequency.start}
+    trial = Trial(("tone",), (0,), (Start(values=values, states=({},)),))
     descended = fit_from_best_start(model, trial)
     found = confirm(model, trial)
     assert abs(descended.values["amplitude"]) < 1.0
     assert found.values["amplitude"] == pytest.approx(4.0, abs=0.15)
-    at = found.values if narrow == "size" else found.states[0]
-    assert at["frequency"] == pytest.approx(side * 37.3, abs=0.1)
+    assert found.values["frequency"] == pytest.approx(side * 37.3, abs=0.1)
 
 
 class TurnedTone(Line):
@@ -144,33 +114,27 @@ def test_led_start_far_from_the_noise_is_let_go_and_not_led_again(
     start = Start(values={"a": 9.0, "b": -9.0, "wave_size": 0.0}, states=({},))
     trial, led = lead_start(model, Trial(("wave",), (0,), (start,)))
     assert led.values["wave_size"] == pytest.approx(4.0, abs=0.15)
-    monkeypatch.setattr(confirmation, "lead_best", None)
+    monkeypatch.setattr(confirmation, "lead", None)
     found = confirm(model, trial)
     assert found.values["wave_size"] == pytest.approx(4.0, abs=0.15)
 
 
-@pytest.mark.parametrize(("left", "size"), [(0.5, 0.0), (50.0, 4.0)])
-def test_other_starts_count_where_they_lead_to_less(left: float, size: float) -> None:
-    """The known fit has no wave, and leaves less or more than the noise."""
-    model = Line([noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME))])
-    start = Start(values={"a": 9.0, "b": -9.0, "wave_size": 0.0}, states=({},))
-    trial, led = lead_start(model, Trial(("wave",), (0,), (start,)))
-    known = replace(led, values={**led.values, "wave_size": 0.0}, cost=left * len(TIME))
-    asked = replace(trial, led=known, others=(replace(known, values=start.values),))
-    again, found = lead_others(model, ((asked, known), fit_null(model, (0,))))
-    assert found.values["wave_size"] == pytest.approx(size, abs=0.15)
-    assert (again.led, again.others) == (found, ())
+def test_start_that_leaves_more_at_first_leads_to_less() -> None:
+    """The filter delays by 0.1 nearly. A delay of 0.15 stands for it where it is absent.
 
-
-def test_filter_is_led_from_where_the_delay_makes_room_for_it() -> None:
-    """The filter delays by 0.1 nearly. A delay of 0.15 stands for it where it is absent."""
+    That leaves less than the right delay with a fifth of the filter, and leads nowhere.
+    """
     model = Late([noisy(late_pulses(0.05, 0.1))], 0.1)
-    base = fit(model, (), (0,), {"a": 0.0, "b": 0.15}, [{}])
-    absent = replace(base, effects=("lag",), values={**base.values, "lag_size": 0.0})
-    trial = Trial(("lag",), (0,), (Start(values=absent.values, states=({},)),), led=absent)
-    _, found = lead_others(model, ((trial, absent), base))
-    assert found.values["lag_size"] == pytest.approx(0.1, abs=0.005)
-    assert found.values["b"] == pytest.approx(0.05, abs=0.005)
+    room, absent = (
+        Start(values={"a": 0.0, "b": late, "lag_size": lag}, states=({},))
+        for late, lag in ((0.05, 0.02), (0.15, 0.0))
+    )
+    trial, led = lead_start(model, Trial(("lag",), (0,), (absent, room)))
+    starts = [FitValues(effects=("lag",), values=s.values, states=s.states) for s in (room, absent)]
+    assert nearest(model, starts, (0,), np.inf) is starts[1]
+    assert trial.led == led
+    assert led.values["lag_size"] == pytest.approx(0.1, abs=0.005)
+    assert led.values["b"] == pytest.approx(0.05, abs=0.005)
 
 
 def test_fit_begins_at_a_led_start_that_is_near_the_noise(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -201,23 +165,6 @@ def test_states_of_the_effects_stay_at_the_nominal_parameters(
     assert nominal.states[0]["angle"] == pytest.approx(0.7, abs=0.05)
 
 
-def test_angle_that_descends_to_its_bound_is_found_by_a_scan() -> None:
-    """From -0.4 the nearest way to 2.9 leads down past -1; the other run pays for the tone."""
-    angles = (0.3, 2.9)
-    plain = 2.0 + 3.0 * TIME
-    model = TurnedTone([noisy(plain + 4.0 * np.sin(20.0 * TIME + angle)) for angle in angles])
-    start = Start(
-        values={"a": 2.0, "b": 3.0, "amplitude": 4.0},
-        states=({"angle": 0.3}, {"angle": -0.4}),
-    )
-    trial = Trial(("tone",), (0, 1), (start,))
-    assert fit_from_best_start(model, trial).values["amplitude"] < 3.0
-    found = confirm(model, trial)
-    assert found.values["amplitude"] == pytest.approx(4.0, abs=0.15)
-    turned = [own["angle"] - angle for own, angle in zip(found.states, angles, strict=True)]
-    assert np.cos(turned) == pytest.approx(1.0, abs=0.01)
-
-
 def test_set_without_an_effect_starts_where_the_slopes_tell_it_to_be(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -239,7 +186,7 @@ def test_set_without_an_effect_starts_where_the_slopes_tell_it_to_be(
     prior = np.diag([0.1, 0.1, 0.0])  # a and b have standard deviations of 10
     rows = np.concatenate([columns, prior])
     expected, *_ = np.linalg.lstsq(rows, np.concatenate([y, np.zeros(3)]), rcond=None)
-    told, kept = asked[0].starts
+    told, kept = asked[0].told
     assert [told.values[name] for name in ("a", "b", "wave_size")] == pytest.approx(expected)
     assert kept.values["a"] == pytest.approx(2.0, abs=0.2)
     assert told.values["kink_size"] == kept.values["kink_size"] == 0.0

@@ -83,15 +83,6 @@ def test_gain_of_an_effect_whose_columns_bend_is_predicted(gap: float) -> None:
     assert start["b"] == pytest.approx(3.0 - start["wave_size"], abs=0.02)
 
 
-@pytest.mark.parametrize("left", [0.0, 2.0])
-def test_leader_is_led_again_only_where_it_leaves_more_than_noise(left: float) -> None:
-    """By hand: of squares of 800 a cosine of 2 leaves 2, beside the noise of 1."""
-    y = noisy(2.0 + 3.0 * TIME + 40.0 * np.sin(20.0 * TIME) + left * np.cos(37.0 * TIME))
-    found = explained(Line([y], ["wave", "cube"]))
-    led = [step.effects for step in found.trace if step.action == "led again"]
-    assert led == ([("wave",)] if left else [])
-
-
 @pytest.mark.parametrize(
     ("beside_random", "sizes", "names"),
     [
