@@ -9,10 +9,9 @@ from dataclasses import dataclass
 class Settings:
     """Sizes are in plausible sizes of an effect, gains in natural logarithms of probability."""
 
-    # A column is local and nearly linear, and a law that bends shows at one of these sizes. In
-    # the relations all effects are tried at the first size, as are those in a simulation whose
-    # slope shows nothing, and the best at the others too, but for those beside effects that leave
-    # noise: they are faint.
+    # A column is local and nearly linear, and a law that bends shows at one of these sizes. All
+    # effects are tried at the first size, and the best at the others too, but for those beside
+    # effects that leave noise: they are faint.
     sizes: tuple[float, ...] = (0.3, 0.1, 1.0, 3.0)
     # Iterations of the short fit of an effect whose state multiplies its size: all else follows by
     # secants, so that they are cheap, and more tell no more.

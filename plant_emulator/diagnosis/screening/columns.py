@@ -77,15 +77,13 @@ def best_score(
 def faint_score(
     simulation: SimulationColumns, candidate: Candidate, states: States
 ) -> Score | None:
-    """Score of an effect by its slopes where it is absent; see `SimulationColumns.of_size`.
+    """Score of an effect by its slopes where it is absent; see `SimulationColumns.slope`.
 
     None: it shows nothing
     """
 
-    def change(only: str | None, size: float, states: States) -> Array | None:
-        name = only or candidate.sizes[0].name
-        found = simulation.of_size(candidate.name, name, states)
-        return None if found is None else size * found
+    def change(only: str | None, size: float, states: States) -> Array:
+        return size * simulation.slope(candidate.name, only or candidate.sizes[0].name, states)
 
     return _best(simulation, candidate, (1.0,), states, change)
 

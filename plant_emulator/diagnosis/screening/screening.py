@@ -217,13 +217,16 @@ def _scores(
 
 
 def _first_score(fidelity: Fidelity, candidate: Candidate, states: States) -> Score | None:
-    """Score of an effect as if it were faint; in the relations at the first size.
+    """Score of an effect at the first size; in a simulation that of its slopes, if it is larger.
 
-    Relations hold between samples: nothing adds up in them, and their columns hardly bend.
+    Relations hold between samples: nothing adds up in them, and their columns hardly bend. A
+    simulation bends: a contact falls on another sample at the first size, and a law may have
+    another slope where it is absent, as friction that gives way before it slides.
     """
-    if isinstance(fidelity, SimulationColumns):
-        return faint_score(fidelity, candidate, states)
-    return best_score(fidelity, candidate, SETTINGS.sizes[:1], states)
+    column = best_score(fidelity, candidate, SETTINGS.sizes[:1], states)
+    if not isinstance(fidelity, SimulationColumns):
+        return column
+    return max((faint_score(fidelity, candidate, states), column), key=_gain)
 
 
 def _gain(score: Score | None) -> float:

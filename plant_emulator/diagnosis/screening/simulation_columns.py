@@ -10,7 +10,6 @@ import numpy as np
 
 from plant_emulator.diagnosis.fitting.joint_fit import linearise
 from plant_emulator.diagnosis.fitting.signature import values_at_size
-from plant_emulator.diagnosis.settings import SETTINGS
 from plant_emulator.estimation.least_squares import linearise_at
 from plant_emulator.estimation.nearby import Beside
 from plant_emulator.estimation.regression import Regression
@@ -36,7 +35,7 @@ class SimulationColumns:
     def __init__(self, model: Model, where: FitValues, runs: Sequence[int]) -> None:
         """Linearise the residual at a fit."""
         self.model, self.where, self.runs = model, where, tuple(runs)
-        self._known: dict[tuple[object, ...], Array | None] = {}
+        self._known: dict[tuple[object, ...], Array] = {}
         self.found = linearise(model, where, runs)
         self.base = np.concatenate([r.ravel() for r in self.found.residuals])
 
@@ -97,40 +96,23 @@ class SimulationColumns:
     # gateway.
     unwhitened = column
 
-    def of_size(
-        self, effect: str, size: str, states: Sequence[Mapping[str, float]]
-    ) -> Array | None:
-        """Change of the data by a plausible size of an effect, as long as it is faint, shape (n,).
+    def slope(self, effect: str, size: str, states: Sequence[Mapping[str, float]]) -> Array:
+        """Change of the data by a plausible size of an effect, as its slope at neutral tells, (n,).
 
-        It is that of the slope at neutral, over as little as those of the parameters. A column over
-        more is another one where a contact falls on a sample, and no parameter follows it there. A
-        size whose slope shows nothing, or that has many narrow basins, is simulated at the first
-        size of the screening.
+        The slope is taken over as little as those of the parameters. A column over more is another
+        one where a contact falls on a sample, and no parameter follows it there.
 
-        size : name of the size parameter, the others are neutral; None: it cannot be simulated
+        size : name of the size parameter, the others are neutral
         """
         key = (effect, size, *(tuple(sorted(own.items())) for own in states))
         if key not in self._known:
-            self._known[key] = self._of_size(effect, size, states)
+            self._known[key] = self._slope(effect, size, states)
         return self._known[key]
 
-    def _of_size(
-        self, effect: str, size: str, states: Sequence[Mapping[str, float]]
-    ) -> Array | None:
+    def _slope(self, effect: str, size: str, states: Sequence[Mapping[str, float]]) -> Array:
         candidate = self.model.candidates[effect]
         (unknown,) = (u for u in candidate.sizes if u.name == size)
-        if unknown.step is None:
-            slope = self._slope(effect, unknown, states)
-            if np.linalg.norm(slope) >= HIDDEN_NORM:
-                return slope
-        share = SETTINGS.sizes[0]
-        found = self.column(effect, values_at_size(candidate, share, size), states)
-        return None if found is None else found / share
-
-    def _slope(self, effect: str, unknown: Unknown, states: Sequence[Mapping[str, float]]) -> Array:
-        """Change by a plausible size, as the slope at neutral tells."""
-        candidate = self.model.candidates[effect]
-        neutral = candidate.neutral[unknown.name]
+        neutral = candidate.neutral[size]
         beside = {**self.where.values, **values_at_size(candidate, 0.0)}
         residuals = [
             Beside(self.model.residual(k, (*self.where.effects, effect)), {**beside, **own, **more})

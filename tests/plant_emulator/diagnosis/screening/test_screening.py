@@ -51,3 +51,26 @@ def test_parameter_that_follows_an_effect_at_a_contact_leaves_the_rest_of_its_ga
     assert promise.gain == pytest.approx(76.5, rel=0.25)
     assert promise.starts[SIMULATION].values["wave_size"] == pytest.approx(0.4, abs=0.1)
     assert promise.starts[SIMULATION].values["a"] == pytest.approx(-0.3, abs=0.1)
+
+
+class Bent(Line):
+    """An effect that grows with the square of its size, and has a wave as its slope."""
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+
+        def residual(v: Mapping[str, float]) -> Array:
+            size = v["kink_size"] if effects else 0.0
+            bend = 40.0 * size**2 * abs(TIME) + 0.1 * size * np.sin(20.0 * TIME)
+            return (self.measured[run] - v["a"] - v["b"] * TIME - bend)[None, :]
+
+        return residual
+
+
+def test_effect_whose_slope_is_another_change_is_promised_by_its_column() -> None:
+    """By hand: a kink of 3.6, as of the size 0.3, gains 2000 * 3.6^2 / 24 = 1080."""
+    model = Bent([noisy(2.0 + 3.0 * TIME + 3.6 * abs(TIME))], ["kink"])
+    null = fit_null(model, (0,))
+    (promise,) = regressions(runner(model), null, ("kink",), (SIMULATION,))
+    assert promise.gain == pytest.approx(1080.0, rel=0.1)
+    assert promise.starts[SIMULATION].values["kink_size"] == pytest.approx(0.3, abs=0.02)
