@@ -79,11 +79,16 @@ def faint_score(
 ) -> Score | None:
     """Score of an effect by its slopes where it is absent; see `SimulationColumns.slope`.
 
-    None: it shows nothing
+    The slope of a size with many narrow basins tells nothing of another basin, and that of a
+    one-sided size nothing of its other side. None: it shows nothing
     """
 
     def change(only: str | None, size: float, states: States) -> Array:
-        return size * simulation.slope(candidate.name, only or candidate.sizes[0].name, states)
+        unknown = next(u for u in candidate.sizes if only in {None, u.name})
+        at = values_at_size(candidate, size, only)[unknown.name]
+        if unknown.step is not None or at == candidate.neutral[unknown.name]:
+            return np.zeros_like(simulation.base)
+        return size * simulation.slope(candidate.name, unknown.name, states)
 
     return _best(simulation, candidate, (1.0,), states, change)
 

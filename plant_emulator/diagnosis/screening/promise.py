@@ -40,21 +40,23 @@ class Promise:
 
 
 def starts_of(promise: Promise, base: FitResult) -> tuple[tuple[Start, ...], tuple[Start, ...]]:
-    """Starts of an effect on top of a fit: those that regressions tell, and its sizes alone.
+    """Starts of an effect on top of a fit, and those of them that are led; the best ones first.
 
-    An estimate moves all unknowns at once, and may miss contact by that near the data. The others
-    have the parameters and states of the fit. The best ones stand first.
+    All estimates of regressions are led. Near the data an estimate may miss contact, because it
+    moves all unknowns at once: the best one is also a start with the parameters and states of the
+    fit. An estimate that promises far less than another may tell a size at which a limit does not
+    act, and a fit would stay there: it is no start near the data.
     """
     order = sorted(promise.starts, key=lambda score: -promise.gains[score])
     told = tuple(promise.starts[score] for score in order)
-    kept = tuple(
-        Start(
-            values={**one.values, **base.values},
-            states=tuple({**own, **fit} for own, fit in zip(one.states, base.states, strict=True)),
-        )
-        for one in told
+    least = SETTINGS.rival_share * promise.gain
+    best, *others = told
+    kept = Start(
+        values={**best.values, **base.values},
+        states=tuple({**own, **fit} for own, fit in zip(best.states, base.states, strict=True)),
     )
-    return told, kept
+    near = [one for one, s in zip(others, order[1:], strict=True) if promise.gains[s] > least]
+    return (best, *near, kept), told
 
 
 def leading(

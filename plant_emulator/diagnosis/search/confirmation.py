@@ -9,7 +9,6 @@ import numpy as np
 
 from plant_emulator.diagnosis.fit_result import FitValues
 from plant_emulator.diagnosis.fitting.approach import (
-    APPROACH_ITERATIONS,
     lead,
     let_go,
     nearest,
@@ -34,42 +33,38 @@ if TYPE_CHECKING:
 class Trial:
     """A hypothesis to fit: its effects, the runs, and where the fit may begin.
 
-    told : starts that regressions tell, the most promising one first
-    kept : starts beside the values and states of the fit that the last effect comes on top of
+    starts : where a fit may begin near the data; led_from : those that are led, one or more
     lengths : of slopes nearby, see `Estimate.lengths`
-    iterations : of each fit at most so many; None: until it converges
+    iterations : of each fit at most so many
     promised : predicted gains of the last effect by score
-    led : the fit along the measured outputs from the best start; None: not known
+    led : the best fit along the measured outputs; None: not known
     """
 
     effects: tuple[str, ...]
     runs: tuple[int, ...]
-    told: tuple[Start, ...]
-    kept: tuple[Start, ...] = ()
+    starts: tuple[Start, ...]
+    led_from: tuple[Start, ...]
     lengths: Lengths = field(default_factory=dict)
-    iterations: int | None = None
+    iterations: int = SETTINGS.leader_iterations
     promised: Mapping[str, float] = field(default_factory=dict)
     led: FitResult | None = None
 
 
-def trial_of(
-    promise: Promise, base: FitResult, runs: tuple[int, ...], iterations: int | None
-) -> Trial:
+def trial_of(promise: Promise, base: FitResult, runs: tuple[int, ...]) -> Trial:
     """The trial of one more effect on top of a fit."""
-    told, kept = starts_of(promise, base)
+    starts, led_from = starts_of(promise, base)
     return Trial(
         effects=(*base.effects, promise.effect),
         runs=runs,
-        told=told,
-        kept=kept,
+        starts=starts,
+        led_from=led_from,
         lengths=base.lengths,
-        iterations=iterations,
         promised=promise.gains,
     )
 
 
-def lead_start(model: Model, trial: Trial) -> tuple[Trial, FitResult]:
-    """The trial led along the measured outputs from its best start, and that fit (a step)."""
+def lead_trial(model: Model, trial: Trial) -> tuple[Trial, FitResult]:
+    """The trial with its best fit along the measured outputs, and that fit (a step)."""
     scanned = _with_scanned_sizes(model, trial)
     led = _lead(model, scanned)
     return replace(scanned, led=led), led
@@ -87,15 +82,20 @@ def confirm(model: Model, trial: Trial) -> FitResult:
 
 
 def fit_from_best_start(model: Model, trial: Trial) -> FitResult:
-    """Fit a hypothesis from the start that leaves least, or led where all are far from the data."""
-    starts = [_values(trial, one) for one in (*trial.told, *trial.kept)]
+    """Fit a hypothesis from the start that leaves least.
+
+    Where all are far from the data, the best one along the measured outputs is let go, and is
+    another start.
+    """
+    starts = [_values(trial, one) for one in trial.starts]
     known = [*starts, trial.led] if trial.led else starts
-    several = len(trial.effects) > 1
-    far = NOISE_MEAN_SQUARE if several else SUSPECT_MEAN_SQUARE
+    # Of several effects one may be absent from a start that is near the data without it.
+    far = NOISE_MEAN_SQUARE if len(trial.effects) > 1 else SUSPECT_MEAN_SQUARE
     near = nearest(model, known, trial.runs, far)
     if near is None:
         led = trial.led or _lead(model, trial)
-        near = let_go(model, led, trial.runs, trial.iterations or APPROACH_ITERATIONS)
+        free = let_go(model, led, trial.runs, trial.iterations)
+        near = nearest(model, [free, *known], trial.runs, np.inf) or free
     return fit(
         model,
         trial.effects,
@@ -108,25 +108,23 @@ def fit_from_best_start(model: Model, trial: Trial) -> FitResult:
 
 
 def _lead(model: Model, trial: Trial) -> FitResult:
-    """The best fit along the measured outputs from the starts that regressions tell.
+    """The best of the fits along the measured outputs from all starts that are led.
 
-    What a start leaves before its fit, or after few iterations, does not tell how far it leads: a
-    filter whose dead time is right may leave more than none with a dead time that stands for it.
+    What a start leaves before its fit, or after few iterations, does not tell how far it leads. A
+    dead time that stands for a filter may leave less than the filter with the right dead time.
     """
-    iterations = trial.iterations or APPROACH_ITERATIONS
-    found = [
-        lead(model, _values(trial, one), trial.runs, iterations=iterations) for one in trial.told
-    ]
+    starts = [_values(trial, one) for one in trial.led_from]
+    found = [lead(model, one, trial.runs, iterations=trial.iterations) for one in starts]
     return min(found, key=lambda one: one.cost)
 
 
 def _with_scanned_sizes(model: Model, trial: Trial) -> Trial:
     """The trial with those sizes of the last effect scanned that have many narrow basins."""
-    told, kept = (
+    starts, led_from = (
         tuple(scan_sizes(model, trial.effects, trial.runs, one) for one in some)
-        for some in (trial.told, trial.kept)
+        for some in (trial.starts, trial.led_from)
     )
-    return replace(trial, told=told, kept=kept)
+    return replace(trial, starts=starts, led_from=led_from)
 
 
 @dataclass(frozen=True)
@@ -149,13 +147,7 @@ def reduce(model: Model, asked: Reduction) -> FitResult:
     # A size that is not neutral would keep the effect in the simulation of a start.
     values = {**base.values, **model.candidates[asked.effect].neutral}
     starts = (_absent(model, asked), Start(values=values, states=base.states))
-    trial = Trial(
-        effects=rest,
-        runs=asked.runs,
-        told=starts,
-        lengths=base.lengths,
-        iterations=SETTINGS.leader_iterations,
-    )
+    trial = Trial(rest, asked.runs, starts=starts, led_from=starts, lengths=base.lengths)
     return fit_from_best_start(model, trial)
 
 

@@ -14,7 +14,7 @@ from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, excess
 from plant_emulator.diagnosis.fitting.fit_steps import refit_along, start_along
 from plant_emulator.diagnosis.search.confirmation import (
     confirm,
-    lead_start,
+    lead_trial,
     trial_of,
 )
 from plant_emulator.diagnosis.search.fitted_sets import FittedSets
@@ -57,33 +57,36 @@ class Moves(FittedSets):
             return False
         return not self.is_far(found) or evidence.leaves_most(self.led(found), self.led(base))
 
-    def fit_on_top(self, base: FitResult, new: Sequence[Promise]) -> list[FitResult]:
-        """Fit effects on top of a fit.
+    def fit_on_top(self, base: FitResult, new: Sequence[Promise], least: float) -> None:
+        """Fit effects on top of a fit; least : gain that one must promise.
 
         Where the base leaves more than noise, a regression may mislead, and a free fit is long. The
         effects are led along the measured outputs first. The one that gains most there is fitted
         freely. Where it comes near the data and leaves little, those may only look the same that
         leave little too. Else it may be in a local minimum. Others are fitted then that gain half
-        of the most along the measured outputs, or of what was reached, and the leader of each
-        regression: what leads a simulation hides what is slow, and noise with a colour leads it.
+        of what it gains along the measured outputs, or freely if that is less, and the one that
+        each regression promises most of: what leads a simulation hides what is slow, and noise with
+        a colour leads it. One further effect alone needs no choice.
         """
-        trials = [trial_of(p, base, self.runner.runs, SETTINGS.leader_iterations) for p in new]
+        trials = [trial_of(p, base, self.runner.runs) for p in new]
         if base.mean_square <= NOISE_MEAN_SQUARE or len(trials) < (2 if base.effects else 1):
-            return self.confirm([*trials[:1], *(_shorter(trial) for trial in trials[1:])])
+            self.confirm([*trials[:1], *(_shorter(trial) for trial in trials[1:])])
+            return
         own = self.led(base)
-        pairs = list(self.runner.map(lead_start, trials))
+        pairs = list(self.runner.map(lead_trial, trials))
         self.trace += [search_step(own, "led", led, trial.promised) for trial, led in pairs]
         first, *rest = sorted(pairs, key=lambda pair: pair[1].cost)
         (best,) = self.confirm([first[0]])
         if not self.is_far(best) and evidence.leaves_little(best, excess(base)):
             rivals = [one for one, led in rest if evidence.leaves_little(led, excess(own))]
         else:
-            least = SETTINGS.rival_share * max(0.0, min(_gain(own, first[1]), _gain(base, best)))
-            leaders = _leaders(trials)
+            promising = _most_promising(trials, least)
+            most = max(0.0, min(_gain(own, first[1]), _gain(base, best)))
+            needed = SETTINGS.rival_share * most
             rivals = [
-                one for one, led in rest if one.effects in leaders or _gain(own, led) >= least
+                one for one, led in rest if one.effects in promising or _gain(own, led) >= needed
             ]
-        return [best, *self.confirm([_shorter(one) for one in rivals])]
+        self.confirm([_shorter(one) for one in rivals])
 
     def confirm(self, trials: Sequence[Trial]) -> list[FitResult]:
         """Fit these trials, and keep what they reach."""
@@ -99,10 +102,11 @@ def _shorter(trial: Trial) -> Trial:
     return replace(trial, iterations=SETTINGS.iterations)
 
 
-def _leaders(trials: Sequence[Trial]) -> set[tuple[str, ...]]:
-    """The sets whose last effect each regression promises most of."""
+def _most_promising(trials: Sequence[Trial], least: float) -> set[tuple[str, ...]]:
+    """The sets whose last effect a regression promises most of; least : gain that counts."""
     scores = {score for one in trials for score in one.promised}
-    return {max(trials, key=lambda one: one.promised.get(s, 0.0)).effects for s in scores}
+    best = {s: max(trials, key=lambda one: one.promised.get(s, 0.0)) for s in scores}
+    return {one.effects for s, one in best.items() if one.promised.get(s, 0.0) > least}
 
 
 def _gain(base: FitResult, found: FitResult) -> float:

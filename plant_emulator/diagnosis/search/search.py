@@ -180,10 +180,12 @@ class Search(Moves):
         found = [p for p in self._screen(base) if not self.refuted(key | {p.effect})]
         tried = [p.effect for p in found if key and key | {p.effect} in self.sets]
         new = to_try(found, base, least, tried)
-        fits = [base, *self.fit_on_top(base, new)]
-        best = min(fits if base.effects else self.sets.values(), key=lambda fit: fit.cost)
-        tells = not base.effects and best is not base and not leaves_most(best, self.null)
-        if tells and self._renew_null(best):
+        self.fit_on_top(base, new, least)
+        if base.effects:
+            return
+        single = [one for names, one in self.unrefuted.items() if len(names) == 1]
+        best = min(single, key=lambda one: one.cost, default=base)
+        if best is not base and not leaves_most(best, self.null) and self._renew_null(best):
             self._expand(self.null)
 
     def _renew_null(self, found: FitResult) -> bool:

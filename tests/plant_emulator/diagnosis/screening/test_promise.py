@@ -53,20 +53,22 @@ def test_effect_also_starts_at_the_parameters_of_the_set() -> None:
     estimated = Start(
         values={"a": 7.0, "b": 8.0, "wave_size": 0.3}, states=({"angle": 0.9, "phase": 0.1},)
     )
-    (told,), (kept,) = starts_of(
+    (told, kept), led = starts_of(
         Promise(effect="wave", gains={"relations": 1.0}, starts={"relations": estimated}), base
     )
     assert told == estimated
+    assert led == (estimated,)
     assert kept.values == {"a": 2.0, "b": 3.0, "wave_size": 0.3}
     assert kept.states == ({"angle": 0.5, "phase": 0.1},)
 
 
-def test_start_of_the_largest_score_is_the_first() -> None:
+def test_start_of_a_score_that_gains_far_less_is_led_only() -> None:
+    """At the size of the relations, which see 12 of 370, a limit does not act."""
     base = fit_null(Line([noisy(2.0 + 3.0 * TIME)]), (0,))
-    less, more = (Start(values={"wave_size": size}, states=({},)) for size in (0.1, 0.4))
-    starts = {"relations": less, "simulation": more}
-    told, kept = starts_of(
-        Promise(effect="wave", gains={"relations": 12.0, "simulation": 370.0}, starts=starts), base
+    idle, acting = (Start(values={"wave_size": size}, states=({},)) for size in (0.0, 0.4))
+    told = {"relations": idle, "simulation": acting}
+    near, led = starts_of(
+        Promise(effect="wave", gains={"relations": 12.0, "simulation": 370.0}, starts=told), base
     )
-    assert told == (more, less)
-    assert [one.values["wave_size"] for one in kept] == [0.4, 0.1]
+    assert [one.values["wave_size"] for one in near] == [0.4, 0.4]
+    assert led == (acting, idle)

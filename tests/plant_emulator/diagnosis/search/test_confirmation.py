@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from plant_emulator.diagnosis.execution.pool import TaskRunner
-from plant_emulator.diagnosis.fit_result import FitResult, FitValues
-from plant_emulator.diagnosis.fitting.approach import fit_null, nearest
+from plant_emulator.diagnosis.fit_result import FitResult
+from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.joint_fit import fit
 from plant_emulator.diagnosis.machine import Candidate, Model
 from plant_emulator.diagnosis.screening.promise import Promise, Start
@@ -19,7 +19,7 @@ from plant_emulator.diagnosis.search.confirmation import (
     Trial,
     confirm,
     fit_from_best_start,
-    lead_start,
+    lead_trial,
     reduce,
     without_effects,
 )
@@ -34,7 +34,6 @@ from tests.plant_emulator.diagnosis.line import (
     noisy,
     runner,
 )
-from tests.plant_emulator.diagnosis.search.late import Late, late_pulses
 
 WAVE = noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME))
 
@@ -71,7 +70,8 @@ def test_frequency_far_from_its_start_is_found_by_a_scan(side: float) -> None:
     measured = noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(side * 37.3 * TIME))
     model = Tone(measured, tone(frequency))
     values = {"a": 2.0, "b": 3.0, "amplitude": 4.0, "frequency": frequency.start}
-    trial = Trial(("tone",), (0,), (Start(values=values, states=({},)),))
+    starts = (Start(values=values, states=({},)),)
+    trial = Trial(("tone",), (0,), starts, starts)
     descended = fit_from_best_start(model, trial)
     found = confirm(model, trial)
     assert abs(descended.values["amplitude"]) < 1.0
@@ -112,35 +112,65 @@ def test_led_start_far_from_the_noise_is_let_go_and_not_led_again(
     y = 2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME) + 2.0 * np.cos(37.0 * TIME)
     model = Line([noisy(y)])
     start = Start(values={"a": 9.0, "b": -9.0, "wave_size": 0.0}, states=({},))
-    trial, led = lead_start(model, Trial(("wave",), (0,), (start,)))
+    trial, led = lead_trial(model, Trial(("wave",), (0,), (start,), (start,)))
     assert led.values["wave_size"] == pytest.approx(4.0, abs=0.15)
     monkeypatch.setattr(confirmation, "lead", None)
     found = confirm(model, trial)
     assert found.values["wave_size"] == pytest.approx(4.0, abs=0.15)
 
 
-def test_start_that_leaves_more_at_first_leads_to_less() -> None:
-    """The filter delays by 0.1 nearly. A delay of 0.15 stands for it where it is absent.
+class Caught(Line):
+    """y = a + wave_size sin(b x): a fit ends at the frequency that it begins near."""
 
-    That leaves less than the right delay with a fifth of the filter, and leads nowhere.
+    parameters = (linear("a", 0.0, std=10.0), linear("b", 20.0, prior=20.0, std=10.0))
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+
+        def residual(v: Mapping[str, float]) -> Array:
+            return (self.measured[run] - v["a"] - v["wave_size"] * np.sin(v["b"] * TIME))[None, :]
+
+        return residual
+
+
+def test_start_that_leaves_more_at_first_leads_to_less() -> None:
+    """By hand: a sine of 4 leaves 8. At half of its frequency it is not found.
+
+    A wave of -4 at the right frequency leaves 32 before its fit, and nothing after it.
     """
-    model = Late([noisy(late_pulses(0.05, 0.1))], 0.1)
-    room, absent = (
-        Start(values={"a": 0.0, "b": late, "lag_size": lag}, states=({},))
-        for late, lag in ((0.05, 0.02), (0.15, 0.0))
+    model = Caught([noisy(4.0 * np.sin(20.0 * TIME))], ["wave"])
+    wrong, right = (
+        Start(values={"a": 0.0, "b": at, "wave_size": size}, states=({},))
+        for at, size in ((10.0, 0.1), (20.0, -4.0))
     )
-    trial, led = lead_start(model, Trial(("lag",), (0,), (absent, room)))
-    starts = [FitValues(effects=("lag",), values=s.values, states=s.states) for s in (room, absent)]
-    assert nearest(model, starts, (0,), np.inf) is starts[1]
-    assert trial.led == led
-    assert led.values["lag_size"] == pytest.approx(0.1, abs=0.005)
-    assert led.values["b"] == pytest.approx(0.05, abs=0.005)
+    left = []
+    for starts in ((wrong,), (right,), (wrong, right)):
+        _, led = lead_trial(model, Trial(("wave",), (0,), starts, starts))
+        left.append(led.mean_square)
+    assert left == pytest.approx([9.0, 1.0, 1.0], rel=0.1)
+
+
+def test_set_begins_as_it_is_where_its_led_fit_is_let_go_to_more(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The cosine of 0.6 stays, so that no start is near the noise."""
+    y = 2.0 + 4.0 * np.sin(20.0 * TIME) + 0.6 * np.cos(37.0 * TIME)
+    model = Line([noisy(y)], ["wave", "kink"])
+    values = {"a": 2.0, "b": 0.0, "wave_size": 4.0, "kink_size": 0.1}
+    start = Start(values=values, states=({},))
+    known = fit(model, ("wave", "kink"), (0,), values, [{}])
+    led, free = (replace(known, values={**values, "a": a}) for a in (20.0, 50.0))
+    monkeypatch.setattr(confirmation, "let_go", lambda *_: free)
+    begun = []
+    monkeypatch.setattr(confirmation, "fit", lambda *args, **_: begun.append(args[3]))
+    fit_from_best_start(model, Trial(("wave", "kink"), (0,), (start,), (start,), led=led))
+    assert begun == [values]
 
 
 def test_fit_begins_at_a_led_start_that_is_near_the_noise(monkeypatch: pytest.MonkeyPatch) -> None:
     model = Line([noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME))])
     start = Start(values={"a": 9.0, "b": -9.0, "wave_size": 0.0}, states=({},))
-    trial, led = lead_start(model, Trial(("wave",), (0,), (start,)))
+    trial, led = lead_trial(model, Trial(("wave",), (0,), (start,), (start,)))
     begun = []
     monkeypatch.setattr(confirmation, "fit", lambda *args, **_: begun.append(args[3]) or led)
     confirm(model, trial)
@@ -186,10 +216,10 @@ def test_set_without_an_effect_starts_where_the_slopes_tell_it_to_be(
     prior = np.diag([0.1, 0.1, 0.0])  # a and b have standard deviations of 10
     rows = np.concatenate([columns, prior])
     expected, *_ = np.linalg.lstsq(rows, np.concatenate([y, np.zeros(3)]), rcond=None)
-    told, kept = asked[0].told
-    assert [told.values[name] for name in ("a", "b", "wave_size")] == pytest.approx(expected)
-    assert kept.values["a"] == pytest.approx(2.0, abs=0.2)
-    assert told.values["kink_size"] == kept.values["kink_size"] == 0.0
+    absent, as_it_is = asked[0].starts
+    assert [absent.values[name] for name in ("a", "b", "wave_size")] == pytest.approx(expected)
+    assert as_it_is.values["a"] == pytest.approx(2.0, abs=0.2)
+    assert absent.values["kink_size"] == as_it_is.values["kink_size"] == 0.0
     assert found.effects == ("wave",)
     assert found.values["a"] == pytest.approx(expected[0])
 
@@ -220,7 +250,7 @@ def test_fit_without_effects_starts_anew_only_where_that_leaves_less(size: float
     assert size == 4.0 or found.cost == pytest.approx(null.cost)
 
 
-def test_leader_that_gains_little_along_the_measured_outputs_is_not_fitted(
+def test_effect_that_gains_little_beside_one_that_leaves_noise_is_not_fitted(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The relations, as the first score, stand for a cube where a wave acts."""

@@ -17,32 +17,44 @@ from tests.plant_emulator.diagnosis.line import SHAPES, TIME, Line, noisy, runne
 NULL = {"a": 0.0, "b": 0.0}
 
 
+def confirmed(sets: Moves) -> list[tuple[str, ...]]:
+    """The sets that were fitted freely."""
+    return [step.effects for step in sets.trace if step.action == "confirmed"]
+
+
 @pytest.mark.parametrize(("wave", "fitted"), [(1.0, [("kink",)]), (1.6, [("kink",), ("wave",)])])
 def test_effects_that_gain_half_of_the_most_along_the_measured_outputs_are_fitted(
     wave: float, fitted: list[tuple[str, ...]]
 ) -> None:
     """By hand: 5 |t| gains 2000 5^2 / 24 = 2083, a wave of 1 2000 / 4 = 500, one of 1.6 1280.
 
-    The regressions tell nothing, so that only the led fits can choose.
+    The regressions promise hardly more of the kink, so that the led fits choose.
     """
     y = noisy(2.0 + 3.0 * TIME + 5.0 * abs(TIME) + wave * np.sin(20.0 * TIME))
     model = Line([y], ("cube", "wave", "kink"))
     null = fit_null(model, (0,))
     alike = [
-        replace(p, gains={"relations": 60.0}, starts={"relations": p.starts["simulation"]})
+        replace(
+            p,
+            gains={"relations": 61.0 if p.effect == "kink" else 60.0},
+            starts={"relations": p.starts["simulation"]},
+        )
         for p in promises(runner(model), null, None)
     ]
     sets = Moves(runner=runner(model), null=null)
-    found = sets.fit_on_top(null, alike)
-    assert [one.effects for one in found] == fitted
+    sets.fit_on_top(null, alike, 5.0)
+    assert confirmed(sets) == fitted
     led = {step.effects: step.gain for step in sets.trace if step.action == "led"}
     assert led["kink",] == pytest.approx(2083.0, rel=0.1)
     assert led["wave",] == pytest.approx(500.0 * wave**2, rel=0.1)
 
 
-@pytest.mark.parametrize(("promised", "fitted"), [(60.0, ["kink"]), (90.0, ["kink", "wave"])])
-def test_leader_of_a_regression_is_fitted_whatever_it_gains_along_the_measured_outputs(
-    promised: float, fitted: list[str]
+@pytest.mark.parametrize(
+    ("promised", "least", "fitted"),
+    [(60.0, 5.0, ["kink"]), (90.0, 5.0, ["kink", "wave"]), (90.0, 100.0, ["kink"])],
+)
+def test_effect_that_a_regression_promises_most_of_is_fitted_whatever_it_gains_when_led(
+    promised: float, least: float, fitted: list[str]
 ) -> None:
     """By hand: 5 |t| gains 2083, and a wave of 0.5 120; t^3 leaves much. The kink promises 80."""
     y = 2.0 + 3.0 * TIME + 5.0 * abs(TIME) + 10.0 * TIME**3 + 0.5 * np.sin(20.0 * TIME)
@@ -55,8 +67,9 @@ def test_leader_of_a_regression_is_fitted_whatever_it_gains_along_the_measured_o
         )
         for p in promises(runner(model), null, None)
     ]
-    found = Moves(runner=runner(model), null=null).fit_on_top(null, supposed)
-    assert [one.effects[0] for one in found] == fitted
+    sets = Moves(runner=runner(model), null=null)
+    sets.fit_on_top(null, supposed, least)
+    assert [name for (name,) in confirmed(sets)] == fitted
 
 
 @pytest.mark.parametrize(("cube", "fitted"), [(0.0, ["bowl"]), (10.0, ["bowl", "tub"])])
@@ -73,9 +86,10 @@ def test_rivals_of_an_effect_that_leaves_little_are_those_that_leave_little_too(
     model = Line([noisy(y)], ("kink", "bowl", "tub"))
     null = fit_null(model, (0,))
     sets = Moves(runner=runner(model), null=null)
-    first, *rivals = sets.fit_on_top(null, promises(runner(model), null, null))
-    assert first.effects == ("kink",)
-    assert sorted(one.effects[0] for one in rivals) == fitted
+    sets.fit_on_top(null, promises(runner(model), null, null), 5.0)
+    (first,), *rivals = confirmed(sets)
+    assert first == "kink"
+    assert sorted(name for (name,) in rivals) == fitted
 
 
 def test_all_effects_are_fitted_on_top_of_a_fit_that_leaves_noise() -> None:
@@ -83,8 +97,8 @@ def test_all_effects_are_fitted_on_top_of_a_fit_that_leaves_noise() -> None:
     null = fit_null(model, (0,))
     assert null.mean_square <= NOISE_MEAN_SQUARE
     sets = Moves(runner=runner(model), null=null)
-    found = sets.fit_on_top(null, promises(runner(model), null, None))
-    assert {one.effects for one in found} == {("wave",), ("kink",)}
+    sets.fit_on_top(null, promises(runner(model), null, None), 5.0)
+    assert set(confirmed(sets)) == {("wave",), ("kink",)}
 
 
 @pytest.mark.parametrize(("later", "kept"), [(4.0, ("kink", "wave")), (0.8, ("wave",))])
