@@ -170,8 +170,8 @@ class SearchStep:
     """A step of the search for effects.
 
     action : what was done with the set of effects, as led (along the measured speeds), confirmed,
-        converged, led again, reduced (from a refuted set), fitted anew, refuted by
-        the runs or by other forms of a law, or noise estimated there
+        converged, reduced (from a refuted set), fitted anew, refuted by the runs or by other forms
+        of a law, gains by few samples, or noise estimated there
     promised : gain that the linear regressions promised for the last effect, by regression
     gain : of log evidence over the fit without effects; of a led fit over the set without its last
         effect, led as well

@@ -52,9 +52,9 @@ class Settings:
     # Gain over the largest one that a rival needs: promised, along the measured outputs, or
     # reached. So much of what an effect needs must be predicted before it is fitted.
     rival_share: float = 0.5
-    # Iterations of a first fit: of a rival, enough to tell a basin from a slope, and of a leader,
-    # enough to come along the valley of the flux, which every voltage limit makes. Fits that may
-    # win go on.
+    # Iterations of a first fit: of a rival, enough to tell a basin from a slope, and of a leader
+    # or along the measured outputs, enough to come along the valley of the flux, which every
+    # voltage limit makes. Fits that may win go on.
     iterations: int = 5
     leader_iterations: int = 25
     # Cost above the best one's up to which a fit may still win [chi squared]. Where the best one

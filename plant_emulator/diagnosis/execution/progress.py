@@ -26,8 +26,7 @@ LABELS = {
     "start_states": "what each effect promises",
     "screen": "what each effect promises",
     "confirm": "first fits of effects",
-    "lead_start": "fits along the measured speeds",
-    "lead_others": "fits along the measured speeds",
+    "lead_trial": "fits along the measured speeds",
     "start_along": "fits along the measured speeds",
     "refit_along": "fits along the measured speeds",
     "refit": "fits to their end",
@@ -40,13 +39,12 @@ LABELS = {
     "locate_gap": "where the gap lies",
     "signature_norms": "what held-out runs need",
     "predict": "held-out runs",
-    "enter": "fits of drafted laws",
     "discriminability": "what to drive next",
     "fit_alternative": "what to drive next",
     "information_gain": "what to drive next",
     "visibility": "what to drive next",
 }
-# All other steps are fits from alternative starts.
+# Most other steps are fits from other starts.
 OTHER_LABEL = "fits from other starts"
 
 

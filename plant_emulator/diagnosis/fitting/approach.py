@@ -57,11 +57,6 @@ def nearest(
     return starts[int(np.argmin(squares))] if min(squares) <= far else None
 
 
-def approach(model: Model, start: FitValues, runs: Sequence[int]) -> FitValues:
-    """Values and states near the data, from which a fit of these effects may begin."""
-    return let_go(model, lead(model, start, runs), runs)
-
-
 def let_go(
     model: Model, led: FitValues, runs: Sequence[int], iterations: int = APPROACH_ITERATIONS
 ) -> FitValues:

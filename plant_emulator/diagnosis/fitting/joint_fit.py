@@ -138,14 +138,10 @@ def _significant(candidate: Candidate, found: FitResult) -> bool:
 
 
 def fit_from(
-    model: Model,
-    effects: Sequence[str],
-    runs: Sequence[int],
-    start: FitResult,
-    iterations: int | None = None,
+    model: Model, effects: Sequence[str], runs: Sequence[int], start: FitResult
 ) -> FitResult:
     """Fit these effects from the values and states of another fit."""
-    return fit(model, effects, runs, start.values, start.states, iterations, lengths=start.lengths)
+    return fit(model, effects, runs, start.values, start.states, lengths=start.lengths)
 
 
 def linearise(

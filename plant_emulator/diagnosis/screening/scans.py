@@ -1,4 +1,4 @@
-"""Scans of unknowns with many basins: the pause of a converter, a frequency, an angle.
+"""Scans of unknowns with many basins: the pause of a converter, a frequency and its angle.
 
 Regressions tell little of such an unknown, because contact jumps with it, or a wave is out of
 phase. A scan with a robust loss finds its basin (`estimation.robust_scan`).
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from plant_emulator.diagnosis.fitting.task import Task
     from plant_emulator.diagnosis.machine import Candidate, Model
     from plant_emulator.diagnosis.screening.promise import Start
-    from plant_emulator.estimation.unknowns import Residual, Unknown
+    from plant_emulator.estimation.unknowns import Unknown
     from plant_emulator.signals.log import Array
 
 
@@ -64,16 +64,9 @@ def scan_sizes(model: Model, effects: Sequence[str], runs: Sequence[int], start:
         return np.concatenate([one(sizes).ravel() for one in of_runs])
 
     present = {u.name: start.values[u.name] for u in narrow}
-    found = _best(residual, present, [_within(candidate, u) for u in narrow])
-    return replace(start, values={**start.values, **found})
-
-
-def _best(
-    residual: Residual, present: Mapping[str, float], unknowns: Sequence[Unknown]
-) -> dict[str, float]:
-    """The best of the present values and those of a scan."""
-    scanned = scan_unknowns(residual, present, unknowns)
-    return min((dict(present), scanned), key=lambda own: cauchy_loss(residual(own)))
+    scanned = scan_unknowns(residual, present, [_within(candidate, u) for u in narrow])
+    best = min((present, scanned), key=lambda sizes: cauchy_loss(residual(sizes)))
+    return replace(start, values={**start.values, **best})
 
 
 def _within(candidate: Candidate, size: Unknown) -> Unknown:

@@ -1,10 +1,14 @@
 """The progress bar's remaining time, with a virtual clock."""
 
+import ast
+from importlib.resources import files
+from pathlib import Path
+
 from rich.progress import Progress
 
 from plant_emulator.cli._progress import reporter
 from plant_emulator.diagnosis.execution.pool import InProcess
-from plant_emulator.diagnosis.execution.progress import ReportingPool
+from plant_emulator.diagnosis.execution.progress import LABELS, ReportingPool
 
 
 class Clock:
@@ -55,3 +59,15 @@ def test_every_step_of_a_pool_is_reported_from_its_begin() -> None:
         ("fits to their end", 0.5),
         ("fits to their end", 1),
     ]
+
+
+def test_each_label_is_that_of_a_step() -> None:
+    folder = files("plant_emulator.diagnosis")
+    sources = [path.read_text() for path in Path(str(folder)).rglob("*.py")]
+    names = {
+        node.name
+        for source in sources
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.FunctionDef)
+    }
+    assert set(LABELS) <= names

@@ -10,8 +10,8 @@ from plant_emulator.diagnosis.fit_result import FitResult, FitValues
 from plant_emulator.diagnosis.fitting import approach as approaching
 from plant_emulator.diagnosis.fitting.approach import (
     CORRECTION_INTERVALS,
-    approach,
     fit_null,
+    lead,
     let_go,
     nearest,
 )
@@ -46,7 +46,7 @@ def nominal_start(model: BenchModel) -> FitValues:
 
 
 def test_fit_along_the_measured_speeds_leads_to_the_noise(model: BenchModel) -> None:
-    near = approach(model, nominal_start(model), RUNS)
+    near = let_go(model, lead(model, nominal_start(model), RUNS), RUNS)
     found = fit(model, (), RUNS, near.values, near.states)
     assert found.mean_square == pytest.approx(1.0, abs=0.03)
     # tests/data/README.md: what the bench was made with
@@ -57,7 +57,7 @@ def test_fit_along_the_measured_speeds_leads_to_the_noise(model: BenchModel) -> 
 
 
 def test_start_near_the_noise_is_kept(model: BenchModel) -> None:
-    near = approach(model, nominal_start(model), RUNS)
+    near = let_go(model, lead(model, nominal_start(model), RUNS), RUNS)
     reached = fit(model, (), RUNS, near.values, near.states)
     assert nearest(model, [nominal_start(model), reached], RUNS) is reached
     assert nearest(model, [nominal_start(model)], RUNS) is None
@@ -68,7 +68,7 @@ def test_values_that_leave_noise_are_let_go_at_once(
     model: BenchModel, monkeypatch: pytest.MonkeyPatch, off: float, led: int
 ) -> None:
     """The right values need no further fit along the measured speeds, and another friction does."""
-    near = approach(model, nominal_start(model), RUNS)
+    near = let_go(model, lead(model, nominal_start(model), RUNS), RUNS)
     right = fit(model, (), RUNS, near.values, near.states)
     friction = {"gear_coulomb_friction": off * right.values["gear_coulomb_friction"]}
     start = replace(right, values={**right.values, **friction})
