@@ -49,10 +49,15 @@ class Regression:
         return _backward(self.lower, self.seen)
 
     def products(self, columns: Array) -> Products:
-        """Compute what the data say of columns, shape (n, k)."""
+        """Compute what the data say of columns, shape (n, k).
+
+        C' M C is |C - F a|^2 + |a|^2, with the coefficients a that follow C. As the difference of
+        two squares it came out negative for a steep slope that the nuisance follows.
+        """
         seen = _forward(self.lower, self.nuisance.T @ columns)
-        gram = columns.T @ columns - seen.T @ seen
-        return Products(columns.T @ self.left, gram, seen)
+        follow = _backward(self.lower, seen)
+        left = columns - self.nuisance @ follow
+        return Products(columns.T @ self.left, left.T @ left + follow.T @ follow, seen)
 
     def theta(self, products: Products, beta: Array) -> Array:
         """Nuisance coefficients beside columns at these coefficients, shape (k,)."""

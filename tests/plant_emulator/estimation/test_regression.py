@@ -44,3 +44,14 @@ def test_coefficients_are_the_joint_posterior_mean(
     joint = np.linalg.solve(np.eye(6) + both.T @ both, both.T @ y)
     assert beta == pytest.approx(joint[4:])
     assert data.theta(products, beta) == pytest.approx(joint[:4])
+
+
+def test_steep_column_that_the_nuisance_follows_gains_nothing() -> None:
+    """By hand: k f beside f of the squares s is followed but for the prior: k^2 s / (1 + s)."""
+    random = np.random.default_rng(2)
+    nuisance = 1e8 * random.standard_normal((60, 1))
+    data = Regression.of(random.standard_normal(60), nuisance)
+    products = data.products(1e6 * nuisance)
+    assert products.gram[0, 0] == pytest.approx(1e12, rel=1e-6)
+    value, _ = gain(products.gram, products.along)
+    assert value == pytest.approx(-np.log(1e6), abs=1.0)
