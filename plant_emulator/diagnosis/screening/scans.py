@@ -1,4 +1,4 @@
-"""Scans of unknowns with many basins: the pause of a converter, a frequency and its angle.
+"""Scans of unknowns with many basins: the pause of a converter, a frequency, an angle.
 
 Regressions tell little of such an unknown, because contact jumps with it, or a wave is out of
 phase. A scan with a robust loss finds its basin (`estimation.robust_scan`).
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from plant_emulator.diagnosis.fitting.signature import values_at_size
+from plant_emulator.diagnosis.screening.promise import Start
 from plant_emulator.diagnosis.settings import SETTINGS
 from plant_emulator.estimation.nearby import Beside
 from plant_emulator.estimation.robust_scan import cauchy_loss, scan_unknowns
@@ -19,10 +20,10 @@ from plant_emulator.estimation.robust_scan import cauchy_loss, scan_unknowns
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from plant_emulator.diagnosis.fit_result import FitResult
     from plant_emulator.diagnosis.fitting.task import Task
     from plant_emulator.diagnosis.machine import Candidate, Model
-    from plant_emulator.diagnosis.screening.promise import Start
-    from plant_emulator.estimation.unknowns import Unknown
+    from plant_emulator.estimation.unknowns import Residual, Unknown
     from plant_emulator.signals.log import Array
 
 
@@ -46,6 +47,16 @@ def _start_states(model: Model, candidate: Candidate, task: Task) -> dict[str, f
     return scan_unknowns(Beside(residual, values), plain, candidate.states)
 
 
+def scan_states(model: Model, found: FitResult, runs: Sequence[int]) -> Start:
+    """A fit with those states of its last effect scanned that have many basins, or are angles."""
+    own = model.candidates[found.effects[-1]].states
+    states = tuple(
+        _best(Beside(model.residual(k, found.effects), found.values), at, own)
+        for k, at in zip(runs, found.states, strict=True)
+    )
+    return Start(values=found.values, states=states)
+
+
 def scan_sizes(model: Model, effects: Sequence[str], runs: Sequence[int], start: Start) -> Start:
     """A start with those sizes of the last effect scanned that have many narrow basins.
 
@@ -64,9 +75,16 @@ def scan_sizes(model: Model, effects: Sequence[str], runs: Sequence[int], start:
         return np.concatenate([one(sizes).ravel() for one in of_runs])
 
     present = {u.name: start.values[u.name] for u in narrow}
-    scanned = scan_unknowns(residual, present, [_within(candidate, u) for u in narrow])
-    best = min((present, scanned), key=lambda sizes: cauchy_loss(residual(sizes)))
-    return replace(start, values={**start.values, **best})
+    found = _best(residual, present, [_within(candidate, u) for u in narrow])
+    return replace(start, values={**start.values, **found})
+
+
+def _best(
+    residual: Residual, present: Mapping[str, float], unknowns: Sequence[Unknown]
+) -> dict[str, float]:
+    """The best of the present values and those of a scan."""
+    scanned = scan_unknowns(residual, present, unknowns)
+    return min((dict(present), scanned), key=lambda own: cauchy_loss(residual(own)))
 
 
 def _within(candidate: Candidate, size: Unknown) -> Unknown:

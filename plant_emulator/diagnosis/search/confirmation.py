@@ -16,7 +16,7 @@ from plant_emulator.diagnosis.fitting.approach import (
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE
 from plant_emulator.diagnosis.fitting.joint_fit import fit, linearise
 from plant_emulator.diagnosis.screening.promise import Start, starts_of
-from plant_emulator.diagnosis.screening.scans import scan_sizes
+from plant_emulator.diagnosis.screening.scans import scan_sizes, scan_states
 from plant_emulator.diagnosis.settings import SETTINGS
 from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE
 
@@ -74,11 +74,22 @@ def confirm(model: Model, trial: Trial) -> FitResult:
     """Fit a hypothesis from its best start (a step).
 
     Where it is not led yet, sizes of the last effect with many narrow basins are scanned at its
-    starts.
+    starts. Such states, and the angle of each run, are scanned once more where the fit leaves more
+    than noise: until then the effect was missing.
     """
     if trial.led is None:
         trial = _with_scanned_sizes(model, trial)
-    return fit_from_best_start(model, trial)
+    found = fit_from_best_start(model, trial)
+    own = model.candidates[trial.effects[-1]].states
+    scanned = any(u.step is not None or u.angle for u in own)
+    if found.mean_square <= NOISE_MEAN_SQUARE or not scanned:
+        return found
+    start = scan_states(model, found, trial.runs)
+    if start.states == found.states:
+        return found
+    there = (start,)
+    again = replace(trial, starts=there, led_from=there, lengths=found.lengths, led=None)
+    return min(found, fit_from_best_start(model, again), key=lambda one: one.cost)
 
 
 def fit_from_best_start(model: Model, trial: Trial) -> FitResult:

@@ -38,11 +38,15 @@ from tests.plant_emulator.diagnosis.line import (
 WAVE = noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME))
 
 
-def tone(frequency: Unknown) -> Candidate:
-    """A wave of unknown amplitude and frequency, with basins of 3."""
+def tone(frequency: Unknown, *, narrow: str) -> Candidate:
+    """A wave of unknown amplitude; its frequency, in basins of 3, is a size or a state."""
     amplitude = replace(linear("amplitude", 1.0), lower=0.1)
-    neutral = {"amplitude": 0.0, "frequency": 0.0}
-    return replace(effect("tone"), sizes=(amplitude, frequency), neutral=neutral)
+    return replace(
+        effect("tone"),
+        sizes=(amplitude, frequency) if narrow == "size" else (amplitude,),
+        states=() if narrow == "size" else (frequency,),
+        neutral={"amplitude": 0.0, "frequency": 0.0} if narrow == "size" else {"amplitude": 0.0},
+    )
 
 
 class Tone(Line):
@@ -62,21 +66,25 @@ class Tone(Line):
         return residual
 
 
-@pytest.mark.parametrize("side", [1.0, -1.0])
-def test_frequency_far_from_its_start_is_found_by_a_scan(side: float) -> None:
+@pytest.mark.parametrize(("narrow", "side"), [("size", 1.0), ("size", -1.0), ("state", 1.0)])
+def test_frequency_far_from_its_start_is_found_by_a_scan(narrow: str, side: float) -> None:
     """A descent from 20 ends at a side lobe, an amplitude of 0.6 in place of 4."""
     lower, upper = sorted((side, 50.0 * side))
     frequency = replace(linear("frequency", 20.0 * side), lower=lower, upper=upper, step=1.0)
     measured = noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(side * 37.3 * TIME))
-    model = Tone(measured, tone(frequency))
-    values = {"a": 2.0, "b": 3.0, "amplitude": 4.0, "frequency": frequency.start}
-    starts = (Start(values=values, states=({},)),)
-    trial = Trial(("tone",), (0,), starts, starts)
+    model = Tone(measured, tone(frequency, narrow=narrow))
+    values = {"a": 2.0, "b": 3.0, "amplitude": 4.0}
+    given, state = {"frequency": frequency.start}, {}
+    if narrow == "state":
+        given, state = state, given
+    start = Start(values={**values, **given}, states=(state,))
+    trial = Trial(("tone",), (0,), (start,), (start,))
     descended = fit_from_best_start(model, trial)
     found = confirm(model, trial)
     assert abs(descended.values["amplitude"]) < 1.0
     assert found.values["amplitude"] == pytest.approx(4.0, abs=0.15)
-    assert found.values["frequency"] == pytest.approx(side * 37.3, abs=0.1)
+    at = found.values if narrow == "size" else found.states[0]
+    assert at["frequency"] == pytest.approx(side * 37.3, abs=0.1)
 
 
 class TurnedTone(Line):
@@ -193,6 +201,23 @@ def test_states_of_the_effects_stay_at_the_nominal_parameters(
     assert nominal.values["a"] == 0.0
     assert nominal.values["amplitude"] == pytest.approx(4.0, abs=0.15)
     assert nominal.states[0]["angle"] == pytest.approx(0.7, abs=0.05)
+
+
+def test_angle_that_descends_to_its_bound_is_found_by_a_scan() -> None:
+    """From -0.4 the nearest way to 2.9 leads down past -1; the other run pays for the tone."""
+    angles = (0.3, 2.9)
+    plain = 2.0 + 3.0 * TIME
+    model = TurnedTone([noisy(plain + 4.0 * np.sin(20.0 * TIME + angle)) for angle in angles])
+    start = Start(
+        values={"a": 2.0, "b": 3.0, "amplitude": 4.0},
+        states=({"angle": 0.3}, {"angle": -0.4}),
+    )
+    trial = Trial(("tone",), (0, 1), (start,), (start,))
+    assert fit_from_best_start(model, trial).values["amplitude"] < 3.0
+    found = confirm(model, trial)
+    assert found.values["amplitude"] == pytest.approx(4.0, abs=0.15)
+    turned = [own["angle"] - angle for own, angle in zip(found.states, angles, strict=True)]
+    assert np.cos(turned) == pytest.approx(1.0, abs=0.01)
 
 
 def test_set_without_an_effect_starts_where_the_slopes_tell_it_to_be(
