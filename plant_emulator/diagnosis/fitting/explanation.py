@@ -51,6 +51,7 @@ class Explanation:
     noise : of every channel as the logs show it; empty where it is as declared
     log_odds : of the final set against its best rival, in the mean square that it leaves [nats]
     regularities : of what the final fit leaves, beside the random effects
+    margins : for each accepted effect, the evidence up to which nothing tells another one from it
     """
 
     null: FitResult
@@ -65,6 +66,7 @@ class Explanation:
     trace: tuple[SearchStep, ...] = ()
     noise: Mapping[str, ChannelNoise] = field(default_factory=dict)
     regularities: Sequence[Regularity] = ()
+    margins: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def gained(self) -> float:
@@ -99,12 +101,13 @@ class Explanation:
         """Classes of effects that these logs cannot tell apart, each led by an accepted effect."""
         found = [[one.effect] for one in self.random_effects]
         for name in self._followed:
+            margin = self.margins.get(name, CLASS_MARGIN)
             costs = sorted(self.alternatives.get(name, {}).items(), key=lambda pair: pair[1])
             near = [
                 other
                 for other, cost in costs
                 if other != name
-                and evidence_of(cost - self.final.cost, self.final, self.null) < CLASS_MARGIN
+                and evidence_of(cost - self.final.cost, self.final, self.null) < margin
             ]
             found.append([name, *near])
         return found

@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.evidence import excess
+from plant_emulator.diagnosis.fitting.evidence import CLASS_MARGIN, excess
 from plant_emulator.diagnosis.fitting.fit_steps import refit, refit_along
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.diagnosis.search.confirmation import (
@@ -156,6 +156,16 @@ class FittedSets:
         explained = 0.5 * (self.null.cost - found.cost) if approximate else 0.0
         least = self.least_gain(others) * max(1.0, found.mean_square)
         return max(least, SETTINGS.law_error_along * explained)
+
+    def margin(self, found: FitResult, name: str) -> float:
+        """Evidence up to which nothing tells another effect in the place of one of a set from it.
+
+        Beside an approximate law the law's error may tell them apart the wrong way.
+        """
+        library = self.runner.model.candidates
+        approximate = any(not library[e].exact_form for e in found.effects if e != name)
+        explained = self.null.cost - found.cost if approximate else 0.0
+        return max(CLASS_MARGIN, SETTINGS.law_error_along * explained)
 
     def value(self, found: FitResult) -> float:
         """Negative log evidence of a set, with the gain that each of its effects needs."""

@@ -268,15 +268,16 @@ class Search(Moves):
             for p in self.promises.get(key, [])
             if not self.refuted(key | {p.effect})
         }
+        margins = {name: self.margin(final, name) for name in final.effects}
+        values = {names: self.value(one) for names, one in sets.items()}
         return Explanation(
             null=self.null,
             final=final,
             hypotheses=summary.hypotheses(sets, shown),
             alternatives={name: summary.alternatives(sets, final, name) for name in final.effects},
             unconverged=summary.unconverged(final),
-            log_odds=summary.log_odds(
-                sets, {names: self.value(one) for names, one in sets.items()}, final, larger
-            ),
+            log_odds=summary.log_odds(sets, values, final, larger, margins),
+            margins=margins,
             reduced_costs=self.reduced_costs,
             trace=tuple(self.trace),
             noise=self.noise.channels if self.noise else {},

@@ -5,10 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.answer import SearchStep
-from plant_emulator.diagnosis.fitting.evidence import (
-    CLASS_MARGIN,
-    evidence_of,
-)
+from plant_emulator.diagnosis.fitting.evidence import evidence_of
 from plant_emulator.diagnosis.fitting.explanation import Hypothesis
 from plant_emulator.diagnosis.settings import SETTINGS
 
@@ -56,6 +53,7 @@ def log_odds(
     values: Mapping[frozenset[str], float],
     final: FitResult,
     larger: Mapping[str, float],
+    margins: Mapping[str, float],
 ) -> float:
     """Log odds of a set against its best rival [nats], in the mean square that the set leaves.
 
@@ -65,12 +63,14 @@ def log_odds(
     values : negative log evidence of each set
     larger : by how much it rises with one more effect, as the simulation's slopes predict, which
         are right beside a set that leaves noise; of an effect that was screened beside it
+    margins : evidence up to which nothing tells another effect from one of the set
     """
     key, null = frozenset(final.effects), sets[frozenset()]
     rivals = [price for name, price in larger.items() if key | {name} not in sets]
     for names, one in sets.items():
-        alike = len(names) == len(key) == len(names & key) + 1 and (
-            evidence_of(one.cost - final.cost, final, null) < CLASS_MARGIN
+        evidence = evidence_of(one.cost - final.cost, final, null)
+        alike = len(names) == len(key) == len(names & key) + 1 and all(
+            evidence < margins[name] for name in key - names
         )
         if names != key and not alike:
             rivals.append(values[names] - values[key])

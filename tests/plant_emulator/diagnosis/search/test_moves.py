@@ -211,6 +211,20 @@ def test_further_effect_must_gain_more_than_the_error_of_the_first_ones_law() ->
     assert sets.needed(large, 1) == pytest.approx(40.0, rel=1e-3)
 
 
+def test_error_of_a_law_may_tell_two_effects_beside_it_apart_the_wrong_way() -> None:
+    """By hand: 3e-5 of a fall of the cost of 2e8 are 6000."""
+    null = fit_null(Line([noisy(2.0 + 3.0 * TIME)]), (0,))
+    sets = Moves(runner=runner(Line([noisy(TIME)])), null=null)
+    large = replace(null, effects=("kink", "wave"), cost=null.cost - 2e8)
+    assert sets.margin(large, "wave") == pytest.approx(6000.0)
+    assert sets.margin(replace(large, effects=("wave",)), "wave") == 10.0
+    assert sets.margin(replace(large, cost=null.cost - 2e3), "wave") == 10.0
+    exact = replace(sets.runner.model.candidates["kink"], exact_form=True)
+    sets.runner.model.candidates["kink"] = exact
+    assert sets.margin(large, "wave") == 10.0
+    assert sets.margin(large, "kink") == pytest.approx(6000.0)
+
+
 def test_set_that_comes_near_the_data_is_screened_anew() -> None:
     """By hand: a cosine of 2 leaves squares of 2 beside the noise of 1, far from the data."""
     y = 2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME)

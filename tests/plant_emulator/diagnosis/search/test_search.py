@@ -118,6 +118,8 @@ def test_rival_of_a_second_effect_is_fitted_where_little_of_the_gap_is_left() ->
     found = Search(declared=there, runner=there, null=null, beside_random=True).explain()
     assert found.final.mean_square > NOISE_MEAN_SQUARE
     assert sorted(map(sorted, found.classes())) == [["kink", "near kink"], ["wave"]]
+    sharp = replace(found, margins=dict.fromkeys(found.final.effects, 0.0))
+    assert [len(names) for names in sharp.classes()] == [1, 1]
 
 
 @pytest.mark.parametrize(("left", "largest"), [(0.0, 3), (2.0, 2)])
