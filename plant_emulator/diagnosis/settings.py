@@ -29,10 +29,11 @@ class Settings:
     # Gain that one more effect needs: needless ones that no run refutes came to 35, or to 38 beside
     # other forms of the laws; true ones to 45 and 136.
     needed_again: float = 40.0
-    # Share of what a set explains that one more effect must gain beside an approximate law: its
-    # error follows any other effect by chance, and grows with what the law explains. Needless
-    # effects gained 3e-6 and 9e-6 of it (12 and 2 of seed 118). Of the 39 pairs of detectable
-    # causes in the blind trials 113 to 118 one is nearer (2.5e-7), the next one has 4.2e-5.
+    # Share of what a set explains that one more effect must gain beside an approximate law, or by
+    # which two effects beside it must differ: its error follows any other effect by chance, and
+    # grows with what the law explains. Needless effects gained 3e-6 and 9e-6 of it (12 and 2 of
+    # seed 118). Of the 39 pairs of detectable causes in the blind trials 113 to 118 one is nearer
+    # (2.5e-7), the next one has 4.2e-5.
     law_error_along: float = 3e-5
     # Most effects of a set: nobody has told more than three causes apart in one set of logs.
     most_effects: int = 3

@@ -40,7 +40,7 @@ class Promise:
 
 
 def starts_of(promise: Promise, base: FitResult) -> tuple[tuple[Start, ...], tuple[Start, ...]]:
-    """Starts of an effect on top of a fit, and those of them that are led; the best ones first.
+    """Starts of an effect near the data on top of a fit, and those that are led; the best first.
 
     All estimates of regressions are led. Near the data an estimate may miss contact, because it
     moves all unknowns at once: the best one is also a start with the parameters and states of the

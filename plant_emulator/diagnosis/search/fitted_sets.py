@@ -148,24 +148,28 @@ class FittedSets:
     def needed(self, found: FitResult, others: int) -> float:
         """Least gain of log evidence that an effect needs beside so many others.
 
-        found : fit of the set; a gain counts in the mean square that it leaves. An approximate law
-            of the others is off by a share of what the set explains
+        found : fit of the set; a gain counts in the mean square that it leaves
         """
-        library = self.runner.model.candidates
-        approximate = any(not library[name].exact_form for name in found.effects[:others])
-        explained = 0.5 * (self.null.cost - found.cost) if approximate else 0.0
         least = self.least_gain(others) * max(1.0, found.mean_square)
-        return max(least, SETTINGS.law_error_along * explained)
+        return max(least, self._gain_of_law_error(found, found.effects[:others]))
 
     def margin(self, found: FitResult, name: str) -> float:
         """Evidence up to which nothing tells another effect in the place of one of a set from it.
 
         Beside an approximate law the law's error may tell them apart the wrong way.
         """
+        others = [other for other in found.effects if other != name]
+        return max(CLASS_MARGIN, 2.0 * self._gain_of_law_error(found, others))
+
+    def _gain_of_law_error(self, found: FitResult, others: Sequence[str]) -> float:
+        """Gain of log evidence that the error of these others' laws may give to any effect.
+
+        An approximate law is off by a share of what the set explains.
+        """
         library = self.runner.model.candidates
-        approximate = any(not library[e].exact_form for e in found.effects if e != name)
-        explained = self.null.cost - found.cost if approximate else 0.0
-        return max(CLASS_MARGIN, SETTINGS.law_error_along * explained)
+        if all(library[name].exact_form for name in others):
+            return 0.0
+        return SETTINGS.law_error_along * 0.5 * (self.null.cost - found.cost)
 
     def value(self, found: FitResult) -> float:
         """Negative log evidence of a set, with the gain that each of its effects needs."""
