@@ -14,6 +14,7 @@ from plant_emulator.diagnosis.fitting.evidence import (
     adequate,
     significant,
 )
+from plant_emulator.diagnosis.fitting.joint_fit import AT_BOUND
 from plant_emulator.diagnosis.search.summary import search_step, unconverged
 from plant_emulator.estimation.noise.channel_noise import MOST_PREDICTABLE
 
@@ -199,11 +200,17 @@ def _reason_against(explained: Explanation) -> str:
 
 
 def _improbable(model: Model, final: FitResult) -> str:
-    """Why an effect stands for something that is the same in all runs; empty where none does.
+    """Why a fit is that of no machine, or of another cause; empty where it may be the machine's.
 
-    A state that scales with the size, as a temperature at the start, lies far off its prior in
-    every run then: a motor that is as hot whenever a run begins has another resistance.
+    A parameter at the bound of what a machine may have bends for a cause that the fit lacks. A
+    state that scales with the size, as a temperature at the start, lies far off its prior in
+    every run where its effect stands for something that is the same in all runs: a motor that is
+    as hot whenever a run begins has another resistance.
     """
+    for u in model.parameters:
+        moved = final.values[u.name] - u.prior
+        if abs(moved) >= AT_BOUND * abs((u.upper if moved > 0.0 else u.lower) - u.prior):
+            return f"the fit has an improbable {u.name}, at the bound of what a machine may have"
     for name in final.effects:
         for u in model.candidates[name].states:
             reach = IMPROBABLE_DEVIATIONS * (u.std or inf)

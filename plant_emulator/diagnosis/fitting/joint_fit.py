@@ -37,8 +37,8 @@ COST_TOLERANCE = 1e-5
 COARSE_COST_TOLERANCE = 1e-4
 # A size differs from neutral for certain from so many of its standard errors on.
 SIGNIFICANT_ERRORS = 3.0
-# Share of the largest size allowed from which on an effect stands for something else. An effect
-# that stood for another law of a first effect came to 0.99 and more.
+# Share of the largest size or change allowed from which on an effect or a parameter stands for
+# something else. An effect that stood for another law of a first effect came to 0.99 and more.
 AT_BOUND = 0.95
 # Standard deviation of the shrinkage prior of a size [plausible sizes].
 SHRINKAGE = 2.0

@@ -154,3 +154,15 @@ def test_effect_with_an_improbable_state_in_every_run_is_not_named(
     decision = decide(model, replace(found, final=replace(found.final, states=states)))
     assert decision.kind == kind
     assert ("warm_state" in decision.reason) == (kind == "unknown")
+
+
+@pytest.mark.parametrize(
+    ("a", "kind"), [(47.0, "effect"), (-47.0, "effect"), (48.0, "unknown"), (-50.0, "unknown")]
+)
+def test_effect_that_needs_a_parameter_at_its_bound_is_not_named(a: float, kind: str) -> None:
+    """The bounds are 50 from the prior; 47.5 is where they begin."""
+    found = explained(Line([noisy(LINE + 5.0 * np.abs(TIME))], ["kink"]))
+    final = replace(found.final, values={**found.final.values, "a": a})
+    decision = decide(Line([LINE], ["kink"]), replace(found, final=final))
+    assert decision.kind == kind
+    assert (" a," in decision.reason) == (kind == "unknown")
