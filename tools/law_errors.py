@@ -58,7 +58,7 @@ def sizes(seed: int, only: tuple[str, ...], number: int) -> list[dict[str, Any]]
     with threadpool_limits(1):
         model, runs = build_model(recipe), tuple(range(len(case.programs)))
         runner = TaskRunner(pool=InProcess(), recipe=recipe, model=model, runs=runs)
-        found, _, _ = Procedure(runner=runner).with_input_noise().with_disturbances().run()
+        found, _, _ = Procedure.begin(runner).with_input_noise().with_disturbances().run()
     if not found.named:
         return []
     (hypothesis,) = found.hypotheses

@@ -18,7 +18,7 @@ from plant_emulator.diagnosis.decision import subsystem
 from plant_emulator.diagnosis.decision.procedure import Procedure
 from plant_emulator.diagnosis.decision.verdict import without_uncertain
 from plant_emulator.diagnosis.design.next_experiment import Advice
-from plant_emulator.diagnosis.execution.pool import TaskRunner, build_model
+from plant_emulator.diagnosis.execution.pool import InProcess, TaskRunner, build_model
 from plant_emulator.diagnosis.execution.progress import ReportingPool
 from plant_emulator.diagnosis.fitting.evidence import (
     LARGER_SHARE,
@@ -174,12 +174,13 @@ class Diagnose:
         notes: Sequence[str] = (),
         progress: Progress | None = None,
     ) -> None:
+        def reporting(pool: Pool) -> Pool:
+            return pool if progress is None else ReportingPool(pool, progress)
+
         self.runner = TaskRunner(
-            pool=pool if progress is None else ReportingPool(pool, progress),
-            recipe=recipe,
-            model=build_model(recipe),
-            runs=plan.fitted,
+            pool=reporting(pool), recipe=recipe, model=build_model(recipe), runs=plan.fitted
         )
+        self.here = replace(self.runner, pool=reporting(InProcess()))
         self.model, self.plan = self.runner.model, plan
         self.settings, self.notes = settings, tuple(notes)
         self.cases = None if cases is None else tuple(cases)
@@ -187,7 +188,7 @@ class Diagnose:
 
     def diagnose(self) -> Findings:
         """Test the hypotheses, predict the held-out runs, locate the gap; give the findings."""
-        # Nobody waits for it: processes load their code while one of them makes the first fit.
+        # Nobody waits for it: the processes load their code while this one makes the first fit.
         self.runner.map(simulate_once, self.plan.fitted)
         tests = self._test()
         # Asked for first, so that it is looked for beside the predictions.
@@ -210,7 +211,8 @@ class Diagnose:
         )
 
     def _test(self) -> _Tests:
-        procedure = Procedure(runner=self.runner).with_input_noise().with_disturbances()
+        procedure = replace(Procedure.begin(self.here), runner=self.runner)
+        procedure = procedure.with_input_noise().with_disturbances()
         explained, decision, runner = procedure.run()
         explained, decision = without_uncertain(
             self.model, explained, decision, self.model_form_errors

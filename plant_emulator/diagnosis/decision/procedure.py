@@ -66,23 +66,29 @@ class _Tested:
 class Procedure:
     """One diagnosis up to its decision.
 
-    null : fit without effects; None where it has not been made yet
+    null : fit without effects; led : along the measured outputs, where one was made
     disturbances : lines of the mains, and the outliers, which are left out; None: there are none
     """
 
     runner: TaskRunner
-    null: FitResult | None = None
+    null: FitResult
+    led: FitResult | None = None
     disturbances: LoggedNoise | None = None
+
+    @classmethod
+    def begin(cls, runner: TaskRunner) -> Procedure:
+        """The procedure with the fit without effects."""
+        ((null, led),) = runner.map(start, [runner.runs])
+        return cls(runner=runner, null=null, led=led)
 
     def with_input_noise(self) -> Procedure:
         """Give the procedure with the noise of measured inputs as part of the noise."""
-        runner, null = whiten_inputs(self.runner)
+        runner, null = whiten_inputs(self.runner, self.null)
         return replace(self, runner=runner, null=null)
 
     def with_disturbances(self) -> Procedure:
-        """Give the procedure with the fit without effects and the disturbances that it leaves."""
-        runs = self.runner.runs
-        (null,) = [self.null] if self.null else self.runner.map(start, [runs])
+        """Give the procedure with the disturbances that the fit without effects leaves."""
+        runs, null = self.runner.runs, self.null
         ((lines, found),) = self.runner.map(find_disturbances, [Task(base=null, runs=runs)])
         if lines is not None:
             (null,) = _whitened(self.runner, lines).map(refit, [Task(base=null, runs=runs)])
@@ -90,8 +96,7 @@ class Procedure:
 
     def run(self) -> tuple[Explanation, Decision, TaskRunner]:
         """Test the hypotheses and decide; give also the runner in whose noise the costs count."""
-        model, runs = self.runner.model, self.runner.runs
-        (null,) = [self.null] if self.null else self.runner.map(start, [runs])
+        model, null = self.runner.model, self.null
         found = self._test_random_gap(null)
         if not (found and found.random) or decide(model, found.explained).kind == "unknown":
             plain = self._test_effects(null, found.instead if found else ())
@@ -123,6 +128,7 @@ class Procedure:
             declared=self.runner,
             runner=runner,
             null=min(nulls, key=lambda one: one.cost),
+            led_null=self.led,
             sets={frozenset(one.effects): one for one in fits},
             noise=self.disturbances,
         )
@@ -179,6 +185,7 @@ class Procedure:
             declared=runner,
             runner=runner,
             null=sets[frozenset()],
+            led_null=self.led,
             sets=sets,
             beside_random=True,
             noise=noise,

@@ -27,7 +27,6 @@ LABELS = {
     "screen": "what each effect promises",
     "confirm": "first fits of effects",
     "lead_trial": "fits along the measured speeds",
-    "start_along": "fits along the measured speeds",
     "refit_along": "fits along the measured speeds",
     "refit": "fits to their end",
     "run_agreement": "whether the runs agree",

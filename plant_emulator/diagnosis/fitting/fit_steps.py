@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plant_emulator.diagnosis.fitting.approach import fit_null, lead, own_start
+from plant_emulator.diagnosis.fitting.approach import approach_null, lead
 from plant_emulator.diagnosis.fitting.joint_fit import fit_from
 
 if TYPE_CHECKING:
@@ -19,9 +19,12 @@ def simulate_once(model: Model, run: int) -> None:
     model.residual(run, ())({**model.nominal((run,)), **states})
 
 
-def start(model: Model, runs: tuple[int, ...]) -> FitResult:
-    """The fit without effects (a step)."""
-    return fit_null(model, runs)
+def start(model: Model, runs: tuple[int, ...]) -> tuple[FitResult, FitResult | None]:
+    """The fit without effects, and the best led fit on the way to it (a step).
+
+    See `approach.approach_null`.
+    """
+    return approach_null(model, runs)
 
 
 def refit(model: Model, task: Task) -> FitResult:
@@ -35,11 +38,3 @@ def refit_along(model: Model, task: Task) -> FitResult:
     See `approach.lead`.
     """
     return lead(model, task.base, task.runs)
-
-
-def start_along(model: Model, runs: tuple[int, ...]) -> FitResult:
-    """The fit without effects, led along the measured outputs from the model's own start (a step).
-
-    See `approach.lead`.
-    """
-    return lead(model, own_start(model, runs), runs)

@@ -12,7 +12,7 @@ import hashlib
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, cast
 
-from plant_emulator.diagnosis.fitting.fit_steps import refit, start
+from plant_emulator.diagnosis.fitting.fit_steps import refit
 from plant_emulator.diagnosis.fitting.task import Task
 from plant_emulator.estimation.residuals import whiten_function
 
@@ -26,15 +26,14 @@ if TYPE_CHECKING:
     from plant_emulator.recordings.input_noise import NoiseDirections
 
 
-def whiten_inputs(runner: TaskRunner) -> tuple[TaskRunner, FitResult | None]:
+def whiten_inputs(runner: TaskRunner, null: FitResult) -> tuple[TaskRunner, FitResult]:
     """Give a runner whose model is whitened for input noise, and the fit without effects there.
 
-    The runner stays as it is where no input of the fitted runs is uncertain, or where the noise of
-    the inputs does not count. The fit is None where none was needed to know that.
+    Both stay as they are where no input of the fitted runs is uncertain, or where the noise of the
+    inputs does not count.
     """
     if not any(runner.model.runs[run].uncertain_inputs for run in runner.runs):
-        return runner, None
-    (null,) = runner.map(start, [runner.runs])
+        return runner, null
     (found,) = runner.map(find_input_noise, [Task(base=null, runs=runner.runs)])
     if not found:
         return runner, null

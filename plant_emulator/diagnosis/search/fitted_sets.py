@@ -42,6 +42,7 @@ class FittedSets:
     """The fitted sets of effects; see the module's text.
 
     runner : in whose noise the costs count; null : fit without effects
+    led_null : fit without effects along the measured outputs, to begin at; None: null leads there
     beside_random : whether a random effect is part of that noise
     sets : the best fit of each set, at first of those that are known
     agreed : whether the runs and other forms of the laws agree on it, where they were asked
@@ -53,6 +54,7 @@ class FittedSets:
 
     runner: TaskRunner
     null: FitResult
+    led_null: FitResult | None = None
     beside_random: bool = False
     sets: dict[frozenset[str], FitResult] = field(default_factory=dict)
     agreed: dict[frozenset[str], bool] = field(default_factory=dict)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from plant_emulator.diagnosis.fitting import evidence
 from plant_emulator.diagnosis.fitting.evidence import NOISE_MEAN_SQUARE, excess
-from plant_emulator.diagnosis.fitting.fit_steps import refit_along, start_along
+from plant_emulator.diagnosis.fitting.fit_steps import refit_along
 from plant_emulator.diagnosis.search.confirmation import (
     confirm,
     lead_trial,
@@ -34,18 +34,13 @@ class Moves(FittedSets):
     """The fitted sets of effects, and what leads from one set to another."""
 
     def led(self, base: FitResult) -> FitResult:
-        """The fit of a set along the measured outputs, begun at its free fit.
-
-        Far from the data the free fit without effects has bent the parameters, some up to their
-        bounds, and the model's own start may lead to less. Either may end in a local minimum.
+        """The fit of a set along the measured outputs, begun at its free fit or, without effects,
+        at the best led fit that is known.
         """
         key = frozenset(base.effects)
         if key not in self.led_fits:
-            leads = [self.runner.map(refit_along, [self.task(base)])]
-            if not key and self.is_far(base):
-                leads.append(self.runner.map(start_along, [self.runner.runs]))
-            found = [one for some in leads for one in some]
-            self.led_fits[key] = min(found, key=lambda one: one.cost)
+            start = base if key or self.led_null is None else self.led_null
+            (self.led_fits[key],) = self.runner.map(refit_along, [self.task(start)])
         return self.led_fits[key]
 
     def leaves_most(self, found: FitResult, base: FitResult) -> bool:

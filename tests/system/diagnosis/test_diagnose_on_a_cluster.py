@@ -79,7 +79,7 @@ def test_steps_of_a_diagnosis_find_on_a_cluster_what_one_process_finds(scheduler
         found = list(cluster.map(start, recipe, fitted))
     finally:
         cluster.close()
-    assert all(fit.converged for fit in found)
+    assert all(fit.converged for fit, _ in found)
     assert found[0] != found[1]
     assert found == alone
 

@@ -10,6 +10,7 @@ from plant_emulator.diagnosis.fit_result import FitResult, FitValues
 from plant_emulator.diagnosis.fitting import approach as approaching
 from plant_emulator.diagnosis.fitting.approach import (
     CORRECTION_INTERVALS,
+    approach_null,
     fit_null,
     lead,
     let_go,
@@ -129,6 +130,9 @@ def test_far_fit_is_let_go_again_only_where_it_is_led_nearer(
     monkeypatch.setattr(approaching, "let_go", noting)
     model = Misled([noisy(2.0 + 3.0 * TIME + 4.0 * np.sin(20.0 * TIME))])
     model.led_to = led_to
-    assert fit_null(model, (0,)).mean_square == pytest.approx(9.0, rel=0.1)
+    found, led = approach_null(model, (0,))
+    assert found.mean_square == pytest.approx(9.0, rel=0.1)
     assert len(far) == let_go
     assert far[0] == pytest.approx(1.0 + led_to[0] ** 2 / 2.0, rel=0.1)
+    assert led is not None
+    assert led.mean_square == pytest.approx(1.0 + min(led_to) ** 2 / 2.0, rel=0.03)

@@ -38,7 +38,7 @@ def test_fits_do_not_follow_the_noise_of_a_fed_input() -> None:
     """By hand: without the fed samples a and b are those of the line, within their errors."""
     y = noisy(2.0 + 3.0 * TIME) + FED
     model = Fed([y])
-    whitened, _ = whiten_inputs(runner(model))
+    whitened, _ = whiten_inputs(runner(model), fit_null(model, (0,)))
     there, plain = fit_null(whitened.recipe.build(), [0]), fit_null(model, [0])
     for name, value in (("a", 2.0), ("b", 3.0)):
         assert abs(there.values[name] - value) < 3.0 * there.standard_errors[name]
@@ -47,7 +47,7 @@ def test_fits_do_not_follow_the_noise_of_a_fed_input() -> None:
 
 def test_procedure_with_input_noise_finds_no_gap_in_their_noise() -> None:
     model = Fed([noisy(2.0 + 3.0 * TIME) + FED])
-    procedure = Procedure(runner=runner(model))
+    procedure = Procedure.begin(runner(model))
     assert procedure.run()[1].kind == "unknown"
     assert procedure.with_input_noise().run()[1].kind == "parameter"
 
@@ -66,7 +66,7 @@ def test_fit_starts_from_the_fit_that_told_the_noise() -> None:
             return super().start_values(runs)
 
     model = Once([noisy(2.0 + 3.0 * TIME) + FED])
-    procedure = Procedure(runner=runner(model))
+    procedure = Procedure.begin(runner(model))
     explained, _, _ = procedure.with_input_noise().run()
     for name, value in (("a", 2.0), ("b", 3.0)):
         assert abs(explained.null.values[name] - value) < 3.0 * explained.null.standard_errors[name]
@@ -74,8 +74,8 @@ def test_fit_starts_from_the_fit_that_told_the_noise() -> None:
 
 def test_machine_that_is_fed_nothing_keeps_its_recipe() -> None:
     model = Line([noisy(2.0 + 3.0 * TIME)])
-    plain = runner(model)
-    assert whiten_inputs(plain) == (plain, None)
+    plain, null = runner(model), fit_null(model, (0,))
+    assert whiten_inputs(plain, null) == (plain, null)
 
 
 def test_quieted_model_is_another_recipe() -> None:

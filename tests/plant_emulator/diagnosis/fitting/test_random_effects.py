@@ -166,7 +166,7 @@ def test_unrest_of_a_shape_that_is_not_the_usual_one() -> None:
 def test_effect_beside_an_unrest_is_named_with_it() -> None:
     y = noisy(2.0 + 3.0 * TIME + 0.5 * np.sin(20.0 * TIME)) + shaken(0.8)
     model = Shaken([y])
-    procedure = Procedure(runner=runner(model))
+    procedure = Procedure.begin(runner(model))
     explained, verdict, weighted = procedure.run()
     assert (verdict.kind, verdict.effects) == ("effect", ("shake", "wave"))
     assert explained.classes() == [["shake"], ["wave"]]
@@ -189,7 +189,7 @@ def test_no_other_effect_is_sought_where_all_is_chance() -> None:
             return super().map(function, recipe, tasks)
 
     model = Shaken([noisy(2.0 + 3.0 * TIME) + shaken(0.8)])
-    procedure = Procedure(runner=runner(model, Watched()))
+    procedure = Procedure.begin(runner(model, Watched()))
     assert procedure.run()[1].effects == ("shake",)
     assert looked
     assert all(isinstance(recipe, WeightedRecipe) for recipe in looked)
@@ -205,13 +205,13 @@ def test_an_unrest_shows_beside_a_coloured_noise() -> None:
     assert not fit_random_effect(
         model, Task(base=fit_null(model, [0]), runs=(0,), effect="shake")
     ).consistent
-    assert Procedure(runner=runner(model)).run()[1].effects == ("shake",)
+    assert Procedure.begin(runner(model)).run()[1].effects == ("shake",)
 
 
 def test_wave_beside_a_great_unrest_is_an_effect_too() -> None:
     """By hand: the half that does not shake tells n/2 0.5^2 / 2 = 125 of the wave [chi squared]."""
     y = noisy(2.0 + 3.0 * TIME + 0.5 * np.sin(20.0 * TIME)) + shaken(8.0)
-    found, decision, _ = Procedure(runner=runner(Shaken([y]))).run()
+    found, decision, _ = Procedure.begin(runner(Shaken([y]))).run()
     assert decision.effects == ("shake", "wave")
     assert found.final.values["wave_size"] == pytest.approx(0.5, abs=0.15)
 
@@ -243,7 +243,7 @@ def test_no_effect_that_differs_from_run_to_run_is_named_beside_a_random_one() -
         noisy(2.0 + 3.0 * TIME + wave * np.sin(20.0 * TIME), seed) + shaken(3.0, seed)
         for seed, wave in ((11, 0.6), (12, 0.1), (13, 0.1))
     ]
-    explained, decision, _ = Procedure(runner=runner(Shaken(runs))).run()
+    explained, decision, _ = Procedure.begin(runner(Shaken(runs))).run()
     assert explained.null.mean_square <= NOISE_MEAN_SQUARE
     assert decision.effects == ("shake",)
     assert any(s.action.startswith("refuted by the runs") for s in explained.trace)
@@ -259,15 +259,15 @@ def test_wave_of_the_turns_beside_an_unrest_is_no_part_of_it() -> None:
 
     still = [noisy(2.0 + 3.0 * TIME, seed) + shaken(0.12, seed) for seed in (11, 12, 13)]
     waved = [y + 0.5 * np.sin(2.0 * np.pi * 7.0 * turns) for y in still]
-    assert Procedure(runner=runner(Turning(still))).run()[1].effects == ("shake",)
-    decision = Procedure(runner=runner(Turning(waved))).run()[1]
+    assert Procedure.begin(runner(Turning(still))).run()[1].effects == ("shake",)
+    decision = Procedure.begin(runner(Turning(waved))).run()[1]
     assert (decision.kind, decision.effects) == ("unknown", ())
     assert "repeats 7 times a turn" in decision.reason
 
 
 def test_unrest_alone_is_an_effect() -> None:
     model = Shaken([noisy(2.0 + 3.0 * TIME) + shaken(0.8)])
-    procedure = Procedure(runner=runner(model))
+    procedure = Procedure.begin(runner(model))
     assert procedure.run()[1].effects == ("shake",)
 
 
@@ -275,7 +275,7 @@ def test_spikes_of_a_transmission_are_no_unrest() -> None:
     """A few values are far off where the slope is steep; without the mark that is unrest."""
     y = noisy(2.0 + 3.0 * TIME)
     spikes = np.where(np.arange(len(TIME)) % 28 == 0, shaken(8.0), 0.0)
-    procedure = Procedure(runner=runner(Shaken([y + spikes])))
+    procedure = Procedure.begin(runner(Shaken([y + spikes])))
     assert procedure.run()[1].effects == ("shake",)
     assert procedure.with_disturbances().run()[1].kind != "effect"
 
@@ -286,7 +286,7 @@ def test_spikes_that_an_unrest_hides_stand_out_beside_it() -> None:
     y = noisy(2.0 + 3.0 * TIME) + shaken(8.0, slope=slope)
     y[[60, 83, 109, 131, 158, 184]] += 160.0
     model = Shaken([y], slope=slope)
-    explained, decision, _ = Procedure(runner=runner(model)).with_disturbances().run()
+    explained, decision, _ = Procedure.begin(runner(model)).with_disturbances().run()
     assert decision.effects == ("shake",)
     assert explained.random_effects[0].size == pytest.approx(8.0, rel=0.05)
     assert explained.noise["y"].outliers == pytest.approx(6 / len(TIME), rel=0.2)
