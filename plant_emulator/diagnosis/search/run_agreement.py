@@ -5,9 +5,11 @@ what differs from run to run. At a fit, the Jacobian's column of a size s is spl
 part of the logs: least squares then tell a size of its own for each part, beside all other
 unknowns. The sizes s_k, with covariance C, agree where chance leaves their chi squared,
 
-    (s_k - m)' V^-1 (s_k - m),   V = C + (e s)^2 I
+    (s_k - m)' V^-1 (s_k - m),   V = C + (e d)^2 I
 
-m is their weighted mean, e the relative error of a law in one of them. It is the test of
+m is their weighted mean, e the relative error of a law in one of them, and d the size whose column
+alone is as long as what all sizes of the effect change: any one of them may have to follow what the
+law lacks. For an effect of one size that is the size itself. It is the test of
 homogeneity of effect sizes (W. Cochran, Biometrics 10 (1954) 101). Each run is a part. A run that
 alone shows the effect has nothing to agree with: it is two parts. So is each run of an effect with
 an angle of its own in each run: the amplitude of a wave is positive in all of them, whatever its
@@ -47,6 +49,7 @@ def run_agreement(model: Model, asked: Reduction) -> float:
     candidate = model.candidates[asked.effect]
     near = linearise(model, asked.base, asked.runs)
     names = [u.name for u in near.unknowns]
+    sizes = [(names.index(u.name), u.scaled(candidate.neutral[u.name])) for u in candidate.sizes]
     halved = range(len(asked.runs)) if any(u.angle for u in candidate.states) else ()
     probability = 1.0
     for unknown in (u for u in candidate.sizes if u.step is None):
@@ -56,12 +59,25 @@ def run_agreement(model: Model, asked: Reduction) -> float:
         if not halved and _showing(split, widest) < 2:
             alone = int(np.argmin(np.diag(split.covariance)))
             split = _split(near, index, widest, (alone,))
-        law = SETTINGS.run_error * (float(near.z[index]) - neutral)
+        law = SETTINGS.run_error * _whole(near, index, sizes)
         spread = _spread(
             split.change, split.inflation * split.covariance + law**2 * np.eye(len(split.change))
         )
         probability = min(probability, float(chdtrc(max(1, _showing(split, widest) - 1), spread)))
     return probability
+
+
+def _whole(near: Estimate, index: int, sizes: Sequence[tuple[int, float]]) -> float:
+    """The size whose column alone is as long as what all sizes of the effect change.
+
+    index : of the size among the unknowns; sizes : of the effect, index and neutral value of each
+    """
+    away = np.zeros(len(near.z))
+    for i, neutral in sizes:
+        away[i] = near.z[i] - neutral
+    change = [float(np.sum((j @ away) ** 2)) for j in near.jacobians]
+    column = [float(np.sum(j[..., index] ** 2)) for j in near.jacobians]
+    return float(np.sqrt(sum(change) / (sum(column) or np.inf)))
 
 
 def _showing(split: Relaxed, widest: float) -> int:

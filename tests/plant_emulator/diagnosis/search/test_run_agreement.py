@@ -51,6 +51,36 @@ def test_two_sizes_by_hand(difference: float) -> None:
     assert spread == pytest.approx(difference**2 / (2.0 * variance), rel=0.2)
 
 
+class Twofold(Line):
+    """A wave and a cosine of another rate are two sizes of one effect."""
+
+    def residual(self, run: int, effects: Sequence[str]) -> Callable[[Mapping[str, float]], Array]:
+        """See `Model`."""
+        plain, cosine = super().residual(run, effects), np.cos(37.0 * TIME)
+        return lambda v: plain(v) - v["cosine_size"] * cosine
+
+
+@pytest.mark.parametrize("size", [0.1, 5.0])
+def test_one_size_may_follow_what_the_law_of_all_sizes_lacks(size: float) -> None:
+    """By hand: each run tells its cosine with the variance 1 / sum(cos^2). The law's error is three
+    tenths of what both change, and both are equally long.
+    """
+    cosines = (0.2, 2.2)
+    measured = [noisy(size * WAVE + c * np.cos(37.0 * TIME), k) for k, c in enumerate(cosines)]
+    model = Twofold(measured, ("wave",))
+    own = model.candidates["wave"]
+    model.candidates["wave"] = replace(
+        own,
+        sizes=(*own.sizes, linear("cosine_size")),
+        neutral={**own.neutral, "cosine_size": 0.0},
+        units={**own.units, "cosine_size": "1"},
+    )
+    found = fit(model, ("wave",), (0, 1), {"a": 0.0, "b": 0.0}, [{}, {}])
+    spread = chi2.isf(run_agreement(model, Reduction(found, (0, 1), "wave")), 1)
+    variance = 1e-3 + 0.3**2 * (size**2 + 1.2**2)
+    assert spread == pytest.approx(2.0**2 / (2.0 * variance), rel=0.1)
+
+
 def test_runs_that_do_not_show_an_effect_say_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """The effect does nothing in two of three runs."""
     model = Line([4.0 * WAVE, 0.0 * WAVE, 0.0 * WAVE], ("wave",))
