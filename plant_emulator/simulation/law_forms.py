@@ -6,8 +6,9 @@ speed or with the load, so that the library's law holds with another size at eac
     size(t) = neutral + (size - neutral) (1 + sum of c_k P_k(u(t)))
 
 P_k are Legendre polynomials over 0 to 1 with a mean square of 1; u is the measured speed of the
-motor, or the measured shaft torque, over its largest value in the run. The coefficients c_k are
-relative errors of the law, and unknowns like any other.
+motor, the measured shaft torque or the measured armature current, over its largest value in the
+run. The torque is the load of the gear and of what turns behind it, the current that of the motor
+and of the drive. The coefficients c_k are relative errors of the law, and unknowns like any other.
 """
 
 from __future__ import annotations
@@ -22,9 +23,10 @@ if TYPE_CHECKING:
 
     from plant_emulator.signals.log import Array, Log
 
-# Measured channels that a law may depend on otherwise, and the degrees of the polynomials: one of
-# speed has at most two turning points.
-CHANNELS, DEGREES = ("motor_speed", "shaft_torque"), (1, 2, 3)
+# Measured channels that a law may depend on otherwise, and the degrees of the polynomials: one has
+# at most two turning points.
+CHANNELS = ("motor_speed", "shaft_torque", "armature_current")
+DEGREES = (1, 2, 3)
 # Quantile of a channel's sizes that counts as the largest: spikes are larger.
 LARGEST = 0.99
 # What stands between the name of a size and that of a form.

@@ -49,7 +49,7 @@ def test_polynomials_by_hand() -> None:
 
 def test_forms_are_told_from_the_values_of_the_model() -> None:
     forms = dict.fromkeys(form_names("friction_size"), 0.0)
-    assert len(forms) == 6
+    assert len(forms) == 9
     assert split_law_forms({"drum_inertia": 300.0, **forms}) == ({"drum_inertia": 300.0}, forms)
 
 
