@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 from plant_emulator.diagnosis.execution.pool import build_model
 from plant_emulator.diagnosis.fitting.evidence import (
     EVIDENCE_THRESHOLD,
-    LARGER_SHARE,
     NOISE_MEAN_SQUARE,
     adequate,
     evidence_of,
@@ -64,7 +63,7 @@ class Search(Moves):
 
         The noise is estimated around the fit without effects where that is near the noise and no
         other set is known, or else around the best set of one effect, and then around the best set
-        if it explains half of the gap. Where that shows another noise, the queue starts again.
+        if it explains a third of the gap. Where that shows another noise, the queue starts again.
         Beside known sets the single effects are tried as well.
         """
         known = any(self.sets) and not self.beside_random
@@ -129,10 +128,9 @@ class Search(Moves):
     def _is_last(self, found: FitResult) -> bool:
         """Whether no effect is worth adding: the cause is foreign, or what is left is random.
 
-        An effect that leaves most of what the others leave is no base for another one, unless a
-        regression promises half of that. Near the noise it always tells the other one of two.
-        The noise of a random effect is that of few courses of its law. Beside it and another one, a
-        gain within the noise may be that of the errors of both laws.
+        An effect that leaves most of what the others leave is no base for another one. Near the
+        noise it always is. The noise of a random effect is that of few courses of its law. Beside
+        it and another one, a gain within the noise may be that of the errors of both laws.
         """
         if not found.effects:
             return False
@@ -143,15 +141,8 @@ class Search(Moves):
         if len(found.effects) == 1:
             foreign = foreign and self.is_far(found)
         if found.mean_square > NOISE_MEAN_SQUARE:
-            foreign = foreign and not self._promises_half(found)
             return foreign or (leaves_random(found) and not self.beside_random)
         return all(p.gain <= self._promising(found) for p in self._screen(found))
-
-    def _promises_half(self, found: FitResult) -> bool:
-        """Whether a regression promises half of what a fit leaves of one more effect."""
-        there = self.led(found) if self.is_far(found) else found
-        half = 0.5 * LARGER_SHARE * excess(there)
-        return any(p.gain >= half for p in self._screen(found))
 
     def _smaller(self, found: FitResult) -> FitResult:
         """The best fit of a set without one of its effects; without effects where none is known."""
@@ -231,7 +222,7 @@ class Search(Moves):
         closes = (
             found.mean_square <= NOISE_MEAN_SQUARE
             or leaves_little(found, excess(found) + fall)
-            or (approximate and hundredth and not leaves_most(found, least))
+            or (approximate and hundredth and 2.0 * excess(found) <= excess(least))
         )
         needed = closes and evidence_of(fall, found, self.null) >= EVIDENCE_THRESHOLD
         # The other effects have been asked as further ones.

@@ -157,11 +157,13 @@ class Caught(Line):
         return Line(self.measured, list(self.candidates))
 
 
-@pytest.mark.parametrize(("other", "most"), [(1.0, False), (5.0, True)])
+@pytest.mark.parametrize(("other", "most"), [(1.0, False), (5.0, False), (7.0, True)])
 def test_first_effect_leaves_little_where_that_is_so_along_the_measured_outputs(
     other: float, most: bool
 ) -> None:
-    """The fit stays at its start, a wave of 4; freely it shows a fifth of it."""
+    """The fit stays at its start, a wave of 4; freely it shows a fifth of it. By hand: the wave has
+    the mean square 8, and the others 0.5, 12.5 and 24.5. It explains 94, 39 or 25 % of both.
+    """
     model = Caught([noisy(4.0 * np.sin(20.0 * TIME) + other * np.cos(37.0 * TIME))])
     null = fit_null(model, (0,))
     stuck = replace(

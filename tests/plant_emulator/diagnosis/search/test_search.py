@@ -437,14 +437,15 @@ def test_faint_second_effect_beside_an_exact_one_is_named() -> None:
     assert found.final.mean_square <= NOISE_MEAN_SQUARE
 
 
-@pytest.mark.parametrize("amplitude", [0.95, 3.0])
-def test_second_cause_is_asked_for_where_the_first_leaves_most(
-    monkeypatch: pytest.MonkeyPatch, amplitude: float
+@pytest.mark.parametrize(("amplitude", "names"), [(0.95, {"kink", "waved kink"}), (3.0, set())])
+def test_second_cause_is_asked_for_where_the_first_leaves_most_near_the_noise_only(
+    monkeypatch: pytest.MonkeyPatch, amplitude: float, names: set[str]
 ) -> None:
     """By hand: of a wave the kinks close 6 % alone, and all together. It leaves 1.45 or 5.5."""
     monkeypatch.setitem(SHAPES, "waved kink", lambda x: np.abs(x) + 0.1 * np.sin(20.0 * x))
     model = Line([noisy(amplitude * np.sin(20.0 * TIME))], ("kink", "waved kink"))
-    assert set(explained(model).final.effects) == {"kink", "waved kink"}
+    found = explained(model)
+    assert (set(found.final.effects) if adequate(found.final, found.null) else set()) == names
 
 
 def beside_a_line(squares: Mapping[str, float]) -> Array:
