@@ -21,7 +21,7 @@ from plant_emulator.diagnosis.design.next_experiment import Advice
 from plant_emulator.diagnosis.execution.pool import InProcess, TaskRunner, build_model
 from plant_emulator.diagnosis.execution.progress import ReportingPool
 from plant_emulator.diagnosis.fitting.evidence import (
-    LARGER_SHARE,
+    LARGEST_SHARE,
     NOISE_MEAN_SQUARE,
     UNEXPLAINED_SHARE,
 )
@@ -69,7 +69,7 @@ THRESHOLDS = {
     "share of what a set explains that one more effect must gain": f"{SETTINGS.law_error_along:g}",
     "share of the gap that named effects may leave": f"{UNEXPLAINED_SHARE:g}",
     "share of the gap that an effect explains, beside which another one is sought": (
-        f"{LARGER_SHARE:g}"
+        f"{LARGEST_SHARE:.2g}"
     ),
     "mean square over the noise up to which a fit leaves noise": f"{NOISE_MEAN_SQUARE:g}",
 }
@@ -180,7 +180,8 @@ class Diagnose:
         self.runner = TaskRunner(
             pool=reporting(pool), recipe=recipe, model=build_model(recipe), runs=plan.fitted
         )
-        self.here = replace(self.runner, pool=reporting(InProcess()))
+        # It makes the first fit while the processes of the pool load their code.
+        self._here = replace(self.runner, pool=reporting(InProcess()))
         self.model, self.plan = self.runner.model, plan
         self.settings, self.notes = settings, tuple(notes)
         self.cases = None if cases is None else tuple(cases)
@@ -188,7 +189,7 @@ class Diagnose:
 
     def diagnose(self) -> Findings:
         """Test the hypotheses, predict the held-out runs, locate the gap; give the findings."""
-        # Nobody waits for it: the processes load their code while this one makes the first fit.
+        # Nobody waits for it.
         self.runner.map(simulate_once, self.plan.fitted)
         tests = self._test()
         # Asked for first, so that it is looked for beside the predictions.
@@ -211,7 +212,7 @@ class Diagnose:
         )
 
     def _test(self) -> _Tests:
-        procedure = replace(Procedure.begin(self.here), runner=self.runner)
+        procedure = replace(Procedure.begin(self._here), runner=self.runner)
         procedure = procedure.with_input_noise().with_disturbances()
         explained, decision, runner = procedure.run()
         explained, decision = without_uncertain(

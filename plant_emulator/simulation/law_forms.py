@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from plant_emulator.signals.log import Array, Log
 
-# Measured channels that a law may depend on otherwise, and the degrees of the polynomials: one has
-# at most two turning points.
+# Measured channels that a law may depend on otherwise, and the degrees of the polynomials: a
+# polynomial has at most two turning points.
 CHANNELS = ("motor_speed", "shaft_torque", "armature_current")
 DEGREES = (1, 2, 3)
 # Quantile of a channel's sizes that counts as the largest: spikes are larger.
@@ -47,12 +47,14 @@ def split_law_forms(values: Mapping[str, float]) -> tuple[dict[str, float], dict
 def size_factors(forms: Mapping[str, float], log: Log) -> dict[str, Array]:
     """Factor on the distance of each size from neutral at the samples of a log, shape (n,).
 
-    A value that is not finite counts as 0.
+    A value that is not finite counts as 0. A log without the channel tells nothing of its forms.
     """
     factors: dict[str, Array] = {}
     for name, coefficient in forms.items():
         size, _, form = name.partition(_MARK)
         channel, _, degree = form.partition(" ")
+        if channel not in log:
+            continue
         factor = factors.setdefault(size, np.ones_like(log.time))
         factor += coefficient * _polynomial(np.abs(np.nan_to_num(log[channel])), int(degree))
     return factors

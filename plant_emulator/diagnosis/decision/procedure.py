@@ -66,7 +66,8 @@ class _Tested:
 class Procedure:
     """One diagnosis up to its decision.
 
-    null : fit without effects; led : along the measured outputs, where one was made
+    null : fit without effects
+    led : the best fit along the measured outputs on the way to it; None: none was needed
     disturbances : lines of the mains, and the outliers, which are left out; None: there are none
     """
 

@@ -200,17 +200,20 @@ def _reason_against(explained: Explanation) -> str:
 
 
 def _improbable(model: Model, final: FitResult) -> str:
-    """Why a fit is that of no machine, or of another cause; empty where it may be the machine's.
+    """Why effects stand for another cause; empty where they may be the cause.
 
-    A parameter at the bound of what a machine may have bends for a cause that the fit lacks. A
+    A parameter for certain at the bound of what a machine may have bends for what they lack. A
     state that scales with the size, as a temperature at the start, lies far off its prior in
     every run where its effect stands for something that is the same in all runs: a motor that is
     as hot whenever a run begins has another resistance.
     """
-    for u in model.parameters:
-        moved = final.values[u.name] - u.prior
-        if abs(moved) >= AT_BOUND * abs((u.upper if moved > 0.0 else u.lower) - u.prior):
-            return f"the fit has an improbable {u.name}, at the bound of what a machine may have"
+    certain = {one.name for one in deviations(model, final) if one.significant}
+    for u in model.parameters if final.effects else ():
+        moved = u.scaled(final.values[u.name]) - u.scaled(u.prior)
+        reach = u.scaled(u.upper if moved > 0.0 else u.lower) - u.scaled(u.prior)
+        if u.name in certain and abs(moved) >= AT_BOUND * abs(reach):
+            names = " and ".join(final.effects)
+            return f"{names} would do, but only with an improbable {u.name}, at its bound"
     for name in final.effects:
         for u in model.candidates[name].states:
             reach = IMPROBABLE_DEVIATIONS * (u.std or inf)

@@ -118,7 +118,7 @@ def approach_null(model: Model, runs: Sequence[int]) -> tuple[FitResult, FitResu
     before lacks a cause. Far from the data a free fit has bent the parameters, some up to their
     bounds, so that the model's own start may lead to less than the fit does.
 
-    The led fit is None where none was needed.
+    The led fit is None where the fit ends near the data: it leads there itself.
     """
     values, states = model.start_values(runs)
     start = FitValues(effects=(), values=values, states=tuple(states))
@@ -128,7 +128,7 @@ def approach_null(model: Model, runs: Sequence[int]) -> tuple[FitResult, FitResu
     first = lead(model, start, runs)
     found = _fit_without_effects(model, let_go(model, first, runs), runs)
     if found.mean_square <= SUSPECT_MEAN_SQUARE:
-        return found, first
+        return found, None
     leads = [first, lead(model, found, runs)]
     if leads[1].mean_square <= max(SUSPECT_MEAN_SQUARE, NEARER_SHARE * first.mean_square):
         again = _fit_without_effects(model, let_go(model, leads[1], runs), runs)

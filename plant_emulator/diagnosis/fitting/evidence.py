@@ -25,9 +25,10 @@ DETECTABLE_NORM = 7.0
 # of the turns may hold of what is explained. Laws other than the library's left up to 0.06 since
 # effects have shapes (0.17 before). Without the true effect the best one left 0.14 and more.
 UNEXPLAINED_SHARE = 0.1
-# Share of the gap that the largest one of three causes explains at least, unless they counteract. A
-# fit that explains less is no reason to fit anew, and no base for another cause.
-LARGER_SHARE = 1.0 / 3.0
+# Share of the gap that the largest one of three causes explains at least, unless they counteract:
+# a set has up to three. A fit that explains less is no reason to fit anew, and no base for another
+# cause.
+LARGEST_SHARE = 1.0 / 3.0
 # Mean square up to which a fit leaves nothing but noise: its variance is uncertain by 2 % (one
 # standard deviation), and the noise of real logs is no exact model of theirs.
 NOISE_MEAN_SQUARE = 1.05
@@ -72,7 +73,7 @@ def leaves_little(found: FitResult, gap: float) -> bool:
 
 def leaves_most(found: FitResult, null: FitResult) -> bool:
     """Whether a fit leaves more of the gap than the largest one of three causes leaves."""
-    return excess(found) > (1.0 - LARGER_SHARE) * excess(null)
+    return excess(found) > (1.0 - LARGEST_SHARE) * excess(null)
 
 
 def adequate(found: FitResult, null: FitResult) -> bool:

@@ -38,7 +38,8 @@ COARSE_COST_TOLERANCE = 1e-4
 # A size differs from neutral for certain from so many of its standard errors on.
 SIGNIFICANT_ERRORS = 3.0
 # Share of the largest size or change allowed from which on an effect or a parameter stands for
-# something else. An effect that stood for another law of a first effect came to 0.99 and more.
+# something else. An effect that stood for another law of a first effect came to 0.99 and more, and
+# so did a flux constant beside an effect that stood for a reaction of the armature.
 AT_BOUND = 0.95
 # Standard deviation of the shrinkage prior of a size [plausible sizes].
 SHRINKAGE = 2.0

@@ -42,7 +42,8 @@ class FittedSets:
     """The fitted sets of effects; see the module's text.
 
     runner : in whose noise the costs count; null : fit without effects
-    led_null : fit without effects along the measured outputs, to begin at; None: null leads there
+    led_null : fit without effects along the measured outputs, to begin at: its cost may be that in
+        another noise. None: null leads there
     beside_random : whether a random effect is part of that noise
     sets : the best fit of each set, at first of those that are known
     agreed : whether the runs and other forms of the laws agree on it, where they were asked
@@ -98,7 +99,8 @@ class FittedSets:
         self.promises.pop(frozenset(), None)
         (led,) = self.runner.map(refit_along, [self.task(null)])
         known = self.led_fits.get(frozenset(), led)
-        self.led_fits[frozenset()] = min(led, known, key=lambda one: one.cost)
+        best = min(led, known, key=lambda one: one.cost)
+        self.led_fits[frozenset()] = self.led_null = best
 
     def keep(self, found: FitResult) -> None:
         """Keep a fit if it is the best one of its set."""

@@ -34,8 +34,9 @@ class Moves(FittedSets):
     """The fitted sets of effects, and what leads from one set to another."""
 
     def led(self, base: FitResult) -> FitResult:
-        """The fit of a set along the measured outputs, begun at its free fit or, without effects,
-        at the best led fit that is known.
+        """The fit of a set along the measured outputs.
+
+        It begins at the free fit or, without effects, at the best led fit that is known.
         """
         key = frozenset(base.effects)
         if key not in self.led_fits:

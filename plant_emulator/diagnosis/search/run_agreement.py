@@ -9,12 +9,14 @@ unknowns. The sizes s_k, with covariance C, agree where chance leaves their chi 
 
 m is their weighted mean, e the relative error of a law in one of them, and d the size whose column
 alone is as long as what all sizes of the effect change: any one of them may have to follow what the
-law lacks. For an effect of one size that is the size itself. It is the test of
-homogeneity of effect sizes (W. Cochran, Biometrics 10 (1954) 101). Each run is a part. A run that
-alone shows the effect has nothing to agree with: it is two parts. So is each run of an effect with
-an angle of its own in each run: the amplitude of a wave is positive in all of them, whatever its
-angle follows. An error that is the same in all parts, as in logs of one program, is not found. A
-size with many narrow basins is not asked: its slope tells nothing of another basin.
+law lacks, and one that changes little refutes nothing. For an effect of one size that is the size
+itself. It is the test of homogeneity of effect sizes (W. Cochran, Biometrics 10 (1954) 101).
+
+Each run is a part. A run that alone shows the effect has nothing to agree with: it is two parts. So
+is each run of an effect with an angle of its own in each run: the amplitude of a wave is positive
+in all of them, whatever its angle follows. An error that is the same in all parts, as in logs of
+one program, is not found. A size with many narrow basins is not asked: its slope tells nothing of
+another basin.
 """
 
 from __future__ import annotations
@@ -68,9 +70,10 @@ def run_agreement(model: Model, asked: Reduction) -> float:
 
 
 def _whole(near: Estimate, index: int, sizes: Sequence[tuple[int, float]]) -> float:
-    """The size whose column alone is as long as what all sizes of the effect change.
+    """The size whose column alone is as long as what all sizes of the effect change [scaled size].
 
     index : of the size among the unknowns; sizes : of the effect, index and neutral value of each
+    0 where no sample shows the size: it has nothing to differ by
     """
     away = np.zeros(len(near.z))
     for i, neutral in sizes:

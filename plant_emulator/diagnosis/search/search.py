@@ -128,9 +128,10 @@ class Search(Moves):
     def _is_last(self, found: FitResult) -> bool:
         """Whether no effect is worth adding: the cause is foreign, or what is left is random.
 
-        An effect that leaves most of what the others leave is no base for another one. Near the
-        noise it always is. The noise of a random effect is that of few courses of its law. Beside
-        it and another one, a gain within the noise may be that of the errors of both laws.
+        An effect that leaves most of what the others leave is no base for another one. A first
+        effect near the data always is. The noise of a random effect is that of few courses of its
+        law. Beside it and another one, a gain within the noise may be that of the errors of both
+        laws.
         """
         if not found.effects:
             return False
@@ -218,11 +219,12 @@ class Search(Moves):
         fall = least.cost - found.cost
         library = self.runner.model.candidates
         approximate = any(not library[e].exact_form for e in least.effects)
+        half = 2.0 * excess(found) <= excess(least)
         hundredth = excess(found) <= SETTINGS.law_error**2 * excess(self.null)
         closes = (
             found.mean_square <= NOISE_MEAN_SQUARE
             or leaves_little(found, excess(found) + fall)
-            or (approximate and hundredth and 2.0 * excess(found) <= excess(least))
+            or (approximate and hundredth and half)
         )
         needed = closes and evidence_of(fall, found, self.null) >= EVIDENCE_THRESHOLD
         # The other effects have been asked as further ones.

@@ -47,6 +47,20 @@ def test_polynomials_by_hand() -> None:
     )
 
 
+@pytest.mark.parametrize("channel", ["motor_speed", "shaft_torque", "armature_current"])
+def test_each_channel_has_forms_of_its_own(channel: str, bench_log: Callable[[str], Log]) -> None:
+    """By hand: where a channel is at its largest, sqrt(3) (2 u - 1) is sqrt(3)."""
+    log, name = bench_log("bench_nominal/program1"), f"size by {channel} 1"
+    assert name in form_names("size")
+    (factor,) = size_factors({name: 0.1}, log).values()
+    largest = np.argmax(np.abs(log[channel]))
+    assert factor[largest] == pytest.approx(1.0 + 0.1 * np.sqrt(3.0))
+
+
+def test_log_without_a_current_has_no_forms_of_it() -> None:
+    assert size_factors({"size by armature_current 1": 0.1}, shown(TIME)) == {}
+
+
 def test_forms_are_told_from_the_values_of_the_model() -> None:
     forms = dict.fromkeys(form_names("friction_size"), 0.0)
     assert len(forms) == 9

@@ -14,6 +14,7 @@ from plant_emulator.diagnosis.decision.verdict import (
 )
 from plant_emulator.diagnosis.fitting.approach import fit_null
 from plant_emulator.diagnosis.fitting.explanation import Explanation
+from plant_emulator.estimation.unknowns import Unknown
 from tests.plant_emulator.diagnosis.line import TIME, Line, explained, linear, noisy
 from tests.plant_emulator.diagnosis.screening.warm import START, Warm
 
@@ -157,12 +158,49 @@ def test_effect_with_an_improbable_state_in_every_run_is_not_named(
 
 
 @pytest.mark.parametrize(
-    ("a", "kind"), [(47.0, "effect"), (-47.0, "effect"), (48.0, "unknown"), (-50.0, "unknown")]
+    ("a", "error", "kind"),
+    [
+        (47.0, 1.0, "effect"),
+        (-47.0, 1.0, "effect"),
+        (48.0, 1.0, "unknown"),
+        (-50.0, 1.0, "unknown"),
+        (50.0, 20.0, "effect"),
+    ],
 )
-def test_effect_that_needs_a_parameter_at_its_bound_is_not_named(a: float, kind: str) -> None:
-    """The bounds are 50 from the prior; 47.5 is where they begin."""
+def test_effect_that_needs_a_parameter_at_its_bound_is_not_named(
+    a: float, error: float, kind: str
+) -> None:
+    """The bounds are 50 from the prior; 47.5 is where they begin. An error of 20 tells nothing."""
     found = explained(Line([noisy(LINE + 5.0 * np.abs(TIME))], ["kink"]))
-    final = replace(found.final, values={**found.final.values, "a": a})
+    final = replace(
+        found.final,
+        values={**found.final.values, "a": a},
+        standard_errors={**found.final.standard_errors, "a": error},
+    )
     decision = decide(Line([LINE], ["kink"]), replace(found, final=final))
     assert decision.kind == kind
-    assert (" a," in decision.reason) == (kind == "unknown")
+    assert (" a, at its bound" in decision.reason) == (kind == "unknown")
+
+
+def test_parameter_at_its_bound_is_judged_by_what_the_fit_leaves_without_effects() -> None:
+    found = explained(Line([noisy(LINE)], ["kink"]))
+    final = replace(found.final, values={**found.final.values, "a": 50.0})
+    assert final.effects == ()
+    assert decide(Line([LINE], ["kink"]), replace(found, final=final)).kind == "parameter"
+
+
+@pytest.mark.parametrize(("a", "kind"), [(0.23, "effect"), (0.21, "unknown"), (4.5, "effect")])
+def test_bound_of_a_logarithmic_parameter_is_one_of_factors(a: float, kind: str) -> None:
+    """By hand: 0.95 of a factor of 5 is 5^0.95 = 4.61, and one over that 0.217."""
+    found = explained(Line([noisy(LINE + 5.0 * np.abs(TIME))], ["kink"]))
+    final = replace(
+        found.final,
+        values={**found.final.values, "a": a},
+        standard_errors={**found.final.standard_errors, "a": 0.01},
+    )
+    model = Line([LINE], ["kink"])
+    model.parameters = (
+        Unknown(name="a", start=1.0, lower=0.2, upper=5.0, prior=1.0, std=0.2),
+        linear("b", 0.0, std=10.0),
+    )
+    assert decide(model, replace(found, final=final)).kind == kind
