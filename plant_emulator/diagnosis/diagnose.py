@@ -180,7 +180,6 @@ class Diagnose:
         self.runner = TaskRunner(
             pool=reporting(pool), recipe=recipe, model=build_model(recipe), runs=plan.fitted
         )
-        # It makes the first fit while the processes of the pool load their code.
         self._here = replace(self.runner, pool=reporting(InProcess()))
         self.model, self.plan = self.runner.model, plan
         self.settings, self.notes = settings, tuple(notes)
@@ -189,7 +188,7 @@ class Diagnose:
 
     def diagnose(self) -> Findings:
         """Test the hypotheses, predict the held-out runs, locate the gap; give the findings."""
-        # Nobody waits for it.
+        # Nobody waits for it: the pool loads its code while this process makes the first fit.
         self.runner.map(simulate_once, self.plan.fitted)
         tests = self._test()
         # Asked for first, so that it is looked for beside the predictions.
