@@ -11,19 +11,11 @@ class Settings:
 
     # A column is local and nearly linear, and a law that bends shows at one of these sizes. All
     # effects are tried at the first size, and the best at the others too, but for those beside
-    # effects that leave noise: they are faint.
+    # effects that leave noise: they are faint. The largest one is the prior standard deviation of a
+    # size in the rich model that noise is estimated beside.
     sizes: tuple[float, ...] = (0.3, 0.1, 1.0, 3.0)
-    # Iterations of the short fit of an effect whose state multiplies its size: all else follows by
-    # secants, so that they are cheap, and more tell no more.
-    secant_iterations: int = 5
-    # Prior standard deviation of a size in the rich model that noise is estimated beside.
-    largest_size: float = 3.0
     # So many effects of each score are tried at the other sizes; the true one was among three.
     tried_further: int = 6
-    # Mean square up to which a linear model around a fit is as good as a fit with the cause: noise
-    # is estimated beside it, the relations are those at its parameters, the simulation is free, and
-    # they tell a second cause of which the first one leaves most.
-    linear_mean_square: float = 1.5
     # Gain that an effect needs: odds of e^15, one of 30 effects by chance in 100 000 logs.
     needed: float = 15.0
     # Gain that one more effect needs: needless ones that no run refutes came to 35, or to 38 beside
@@ -53,9 +45,9 @@ class Settings:
     # Gain over the largest one that a rival needs: promised, along the measured outputs, or
     # reached. So much of what an effect needs must be predicted before it is fitted.
     rival_share: float = 0.5
-    # Iterations of a first fit: of a rival, enough to tell a basin from a slope, and of a leader
-    # or along the measured outputs, enough to come along the valley of the flux, which every
-    # voltage limit makes. Fits that may win go on.
+    # Iterations of a first fit: of a rival, or of an effect whose state multiplies its size, enough
+    # to tell a basin from a slope, and of a leader or along the measured outputs, enough to come
+    # along the valley of the flux, which every voltage limit makes. Fits that may win go on.
     iterations: int = 5
     leader_iterations: int = 25
     # Cost above the best one's up to which a fit may still win [chi squared]. Where the best one

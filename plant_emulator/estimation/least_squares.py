@@ -36,7 +36,8 @@ if TYPE_CHECKING:
     from plant_emulator.signals.log import Array
 
 MAX_ITERATIONS = 60
-# Mean square above which a fit may lie in a local minimum, so that other starts are tried.
+# Mean square above which a fit may lie in a local minimum, so that other starts are tried, and
+# slopes around it mislead. What is left then is correlated.
 SUSPECT_MEAN_SQUARE = 1.5
 # Fall of the cost that steps with bounded leverage must promise, and keep, to be taken: a tenth of
 # the gain that an effect needs [chi squared].

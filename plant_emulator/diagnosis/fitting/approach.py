@@ -21,6 +21,7 @@ from plant_emulator.diagnosis.fitting.joint_fit import (
     to_result,
     with_starts,
 )
+from plant_emulator.diagnosis.settings import SETTINGS
 from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE, estimate
 
 if TYPE_CHECKING:
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
 
     from plant_emulator.diagnosis.machine import Model
 
-# Most iterations of a fit along the measured outputs.
-APPROACH_ITERATIONS = 25
 # Relative fall of the cost that ends a fit along the measured outputs: it is a start only.
 LED_COST_TOLERANCE = 1e-3
 # Share of what a fit along the measured outputs left before, up to which another one leads nearer
@@ -58,7 +57,7 @@ def nearest(
 
 
 def let_go(
-    model: Model, led: FitValues, runs: Sequence[int], iterations: int = APPROACH_ITERATIONS
+    model: Model, led: FitValues, runs: Sequence[int], iterations: int = SETTINGS.leader_iterations
 ) -> FitValues:
     """A fit along the measured outputs, left to run freely for longer and longer times.
 
@@ -85,7 +84,7 @@ def lead(
     start: FitValues,
     runs: Sequence[int],
     interval: float = CORRECTION_INTERVALS[0],
-    iterations: int = APPROACH_ITERATIONS,
+    iterations: int = SETTINGS.leader_iterations,
 ) -> FitResult:
     """Fit by a simulation that is led along the measured outputs; see `Model.observer`.
 

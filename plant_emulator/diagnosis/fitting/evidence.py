@@ -12,6 +12,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE
+
 if TYPE_CHECKING:
     from plant_emulator.diagnosis.fit_result import FitResult
 
@@ -37,8 +39,6 @@ LJUNG_BOX_LIMIT = 200.0
 # Ljung-Box excess of a residual, as a share of its squares beyond the noise, up to which the gap
 # may be random. A dead time that varies at each scan had left 0.014.
 RANDOM_SHARE = 0.05
-# Mean square from which on a fit leaves more than what the noise explains.
-MISFIT_MEAN_SQUARE = 1.5
 
 
 def evidence_of(fall: float, better: FitResult, null: FitResult) -> float:
@@ -48,7 +48,7 @@ def evidence_of(fall: float, better: FitResult, null: FitResult) -> float:
     null : fit without effects
     """
     fraction = better.effective_fraction
-    if better.mean_square > MISFIT_MEAN_SQUARE:
+    if better.mean_square > SUSPECT_MEAN_SQUARE:
         fraction = min(fraction, null.effective_fraction)
     return max(0.0, fall) / max(1.0, better.mean_square) * fraction
 

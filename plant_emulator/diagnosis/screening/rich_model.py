@@ -26,7 +26,7 @@ def rich_columns(candidates: Mapping[str, Candidate], fidelity: Fidelity) -> Ite
     An effect with states has columns of its own in each run: at their starts, and what each state
     changes that lies one deviation of its prior further. A state with many narrow basins stays.
     """
-    size = SETTINGS.sizes[0]
+    size, largest = SETTINGS.sizes[0], max(SETTINGS.sizes)
     for name, candidate in candidates.items():
         if candidate.stochastic or name in fidelity.where.effects:
             continue
@@ -45,4 +45,4 @@ def rich_columns(candidates: Mapping[str, Candidate], fidelity: Fidelity) -> Ite
                 columns.append(beside - change)
         for column in (own * column for own in owners for column in columns):
             if column.any():
-                yield SETTINGS.largest_size / size * column[:, None]
+                yield largest / size * column[:, None]

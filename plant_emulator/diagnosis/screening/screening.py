@@ -142,7 +142,7 @@ def _fitted(fidelity: SimulationColumns, candidate: Candidate, asked: Screening)
                 asked.runs,
                 {**asked.base.values, **values_at_size(candidate, way * SETTINGS.sizes[1])},
                 states,
-                SETTINGS.secant_iterations,
+                SETTINGS.iterations,
                 fidelity.found,
             )
             for way in signs(candidate.sizes)

@@ -26,6 +26,7 @@ from plant_emulator.diagnosis.search.law_forms import gain_beside_forms
 from plant_emulator.diagnosis.search.run_agreement import run_agreement
 from plant_emulator.diagnosis.search.summary import search_step
 from plant_emulator.diagnosis.settings import SETTINGS
+from plant_emulator.estimation.least_squares import SUSPECT_MEAN_SQUARE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -89,7 +90,7 @@ class FittedSets:
 
     def is_far(self, found: FitResult) -> bool:
         """Whether a fit leaves so much that slopes around it may mislead."""
-        return found.mean_square > SETTINGS.linear_mean_square
+        return found.mean_square > SUSPECT_MEAN_SQUARE
 
     def take_null(self, null: FitResult) -> None:
         """Take a better fit without effects in the place of the known one."""
