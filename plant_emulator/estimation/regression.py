@@ -26,27 +26,29 @@ class Regression:
     """Data beside nuisance columns that are integrated out.
 
     y : data, shape (n,); nuisance : F, scaled to unit priors, shape (n, k)
-    lower : Cholesky factor L of 1 + F'F; seen : L^-1 F' y; left : M y
+    basis, upper : Q and R with F = Q R and 1 + F'F = R'R; seen : Q' y; left : M y
     """
 
     y: Array
     nuisance: Array
-    lower: Array
+    basis: Array
+    upper: Array
     seen: Array
     left: Array
 
     @classmethod
     def of(cls, y: Array, nuisance: Array) -> Regression:
         """Factor the nuisance's precision once; y : shape (n,), nuisance : shape (n, k)."""
-        gram = np.eye(nuisance.shape[1]) + nuisance.T @ nuisance
-        lower = np.asarray(np.linalg.cholesky(gram), float)
-        seen = _forward(lower, nuisance.T @ y)
-        return cls(y, nuisance, lower, seen, y - nuisance @ _backward(lower, seen))
+        # In the squares of steep slopes the unit prior would be lost by rounding.
+        both, upper = np.linalg.qr(np.concatenate([nuisance, np.eye(nuisance.shape[1])]))
+        basis = both[: len(y)]
+        seen = basis.T @ y
+        return cls(y, nuisance, basis, upper, seen, y - nuisance @ _solve(upper, seen))
 
     @property
     def mean(self) -> Array:
         """Mean of the nuisance coefficients, shape (k,)."""
-        return _backward(self.lower, self.seen)
+        return _solve(self.upper, self.seen)
 
     def products(self, columns: Array) -> Products:
         """Compute what the data say of columns, shape (n, k).
@@ -54,25 +56,25 @@ class Regression:
         C' M C is |C - F a|^2 + |a|^2, with the coefficients a that follow C. As the difference of
         two squares it came out negative for a steep slope that the nuisance follows.
         """
-        seen = _forward(self.lower, self.nuisance.T @ columns)
-        follow = _backward(self.lower, seen)
+        seen = self.basis.T @ columns
+        follow = _solve(self.upper, seen)
         left = columns - self.nuisance @ follow
         return Products(columns.T @ self.left, left.T @ left + follow.T @ follow, seen)
 
     def theta(self, products: Products, beta: Array) -> Array:
         """Nuisance coefficients beside columns at these coefficients, shape (k,)."""
-        return _backward(self.lower, self.seen - products.seen @ beta)
+        return _solve(self.upper, self.seen - products.seen @ beta)
 
     def follow(self, column: Array) -> Array:
         """Nuisance coefficients that follow a column best, shape (k,)."""
-        return _backward(self.lower, _forward(self.lower, self.nuisance.T @ column))
+        return _solve(self.upper, self.basis.T @ column)
 
 
 @dataclass(frozen=True)
 class Products:
     """Products of columns C with the data and each other, the nuisance integrated out.
 
-    along : C' M y, shape (k,); gram : C' M C, shape (k, k); seen : L^-1 F' C
+    along : C' M y, shape (k,); gram : C' M C, shape (k, k); seen : Q' C
     """
 
     along: Array
@@ -85,20 +87,15 @@ def gain(gram: Array, along: Array) -> tuple[float, Array]:
 
     gram : C' M C, shape (k, k); along : C' M y, shape (k,)
     """
+    from scipy.linalg import cho_solve
+
     lower = np.asarray(np.linalg.cholesky(np.eye(len(gram)) + gram), float)
-    mean = _backward(lower, _forward(lower, along))
+    mean = cho_solve((lower, True), along)
     return float(0.5 * along @ mean - np.log(np.diag(lower)).sum()), mean
 
 
-def _forward(lower: Array, right: Array) -> Array:
-    """L^-1 times an array."""
+def _solve(upper: Array, right: Array) -> Array:
+    """R^-1 times an array."""
     from scipy.linalg import solve_triangular
 
-    return np.asarray(solve_triangular(lower, right, lower=True))
-
-
-def _backward(lower: Array, right: Array) -> Array:
-    """L'^-1 times an array."""
-    from scipy.linalg import solve_triangular
-
-    return np.asarray(solve_triangular(lower, right, lower=True, trans="T"))
+    return np.asarray(solve_triangular(upper, right))

@@ -46,6 +46,14 @@ def test_coefficients_are_the_joint_posterior_mean(
     assert data.theta(products, beta) == pytest.approx(joint[:4])
 
 
+def test_steep_columns_do_not_round_the_prior_away() -> None:
+    """By hand: of two equal columns each takes half. Their squares have no room for the prior."""
+    column = np.random.default_rng(2).standard_normal(60)
+    nuisance = 1e9 * np.stack([column, column], axis=1)
+    data = Regression.of(1e9 * column, nuisance)
+    assert data.mean == pytest.approx([0.5, 0.5])
+
+
 def test_steep_column_that_the_nuisance_follows_gains_nothing() -> None:
     """By hand: k f beside f of the squares s is followed but for the prior: k^2 s / (1 + s)."""
     random = np.random.default_rng(2)
