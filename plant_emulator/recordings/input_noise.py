@@ -67,10 +67,13 @@ class NoiseDirections:
         channels of a sample side by side
     deviations : standard deviations of the input noise along them, over those of the sensors,
         shape (k,)
+    known : 0 where no direction tells what the input noise does, else 1, shape (samples,); None:
+        1 everywhere
     """
 
     directions: csr_array
     deviations: Array
+    known: Array | None = None
 
     def along(self, residual: Array) -> Array:
         """Components of a residual, shape (channels, samples), along the directions, shape (k,)."""
@@ -78,6 +81,7 @@ class NoiseDirections:
 
     def whiten(self, residual: Array) -> Array:
         """The residual with noise of variance 1 in every direction, shape (channels, samples)."""
+        residual = residual if self.known is None else residual * self.known
         taken = 1.0 - 1.0 / np.sqrt(1.0 + self.deviations**2)
         much = self.directions.T @ (taken * self.along(residual))
         return np.asarray(residual - much.reshape(residual.shape[::-1]).T)
@@ -93,6 +97,10 @@ def noise_directions(
     The slopes are differences over one standard deviation, because contact makes them uneven.
     Windows that are too far apart to meet in a stretch are simulated together. The response to one
     window must end within INPUT_MEMORY; a rest of it would add to the response to the next window.
+
+    Where an error one way is no mirror of the other way, a contact comes and goes with it, and no
+    sum of directions holds what it does: these samples do not count. A step of the reference that a
+    hole hid left a hundred times the noise, whatever the machine was.
     """
     if not recording.uncertain_inputs:
         return None
@@ -105,22 +113,26 @@ def noise_directions(
     stretch, memory = (length * round(span / window) for span in (STRETCH, INPUT_MEMORY))
     answers = [
         factor * _answer(disturbed, values, gap_position, base)
-        for disturbed, factor in (
-            *_disturbed_torques(recording, length, stretch + memory),
-            *_disturbed_rows(recording),
-        )
+        for disturbed, factor in _disturbed_torques(recording, length, stretch + memory)
     ]
+    known = np.ones(base.shape[1])
+    for pair in _disturbed_rows(recording):
+        both = [_answer(disturbed, values, gap_position, base) for disturbed in pair]
+        known[(np.abs(sum(both)) > 2.0 * COUNTED_DEVIATION).any(axis=0)] = 0.0
+        answers += [0.5**0.5 * answer for answer in both]
     if not answers:
         return None
+    answers = [answer * known for answer in answers]
     parts = [
         _strongest([answer[:, first : first + stretch] for answer in answers])
         for first in range(0, base.shape[1], stretch)
     ]
-    if not any(len(deviations) for _, deviations in parts):
+    if known.all() and not any(len(deviations) for _, deviations in parts):
         return None
     return NoiseDirections(
         directions=csr_array(block_diag([directions for directions, _ in parts])),
         deviations=np.concatenate([deviations for _, deviations in parts]),
+        known=known,
     )
 
 
@@ -179,12 +191,12 @@ def _disturbed_torques(
     ]
 
 
-def _disturbed_rows(recording: Recording) -> list[tuple[Recording, float]]:
-    """The recording with an input that is off by its standard deviation at some rows, as above.
+def _disturbed_rows(recording: Recording) -> list[tuple[Recording, Recording]]:
+    """The recording with an input that is off by its standard deviation at some rows, both ways.
 
     An input has one error in a hole, and one at each row whose time is not known. Those that are
-    too far apart to meet in a stretch are in one recording. An input is off both ways, with half of
-    the variance each, because a contact that comes early is no mirror of a late one.
+    too far apart to meet in a stretch are in one recording. Each way has half of the variance,
+    because a contact that comes early is no mirror of a late one.
     """
     stamped = recording.stamp_errors
     alone = [(row, row + 1) for row in np.flatnonzero(stamped).tolist()]
@@ -199,8 +211,8 @@ def _disturbed_rows(recording: Recording) -> list[tuple[Recording, float]]:
 
 def _off_by(
     recording: Recording, name: str, deviation: Array, spans: Iterable[Sequence[int]]
-) -> list[tuple[Recording, float]]:
-    """The recording with an input off by its deviation in spans of rows, as above.
+) -> list[tuple[Recording, Recording]]:
+    """The recording with an input off by its deviation in spans of rows, both ways, as above.
 
     spans : first row, and row behind the last one
     """
@@ -215,9 +227,8 @@ def _off_by(
         off[first:behind] = deviation[first:behind]
         together.append((time[behind - 1], off))
     return [
-        (recording.with_input_off(name, way * off), 0.5**0.5)
+        (recording.with_input_off(name, off), recording.with_input_off(name, -off))
         for _, off in together
-        for way in (1.0, -1.0)
     ]
 
 

@@ -104,6 +104,6 @@ class InputNoiseRecipe:
         for run, found in sorted(self.noise.items()):
             sparse = found.directions
             own.update(f"{run} {sparse.shape}".encode())
-            for part in (sparse.data, sparse.indices, sparse.indptr, found.deviations):
-                own.update(part.tobytes())
+            for part in (sparse.data, sparse.indices, sparse.indptr, found.deviations, found.known):
+                own.update(b"" if part is None else part.tobytes())
         return own.hexdigest()

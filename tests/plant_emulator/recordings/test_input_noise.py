@@ -115,6 +115,32 @@ def test_what_a_hole_hides_of_an_input_is_noise(true_log: Log, nominal: Paramete
     assert np.mean(left[:, contact] ** 2) < 1.5
 
 
+def test_step_that_a_hole_hides_does_not_count(nominal: ParameterSet) -> None:
+    """The motor brakes from 350 to 300 rad/s in the hole, and the drum flies through the gap.
+
+    No sum of directions holds what a step at a wrong time makes of the contact behind the hole.
+    """
+    time = np.arange(0.0, 16.0, 0.01)
+    corners = [(0.0, 0.0), (1.0, 0.0), (8.0, 350.0), (12.15, 350.0), (12.23, 300.0)]
+    asked = np.interp(time, *np.transpose(corners))
+    exact = simulate(inputs_of(Log(time, {"speed_reference": asked})), nominal.values())
+    log = add_noise(exact, 1)
+    kept = (time <= 12.1) | (time >= 12.47)
+    signals = {name: values[kept] for name, values in log.signals.items()}
+    every = dict.fromkeys(compared_channels(log), np.ones(int(kept.sum()), bool))
+    bridged, use = bridge_holes(Log(time[kept], signals), every)
+    run = recording(bridged, use=use)
+    found = noise_directions(run, nominal.values(), 0.0)
+    assert found is not None
+    residual = run.residual(nominal.values(), 0.0)
+    assert np.abs(residual).max() > 50.0
+    left = found.whiten(residual)
+    assert np.mean(left[left != 0.0] ** 2) < 1.1
+    counted = ((left != 0.0) | (residual == 0.0)).all(axis=0)
+    assert counted[bridged.time < 12.1].all()
+    assert counted[bridged.time > 14.0].mean() > 0.9
+
+
 def test_what_jitter_hides_of_a_short_ramp_is_noise(nominal: ParameterSet) -> None:
     """A ramp of 625 rad/s^2 has seven rows: they tell no line, and 1 ms is 0.6 rad/s of it.
 
