@@ -121,3 +121,8 @@ class VarianceComponent:
     def consistent(self) -> bool:
         """Whether the residual is what the random effect leaves."""
         return self.unopposed and self.homoscedastic and self.white
+
+    @property
+    def coloured(self) -> bool:
+        """Whether all but the colour of the residual is what the random effect leaves."""
+        return self.unopposed and self.homoscedastic and not self.white

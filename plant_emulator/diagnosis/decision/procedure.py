@@ -28,7 +28,11 @@ from plant_emulator.diagnosis.fitting.input_noise_model import whiten_inputs
 from plant_emulator.diagnosis.fitting.random_effects import WeightedRecipe, fit_random_effect
 from plant_emulator.diagnosis.fitting.regularity import find_regularities
 from plant_emulator.diagnosis.fitting.task import Task
-from plant_emulator.diagnosis.search.logged_noise import WhitenedRecipe, find_disturbances
+from plant_emulator.diagnosis.search.logged_noise import (
+    WhitenedRecipe,
+    estimate_noise,
+    find_disturbances,
+)
 from plant_emulator.diagnosis.search.search import Search
 from plant_emulator.diagnosis.search.summary import not_told_apart
 
@@ -158,14 +162,20 @@ class Procedure:
         """Test all effects with the best random effect as part of the noise.
 
         base : fit whose residual shows the random effect
-        beside : hypotheses whose noise the random effect shows beside, where it was estimated
+        beside : hypotheses whose noise the random effect shows beside, where it was estimated;
+            None: the declared noise, or that around the base where it leaves a colour
         None: no random effect explains the residual. The one that does may show no longer beside
         the effects that are found
         """
-        estimated = None if beside is None else beside.estimated
-        noise = estimated or self.disturbances
+        noise = (None if beside is None else beside.estimated) or self.disturbances
         plain = _whitened(self.runner, noise)
-        runner, name = self._weighted(plain, base)
+        found = self._fit_random_effects(plain, base, plain.model.candidates)
+        if beside is None and any(one.coloured for one in found):
+            # The noise may have that colour.
+            (noise,) = self.runner.map(estimate_noise, [Task(base=base, runs=plain.runs)])
+            plain = _whitened(self.runner, noise)
+            found = self._fit_random_effects(plain, base, plain.model.candidates)
+        runner, name = _weighted(plain, found)
         if not name:
             return None
         # Beside a random effect outliers stand out that its large residuals hid before.
@@ -174,7 +184,8 @@ class Procedure:
         if hidden is not None:
             noise = hidden if noise is None else noise.with_outliers_of(hidden)
             plain = _whitened(self.runner, noise)
-            runner, name = self._weighted(plain, base)
+            found = self._fit_random_effects(plain, base, plain.model.candidates)
+            runner, name = _weighted(plain, found)
             if not name:
                 return None
         # The search begins with the fit that showed the random effect, too: it may be far from the
@@ -193,32 +204,17 @@ class Procedure:
         )
         explained = search.explain()
         last = self._fit_random_effects(plain, explained.final, [name])
-        if not last:
+        if not any(one.consistent for one in last):
             enough = explained.final.effects and adequate(explained.final, explained.null)
             instead = not_told_apart(search.unrefuted) if enough else ()
             return _Tested(explained=explained, runner=runner, instead=instead)
         explained = replace(explained, random_effects=tuple(last))
         return _Tested(explained=_with_regularities(explained, runner), runner=runner)
 
-    def _weighted(self, plain: TaskRunner, base: FitResult) -> tuple[TaskRunner, str]:
-        """The runner with the best random effect as part of the noise, and the effect's name.
-
-        base : fit whose residual shows the random effect
-        Without one, the runner is as given and the name is empty.
-        """
-        model = plain.model
-        found = self._fit_random_effects(plain, base, model.candidates)
-        best = max(found, key=lambda one: one.evidence, default=None)
-        if best is None:
-            return plain, ""
-        weights = dict(zip(plain.runs, best.weights, strict=True))
-        every = tuple(weights.get(k, np.ones(1)) for k in range(len(model.runs)))
-        return replace(plain, recipe=WeightedRecipe(plain.recipe, every)), best.effect
-
     def _fit_random_effects(
         self, runner: TaskRunner, base: FitResult, names: Iterable[str]
     ) -> list[VarianceComponent]:
-        """Fit the random effects among these on top of a fit; give those that count."""
+        """Fit the random effects among these on top of a fit; give those of enough evidence."""
         library = self.runner.model.candidates
         tasks = [
             Task(base=base, runs=runner.runs, effect=name)
@@ -226,9 +222,7 @@ class Procedure:
             if library[name].stochastic
         ]
         return [
-            one
-            for one in runner.map(fit_random_effect, tasks)
-            if one.consistent and one.evidence > EVIDENCE_THRESHOLD
+            one for one in runner.map(fit_random_effect, tasks) if one.evidence > EVIDENCE_THRESHOLD
         ]
 
     def _check_consistency(self, explained: Explanation, decision: Decision) -> Decision:
@@ -249,6 +243,20 @@ def _with_regularities(explained: Explanation, runner: TaskRunner) -> Explanatio
     """
     (found,) = runner.map(find_regularities, [Task(base=explained.final, runs=runner.runs)])
     return replace(explained, regularities=found)
+
+
+def _weighted(plain: TaskRunner, found: Iterable[VarianceComponent]) -> tuple[TaskRunner, str]:
+    """The runner with the best random effect that counts as part of the noise, and its name.
+
+    Without one, the runner is as given and the name is empty.
+    """
+    counting = (one for one in found if one.consistent)
+    best = max(counting, key=lambda one: one.evidence, default=None)
+    if best is None:
+        return plain, ""
+    weights = dict(zip(plain.runs, best.weights, strict=True))
+    every = tuple(weights.get(k, np.ones(1)) for k in range(len(plain.model.runs)))
+    return replace(plain, recipe=WeightedRecipe(plain.recipe, every)), best.effect
 
 
 def _whitened(runner: TaskRunner, noise: LoggedNoise | None) -> TaskRunner:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from plant_emulator.diagnosis.decision.procedure import Procedure
 from plant_emulator.diagnosis.diagnose import Diagnose
@@ -178,8 +179,15 @@ def test_effect_beside_an_unrest_is_named_with_it() -> None:
     assert again.cost == pytest.approx(explained.final.cost, abs=0.1)
 
 
-def test_no_other_effect_is_sought_where_all_is_chance() -> None:
-    """Every look at one counts the unrest as noise already."""
+def coloured(size: float) -> Array:
+    """Noise that is correlated over some five samples."""
+    drawn = np.random.default_rng(8).standard_normal(len(TIME))
+    return np.asarray(lfilter([size], [1.0, -0.8], drawn))
+
+
+@pytest.mark.parametrize(("size", "colour"), [(0.8, 0.0), (10.0, 0.6)])
+def test_no_other_effect_is_sought_where_all_is_chance(size: float, colour: float) -> None:
+    """Every look at one counts the unrest as noise already, and so beside a coloured noise."""
     looked = []
 
     class Watched(InProcess):
@@ -188,7 +196,7 @@ def test_no_other_effect_is_sought_where_all_is_chance() -> None:
                 looked.append(recipe)
             return super().map(function, recipe, tasks)
 
-    model = Shaken([noisy(2.0 + 3.0 * TIME) + shaken(0.8)])
+    model = Shaken([noisy(2.0 + 3.0 * TIME) + coloured(colour) + shaken(size)])
     procedure = Procedure.begin(runner(model, Watched()))
     assert procedure.run()[1].effects == ("shake",)
     assert looked
@@ -197,11 +205,7 @@ def test_no_other_effect_is_sought_where_all_is_chance() -> None:
 
 def test_an_unrest_shows_beside_a_coloured_noise() -> None:
     """In the declared noise the colour is structure, and no course of chance."""
-    from scipy.signal import lfilter
-
-    drawn = np.random.default_rng(8).standard_normal(len(TIME))
-    colour = lfilter([0.6 * 2.0], [1.0, -0.8], drawn)
-    model = Shaken([noisy(2.0 + 3.0 * TIME) + colour + shaken(4.0)])
+    model = Shaken([noisy(2.0 + 3.0 * TIME) + coloured(1.2) + shaken(4.0)])
     assert not fit_random_effect(
         model, Task(base=fit_null(model, [0]), runs=(0,), effect="shake")
     ).consistent
